@@ -1,10 +1,10 @@
 // @ts-check
 /**
- * The service worker: keeps what was shown last, for when the server cannot be reached.
+ * The service worker: it keeps the last pages for times without a server.
  *
- * The server always comes first, so an old page never meets a new one while it answers. Whatever
- * moves a robot or tells of one (`/api`, `/ws`, anything but GET) does not pass here. It has no
- * timer and gives no command.
+ * The server always comes first, so no old page is shown while it responds. Requests that move a robot
+ * or concern one (`/api`, `/ws`, anything but GET) do not pass here. It has no timer and sends no
+ * command.
  */
 
 /**
@@ -12,14 +12,14 @@
  * @typedef {LifeEvent & {request: Request, respondWith: (answer: Promise<Response>) => void}} AskEvent
  */
 
-/** The page's types know no workers. @type {{addEventListener: (name: string, listener: (event: any) => void) => void}} */
+/** TypeScript's page types lack service workers. @type {{addEventListener: (name: string, listener: (event: any) => void) => void}} */
 const worker = self;
 
 const CACHE = "urc-1";
-/** What is kept beside what was opened. */
+/** Files that are kept besides opened pages. */
 const FIRST = ["/", "/static/core/tokens.css", "/static/core/app.css", "/static/manage/menu.css", "/static/core/theme.js", "/static/favicon.svg"];
 const KEPT = /^\/(static|vendor|widgets|words)\/|^\/$|^\/robots\/[^/]+\/$|^\/app\.webmanifest$/;
-/** Asked again and again by who writes a widget; without the server nothing changes. */
+/** Polled by the pages of a widget in development; useless without the server. */
 const NEVER = /\/stamp$/;
 const MOST = 400;
 
@@ -39,7 +39,7 @@ worker.addEventListener("fetch", (/** @type {AskEvent} */ event) => {
   const { request } = event;
   const url = new URL(request.url);
   if (request.method !== "GET" || url.origin !== location.origin) return;
-  if (url.searchParams.has("key")) return; // an address with a key is kept nowhere
+  if (url.searchParams.has("key")) return; // a URL with a key is never kept
   if (!KEPT.test(url.pathname) || NEVER.test(url.pathname)) return;
   event.respondWith(answer(event, request));
 });
@@ -51,7 +51,7 @@ worker.addEventListener("fetch", (/** @type {AskEvent} */ event) => {
 async function answer(event, request) {
   try {
     const found = await fetch(request);
-    // What another address answered is not what stands at this one, and no page opens from it.
+    // A redirect's response belongs to another URL, and no page opens from it.
     if (found.status === 200 && !found.redirected) event.waitUntil(keep(request, found.clone()));
     return found;
   } catch (error) {

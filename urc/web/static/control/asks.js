@@ -1,29 +1,29 @@
 // @ts-check
 /**
- * Questions before a command, asked in the place of the widget that gives it: never in front of
- * anything else, so that STOP is always free. Saying nothing means no.
+ * Confirmations of commands, asked in the cell of the widget. They cover nothing else, so STOP stays
+ * reachable. No answer means no.
  *
- * Where two people must say yes, the server asks the other screens; theirs stand below the heading
- * of the page.
+ * For the two-person rule the server also asks the other pages; their questions are shown below the
+ * heading of the page.
  *
  * @typedef {import("../core/types.js").Value} Value
  * @typedef {import("../core/types.js").Question} Question
  *
- * @typedef {object} Ticket A question that was answered with yes.
- * @property {(run: number) => void} began the command is under way
+ * @typedef {object} Ticket A confirmation of the operator.
+ * @property {(run: number) => void} began reports that the command is under way
  * @property {() => void} close
  */
 import { slide } from "./slide.js";
 import { t } from "../core/words.js";
 
-/** How long a question stands, and how long one about a hazard. */
+/** Time limit of a question, and of one about a hazard. */
 const ASK_MS = 10_000;
 const HAZARD_MS = 5000;
-/** A second tap of the same finger is no answer to a question that it has not seen. */
+/** Taps within this time of the first one do not count: the operator has not read the question yet. */
 const READ_MS = 400;
 
 /**
- * Return what people are asked before a command with these arguments.
+ * Return the questions before a command with these arguments.
  *
  * @param {readonly Question[]} asks
  * @param {Record<string, import("../core/types.js").Given>} args
@@ -35,22 +35,22 @@ export function questionsOf(asks, args) {
 
 export class Asks {
   /**
-   * @param {HTMLElement} heading where the questions of others stand
+   * @param {HTMLElement} heading element after which questions of other pages are shown
    * @param {(message: object) => boolean} say
    */
   constructor(heading, say) {
     this.heading = heading;
     this.say = say;
-    /** Number of a command → its question that waits for a second person. @type {Map<number, {number: number, isWithdrawn: boolean, tell: (leftMs: number) => void}>} */
+    /** Number of a command → its question to a second person. @type {Map<number, {number: number, isWithdrawn: boolean, tell: (leftMs: number) => void}>} */
     this.waiting = new Map();
-    /** Questions of others. @type {Map<number, HTMLElement>} */
+    /** Questions of other pages. @type {Map<number, HTMLElement>} */
     this.others = new Map();
-    /** How each question that stands in a cell is taken back. @type {Set<(why: string) => void>} */
+    /** Functions that withdraw the open questions in cells. @type {Set<(why: string) => void>} */
     this.standing = new Set();
   }
 
   /**
-   * Ask in the cell; rejects with an Error named "Cancelled" when the answer is no.
+   * Ask in the cell; reject with an Error named "Cancelled" when the answer is no.
    *
    * @param {HTMLElement} cell
    * @param {Question[]} questions
@@ -107,7 +107,7 @@ export class Asks {
       no.addEventListener("click", () => refuse(t("not sent")), { signal: end.signal, once: true });
       box.addEventListener("keydown", (event) => {
         if (event.key !== "Escape") return;
-        event.preventDefault(); // it means no, and not STOP
+        event.preventDefault(); // Escape means no here, and not STOP
         no.click();
       }, { signal: end.signal });
       const isRead = () => performance.now() - askedMs > READ_MS;
@@ -154,7 +154,7 @@ export class Asks {
               const seconds = Math.max(0, Math.ceil((endMs - performance.now()) / 1000));
               text.textContent = t("Waiting for a second person: {seconds} s", { seconds });
             };
-            text.removeAttribute("role"); // told once, not each second
+            text.removeAttribute("role"); // announced once, not every second
             count();
             clearInterval(counting);
             counting = window.setInterval(count, 1000);
@@ -192,12 +192,12 @@ export class Asks {
     if (!this.others.has(message.n)) this.show(message);
   }
 
-  /** STOP was pressed: nobody says yes to what was wished before it. @param {string} why */
+  /** Withdraw all confirmations after STOP. @param {string} why */
   stopped(why) {
     for (const refuse of [...this.standing]) refuse(why);
   }
 
-  /** The page has lost the server: its questions are over. */
+  /** Remove all questions after a loss of the server. */
   lost() {
     for (const box of this.others.values()) box.remove();
     this.others.clear();

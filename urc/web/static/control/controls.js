@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The bar below the widgets of a robot that moves: who drives, and STOP.
+ * The control bar below the widgets of a robot that moves: the driving operator, and STOP.
  *
  * @typedef {import("./drive.js").Drive} Drive
  * @typedef {import("./drive.js").Verb} Verb

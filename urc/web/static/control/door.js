@@ -1,10 +1,10 @@
 // @ts-check
 /**
- * STOP for browsers without a key: one request, and what came of it.
+ * STOP for browsers without a key: one request, and its result.
  */
 import { t } from "../core/words.js";
 
-/** So long a robot may take to confirm. */
+/** Time limit for the robot's acknowledgement. */
 const WITHIN_MS = 5000;
 
 /**
@@ -39,7 +39,7 @@ for (const button of document.querySelectorAll("[data-stop-url]")) {
     event.preventDefault();
     void stop(button, note);
   });
-  // A screen reader clicks without a pointer.
+  // Screen readers send a click without pointer events.
   button.addEventListener("click", (event) => {
     if (event.detail === 0) void stop(button, note);
   });

@@ -1,36 +1,36 @@
 // @ts-check
 /**
- * Who has the controls, and STOP. Knows the socket and no widget.
+ * The lease and STOP of this page. It knows the socket and no widget.
  *
  * @typedef {import("../core/types.js").Lease} Lease
  * @typedef {import("../live/socket.js").Socket} Socket
  * @typedef {"take" | "ask" | "yes" | "no" | "force" | "leave" | "reset"} Verb
- * @typedef {"" | "sending" | "sent" | "failed"} StopPhase What is known of the last press of STOP,
- *   before the lease says that it is latched.
+ * @typedef {"" | "sending" | "sent" | "failed"} StopPhase State of the last press of STOP, until the
+ *   lease reports the latch.
  */
 import { Spare } from "./spare.js";
 
-/** Without a word of the server for so long, STOP goes the other way too. */
+/** Silence of the server after which STOP is also sent by HTTP. */
 const STOP_AGAIN_MS = 300;
 const POST_WITHIN_MS = 3000;
-/** A way there and back that takes longer makes what is lost on it cost too much time: see `Spare`. */
+/** Round-trip time above which packet loss costs too much time: see `Spare`. */
 const FAR_MS = 40;
-/** So much later than the one before it, a beat was lost on the way, or held up. */
+/** Interval of heartbeats that means loss or delay. */
 const LATE_BEAT_MS = 150;
-/** For so long a link that has lost something counts as one that does. */
+/** Time for which a link counts as lossy after a loss. */
 const LOSSY_MS = 5000;
 /**
- * So long after a tick the browser need not have noted yet that it has left: until then another may
- * follow. It notes that when it has nothing better to do, such as painting.
+ * Time after a tick in which the browser may not have reported that it was sent; another may follow
+ * within it. Browsers report that at low priority, after painting.
  */
 const LEAVING_MS = 8;
 
 export class Drive {
   /**
    * @param {Socket} socket
-   * @param {string} stopUrl where STOP goes when the socket is down
-   * @param {() => void} changed something to show
-   * @param {string} [spareUrl] where a second line goes
+   * @param {string} stopUrl URL of STOP while the socket is down
+   * @param {() => void} changed callback for changes of the display
+   * @param {string} [spareUrl] URL of the redundant socket
    */
   constructor(socket, stopUrl, changed, spareUrl = "") {
     this.socket = socket;
@@ -38,25 +38,25 @@ export class Drive {
     this.changed = changed;
     /** @type {Lease | null} */
     this.lease = null;
-    /** How often STOP was pressed, as the server said last; null while it has not. @type {number | null} */
+    /** Number of STOPs in the server's last message; null before the first. @type {number | null} */
     this.stops = null;
-    /** Newest number that the server has told this page; 0 while it has not. */
+    /** Newest heartbeat number of the server; 0 before the first. */
     this.beat = 0;
     this.beatMs = 0;
-    /** When a beat came late, on this page's clock. */
+    /** Time of the last late heartbeat, on this page's clock. */
     this.lateMs = -Infinity;
     this.spare = new Spare(spareUrl, (message) => this.hear(message.n, performance.now()));
-    /** When a tick went out last with nothing before it. */
+    /** Time of the last tick that left an empty buffer. */
     this.freeMs = -Infinity;
-    /** Counts what this page says of held controls. */
+    /** Counter of messages about held controls. */
     this.number = 0;
     /** @type {StopPhase} */
     this.phase = "";
-    /** What the server said when STOP went the other way. @type {{latched: string, confirmed: boolean} | null} */
+    /** Response to STOP by HTTP. @type {{latched: string, confirmed: boolean} | null} */
     this.posted = null;
-    /** Why the last wish about the controls was not granted. */
+    /** Why the last request about the controls was refused. */
     this.refusal = "";
-    /** When the asker gets the controls, on this page's clock. */
+    /** Time at which the asking page gets the controls, on this page's clock. */
     this.handedMs = 0;
     /** @type {number | undefined} */
     this.timer = undefined;
@@ -77,7 +77,7 @@ export class Drive {
   /**
    * @param {Lease} lease
    * @param {number} nowMs
-   * @returns {boolean} whether STOP was pressed since the last one, be it that it is reset already
+   * @returns {boolean} whether STOP was pressed since the last lease, even if it is reset already
    */
   setLease(lease, nowMs) {
     const wasMine = this.isMine;
@@ -91,13 +91,13 @@ export class Drive {
     if (lease.latched) this.settle("");
     this.posted = null;
     this.double();
-    if (isOwed) this.stop(); // pressed when nobody could be told: it is told now
+    if (isOwed) this.stop(); // pressed while the socket was down: sent now
     else this.changed();
     return isStopped;
   }
 
   /**
-   * A number of the server, on either line.
+   * Take a heartbeat number from either socket.
    *
    * @param {number} beat
    * @param {number} nowMs
@@ -110,33 +110,33 @@ export class Drive {
     this.double();
   }
 
-  /** Whether the way to the server has lost or held up something just now. */
+  /** Whether the link to the server has recently lost or delayed data. */
   get isLossy() {
     return performance.now() - this.lateMs < LOSSY_MS;
   }
 
-  /** Have a second line where the first one may be held up for longer than a lease. */
+  /** Open a redundant socket if the link may delay data for longer than a lease. */
   double() {
     if (!this.isMine) this.spare.want("");
     else if ((this.socket.tripMs ?? 0) > FAR_MS || this.isLossy) this.spare.want(this.lease?.spare ?? "");
   }
 
-  /** Whether a tick would go out at once. */
+  /** Whether a tick would be sent at once. */
   get isFree() {
     return this.isClear || this.spare.isFree;
   }
 
-  /** Whether nothing waits on the first line. */
+  /** Whether the buffer of the first socket is empty. */
   get isClear() {
     return this.socket.unsent === 0 || performance.now() - this.freeMs < LEAVING_MS;
   }
 
   /**
-   * Say something of held controls on every line; a tick only where nothing waits before it.
+   * Send a message about held controls on all sockets; a tick only into an empty buffer.
    *
    * @param {Record<string, unknown>} message
    * @param {boolean} isTick
-   * @returns {boolean} whether it was handed to the browser
+   * @returns {boolean} whether the browser took it
    */
   tell(message, isTick = false) {
     this.number += 1;
@@ -147,7 +147,7 @@ export class Drive {
     return this.spare.send(numbered) || isSent;
   }
 
-  /** The page has lost the server: it holds nothing any more. */
+  /** Forget the lease after a loss of the server. */
   lost() {
     if (this.lease?.latched) {
       this.posted = { latched: this.lease.latched, confirmed: this.lease.confirmed };
@@ -166,14 +166,14 @@ export class Drive {
 
   /**
    * @param {Verb} verb
-   * @returns {boolean} whether it was handed to the browser
+   * @returns {boolean} whether the browser took it
    */
   say(verb) {
     this.refusal = "";
     return this.socket.send({ t: "drive", verb });
   }
 
-  /** Stop the robot: at once, by the socket, and by a request of its own where that says nothing. */
+  /** Stop the robot: at once by the socket, and by HTTP if the server does not react. */
   stop() {
     this.settle("sending");
     if (this.tell({ t: "stop" })) {

@@ -1,21 +1,21 @@
 // @ts-check
 /**
- * Dead-man controls: while a page has one, nothing that is held counts unless one of them is open.
+ * Dead-man controls: on a page that has one, held controls only count while one of them is active.
  *
- * One that is held is open for as long as a hand is there; one that is switched on closes by itself
- * when nothing was driven for a while. Whatever makes a page let go closes both.
+ * One that must be held is active while it is held. One that is switched on switches off after a time
+ * without motion. Any event that releases held controls releases both kinds.
  *
  * @typedef {import("../core/types.js").GateSpec} GateSpec
  *
- * @typedef {object} Keeper
- * @property {(reason: string) => void} letGo
+ * @typedef {object} Keeper The owner of all held controls.
+ * @property {(reason: string) => void} letGo Releases everything.
  * @property {() => void} run Starts the sampling.
- * @property {() => boolean} isDriving Whether anything is held.
+ * @property {() => boolean} isDriving Whether a control is held.
  */
 import { Control, Grip } from "./grip.js";
 import { t } from "../core/words.js";
 
-/** A gate commands nothing by itself. */
+/** A dead-man control has no command of its own. */
 const NOTHING = {
   command: "", names: {}, fixed: {}, ranges: {}, neutral: {}, line: "", refusal: "", isHeld: true,
   leaseMs: 0, isAnswered: false,
@@ -31,11 +31,11 @@ export class Gate {
     this.spec = spec;
     this.isOpen = false;
     this.reason = "";
-    /** When one that is switched on closes. */
+    /** Time at which a switched-on control switches off. */
     this.untilMs = 0;
     const { el, key, pad = "" } = spec;
     const keys = key ? [key, "Enter"] : ["Enter"];
-    /** What is gripped, where it must be held; it also knows all the ways of letting go. */
+    /** The held control of one that must be held; it handles all kinds of release. */
     this.grip = new Grip(this, new Control(""), NOTHING, {
       el, keys, pad,
       ...(key && { page: () => /** @type {const} */ ("all") }),
@@ -44,7 +44,7 @@ export class Gate {
     });
   }
 
-  /** Whether a hand holds it at this moment. */
+  /** Whether it is held now. */
   get isHeld() {
     return this.isOpen && this.grip.hand !== null;
   }
@@ -61,7 +61,7 @@ export class Gate {
     this.show();
   }
 
-  /** A key presses it, as it presses a button. @param {KeyboardEvent} event */
+  /** Handle a key as a press of the button. @param {KeyboardEvent} event */
   pressed(event) {
     if (event.defaultPrevented || (event.code !== "Enter" && event.code !== "Space")) return;
     event.preventDefault();
@@ -82,7 +82,7 @@ export class Gate {
     this.keeper.run();
   }
 
-  /** @param {string} reason "" when a person closed it */
+  /** @param {string} reason "" for a release by the operator */
   close(reason) {
     if (!this.isOpen) return;
     this.isOpen = false;
@@ -91,7 +91,7 @@ export class Gate {
     this.keeper.letGo(reason || t("the dead-man was let go"));
   }
 
-  /** One frame. @param {number} nowMs */
+  /** Run one animation frame. @param {number} nowMs */
   step(nowMs) {
     if (!this.isOpen) return;
     if (this.spec.isHeld) {
@@ -110,7 +110,7 @@ export class Gate {
     this.spec.show({ isOpen: this.isOpen, leftS, reason: this.reason });
   }
 
-  // -- what its grip tells
+  // -- callbacks of the held control
 
   begin() {
     this.open();

@@ -1,25 +1,25 @@
 // @ts-check
 /**
- * One pointer that has hold of an element, until it is let go or taken away.
+ * Pointer capture: one pointer holds an element until its release or loss.
  *
- * Not for what moves a robot while it is held: that is `ctx.hold`, which lets go by itself.
+ * Controls that move a robot use `ctx.hold` instead, which also stops the robot.
  *
  * @typedef {object} Grasp
- * @property {() => void} drop takes it away, where somebody has hold of it
+ * @property {() => void} drop ends a hold, if there is one
  *
- * @typedef {"x" | "y" | "round"} Way how a finger draws something: along an axis, or round a dial
+ * @typedef {"x" | "y" | "round"} Way direction of a drag: along an axis, or around a dial
  */
 
-/** After these, what a hand has drawn so far is not what it meant. */
+/** Events that make a drag invalid. */
 const BREAKS = ["blur", "pagehide", "resize", "urc-let-go"];
-/** A finger that has gone less far has not begun to draw. */
+/** Distance below which a touch is no drag yet. */
 const STILL_PX = 6;
-/** A finger that has rested for so long on a dial means the dial, wherever it goes then. */
+/** Time after which a resting finger on a dial counts as a drag, wherever it moves next. */
 const REST_MS = 400;
 
 /**
- * Whether a finger, a pen or the main button of a mouse is down. With another button of the mouse down
- * as well, a move that says so is all that is told of the first one's end.
+ * Whether a finger, a pen or the main button of a mouse is down. While a second mouse button is down
+ * too, the release of the first one is only reported as a move.
  *
  * @param {PointerEvent} event
  */
@@ -28,10 +28,10 @@ export function isDown({ buttons }) {
 }
 
 /**
- * Whether a finger draws, and does not scroll the page; null while nobody can tell.
+ * Whether a touch is a drag, and not a scroll of the page; null while that is open.
  *
  * @param {Way} way
- * @param {PointerEvent} from where it went down
+ * @param {PointerEvent} from start of the touch
  * @param {PointerEvent} to
  * @returns {boolean | null}
  */
@@ -44,24 +44,24 @@ export function draws(way, from, to) {
 }
 
 /**
- * Let one pointer at a time take hold of an element.
+ * Let one pointer at a time hold an element.
  *
  * @param {HTMLElement} el
  * @param {object} spec
- * @param {(event: PointerEvent) => boolean} spec.take one goes down; whether it takes hold
+ * @param {(event: PointerEvent) => boolean} spec.take handles a press; returns whether the hold begins
  * @param {(event: PointerEvent) => void} spec.move
- * @param {(event: PointerEvent) => void} spec.release somebody has let it go
- * @param {() => void} spec.cancel it was taken away
- * @param {boolean} [spec.isDrawing] whether it is lost with the page's focus or size, and a touch
- *   begins nothing else, no menu and no zoom
- * @param {Way} [spec.way] where a finger may scroll the page by any other way: it takes hold when it
- *   draws, or by a tap, and not before. The style of the element says where it scrolls: `touch-action`
+ * @param {(event: PointerEvent) => void} spec.release handles a release by the operator
+ * @param {() => void} spec.cancel handles the loss of the pointer
+ * @param {boolean} [spec.isDrawing] whether loss of focus or a resize of the page cancels, and a touch
+ *   opens no menu and no zoom
+ * @param {Way} [spec.way] drag direction, if other touches may scroll the page: a hold begins with a
+ *   drag or a tap. The style `touch-action` of the element says where it scrolls
  * @param {AbortSignal} spec.signal
  * @returns {Grasp}
  */
 export function grasp(el, { take, move, release, cancel, isDrawing = false, way, signal }) {
   let pointerId = -1;
-  let finger = /** @type {PointerEvent | null} */ (null); // one that may yet want something else
+  let finger = /** @type {PointerEvent | null} */ (null); // a touch that may become a scroll
   const drop = () => {
     finger = null;
     if (pointerId === -1) return;
@@ -77,7 +77,7 @@ export function grasp(el, { take, move, release, cancel, isDrawing = false, way,
   const letGo = (/** @type {PointerEvent} */ event) => {
     if (event.pointerId === finger?.pointerId) hold(event); // a tap
     if (event.pointerId !== pointerId) return;
-    pointerId = -1; // so that losing the capture, which follows, cancels nothing
+    pointerId = -1; // first, so that the loss of capture that follows cancels nothing
     release(event);
   };
   el.addEventListener("pointerdown", (event) => {
@@ -93,7 +93,7 @@ export function grasp(el, { take, move, release, cancel, isDrawing = false, way,
   }, { signal });
   el.addEventListener("pointerup", letGo, { signal });
   el.addEventListener("pointercancel", drop, { signal });
-  // A part of it that a finger touched loses what it had to the whole.
+  // Child elements lose an implicit capture to the whole element.
   el.addEventListener("lostpointercapture", ({ target }) => target === el && drop(), { signal });
   if (isDrawing) for (const name of BREAKS) addEventListener(name, drop, { signal });
   if (isDrawing || way) keepStill(el, () => isDrawing || pointerId !== -1, signal);
@@ -101,7 +101,7 @@ export function grasp(el, { take, move, release, cancel, isDrawing = false, way,
 }
 
 /**
- * Have a touch on an element scroll, zoom and open nothing.
+ * Disable scroll, zoom and menu for touches on an element.
  *
  * @param {HTMLElement} el
  * @param {() => boolean} isSo

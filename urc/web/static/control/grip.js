@@ -1,10 +1,9 @@
 // @ts-check
 /**
- * One thing that a hand can hold, and the command that it moves.
+ * A held control: its input by a pointer, keys or a gamepad, and its command.
  *
- * A grip is held by one hand at a time: the pointer that went down first, keys, or a gamepad. A
- * lever may stay where it was put when the pointer lets it go, for as long as another hand holds
- * the robot's controls. What becomes of all that is up to whoever holds all grips.
+ * One input at a time holds it. A lever may keep its position after the release of the pointer, while
+ * another control holds the robot. The owner of all held controls decides about the effects.
  *
  * @typedef {import("../widgets/output.js").Output} Output
  * @typedef {import("../core/types.js").Hand} Hand
@@ -12,10 +11,10 @@
  * @typedef {import("../core/types.js").HoldSpec} HoldSpec
  * @typedef {import("../core/types.js").Value} Value
  *
- * @typedef {object} Holder
+ * @typedef {object} Holder The owner of all held controls.
  * @property {(grip: Grip) => void} begin
- * @property {(grip: Grip) => void} moved What the hand does has changed.
- * @property {(grip: Grip) => boolean} isGuarded Whether another hand is there, so that it may stay.
+ * @property {(grip: Grip) => void} moved The input has changed.
+ * @property {(grip: Grip) => boolean} isGuarded Whether another control is held, so that it may stay.
  * @property {(grip: Grip) => void} end
  * @property {(grip: Grip) => void} forget
  */
@@ -26,12 +25,12 @@ import { argumentsOf } from "../widgets/output.js";
 import { Together } from "./together.js";
 import { t } from "../core/words.js";
 
-/** Every kind of hand: what lets go of all. @type {Hand["kind"][]} */
+/** Every kind of input, to release all. @type {Hand["kind"][]} */
 export const ANY = ["pointer", "keys", "pad", "stay"];
-/** The longest step of time that a widget is told: what was missed is not caught up on. */
+/** Longest time step for a widget; a longer gap is not made up for. */
 const LONGEST_STEP_S = 0.1;
 
-/** One held command, and the grips that hold it now: two sticks may share a command. */
+/** One held command with its held controls: two sticks may share a command. */
 export class Control {
   /** @param {string} command */
   constructor(command) {
@@ -42,24 +41,24 @@ export class Control {
     /** @type {HoldPhase} */
     this.phase = "idle";
     this.reason = "";
-    /** Lease in which it was stopped: it moves again in a later one only. */
+    /** Lease in which it was stopped: only a later one moves it again. */
     this.closedEpoch = -1;
     this.epoch = 0;
     this.askedMs = 0;
-    /** When a move of its hand went out before the frame. */
+    /** Time of the last tick outside the animation frames. */
     this.movedMs = -Infinity;
     this.sentMs = -Infinity;
     this.sent = "";
     this.isReleaseOwed = false;
   }
 
-  /** How long its motion lasts when nothing is heard. */
+  /** Time for which the motion outlives the last tick. */
   get leaseMs() {
     return Math.min(...[...this.grips].map((grip) => grip.output.leaseMs));
   }
 }
 
-/** One thing that a hand can hold. */
+/** One held control. */
 export class Grip {
   /**
    * @param {Holder} holder
@@ -77,7 +76,7 @@ export class Grip {
     this.pointerId = -1;
     /** @type {Set<string>} */
     this.keys = new Set();
-    /** What the widget said last, by the names of its output; null while nothing holds it. */
+    /** Last sampled values by the names of the output; null while it is not held. */
     this.values = /** @type {Record<string, Value> | null} */ (null);
     this.takenMs = 0;
     this.shown = "";
@@ -90,16 +89,16 @@ export class Grip {
     el.style.touchAction = "none";
     el.style.userSelect = "none";
     el.addEventListener("pointerdown", (event) => this.down(event), options);
-    // Where buttons can be pressed within it, nothing may lie over them.
+    // The canvas for early moves must not cover buttons inside the element.
     if (!this.spec.isFree && !el.querySelector("button, a, input, [tabindex]")) hurryMoves(el);
-    // The raw event comes before the frame's, in secure contexts; where there is none, the other does.
+    // Raw pointer events arrive before the animation frame, in secure contexts; others use moves.
     el.addEventListener("pointerrawupdate", (event) => this.move(/** @type {PointerEvent} */ (event)), options);
     el.addEventListener("pointermove", (event) => this.move(event), options);
     el.addEventListener("pointerup", (event) => this.up(event.pointerId, true), options);
     for (const name of /** @type {const} */ (["pointercancel", "lostpointercapture"])) {
       el.addEventListener(name, (event) => this.up(event.pointerId, false), options);
     }
-    // A long press must stay a press: no menu, no selection, no zoom.
+    // A long press must not open a menu, select or zoom.
     el.addEventListener("touchstart", (event) => event.preventDefault(), { signal, passive: false });
     document.addEventListener("keydown", (event) => this.keyDown(event), options);
     document.addEventListener("keyup", (event) => this.keyUp(event.code), options);
@@ -118,7 +117,7 @@ export class Grip {
     this.spec.el.setPointerCapture(event.pointerId);
     const { clientX: x, clientY: y } = event;
     const hand = { ...this.newHand("pointer"), x, y, startX: x, startY: y };
-    if (this.hand) this.hand = hand; // it had stayed: the same gesture goes on
+    if (this.hand) this.hand = hand; // it had kept its position: the gesture continues
     else this.begin(hand);
   }
 
@@ -138,7 +137,7 @@ export class Grip {
 
   /**
    * @param {number} pointerId
-   * @param {boolean} isMeant whether a person has let it go
+   * @param {boolean} isMeant whether the operator released it
    */
   up(pointerId, isMeant) {
     if (pointerId !== this.pointerId) return;
@@ -154,7 +153,7 @@ export class Grip {
 
   /** @param {KeyboardEvent} event */
   keyDown(event) {
-    // On a Mac nobody hears what comes up while this key is down: what is held would stay so.
+    // macOS reports no key-up while Meta is down, so keys could stay held.
     if (event.key === "Meta") this.drop(["keys"]);
     const { spec } = this;
     const isTap = Object.hasOwn(spec.taps ?? {}, event.code);
@@ -173,7 +172,7 @@ export class Grip {
   }
 
   /**
-   * Whether keys that go to an element are for this grip.
+   * Whether this control takes keys that go to an element.
    *
    * @param {EventTarget | null} target
    */
@@ -191,7 +190,7 @@ export class Grip {
     else if (this.hand?.kind === "keys") this.holder.moved(this);
   }
 
-  /** The focus has gone somewhere: what is typed there holds nothing. @param {EventTarget | null} target */
+  /** Release keys when the focus moves to an element that takes them. @param {EventTarget | null} target */
   focusMoved(target) {
     if (this.spec.page && takesText(target)) this.drop(["keys"]);
   }
@@ -216,7 +215,7 @@ export class Grip {
   }
 
   /**
-   * Let go, if it is held by one of these kinds of hand.
+   * Release, if one of these kinds of input holds it.
    *
    * @param {Hand["kind"][]} kinds
    */
@@ -232,7 +231,7 @@ export class Grip {
     this.holder.end(this);
   }
 
-  /** Let go of a pointer that was taken away: a browser tells that with the next move only. */
+  /** Release a lost pointer, which browsers report only with the next move. */
   check() {
     if (this.hand?.kind === "stay" && !this.holder.isGuarded(this)) this.drop(["stay"]);
     if (this.hand?.kind !== "pointer") return;
@@ -240,10 +239,10 @@ export class Grip {
   }
 
   /**
-   * Ask the widget what the hand means now.
+   * Sample the widget for the present input.
    *
    * @param {number} nowMs
-   * @param {boolean} isNew whether motion may begin only now, so that it begins at nothing
+   * @param {boolean} isNew whether the motion only begins now, from zero
    */
   take(nowMs, isNew = false) {
     if (!this.hand) return;
@@ -252,15 +251,15 @@ export class Grip {
     this.values = this.spec.sample(this.hand, isNew ? 0 : Math.min(LONGEST_STEP_S, gapS));
   }
 
-  /** @returns {Record<string, Value>} what was taken, by the command's own names */
+  /** @returns {Record<string, Value>} the sampled values, by the names of the command */
   given() {
     return this.values ? argumentsOf(this.output, this.values) : {};
   }
 
   /**
-   * What counts of what was taken: nothing of what another hand gives.
+   * Return the sampled values without arguments that another input gives.
    *
-   * @param {ReadonlySet<string>} lost arguments of the command that this hand pushes in vain
+   * @param {ReadonlySet<string>} lost arguments that belong to another input
    */
   counted(lost) {
     if (!this.values || lost.size === 0) return this.values;
@@ -290,11 +289,11 @@ export class Grip {
 }
 
 /**
- * Get pointer moves as they happen, where the browser delays them to the next frame.
+ * Get pointer moves without the delay to the next animation frame.
  *
- * Raw pointer events exist only in secure contexts, and a dashboard in a local network has none. But
- * every browser has desynchronized canvases: a pointer that goes down on one delivers its moves at
- * once. So an empty canvas covers the element. Without such canvases, moves come with the frames.
+ * Raw pointer events exist only in secure contexts, and a dashboard on a local network has none. But
+ * all browsers have desynchronized canvases, which deliver moves at once. So an empty canvas covers the
+ * element. Without such canvases, moves arrive with the animation frames.
  *
  * @param {HTMLElement} el receives the pointer events of its children
  */

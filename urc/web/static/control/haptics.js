@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * What a hand feels: a tick when it has taken hold, another at the end of the way, two when nothing
- * comes of it. Only where the device can; never the only sign.
+ * Haptic feedback: one pulse for the start of a hold, one at the end of the travel, two for a refusal.
+ * It is never the only feedback, because many devices have none.
  */
 
 const TICK_MS = 12;
@@ -16,13 +16,13 @@ const CALM = "(prefers-reduced-motion: reduce)";
  * @property {boolean} isAtEnd
  */
 
-/** What each control felt like last. @type {WeakMap<object, Feeling>} */
+/** Last state of each control. @type {WeakMap<object, Feeling>} */
 const last = new WeakMap();
 
 /**
- * Tell how a control is now; the hand feels what has changed.
+ * Report the state of a control; changes are felt.
  *
- * @param {object} control the same one each time
+ * @param {object} control the same object in all calls
  * @param {boolean} isHeld
  * @param {boolean} isSpent
  * @param {Readonly<Record<string, unknown>> | null} values from -1 to 1
@@ -43,7 +43,7 @@ export function feel(control, isHeld, isSpent, values) {
 
 /** @param {number | number[]} pattern */
 function buzz(pattern) {
-  // Before the first touch a browser refuses, and complains.
+  // Before the first touch browsers refuse vibration with a warning.
   if (!("vibrate" in navigator) || !navigator.userActivation?.hasBeenActive) return;
   if (matchMedia(CALM).matches) return;
   navigator.vibrate(pattern);

@@ -1,15 +1,14 @@
 // @ts-check
 /**
- * What hands do: held controls, sampled on the page's main thread, and every way of letting go.
+ * Held controls of a page: sampling on the main thread, and all kinds of release.
  *
- * A grip is one thing that a hand holds: by one pointer, by keys, or by a gamepad. While it is held
- * its widget is asked for the values when the hand moves and in every animation frame, and a tick of
- * them goes out at once when they change, and every 50 ms. There is no timer that could go on when
- * the page does not: a page that is hidden, frozen, blocked or gone draws no frames, so it sends
- * nothing, and the server stops the robot.
+ * A held control samples its widget when its input moves and in every animation frame. A change of the
+ * values sends a tick at once; unchanged values repeat every 50 ms. No timer can outlive the page: a
+ * hidden, frozen, blocked or closed page draws no frames and so sends nothing, and the server stops the
+ * robot.
  *
- * Whatever else happens to the page while a control is held means neutral, and the end of that
- * gesture. After that, and after a stop or a refusal, nothing is sent before a new gesture.
+ * Any other event of the page during a hold sets neutral and ends the gesture. After that, and after a
+ * stop or a refusal, nothing is sent before a new gesture.
  *
  * @typedef {import("./drive.js").Drive} Drive
  * @typedef {import("../widgets/output.js").Output} Output
@@ -22,9 +21,9 @@ import { Pads } from "./pad.js";
 import { said, t } from "../core/words.js";
 
 const TICK_MS = 50;
-/** So long the server may take to grant the controls. */
+/** Time limit for the grant of the controls. */
 const ASK_MS = 1500;
-/** Moves of one control that go out at once are so far apart; what comes between waits for a frame. */
+/** Shortest interval of early ticks of one control; moves in between wait for the frame. */
 const SOONEST_MS = 4;
 
 export class Input {
@@ -37,17 +36,17 @@ export class Input {
     this.grips = new Set();
     /** @type {Set<Gate>} */
     this.gates = new Set();
-    /** Cells of dead-man controls, also of those that do not stand yet, or have failed. @type {Set<HTMLElement>} */
+    /** Cells of dead-man controls, also of unmounted or failed ones. @type {Set<HTMLElement>} */
     this.gated = new Set();
     this.pads = new Pads(() => this.run());
     this.isRunning = false;
     this.frameMs = 0;
-    /** Calls of the loop that was stopped last do nothing. */
+    /** Number of the sampling loop; callbacks of an older loop do nothing. */
     this.round = 0;
     this.watch();
   }
 
-  /** Everything that means neutral, whoever holds what. */
+  /** Listen to all events of the page that release held controls. */
   watch() {
     const all = (/** @type {string} */ why) => () => this.letGo(why);
     addEventListener("blur", all(t("the window lost the focus")));
@@ -98,12 +97,12 @@ export class Input {
     });
   }
 
-  /** All that can be gripped; dead-man controls first, since the others ask for them. */
+  /** All held controls; dead-man controls first, since the others depend on them. */
   gripped() {
     return [...[...this.gates].map((gate) => gate.grip), ...this.grips];
   }
 
-  /** Whether anything is held that moves the robot. */
+  /** Whether a control that moves the robot is held. */
   isDriving() {
     return [...this.grips].some((grip) => grip.hand);
   }
@@ -140,7 +139,7 @@ export class Input {
     if (refusal || !drive.say("take")) this.spend(control, refusal || t("no connection to URC"));
   }
 
-  /** Why nothing can be driven now; "" when it can be asked for. */
+  /** Why nothing can be driven now; "" if the controls can be requested. */
   refusal() {
     const refusal = this.against();
     if (refusal) return refusal;
@@ -149,7 +148,7 @@ export class Input {
     return isGated && !isOpen ? t("hold the dead-man control first") : "";
   }
 
-  /** Why nothing may be moved by this page now. */
+  /** Why this page may move nothing now. */
   against() {
     const { lease, isMine } = this.drive;
     if (!lease) return t("no connection to URC");
@@ -161,8 +160,8 @@ export class Input {
   }
 
   /**
-   * Why a command that is given once cannot be given now: whoever only watches gives none, and what
-   * moves something by itself goes neither against STOP nor against whoever drives.
+   * Why a single command cannot be given now: a watcher gives none, and autonomous motion does not start
+   * against STOP or against another operator.
    *
    * @param {boolean} moves
    */
@@ -172,7 +171,7 @@ export class Input {
   }
 
   /**
-   * The hand of a grip has moved: that goes out at once, not with the next frame.
+   * Send a tick for a moved input at once, without waiting for the next frame.
    *
    * @param {Grip} grip
    */
@@ -180,7 +179,7 @@ export class Input {
     const { control } = grip;
     const nowMs = performance.now();
     if (control.phase !== "held" || nowMs - control.movedMs < SOONEST_MS) return;
-    if (nowMs - this.frameMs > control.leaseMs) return; // held up: the next frame ends the gesture
+    if (nowMs - this.frameMs > control.leaseMs) return; // delayed: the next frame ends the gesture
     control.movedMs = nowMs;
     grip.take(nowMs);
     this.stepOne(control, nowMs);
@@ -194,7 +193,8 @@ export class Input {
       this.release(control);
       if (control.phase !== "spent") control.phase = "idle";
     }
-    for (const other of [...control.grips]) other.check(); // what has stayed goes with the last hand
+    // A lever that stays is released with the last control.
+    for (const other of [...control.grips]) other.check();
     grip.show();
   }
 
@@ -206,7 +206,7 @@ export class Input {
   }
 
   /**
-   * End the gesture: what is held stays so without any effect, until it is let go.
+   * End the gesture: the control stays held without effect until it is released.
    *
    * @param {Control} control
    * @param {string} reason
@@ -218,7 +218,7 @@ export class Input {
   }
 
   /**
-   * Let go of everything that is held.
+   * Release all held controls.
    *
    * @param {string} reason
    */
@@ -235,7 +235,7 @@ export class Input {
     }
   }
 
-  /** STOP was pressed, or the line is gone: no gesture survives that. @param {string} reason */
+  /** End all gestures after STOP or the loss of the socket. @param {string} reason */
   spendAll(reason) {
     for (const gate of this.gates) if (!gate.spec.isHeld) gate.close(reason);
     for (const control of this.controls.values()) {
@@ -244,8 +244,8 @@ export class Input {
   }
 
   /**
-   * The server has stopped a control, or refused its ticks. What ended the gesture first is why: the
-   * ticks that were under way are refused for that.
+   * Handle a stop or a refusal by the server. The first reason for the end of a gesture stays: ticks
+   * already sent are refused because of it.
    *
    * @param {string} command
    * @param {string} reason
@@ -259,7 +259,7 @@ export class Input {
     if (control.grips.size === 0) this.release(control);
   }
 
-  /** The lease has changed: what was said about the last gesture is over. */
+  /** Clear the reason of the last gesture after a change of the lease. */
   leaseChanged() {
     for (const control of this.controls.values()) {
       if (control.phase !== "spent" || control.grips.size > 0 || this.drive.isLatched) continue;
@@ -268,14 +268,14 @@ export class Input {
     }
   }
 
-  /** The server refused a wish. @param {string} reason */
+  /** Handle the refusal of a request about the controls. @param {string} reason */
   refused(reason) {
     for (const control of this.controls.values()) {
       if (control.phase === "asking") this.spend(control, reason);
     }
   }
 
-  /** Sample from now on, for as long as something is held. */
+  /** Start sampling; it ends with the last hold. */
   run() {
     if (this.isRunning) return;
     this.isRunning = true;
@@ -291,10 +291,10 @@ export class Input {
   }
 
   /**
-   * One frame.
+   * Run one animation frame.
    *
    * @param {number} nowMs
-   * @returns {boolean} whether there is to be another
+   * @returns {boolean} whether another frame is needed
    */
   step(nowMs) {
     const gapMs = nowMs - this.frameMs;
@@ -348,7 +348,7 @@ export class Input {
     const values = control.together.values(control.grips);
     const text = JSON.stringify(values);
     if (text === control.sent && nowMs - control.sentMs < TICK_MS) return;
-    if (!drive.isFree) return; // the newest goes when the line is free, not after others
+    if (!drive.isFree) return; // wait for an empty buffer: the newest tick goes first
     const { command, epoch } = control;
     const tick = { t: "tick", command, arguments: values, epoch, echo: drive.beat };
     control.isReleaseOwed = drive.tell(tick, true);

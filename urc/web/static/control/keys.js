@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Whose a key is: an element that has the focus may need it for itself.
+ * Key ownership: whether the focused element needs a key for itself.
  */
 
 const TEXT = [
@@ -28,17 +28,17 @@ const SPACE = [
   ...["button", "switch", "checkbox", "radio", "tab", "option", "menuitem"].map((role) => `[role="${role}"]`),
 ].join();
 
-/** Whether somebody types there. @param {EventTarget | null} target */
+/** Whether the element takes text. @param {EventTarget | null} target */
 export function takesText(target) {
   return target instanceof Element && target.closest(TEXT) !== null;
 }
 
-/** Whether letters and arrows mean something there. @param {EventTarget | null} target */
+/** Whether the element uses letters and arrows. @param {EventTarget | null} target */
 export function takesKeys(target) {
   return target instanceof Element && target.closest(KEYS) !== null;
 }
 
-/** Whether Space presses what has the focus. @param {EventTarget | null} target */
+/** Whether Space presses the focused element. @param {EventTarget | null} target */
 export function takesSpace(target) {
   return target instanceof Element && target.closest(SPACE) !== null;
 }

@@ -1,18 +1,17 @@
 // @ts-check
 /**
- * Gamepads: a stick moves something only while a shoulder button beside it is held down.
+ * Gamepads: a stick moves something only while the shoulder button of its side is held.
  *
- * A press counts when everything that nobody holds was at rest in that moment. A pad that vanishes,
- * that another takes the place of, or that says nothing new while it pushes lets go; none enables
- * anything by being plugged in. Where its sticks and buttons are, the browser says for those it
- * knows ("standard"); for any other, what a person has stored on this device.
+ * A press counts only if all sticks that hold nothing were at rest. A gamepad that vanishes, is replaced,
+ * or sends unchanged deflections for too long releases its controls; plugging one in enables nothing.
+ * Browsers know the layout of some gamepads ("standard"); others need a mapping stored on this device.
  *
  * @typedef {import("../core/types.js").HoldSpec} HoldSpec
  * @typedef {import("../core/types.js").Hand} Hand
  * @typedef {import("../core/types.js").PadView} PadView
  * @typedef {import("../widgets/padmap.js").PadMap} PadMap
  *
- * @typedef {object} Held The part of a grip that a pad needs.
+ * @typedef {object} Held The part of a held control that a gamepad needs.
  * @property {HoldSpec} spec
  * @property {Hand | null} hand
  * @property {(kind: Hand["kind"]) => Hand} newHand
@@ -21,25 +20,25 @@
  */
 import { STANDARD, parsed, sticksOf } from "../widgets/padmap.js";
 
-/** Beyond it a stick is not at rest. */
+/** Deflection below which a stick is at rest. */
 const REST = 0.05;
-/** So long a pad that pushes may say the same: one whose line is cut looks like that. */
+/** Time after which an unchanged deflection counts as a frozen link. */
 const FROZEN_MS = 2000;
 const STORED = "urc-pad:";
-/** Where the sides' sticks are in what `sticksOf` returns. */
+/** Indexes of each side's stick in the result of `sticksOf`. */
 const PLACES = { left: [0, 1], right: [2, 3] };
 
 export class Pads {
   /** @param {() => void} run starts the sampling */
   constructor(run) {
     this.isConnected = false;
-    /** Sides whose shoulder button was up since the last press. @type {Set<string>} */
+    /** Sides whose shoulder button was up since their last press. @type {Set<string>} */
     this.ready = new Set();
-    /** The one that is used, by place and name. */
+    /** Gamepad in use, by index and name. */
     this.used = "";
     this.stamp = 0;
     this.stampMs = 0;
-    /** Buttons that are down, of those that step the speed. @type {Set<string>} */
+    /** Held buttons for speed steps. @type {Set<string>} */
     this.down = new Set();
     /** Name of a device → its mapping. @type {Map<string, PadMap | null>} */
     this.maps = new Map();
@@ -59,7 +58,7 @@ export class Pads {
     return (navigator.getGamepads?.() ?? []).flatMap((pad) => (pad?.connected ? [pad] : []));
   }
 
-  /** @returns {Gamepad | null} the first whose layout is known */
+  /** @returns {Gamepad | null} the first gamepad with a known layout */
   pad() {
     return this.all().find((pad) => this.mapOf(pad) !== null) ?? null;
   }
@@ -78,15 +77,15 @@ export class Pads {
   }
 
   /**
-   * Keep where the sticks and buttons of a device are; null: as the browser says. What is held is
-   * let go: the same hand means something else now.
+   * Store the mapping of a device; null restores the browser's layout. Held controls are released,
+   * because the same deflection has another meaning now.
    *
    * @param {string} id
    * @param {PadMap | null} map
    */
   setMap(id, map) {
     this.maps.set(id, map);
-    this.used = ""; // it is met anew
+    this.used = ""; // treated as a new device
     try {
       if (map) localStorage.setItem(STORED + id, JSON.stringify(map));
       else localStorage.removeItem(STORED + id);
@@ -95,7 +94,7 @@ export class Pads {
     }
   }
 
-  /** @returns {PadView[]} what each pad says, for those who show it */
+  /** @returns {PadView[]} the state of each gamepad, for display */
   views() {
     return this.all().map((pad) => ({
       id: pad.id ?? "",
@@ -151,7 +150,7 @@ export class Pads {
       this.ready.add(side);
       return;
     }
-    this.ready.delete(side); // a press counts once; off its centre it does not: press it again
+    this.ready.delete(side); // each press counts once; off-centre it needs another press
     if (grip.hand?.kind === "pad") {
       const buttons = pad.buttons.map(({ pressed }) => pressed);
       Object.assign(grip.hand, { axes: [across, along], sticks, buttons });
@@ -179,7 +178,7 @@ export class Pads {
    * @param {number} nowMs
    */
   isFrozen({ timestamp }, nowMs) {
-    if (timestamp === undefined) return false; // it says no time: nothing can be told from it
+    if (timestamp === undefined) return false; // without timestamps a freeze cannot be detected
     if (timestamp !== this.stamp) {
       this.stamp = timestamp;
       this.stampMs = nowMs;
@@ -189,7 +188,7 @@ export class Pads {
 }
 
 /**
- * Whether a press may count: no stick is pushed but those that somebody holds already.
+ * Whether a press may count: all sticks that hold nothing are at rest.
  *
  * @param {Held} grip
  * @param {Held[]} all
@@ -208,6 +207,6 @@ function stored(id) {
   try {
     return parsed(localStorage.getItem(STORED + id));
   } catch {
-    return null; // no storage: as the browser says
+    return null; // no storage: use the browser's layout
   }
 }

@@ -1,11 +1,11 @@
 // @ts-check
 /**
- * A press that counts when it is touched, not when it is let go: STOP waits for no finger.
+ * A press that acts on touch, not on release: STOP must not wait for the finger to lift.
  */
 
 /**
- * Call `act` when an element is touched. A key and a screen reader have only the click; the click that
- * follows a touch is the same press, and one that slid off has none.
+ * Call `act` when an element is touched. Keys and screen readers only send a click. The click after a
+ * touch is the same press, and is ignored.
  *
  * @param {HTMLElement} el
  * @param {() => void} act
@@ -13,7 +13,7 @@
  */
 export function whenPressed(el, act, signal) {
   const options = signal ? { signal } : {};
-  /** The pointer whose touch has counted. */
+  /** The pointer whose touch has acted already. */
   let counted = NaN;
   el.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;

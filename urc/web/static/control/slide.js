@@ -1,27 +1,27 @@
 // @ts-check
-/** Something that is slid, so that nobody does it by a touch alone. */
+/** A slide to confirm, against accidental touches. */
 import { grasp } from "./grasp.js";
 
-/** A finger that rests on a slide for so long has slid it: nobody has to drag. */
+/** Time after which a resting finger counts as a slide, for operators who cannot drag. */
 const REST_MS = 1500;
 const REST_EVERY_MS = 50;
-/** A finger that has moved less rests. */
+/** Distance below which a finger counts as resting. */
 const STILL_PX = 8;
-/** Share of the slide's width that a finger must go. */
+/** Share of the slide's width for a complete slide. */
 const WAY = 0.75;
 
 /**
- * Make an element a slide: it is done when it is drawn to its end and let go, when a finger has
- * rested on it, or by the arrow keys.
+ * Make an element a slide. It acts after a drag to its end with release, after a long press, or by the
+ * arrow keys.
  *
  * @param {HTMLElement} el empty
  * @param {object} spec
- * @param {string} spec.label what it does
+ * @param {string} spec.label description of the action
  * @param {() => void} spec.done
- * @param {() => void} [spec.touched] called when somebody begins
+ * @param {() => void} [spec.touched] called at the start of a slide
  * @param {() => boolean} [spec.isReady]
- * @param {import("../core/types.js").Context["onStop"]} [spec.onStop] by which it learns of STOP: what is drawn
- *   then is not done
+ * @param {import("../core/types.js").Context["onStop"]} [spec.onStop] reports STOP, which cancels a
+ *   slide
  * @param {AbortSignal} spec.signal
  */
 export function slide(el, { label, done, touched, isReady = () => true, onStop, signal }) {
@@ -47,7 +47,7 @@ export function slide(el, { label, done, touched, isReady = () => true, onStop, 
   /** @type {number | undefined} */
   let resting;
 
-  /** @param {number} now from 0 to 1 */
+  /** @param {number} now position, 0 to 1 */
   function put(now) {
     share = Math.min(1, Math.max(0, now));
     el.style.setProperty("--urc-slide", String(share));
@@ -91,10 +91,10 @@ export function slide(el, { label, done, touched, isReady = () => true, onStop, 
     const way = { ArrowRight: 0.1, ArrowUp: 0.1, ArrowLeft: -0.1, ArrowDown: -0.1 }[event.key];
     if (way === undefined || !isReady()) return;
     event.preventDefault();
-    // A key that is held down slides once; then it has to come up.
+    // A held key slides once; it must be released before the next slide.
     if (event.repeat && share === 0) return;
     touched?.();
-    hold.drop(); // one hand at a time
+    hold.drop(); // one input at a time
     put(Math.round((share + way) * 10) / 10);
     if (share >= 1) letGo();
   }, { signal });

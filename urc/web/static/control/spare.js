@@ -1,22 +1,22 @@
 // @ts-check
 /**
- * A second line to the server while this page drives over a link that loses packets.
+ * The redundant socket of a page that drives over a lossy link.
  *
- * What a connection has lost holds up all that comes after it. Two connections hardly lose at the
- * same time, so what is said about held controls goes over both, and the first of each two counts.
+ * Packet loss delays all later data of a connection. Two connections rarely lose packets at the same
+ * time, so messages about held controls go over both, and the first copy of each counts.
  */
 
 const AGAIN_MS = 1000;
 
 export class Spare {
   /**
-   * @param {string} url "": there is none
-   * @param {(message: any) => void} take has what the server says there
+   * @param {string} url "" for no redundant socket
+   * @param {(message: any) => void} take handles messages of the server
    */
   constructor(url, take) {
     this.url = url;
     this.take = take;
-    /** What names this page's seat; "" while no line is wanted. */
+    /** Key of this page; "" while no socket is wanted. */
     this.key = "";
     /** @type {WebSocket | null} */
     this.line = null;
@@ -24,12 +24,12 @@ export class Spare {
     this.retry = undefined;
   }
 
-  /** Whether what is said goes out at once. */
+  /** Whether a message would be sent at once. */
   get isFree() {
     return this.line?.readyState === WebSocket.OPEN && this.line.bufferedAmount === 0;
   }
 
-  /** @param {string} key of the seat, or "" when no line is wanted */
+  /** @param {string} key key of the page, or "" to close the socket */
   want(key) {
     if (key === this.key || !this.url) return;
     this.close();
@@ -42,7 +42,7 @@ export class Spare {
     this.line = line;
     line.addEventListener("open", () => {
       if (line === this.line) line.send(JSON.stringify({ t: "spare", key: this.key }));
-      else line.close(); // not wanted any more meanwhile
+      else line.close(); // no longer wanted
     });
     line.addEventListener("message", (event) => {
       if (line === this.line && typeof event.data === "string") this.take(JSON.parse(event.data));
@@ -64,7 +64,7 @@ export class Spare {
 
   /**
    * @param {object} message
-   * @returns {boolean} whether it was handed to the browser, with nothing before it
+   * @returns {boolean} whether the browser took it into an empty buffer
    */
   send(message) {
     if (!this.isFree) return false;

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * STOP: what pressing it does, and what is known of it. Whoever shows it, a bar or a widget.
+ * STOP: the action of its buttons, and its state, for the bar and for widgets.
  *
  * @typedef {import("./drive.js").Drive} Drive
  * @typedef {import("./input.js").Input} Input
@@ -15,8 +15,8 @@ export class StopButton {
    * @param {Drive} drive
    * @param {Input} input
    * @param {Store} store
-   * @param {string[]} lines the transports over which it reaches the robot
-   * @param {boolean} hasKeys whether keys press it
+   * @param {string[]} lines transports over which it reaches the robot
+   * @param {boolean} hasKeys whether keys trigger it
    */
   constructor(drive, input, store, lines, hasKeys = lines.length > 0) {
     this.drive = drive;
@@ -26,22 +26,22 @@ export class StopButton {
     /** @type {Set<(state: StopState) => void>} */
     this.listeners = new Set();
     this.seen = "";
-    /** Called at each press, here or elsewhere. */
+    /** Called at each press, on this page or another. */
     this.onPressed = () => {};
     if (hasKeys) {
       addEventListener("keydown", (event) => {
         if (event.key !== "Escape" || event.defaultPrevented || event.repeat) return;
-        if (document.querySelector(":popover-open")) return; // it is closed by it, as everywhere
+        if (document.querySelector(":popover-open")) return; // Escape closes the popover
         event.preventDefault();
         this.press();
       });
-      // Before anything that has the focus: while something is held, both are STOP wherever it is.
+      // In the capture phase: during a hold both keys mean STOP, whatever has the focus.
       addEventListener("keydown", (event) => this.space(event), { capture: true });
       addEventListener("keydown", (event) => this.escape(event), { capture: true });
     }
   }
 
-  /** While something is held, Escape means nothing else. @param {KeyboardEvent} event */
+  /** Handle Escape: during a hold it means STOP alone. @param {KeyboardEvent} event */
   escape(event) {
     if (event.key !== "Escape" || event.repeat || !this.input.isDriving()) return;
     event.preventDefault();
@@ -49,14 +49,14 @@ export class StopButton {
     this.press();
   }
 
-  /** Space is STOP; with nothing held it still presses a button that has the focus. @param {KeyboardEvent} event */
+  /** Handle Space: STOP during a hold, else a press of the focused button. @param {KeyboardEvent} event */
   space(event) {
     if (event.code !== "Space" || event.ctrlKey || event.altKey || event.metaKey) return;
     if (takesText(event.target) || (takesSpace(event.target) && !this.input.isDriving())) return;
     event.preventDefault();
     event.stopImmediatePropagation();
     if (event.repeat) return;
-    // A button is pressed when its key comes up: not this one.
+    // Buttons act on key-up: swallow this one.
     const end = new AbortController();
     const swallow = (/** @type {KeyboardEvent} */ up) => {
       if (up.code !== "Space") return;
@@ -100,14 +100,14 @@ export class StopButton {
   }
 
   /**
-   * It was pressed, here or elsewhere: who follows it hears so at once, since a page that is hidden
-   * draws no frames, and also when it is reset already.
+   * Report a press on this page or another at once: a hidden page draws no frames, and the latch may be
+   * reset already.
    */
   heard() {
     this.onPressed();
     const state = this.state();
     if (state.phase === "") for (const listener of this.listeners) listener({ ...state, phase: "latched" });
-    this.seen = ""; // told anew: what goes on by itself ends with each press
+    this.seen = ""; // reported again: each press ends autonomous motion
     this.frame();
   }
 

@@ -1,17 +1,17 @@
 // @ts-check
 /**
- * What several hands on one command give together: each argument is of the hand that pushed it first.
+ * The merged arguments of several inputs for one command: each argument belongs to the first input that
+ * moved it.
  *
- * A hand that only touches a control, or has let it spring back, has no argument. One that pushes
- * what another hand has, gives nothing for it before it has been at rest: nothing jumps from one hand
- * to the other, neither when a second one comes nor when the first one goes.
+ * An input at rest has no argument. An input that moves an argument of another one must first return to
+ * rest. So a value never jumps from one input to another when a second one begins or the first one ends.
  *
  * @typedef {import("../widgets/output.js").Output} Output
  * @typedef {import("../core/types.js").Value} Value
  *
- * @typedef {object} Giving A grip, as far as it matters here.
+ * @typedef {object} Giving A held control, as far as it matters here.
  * @property {Pick<Output, "neutral" | "ranges">} output
- * @property {() => Record<string, Value>} given What its hand gives, by the command's own names.
+ * @property {() => Record<string, Value>} given Its sampled values, by the names of the command.
  */
 
 /** @type {ReadonlySet<string>} */
@@ -19,16 +19,16 @@ const NONE = new Set();
 
 export class Together {
   constructor() {
-    /** Argument → who has it. @type {Map<string, Giving>} */
+    /** Argument → its owner. @type {Map<string, Giving>} */
     this.owners = new Map();
-    /** Arguments that a hand pushes and does not have. @type {Map<Giving, Set<string>>} */
+    /** Arguments that an input moves but does not own. @type {Map<Giving, Set<string>>} */
     this.waiting = new Map();
   }
 
   /**
    * Return the arguments of the command.
    *
-   * @param {ReadonlySet<Giving>} grips that are held, in the order in which they were taken
+   * @param {ReadonlySet<Giving>} grips held controls, in the order of their start
    * @returns {Record<string, Value>}
    */
   values(grips) {
@@ -45,7 +45,7 @@ export class Together {
   }
 
   /**
-   * Return the arguments that a hand pushes and does not have.
+   * Return the arguments that an input moves but does not own.
    *
    * @param {Giving} grip
    */
@@ -53,7 +53,7 @@ export class Together {
     return this.waiting.get(grip) ?? NONE;
   }
 
-  /** Let go of what hands had that are gone. @param {ReadonlySet<Giving>} grips */
+  /** Release the arguments of ended inputs. @param {ReadonlySet<Giving>} grips */
   forget(grips) {
     for (const [name, owner] of this.owners) if (!grips.has(owner)) this.owners.delete(name);
     for (const grip of this.waiting.keys()) if (!grips.has(grip)) this.waiting.delete(grip);
@@ -69,7 +69,7 @@ export class Together {
   }
 
   /**
-   * Whether a hand that pushes an argument has it, now at the latest.
+   * Whether an input owns an argument that it moves; a free one becomes its own.
    *
    * @param {Giving} grip
    * @param {string} name

@@ -1,15 +1,15 @@
 // @ts-check
 /**
- * Questions to this server's own `/api/v1`, each with one answer, or one line that says why not.
+ * Requests to this server's `/api/v1`, each with one reply or a reason of one line.
  */
 import { t } from "./words.js";
 
-/** An answer may take as long as a robot is tried. */
+/** Time limit of a request; a test of a robot takes long. */
 const WITHIN_MS = 30_000;
 
 /**
  * @param {string} path
- * @param {object | Blob} [body] sent as JSON, or as it is; without one it is only asked
+ * @param {object | Blob} [body] JSON or raw body of a POST; without it the request is a GET
  * @returns {Promise<any>}
  */
 export async function ask(path, body) {

@@ -1,10 +1,10 @@
 // @ts-check
-/** Elements out of data. Text is text: nothing here reads markup. */
+/** Creation of elements from data. Text is always plain text, never markup. */
 
 /**
  * @param {string} tag
- * @param {Record<string, string | boolean | (() => void)>} [is] attributes; `on…` are listeners; what
- *   is false is left out
+ * @param {Record<string, string | boolean | (() => void)>} [is] attributes; `on…` are listeners; false
+ *   leaves one out
  * @param {(Node | string | false | null | undefined)[]} inside
  * @returns {HTMLElement}
  */
@@ -22,7 +22,7 @@ export function made(tag, is = {}, ...inside) {
 }
 
 /**
- * Put rows in the place of others; who had the focus keeps it, by `data-key`.
+ * Replace the rows of a list; the focus stays by `data-key`.
  *
  * @param {Element} list
  * @param {HTMLElement[]} rows
@@ -50,8 +50,8 @@ export function button(text, key, act, more = {}) {
 }
 
 /**
- * Let be pressed what does nothing before its module is there: a form that is sent by the browser
- * itself would be refused by the page's policy.
+ * Enable the buttons of forms once their module has loaded. Before, the browser itself would submit the
+ * form, which the page policy refuses.
  *
  * @param {ParentNode} root
  */

@@ -1,5 +1,5 @@
 // @ts-check
-/** English is what the pages are written in, so nothing is translated. */
+/** The catalogue of English: empty, because the texts of the pages are in English. */
 /** @type {Record<string, string>} */
 const words = {};
 export default words;

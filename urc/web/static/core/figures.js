@@ -1,18 +1,18 @@
 // @ts-check
 /**
- * Numbers as people read them: all digits that mean something, and none that arithmetic made up.
- * The only place where that is decided. Pure.
+ * Formatting of numbers: all significant digits, and no artefacts of floating point arithmetic. All
+ * pages use it. Pure.
  */
 
-/** So many digits are written where nobody has said how many mean something. */
+/** Significant digits without a declared precision. */
 const FIGURES = 4;
-/** A number has so many digits that mean something, as a float of 32 bits: 73.0000019073486 is 73. */
+/** Reliable digits of a number, as in a float of 32 bits: 73.0000019073486 is 73. */
 const TRUSTED = 7;
-/** More digits after the point are not written. */
+/** Most digits after the point. */
 const MOST = 100;
 
 /**
- * Return a number with so many digits after the point; never as "-0".
+ * Return a number with `digits` digits after the point; never as "-0".
  *
  * @param {number} value
  * @param {number} digits
@@ -23,7 +23,7 @@ export function fixed(value, digits) {
 }
 
 /**
- * Return a number by four digits that mean something; what stands before the point is never rounded.
+ * Return a number with four significant digits; the integer part is never rounded.
  *
  * @param {number} value
  */
@@ -33,26 +33,26 @@ export function rough(value) {
 }
 
 /**
- * Return how many digits after the point a number has in the unit that is shown, where it has
- * `digits` in its own: as many as are needed to tell apart what was not the same.
+ * Return the digits after the point in the displayed unit, for `digits` in the signal's unit: enough to
+ * tell different values apart.
  *
- * @param {number | undefined} digits undefined stays what it is
- * @param {(value: number) => number} factor to the unit that is shown, as of the context's `unit`
+ * @param {number | undefined} digits undefined is returned unchanged
+ * @param {(value: number) => number} factor conversion to the displayed unit, as `unit` of the context
  */
 export function digitsIn(digits, factor) {
   if (digits === undefined) return undefined;
   const step = Math.abs(factor(1) - factor(0));
-  // An offset costs the step its last places: a hundredth must still need two digits.
+  // An offset costs the step its last digits: a hundredth must still need two digits.
   const needed = Math.ceil(digits - Math.log10(step) - 1e-9);
   return Number.isFinite(needed) ? Math.min(MOST, Math.max(0, needed)) : digits;
 }
 
 /**
- * Return a number of a signal in the unit that is shown: by its precision, else as fine as it came.
+ * Return a signal's number in the displayed unit: by its precision, else with its own digits.
  *
  * @param {number} value in the signal's unit
- * @param {number | undefined} precision digits after the point that mean something in the signal's unit
- * @param {(value: number) => number} [factor] to the unit that is shown
+ * @param {number | undefined} precision significant digits after the point, in the signal's unit
+ * @param {(value: number) => number} [factor] conversion to the displayed unit
  */
 export function figure(value, precision, factor) {
   if (!factor) return precision === undefined ? exact(value) : fixed(value, precision);
@@ -62,34 +62,34 @@ export function figure(value, precision, factor) {
 }
 
 /**
- * Return a converted number with as many digits as it came with, and no fewer than four.
+ * Return a converted number with as many digits as the original, and at least four.
  *
- * @param {number} value as it came
+ * @param {number} value the original
  * @param {number} shown
  * @param {(value: number) => number} factor
  */
 function asFine(value, shown, factor) {
   const came = digitsIn(placesOf(value), factor) ?? 0;
   const four = FIGURES - 1 - magnitude(shown);
-  // Near an offset that takes most of it away, only what arithmetic left behind would be seen.
+  // Near a large offset the last digits are artefacts of the arithmetic.
   const trusted = TRUSTED - 1 - magnitude(Math.max(Math.abs(shown), Math.abs(factor(0))));
   const digits = Math.max(0, Math.min(Math.max(came, four), trusted, MOST));
   return Number.isFinite(digits) ? exact(Number(shown.toFixed(digits))) : exact(shown);
 }
 
-/** The same, but for what stands before the point: that is never rounded. @param {number} value */
+/** The same, without rounding of the integer part. @param {number} value */
 function exact(value) {
   if (Number.isInteger(value)) return String(value);
   return String(Number(Math.abs(value) < 10 ** TRUSTED ? value.toPrecision(TRUSTED) : value.toFixed(0)));
 }
 
-/** How many digits a number has after its point. @param {number} value */
+/** Return the digits after the point. @param {number} value */
 function placesOf(value) {
   const [digits = "", power = "0"] = exact(value).split("e");
   return Math.max(0, (digits.split(".")[1] ?? "").length - Number(power));
 }
 
-/** The power of ten of its first digit; that of 0 is none. @param {number} value */
+/** Return the power of ten of the first digit; 0 for 0. @param {number} value */
 function magnitude(value) {
   return Math.floor(Math.log10(Math.abs(value)));
 }

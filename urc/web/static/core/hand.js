@@ -1,6 +1,6 @@
 // @ts-check
-// A classic script, run before anything is drawn: a grid that turns round is a grid that jumps. With
-// which hand the operator works is kept on the device; the rules of the grid know both.
+// A classic script before the first paint, so that the grid does not jump. The device stores the
+// operator's hand; the rules of the grid have a layout for each.
 {
   const KEY = "urc-hand";
 
@@ -25,13 +25,13 @@
       if (!(choice instanceof HTMLSelectElement)) continue;
       choice.value = kept();
       choice.addEventListener("change", () => {
-        // Whoever holds a control lets go of it before it moves away under the finger.
+        // Held controls are released before they move away under the finger.
         dispatchEvent(new CustomEvent("urc-let-go", { detail: "the layout was changed" }));
         show(choice.value);
         try {
           localStorage.setItem(KEY, choice.value);
         } catch {
-          // Private mode: the choice lasts as long as this page.
+          // Private mode: the choice lasts until the page closes.
         }
       });
     }

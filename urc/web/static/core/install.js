@@ -1,13 +1,13 @@
 // @ts-check
 /**
- * Makes the pages an app of the device: they open even where the server cannot be reached, and say
- * so. It needs HTTPS, or the machine itself; elsewhere the pages are what they are without it.
+ * Makes the pages an installed app: they open without a server, with a message. It needs HTTPS or
+ * localhost; elsewhere the pages work without it.
  */
 
-/** The one script that may become a service worker. */
+/** The only script that may become a service worker. */
 const WORKER = "/sw.js";
 
-/** @returns {string} what `register` takes where the page's policy asks for trusted types */
+/** @returns {string} the argument of `register` under a policy with trusted types */
 function trusted() {
   const types = /** @type {any} */ (globalThis).trustedTypes;
   if (!types) return WORKER;

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Values and ages as texts for people. Knows no store and no DOM.
+ * Values and ages as text. It knows no store and no DOM.
  *
  * @typedef {import("./types.js").Held} Held
  * @typedef {import("./types.js").Signal} Signal
@@ -12,7 +12,7 @@ export const DASH = "—";
 /**
  * @param {Held} value in the signal's unit
  * @param {Signal} signal
- * @param {(value: number) => number} [factor] to the unit that people want to see
+ * @param {(value: number) => number} [factor] conversion to the displayed unit
  * @returns {string}
  */
 export function textOf(value, signal, factor) {
@@ -27,11 +27,11 @@ export function textOf(value, signal, factor) {
 }
 
 /**
- * Return the word by which people know a value: where a signal has `states`, its values are words, and
- * a command takes what the robot says.
+ * Return the word for a value of a signal with `states`. A command takes the value as the robot sends
+ * it.
  *
  * @param {Pick<Signal, "states"> | undefined} signal
- * @param {unknown} value as the robot says it, or a word already
+ * @param {unknown} value value from the robot, or a word
  */
 export function wordOf(signal, value) {
   const states = signal?.states ?? {};
@@ -40,7 +40,7 @@ export function wordOf(signal, value) {
 }
 
 /**
- * Return short words one after the other; where there is no room, the line breaks between them.
+ * Return short words in sequence; the line may only break between them.
  *
  * @param {readonly string[]} words
  */
@@ -49,7 +49,7 @@ export function inTurn(words) {
 }
 
 /**
- * Whole numbers only: a reader wants to know "old", not tenths.
+ * Return an age in whole numbers, because tenths do not matter.
  *
  * @param {number} seconds
  */

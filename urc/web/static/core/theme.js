@@ -1,6 +1,6 @@
 // @ts-check
-// A classic script, run before anything is drawn: a page that changes its colours is a page that
-// blinks. The choice is kept on the device; where nothing can be kept, the device's own wish rules.
+// A classic script before the first paint, so that colours do not flash. The device stores the choice;
+// without storage, the preference of the system counts.
 {
   const KEY = "urc-theme";
   const THEMES = new Set(["dark", "light", "sunlight", "night"]);
@@ -29,7 +29,7 @@
       choice.value = THEMES.has(kept()) ? kept() : "";
     }
   });
-  // Of the document, so that a choice counts that is made while the page's modules are still coming.
+  // On the document, so that a choice before the modules have loaded counts.
   document.addEventListener("change", ({ target }) => {
     if (!(target instanceof HTMLSelectElement)) return;
     if (target.matches("[data-theme-choice]")) {
@@ -37,10 +37,10 @@
       try {
         localStorage.setItem(KEY, target.value);
       } catch {
-        // Private mode: the choice lasts as long as this page.
+        // Private mode: the choice lasts until the page closes.
       }
     } else if (target.matches("[data-language-choice]")) {
-      // A cookie, since the server writes the page's words.
+      // A cookie, since the server renders the texts of the page.
       document.cookie = `urc-language=${target.value};path=/;max-age=${YEAR_S};samesite=strict`;
       location.reload();
     }

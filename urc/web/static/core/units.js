@@ -1,8 +1,8 @@
 // @ts-check
 /**
- * In which units people want to see values. Inside, and on the wire, all stays as declared.
+ * Displayed units of values. Internally and in messages, values keep their declared unit.
  *
- * Knows no DOM but the select of the choice, and the device's storage, where it is kept.
+ * It knows no DOM but the select of the choice, and the storage of the device.
  *
  * @typedef {import("./types.js").Conversion} Conversion
  * @typedef {import("./types.js").Held} Held
@@ -10,12 +10,12 @@
 
 export const KEY = "urc-units";
 
-/** How units are written for people whose spelling in documents is for keyboards. */
+/** Symbols of units whose spelling in documents is for keyboards. */
 const SIGNS = { deg: "°", "deg/s": "°/s", degC: "°C", degF: "°F", "m/s2": "m/s²", "m/s^2": "m/s²", ohm: "Ω" };
 
 /**
- * Unit of a signal → what people of a system read instead: factor, symbol and, where zero is not
- * zero, the offset.
+ * Unit of a signal → displayed unit in a unit system: factor, symbol and, for units with another zero,
+ * the offset.
  *
  * @type {Record<string, Record<string, [number, string, number?]>>}
  */
@@ -55,19 +55,19 @@ const SYSTEMS = {
 };
 
 /**
- * Return the sign of a unit as people write it: "°C" for "degC".
+ * Return the symbol of a unit: "°C" for "degC".
  *
- * @param {string} unit as documents spell it
+ * @param {string} unit spelling in documents
  */
 export function symbolOf(unit) {
   return Object.entries(SIGNS).find(([name]) => name === unit)?.[1] ?? unit;
 }
 
 export class Units {
-  /** @param {string} system one of the systems; anything else leaves units as they are declared */
+  /** @param {string} system name of a unit system; any other text leaves units as declared */
   constructor(system = "") {
     this.system = "";
-    /** What was asked before. @type {Map<string, Conversion>} */
+    /** Cached conversions. @type {Map<string, Conversion>} */
     this.known = new Map();
     this.use(system);
   }
@@ -79,7 +79,7 @@ export class Units {
   }
 
   /**
-   * Return how values of a unit are shown to people.
+   * Return the conversion to the displayed unit.
    *
    * @param {string} symbol
    * @returns {Conversion}
@@ -104,17 +104,17 @@ export class Units {
   }
 }
 
-/** Return the system that was chosen on this device. */
+/** Return the stored unit system of this device. */
 export function chosenSystem() {
   try {
     return localStorage.getItem(KEY) ?? "";
   } catch {
-    return ""; // nothing can be kept here
+    return ""; // no storage
   }
 }
 
 /**
- * Let people choose the system, in a select of the page; it is kept on the device.
+ * Offer the unit systems in a select of the page; the device stores the choice.
  *
  * @param {(system: string) => void} use
  */
@@ -129,7 +129,7 @@ export function offerSystems(use) {
       try {
         localStorage.setItem(KEY, choice.value);
       } catch {
-        // Private mode: the choice lasts as long as this page.
+        // Private mode: the choice lasts until the page closes.
       }
     });
   }
@@ -141,7 +141,7 @@ export function offerSystems(use) {
 }
 
 /**
- * Return what leads there; undefined where nothing has to be done.
+ * Return the function of a conversion; undefined for the identity.
  *
  * @param {Conversion} conversion
  * @returns {((value: number) => number) | undefined}
@@ -151,7 +151,7 @@ export function factorOf({ factor, offset }) {
 }
 
 /**
- * Convert whatever is a number, or numbers; the rest stays.
+ * Convert a number or numbers; other values stay as they are.
  *
  * @param {Held} value
  * @param {{factor: number, offset: number} | undefined} conversion

@@ -1,8 +1,8 @@
 // @ts-check
 /**
- * What the page says, in the reader's language. English is the key; what nobody translated stays it.
+ * Texts of the page in the user's language. English is the key, and the fallback.
  *
- * The import map leads `urc/words` to the table of the language that the server chose.
+ * The import map points `urc/words` at the table of the language that the server chose.
  */
 import table from "urc/words";
 
@@ -11,7 +11,7 @@ const words = table;
 
 /**
  * @param {string} text
- * @param {Readonly<Record<string, string | number>>} [names] what stands for each `{name}`
+ * @param {Readonly<Record<string, string | number>>} [names] value of each `{name}`
  * @returns {string}
  */
 export function t(text, names = {}) {
@@ -22,8 +22,8 @@ export function t(text, names = {}) {
 }
 
 /**
- * What the server says of the controls. It says it in English, to all pages alike, so what has a fixed
- * form is put into the reader's language here.
+ * Messages of the server about the controls. All pages get them in English; those with a fixed form are
+ * translated here.
  */
 const SENTENCES = [
   mark("stopped by {name}: reset it first"),
@@ -70,7 +70,7 @@ function form(text) {
 }
 
 /**
- * Return a sentence of the server in the reader's language; as it came when it has no fixed form.
+ * Return a message of the server in the user's language, or unchanged if it has no fixed form.
  *
  * @param {string} sentence
  * @returns {string}
@@ -86,7 +86,7 @@ export function said(sentence) {
 }
 
 /**
- * Marks a text that is said elsewhere, by `t`, so that the catalogues have it.
+ * Mark a text for the catalogues; `t` translates it elsewhere.
  *
  * @template {string} Text
  * @param {Text} text

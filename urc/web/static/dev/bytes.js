@@ -1,11 +1,11 @@
 // @ts-check
 /**
- * Bytes as people read them. Everything is made of text nodes: robots speak in here.
+ * Bytes in readable form. All elements consist of text nodes, because the text comes from robots.
  */
 
 /** @type {Record<number, string>} */
 const NAMED = { 9: "\\t", 10: "\\n", 13: "\\r", 27: "\\e", 0: "\\0" };
-// Controls, and marks that reorder what is shown.
+// Control characters, and marks that reorder text.
 const HIDDEN = /[\u0000-\u001f\u007f-\u009f\u200e\u200f\u2028-\u202e\u2066-\u2069]/g;
 
 /**
@@ -22,10 +22,10 @@ export function hexOf(bytes) {
 }
 
 /**
- * Return bytes as text, with an escape for whatever cannot be seen.
+ * Return bytes as text, with escapes for invisible characters.
  *
  * @param {Uint8Array} bytes
- * @param {string} encoding as Python calls it
+ * @param {string} encoding Python's name of the encoding
  */
 export function textOf(bytes, encoding) {
   return visible(decoder(encoding).decode(bytes));
@@ -52,7 +52,7 @@ function decoder(encoding) {
   try {
     return new TextDecoder(encoding.replaceAll("_", "-"));
   } catch {
-    return new TextDecoder(); // an encoding that the browser does not know
+    return new TextDecoder(); // the browser lacks this encoding
   }
 }
 

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The commands of a robot: their arguments, what they would send, and what became of them. Knows no
+ * The commands of a robot: their arguments, the preview of their frames, and their results. It knows no
  * socket.
  *
  * @typedef {import("../core/types.js").Value} Value
@@ -28,7 +28,7 @@
  *
  * @typedef {{refusal: string, frames: Frame[], questions: string[], requires: string[]}} Shown
  *
- * @typedef {object} Desk Where questions and commands go.
+ * @typedef {object} Desk Functions that send requests and commands.
  * @property {(message: object) => Promise<any>} ask
  * @property {(command: string, args: Record<string, unknown>, isConfirmed: boolean) => Promise<Record<string, unknown>>} run
  */
@@ -55,7 +55,7 @@ export class Commands {
   set(commands, lines) {
     this.lines = new Map(lines.map((line) => [line.name, line]));
     const key = JSON.stringify(commands);
-    if (key === this.key) return; // what somebody has filled in stays
+    if (key === this.key) return; // filled-in values stay
     this.key = key;
     const none = element("p", "dev-quiet", "This robot has no command.");
     this.el.replaceChildren(...(commands.length ? commands.map((one) => this.command(one)) : [none]));
@@ -132,7 +132,7 @@ export class Commands {
    * @param {Command} command
    * @param {Record<string, unknown>} values
    * @param {HTMLElement} result
-   * @param {boolean} isConfirmed whether somebody was asked first, and said yes
+   * @param {boolean} isConfirmed whether the operator has confirmed the command
    */
   async run(command, values, result, isConfirmed = false) {
     result.replaceChildren(element("p", "dev-quiet", "… waiting for the robot"));

@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The interface that every robot has: all signals with their age, all commands with a form each, and
- * where the server shows it, what goes over the wire.
+ * The debug interface of every robot: all signals with their age, all commands with a form, and the
+ * traffic log if the server offers it.
  *
  * @typedef {import("./debug_commands.js").Doors} CommandDoors
  * @typedef {import("../live/store.js").Store} Store
@@ -26,7 +26,7 @@ export class Debug {
     if (wire) watchWire(el, wire, this.over.signal);
   }
 
-  /** Names of the images that can be seen. */
+  /** Return the names of the visible images. */
   pictures() {
     return this.signals.pictures();
   }

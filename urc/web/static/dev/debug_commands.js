@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * All commands, with a form each. A form is made when it is opened first: a hundred of them would
- * cost a phone a second.
+ * All commands, each with a form. A form is made when it is first opened: a hundred of them would take a
+ * second on a phone.
  *
  * @typedef {import("./fields.js").Argument} Argument
  * @typedef {import("../widgets/cell.js").Doors} HostDoors
@@ -16,7 +16,7 @@
  * @property {string} line
  * @property {number} steps
  * @property {boolean} isAnswered
- * @property {number} leaseMs 0 for what is not held
+ * @property {number} leaseMs 0 for a command without hold
  * @property {import("../core/types.js").Question[]} asks
  * @property {string[]} requires
  * @property {(Argument & {description: string})[]} arguments
@@ -61,7 +61,7 @@ export class DebugCommands {
   form(command) {
     const form = document.createElement("form");
     form.className = "dev-form";
-    form.noValidate = true; // the server says it, in words
+    form.noValidate = true; // the server reports mistakes in words
     const fields = element("div", "dev-tools");
     const inputs = command.arguments.map((argument) => field(argument));
     fields.append(...inputs.map(({ label, argument }) => withHelp(label, argument)));

@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * Starts the dev page: two sockets, one for values and commands as every page has it, and one for
- * the traffic, the profile, and questions.
+ * Starts the developer page with two sockets: one for values and commands, as on all pages, and one for
+ * the traffic, the profile and requests.
  *
  * @typedef {import("../core/types.js").Reading} Reading
  * @typedef {{severity: string, text: string}} Found
@@ -68,7 +68,7 @@ const commands = new Commands(part(root, "[data-commands]"), desk);
 const timeline = new Timeline(root, root.dataset["timeline"] ?? "");
 
 /**
- * Ask one thing and wait for its one answer.
+ * Send a request and wait for its only reply.
  *
  * @param {Socket} socket
  * @param {object} message
@@ -78,7 +78,7 @@ function request(socket, message) {
   lastId += 1;
   const id = lastId;
   return new Promise((resolve, reject) => {
-    // The server has its own limit for commands, and always answers; this is for one that died.
+    // The server always replies within its own limit; this limit is for a dead server.
     const patience = socket === values ? 4 * ANSWER_WITHIN_MS : ANSWER_WITHIN_MS;
     const alarm = setTimeout(() => settle(id, new Error("URC has not answered")), patience);
     const done = () => clearTimeout(alarm);
@@ -134,7 +134,7 @@ function take(message) {
   switch (message.t) {
     case "hello":
       log.restart();
-      // Not before: the robot is connected for the first of the two, and its first words count.
+      // Only now: the robot connects for the first of the two sockets, and its first messages count.
       if (!values.isWanted) values.open();
       break;
     case "rows":

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The arguments of a command as a form, on the dev page and where faults are found.
+ * The arguments of a command as a form, for the developer page and the debug interface.
  *
  * @typedef {import("../core/types.js").Value} Value
  *
@@ -19,7 +19,7 @@
  * @typedef {object} Field
  * @property {Argument} argument
  * @property {HTMLElement} label
- * @property {() => unknown} read what was written, as its type; undefined for nothing
+ * @property {() => unknown} read the input as its type; undefined for an empty field
  */
 import { element } from "./bytes.js";
 
@@ -63,7 +63,7 @@ export function field(argument) {
 }
 
 /**
- * Return what stands in the fields, by the names of the arguments; what was left empty is not there.
+ * Return the values of the fields by the names of the arguments, without empty fields.
  *
  * @param {Field[]} fields
  */
@@ -87,7 +87,7 @@ function caption(argument) {
 }
 
 /**
- * Return what was written, as its type; what is none goes to the server as it is, which says so.
+ * Return the input as its type; invalid input goes to the server unchanged, which reports it.
  *
  * @param {Argument} argument
  * @param {string} text

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The wire log: what went over every line, and the faults and notes in between.
+ * The traffic log: the traffic of every transport, with faults and notes.
  *
  * @typedef {object} Row
  * @property {number} n
@@ -14,13 +14,13 @@
  * @property {string} [more]
  * @property {string} [text]
  * @property {string} [level]
- * @property {string} [picture] media type, where `data` is a whole picture
+ * @property {string} [picture] media type, if `data` is a whole image
  */
 import { part } from "../live/badge.js";
 import { bytesOf, element, hexOf, sizeText, textOf, visible } from "./bytes.js";
 
 const ROWS_KEPT = 1000;
-/** So near to the end the log follows what comes. */
+/** Distance from the end within which the log follows new rows. */
 const NEAR_PX = 40;
 /** @type {Record<Row["kind"], string>} */
 const SIGNS = { sent: "→ sent", received: "← received", note: "· note" };
@@ -39,12 +39,12 @@ export class WireLog {
     this.encodings = new Map();
     /** @type {Row[]} */
     this.waiting = [];
-    /** Rows that came while it was paused and were too many. */
+    /** Rows dropped during a pause. */
     this.lost = 0;
     this.isPaused = false;
-    /** Number of the next row that is expected. */
+    /** Expected number of the next row. */
     this.next = 0;
-    /** From the server's clock to this device's. */
+    /** Offset from the server's clock to this device's. */
     this.skewMs = Infinity;
     this.pauseButton.addEventListener("click", () => this.pause(!this.isPaused));
     part(root, "[data-clear]").addEventListener("click", () => this.clear());
@@ -64,7 +64,7 @@ export class WireLog {
     this.filter();
   }
 
-  /** The server counts anew on each connection. */
+  /** Start again: the server counts from the beginning on each connection. */
   restart() {
     this.next = 0;
     this.skewMs = Infinity;
@@ -77,7 +77,7 @@ export class WireLog {
       rows = [{ n: first, time_s: 0, kind: "note", line: "URC", level: "warning", text }, ...rows];
     }
     this.next = first + rows.length - (first > this.next ? 1 : 0);
-    // The fastest message so far tells best how the two clocks differ; so times keep their order.
+    // The fastest message so far gives the best estimate of the offset; it keeps times in order.
     this.skewMs = Math.min(this.skewMs, Date.now() - now);
     const nowMs = this.skewMs + now;
     const timed = rows.map((row) => ({ ...row, time_s: nowMs - row.time_s }));
@@ -92,7 +92,7 @@ export class WireLog {
     this.tell();
   }
 
-  /** @param {Row[]} rows whose times are the page's own */
+  /** @param {Row[]} rows rows with times of the page's own clock */
   show(rows) {
     const list = this.list;
     const isAtEnd = list.scrollHeight - list.scrollTop - list.clientHeight < NEAR_PX;

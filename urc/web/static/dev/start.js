@@ -1,5 +1,5 @@
 // @ts-check
-/** The dev interface: its button has everything read anew, and opens the robot. */
+/** The developer start page: its button reloads all documents, and opens the robot. */
 import { ask, reason } from "../core/ask_server.js";
 import { part } from "../live/badge.js";
 

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Why did it move? What the audit says of one robot, newest first, asked for on demand.
+ * Why did it move? The audit log of one robot, newest first, loaded on demand.
  *
  * @typedef {object} Entry
  * @property {number} at UTC in seconds
@@ -22,7 +22,7 @@ import { element, visible, wordsOf } from "./bytes.js";
 
 const MOST = 200;
 const ANSWER_WITHIN_MS = 10_000;
-/** A shape and a word each: colour alone says nothing. @type {Record<string, string>} */
+/** A shape and a word each, because colour alone is not enough. @type {Record<string, string>} */
 const SIGNS = {
   moved: "● moved",
   stopped: "■ stopped",
@@ -49,7 +49,7 @@ export class Timeline {
     part(root, "[data-why-refresh]").addEventListener("click", () => this.refresh());
   }
 
-  /** Ask anew; what is shown stays until the answer has come. */
+  /** Reload; the old entries stay until the response arrives. */
   async refresh() {
     if (this.isAsking) return;
     this.isAsking = true;

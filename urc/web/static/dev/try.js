@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The parser to try. Knows no socket.
+ * The try-out of the parser. It knows no socket.
  *
  * @typedef {import("./commands.js").Desk} Desk
  * @typedef {{name: string, type: string, framing: string, encoding: string, messages: boolean}} Line

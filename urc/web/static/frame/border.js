@@ -1,25 +1,25 @@
 // @ts-check
 /**
- * What may pass between the page and a foreign widget in its frame. Knows no DOM and no socket.
+ * The messages between the page and a third-party widget in its frame. It knows no DOM and no socket.
  *
- * A frame is somebody else's program: whatever it says is looked at here before anything is done
- * with it, and it is told only what its cell is bound to.
+ * A frame runs third-party code: each of its messages is checked here before it has any effect, and the
+ * page only sends it data of its own bindings.
  *
  * @typedef {import("../widgets/output.js").Output} Output
  * @typedef {import("../core/types.js").Given} Given
  * @typedef {import("../core/types.js").Topics} Topics
  * @typedef {import("../core/types.js").Value} Value
  *
- * @typedef {{x: number, y: number, width: number, height: number}} Box In CSS pixels of the frame.
+ * @typedef {{x: number, y: number, width: number, height: number}} Box Rectangle in CSS pixels of the frame.
  *
- * @typedef {object} Place Where something that can be gripped is.
+ * @typedef {object} Place Place of an element that can be held.
  * @property {number} id
  * @property {Box} box
- * @property {Box[]} holes Inside of it, left to the frame: buttons.
+ * @property {Box[]} holes Parts that stay with the frame: buttons.
  * @property {string} label
- * @property {string} said Its value in words, for those who cannot see it.
+ * @property {string} said Its value in words, for screen readers.
  * @property {boolean} isFocusable
- * @property {"none" | "free"} page Which of its keys count on the whole page.
+ * @property {"none" | "free"} page Which of its keys work on the whole page.
  *
  * @typedef {(
  *   {t: "ready" | "mounted" | "in" | "out" | "more" | "stop" | "pads" | "onstop"}
@@ -37,29 +37,29 @@
  *   | {t: "gate", id: number, isHeld: boolean, timeoutMs: number, key: string, pad: "" | "left" | "right"}
  *   | {t: "places", places: Place[]}
  *   | {t: "values", id: number, n: number, values: Record<string, Value>}
- * )} Said What a frame may say.
+ * )} Said A valid message of a frame.
  */
 
-/** Beyond that many messages a second a frame floods the page. */
+/** Rate of messages a second above which a frame is a flood. */
 export const MOST_MESSAGES = 1000;
-/** Commands a second. */
+/** Highest rate of commands a second. */
 export const MOST_COMMANDS = 20;
 const MOST_TEXT = 20_000;
 const MOST_NAMES = 64;
 const MOST_ITEMS = 10_000;
 const MOST_GRIPS = 16;
 const MOST_HOLES = 16;
-/** Further elements in which the keys of a grip count. */
+/** Most further elements that accept the keys of a held control. */
 const MOST_MORE = 4;
-/** Keys that are never a widget's: they leave it, or stop the robot. */
+/** Keys that no widget may take: they leave it, or stop the robot. */
 const NEVER_KEYS = new Set(["Escape", "Space", "Tab"]);
 const VERBS = new Set(["pause", "step", "resume", "abort"]);
-/** Taking by force, handing over and undoing a STOP are not for other people's programs. */
+/** Requests that third-party widgets may send; force, handover and reset are not among them. */
 const WISHES = new Set(["take", "ask", "leave"]);
 const TOPICS = new Set(["links", "lease", "alarms", "latency", "sequences", "theme"]);
 const PLAIN = new Set(["ready", "mounted", "in", "out", "more", "stop", "pads", "onstop"]);
 
-/** Counts what happens in a second. */
+/** A limit on events a second. */
 export class Rate {
   /** @param {number} most */
   constructor(most) {
@@ -69,7 +69,7 @@ export class Rate {
   }
 
   /**
-   * Count one; false when it is one too many.
+   * Count one event; return false above the limit.
    *
    * @param {number} nowMs
    */
@@ -162,10 +162,10 @@ function placeOf(place) {
 }
 
 /**
- * Return what a frame said, with nothing in it that it may not say; null when it means nothing.
+ * Return a message of a frame with its valid parts; null for an invalid one.
  *
  * @param {unknown} message
- * @param {Readonly<Record<string, Output>>} outputs those that are bound in its cell
+ * @param {Readonly<Record<string, Output>>} outputs bound outputs of its cell
  * @returns {Said | null}
  */
 export function heard(message, outputs) {
@@ -214,7 +214,7 @@ export function heard(message, outputs) {
 }
 
 /**
- * The same, of what has to do with hands.
+ * The same, for messages about held controls.
  *
  * @param {Record<string, unknown>} message
  * @param {Output | undefined} bound
@@ -247,7 +247,7 @@ function gripped(message, bound) {
 }
 
 /**
- * Return what a frame may know of a topic: of what its cell is bound to, and no addresses.
+ * Return the part of a topic that a frame may know: only for its bindings, and without addresses.
  *
  * @param {keyof Topics} what
  * @param {any} news

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * What a widget in a frame is given: the same as in the page, through the frame's port.
+ * The context of a widget in a frame: the same interface as in the page, through the frame's port.
  *
  * @typedef {import("./frame.js").Frame} Frame
  * @typedef {import("../core/types.js").Context} Context
@@ -16,9 +16,9 @@ import { Decoder } from "../widgets/picture.js";
 import { loadStyle } from "../widgets/style.js";
 
 const MOST_KEPT = 20_000;
-/** What a frame is told of; the log and what is watched are not among it, for they tell of the whole robot. */
+/** Topics for frames. The log and the alarm statistics are missing: they concern the whole robot. */
 const TOLD = ["links", "lease", "alarms", "latency", "sequences", "theme"];
-/** What people may want with the controls by a program that is not ours. */
+/** Requests about the controls that a third-party widget may send. */
 const WISHES = ["take", "ask", "leave"];
 
 /**

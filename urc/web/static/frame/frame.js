@@ -1,9 +1,9 @@
 // @ts-check
 /**
- * Inside the frame of a foreign widget: its whole world. Talks to the page through one port.
+ * The code inside the frame of a third-party widget. It talks to the page through one port.
  *
- * The widget's code shares this document, so nothing here is trusted by the page; it is here that
- * well-meant widgets find what they are used to.
+ * The widget's code shares this document, so the page trusts nothing from here. This code gives
+ * widgets the interface that they have in the page.
  *
  * @typedef {import("../core/types.js").Instance} Instance
  * @typedef {import("../core/types.js").Outlet} Outlet
@@ -15,18 +15,18 @@ import { contextOf } from "./context.js";
 import { Grips } from "./grips.js";
 import { part, t } from "../widgets/kit.js";
 
-/** Where this code comes from, as all of a frame's does: it has no cookies, and no other way to it. */
+/** Base URL of all code of the frame: a frame sends no cookies, so its path holds a secret. */
 const PLACE = new URL("../..", import.meta.url);
 
-/** @param {string} url of a module, as our pages load it */
+/** @param {string} url URL of a module in our pages */
 function below(url) {
   return new URL(url.replace(/^\//, ""), PLACE).href;
 }
 
-/** A widget that is slow gets its news so often. */
+/** Interval of updates for a slow widget. */
 const SLOW_EVERY_MS = 1000;
 
-/** The markup of templates, which the server rendered; there is no second policy. */
+/** Policy for the markup that the server rendered; no second policy can be made. */
 const markup = /** @type {any} */ (globalThis).trustedTypes?.createPolicy("urc", {
   createHTML: (/** @type {string} */ html) => html,
 });
@@ -34,7 +34,7 @@ const markup = /** @type {any} */ (globalThis).trustedTypes?.createPolicy("urc",
 export class Frame {
   /** @param {MessagePort} port */
   constructor(port) {
-    // Kept as it is now: the widget may change what is on the prototype.
+    // Bound now: the widget may change the prototype later.
     this.say = port.postMessage.bind(port);
     this.el = part(document, "[data-frame]");
     this.end = new AbortController();
@@ -56,7 +56,7 @@ export class Frame {
     this.units = {};
     /** @type {unknown} */
     this.memory = null;
-    /** From the page's clock to this frame's. */
+    /** Offset from the page's clock to this frame's. */
     this.shiftS = 0;
     /** @type {Map<number, {resolve: (values: any) => void, reject: (error: Error) => void}>} */
     this.waiting = new Map();
@@ -70,7 +70,7 @@ export class Frame {
     this.say({ t: "ready" });
   }
 
-  /** STOP must be reached from here, too. */
+  /** Forward the keys of STOP to the page. */
   watchKeys() {
     addEventListener("keydown", (event) => {
       if (event.code === "Escape" && !event.repeat) this.say({ t: "stop" });
@@ -158,7 +158,7 @@ export class Frame {
   }
 
   /**
-   * Let what a listener throws be told to the page.
+   * Report an exception of a listener to the page.
    *
    * @template T
    * @param {(news: T) => void} listener
@@ -218,7 +218,7 @@ export class Frame {
   /**
    * @param {string} what
    * @param {(news: any) => void} listener
-   * @param {boolean} isTold whether the page tells it unasked
+   * @param {boolean} isTold whether the page sends it without a request
    */
   follow(what, listener, isTold = false) {
     const topic = this.topics.get(what) ?? { news: null, isKnown: false, listeners: [] };
@@ -250,7 +250,7 @@ function showTheme(name) {
 }
 
 /**
- * Put the files that the page has handed over in the place of their addresses.
+ * Replace URLs of files by those of the blobs that the page has sent.
  *
  * @param {Record<string, unknown>} options
  * @param {Record<string, Blob>} files

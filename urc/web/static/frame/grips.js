@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * What can be gripped in a frame. The page feels the hands; here is told where the grips are, and
- * what a hand means.
+ * The held controls of a frame. The page handles the input; this module reports the places of the
+ * controls, and samples the widget.
  *
  * @typedef {import("./frame.js").Frame} Frame
  * @typedef {import("../core/types.js").GateSpec} GateSpec
@@ -10,7 +10,7 @@
  */
 
 const LOOK_EVERY_MS = 250;
-/** What a hand may press inside of a grip, where the widget says that it takes no hold there. */
+/** Elements that stay clickable inside a held control, where the widget's `isFree` says so. */
 const PRESSED = "a, button, input, select, textarea, [role=button]";
 
 export class Grips {
@@ -21,7 +21,7 @@ export class Grips {
     this.holds = new Map();
     /** @type {Map<number, GateSpec>} */
     this.gates = new Map();
-    /** Further elements in which the keys of a grip count. @type {Map<number, {el: HTMLElement}>} */
+    /** Further elements that accept the keys of a held control. @type {Map<number, {el: HTMLElement}>} */
     this.more = new Map();
     this.count = 0;
     this.placed = "";
@@ -62,11 +62,11 @@ export class Grips {
     }
     this.count += 1;
     el.dataset["focusable"] = String(el.tabIndex >= 0);
-    el.tabIndex = -1; // the page's element over it takes the focus
+    el.tabIndex = -1; // the page's overlay takes the focus
     return this.count;
   }
 
-  /** Tell where everything is, when that has changed. */
+  /** Report the places of all elements after a change. */
   place() {
     if (this.count === 0) return;
     /** @type {[number, Pick<HoldSpec, "el" | "isFree" | "page">][]} */
@@ -138,7 +138,7 @@ function justEl([id, { el }]) {
 }
 
 /**
- * Return what of an element takes the focus: it, or what is in it.
+ * Return the focusable element: the element itself, or one inside it.
  *
  * @param {HTMLElement} el
  */

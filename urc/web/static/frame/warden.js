@@ -1,11 +1,10 @@
 // @ts-check
 /**
- * The page's side of a foreign widget: its frame, and what passes in and out of it.
+ * The page's side of a third-party widget: its frame, and the messages in and out of it.
  *
- * The frame has no origin, so it reaches nothing of the page; it has one port, whose messages are
- * looked at by `border.js`. It gets the readings and outputs of its cell, and may give the commands
- * that are bound there. When it throws, floods, goes elsewhere or stops answering, it is taken out
- * and its cell becomes a card.
+ * The frame has no origin, so it cannot reach the page. It has one port, whose messages `border.js`
+ * checks. It gets the readings and outputs of its cell, and may run the bound commands. A frame that
+ * throws, floods, navigates or stops responding is removed, and its cell shows a card.
  *
  * @typedef {import("../widgets/cell.js").Doors} Doors
  * @typedef {import("../live/store.js").Store} Store
@@ -24,18 +23,18 @@ import { TICK_MS, Watch } from "./watch.js";
 import { filesOf } from "./warden_files.js";
 import { Overlays } from "./warden_grips.js";
 
-/** A frame that has not come up by then never will. */
+/** Time limit for the start of a frame. */
 const COMING_MS = 20_000;
 const LOADING_MS = 5000;
 const PADS_EVERY_MS = 50;
-/** Presses of STOP a second: one is enough. */
+/** Presses of STOP a second; further ones have no use. */
 const MOST_STOPS = 5;
-/** Messages a second to the page itself. Extensions of the browser may say something, widgets have a port. */
+/** Messages a second to the page itself. Browser extensions may send some; widgets have a port. */
 const MOST_ASIDE = 20;
 
-/** Those whose frames may speak to the page. @type {Set<Warden>} */
+/** Wardens whose frames may send messages to the page. @type {Set<Warden>} */
 const wardens = new Set();
-// First of all listeners, and without a look at what was said: a flood costs next to nothing.
+// The first of all listeners, without a look at the content: a flood costs little.
 addEventListener("message", (event) => {
   for (const warden of wardens) {
     if (event.source !== warden.frameEl?.contentWindow) continue;
@@ -58,7 +57,7 @@ export class Warden extends Cell {
   constructor(el, doors) {
     super(el, doors);
     this.isForeign = true;
-    /** Whether it pressed STOP by itself, and nobody has touched it since. */
+    /** Whether it pressed STOP itself, without an operator's touch since. */
     this.hasStopped = false;
     this.html = el.dataset["html"] ?? "";
     this.url = el.dataset["frame"] ?? "";
@@ -70,14 +69,14 @@ export class Warden extends Cell {
     this.life = new AbortController();
     this.overlays = new Overlays(this);
     this.memory = memoryOf(this.config.slot);
-    /** Whether it has begun what it has not ended. */
+    /** Whether it has reported the start of work, and not the end. */
     this.isAtWork = false;
     this.strikes = 0;
-    /** Whether a person has brought the focus here. */
+    /** Whether the operator has moved the focus here. */
     this.isUsed = false;
-    /** Whether what was sent last is not drawn yet. */
+    /** Whether the last update is not drawn yet. */
     this.isFull = false;
-    /** Edition of the store whose units were told. */
+    /** Edition of the store at the last report of units. */
     this.toldEdition = -1;
     this.isUp = false;
     this.messages = new Rate(MOST_MESSAGES);
@@ -86,7 +85,7 @@ export class Warden extends Cell {
     this.stops = new Rate(MOST_STOPS);
     /** @type {Set<string>} */
     this.followed = new Set();
-    /** Files that its options name. @type {Record<string, Blob>} */
+    /** Files in its options. @type {Record<string, Blob>} */
     this.files = {};
     /** @type {() => void} */
     this.settled = () => {};
@@ -106,7 +105,7 @@ export class Warden extends Cell {
     await standing;
   }
 
-  /** Make a frame, and let the widget come up in it. */
+  /** Make a frame, and start the widget in it. */
   enter() {
     if (this.end.signal.aborted) return;
     this.life = new AbortController();
@@ -147,28 +146,28 @@ export class Warden extends Cell {
     const { port1, port2 } = new MessageChannel();
     this.port = port1;
     port1.addEventListener("message", (event) => {
-      // Counted before it is unpacked: a flood costs next to nothing.
+      // Counted before it is decoded: a flood costs little.
       if (this.messages.take(performance.now())) this.take(event.data);
       else this.fail(new Error(t("it floods the page with messages")));
     }, { signal: this.life.signal });
     port1.start();
-    // A frame without an origin has no name to be addressed by; nothing secret is said here.
+    // A frame without an origin cannot be addressed by name; this message has no secret.
     frame.contentWindow?.postMessage({ t: "port" }, "*", [port2]);
   }
 
-  /** It said something to the page, past its port. */
+  /** Count a message to the page that bypasses the port. */
   aside() {
     if (!this.asides.take(performance.now())) this.fail(new Error(t("it floods the page with messages")));
   }
 
-  /** A frame may take the focus with a hand, and not by itself. */
+  /** Take back the focus if the frame took it without the operator. */
   keepFocus() {
     if (document.activeElement !== this.frameEl) this.isUsed = false;
     else if (this.isTouched()) this.isUsed = true;
     else if (!this.isUsed) this.frameEl?.blur();
   }
 
-  /** Whether a person has just done something in the frame. */
+  /** Whether the operator has just touched the frame. */
   isTouched() {
     return document.activeElement === this.frameEl && navigator.userActivation?.isActive !== false;
   }
@@ -215,7 +214,7 @@ export class Warden extends Cell {
   }
 
   /**
-   * Do what the widget asks for.
+   * Perform a request of the widget.
    *
    * @param {Said} message
    */
@@ -259,9 +258,9 @@ export class Warden extends Cell {
     }
   }
 
-  /** A hand may press STOP as often as it likes; the widget by itself once, so that a reset holds. */
+  /** Press STOP. The operator may do so any time; the widget by itself once, so that a reset holds. */
   stop() {
-    // Escape is no activation for browsers: the focus that a hand brought counts as one.
+    // Browsers do not count Escape as an activation; the operator's focus counts instead.
     const isByHand = this.isTouched() || (this.isUsed && document.activeElement === this.frameEl);
     if (!isByHand && this.hasStopped) return;
     if (!this.stops.take(performance.now())) return;
@@ -270,7 +269,7 @@ export class Warden extends Cell {
     this.doors.stop.press();
   }
 
-  /** The frame listens: hand the widget over. */
+  /** Send the widget to its frame, which is ready. */
   begin() {
     const { config, doors } = this;
     this.isUp = true;
@@ -293,7 +292,7 @@ export class Warden extends Cell {
     });
   }
 
-  /** In which unit people want to see each input. */
+  /** Return the displayed unit of each input. */
   unitsTold() {
     const { store } = this.doors;
     const pairs = this.inputs.map((bound) => {
@@ -313,7 +312,7 @@ export class Warden extends Cell {
    * @param {() => void} work
    */
   measured(_, work) {
-    work(); // what takes time here is ours; the frame measures its own
+    work(); // the frame measures its own time
   }
 
   /**
@@ -323,7 +322,7 @@ export class Warden extends Cell {
    * @param {boolean} isOutputNews
    */
   call(readings, changed, outlets, isOutputNews) {
-    this.size = null; // the frame sees its own
+    this.size = null; // the frame measures its own size
     if (changed.length === 0 && !isOutputNews) return;
     const { edition } = this.doors.store;
     const units = edition === this.toldEdition ? null : this.unitsTold();
@@ -376,11 +375,11 @@ export class Warden extends Cell {
     try {
       this.memory.write(JSON.parse(text));
     } catch (error) {
-      console.info(`widget ${this.config.widget}:`, error); // it was told so in its frame
+      console.info(`widget ${this.config.widget}:`, error); // the frame got the error, too
     }
   }
 
-  // -- what the watch asks for
+  // -- called by the watchdog
 
   get isBusy() {
     return this.isAtWork || this.overlays.isOwed;
@@ -388,7 +387,7 @@ export class Warden extends Cell {
 
   /** @param {number} n */
   ping(n) {
-    this.keepFocus(); // no event tells that it goes from one frame to another
+    this.keepFocus(); // no event reports a move from one frame to another
     this.post({ t: "ping", n });
   }
 
@@ -396,7 +395,7 @@ export class Warden extends Cell {
     this.fail(new Error(t("it stopped answering")));
   }
 
-  /** Take the frame out; what it held is let go. */
+  /** Remove the frame; its held controls are released. */
   leave() {
     watch.remove(this);
     wardens.delete(this);
@@ -410,7 +409,7 @@ export class Warden extends Cell {
     this.isAtWork = false;
     this.isFull = false;
     this.followed.clear();
-    this.edition = -1; // whoever comes back is told everything
+    this.edition = -1; // a new frame gets all values
     this.seenOutlets = null;
     this.remark(t("◌ begins anew: another widget had stopped it"));
   }

@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * Files that a document names for a foreign widget: its frame may load nothing of a robot itself,
- * so the page hands them over.
+ * Files in the options of a third-party widget. Its frame may load nothing of a robot, so the page
+ * passes them in.
  */
 
 const FILE = /^\/robots\/[^/]+\/files\//;
@@ -10,7 +10,7 @@ const MOST_BYTES = 16 << 20;
 const WITHIN_MS = 15_000;
 
 /**
- * Whether it is the address of a robot's file: one that leads there without any detour.
+ * Whether a text is the URL of a robot's file, in its canonical form.
  *
  * @param {string} text
  */
@@ -19,7 +19,7 @@ function isFile(text) {
 }
 
 /**
- * Return address → file, for each that the options name; those that cannot be had are left out.
+ * Return URL → file, for each file in the options; missing ones are left out.
  *
  * @param {Readonly<Record<string, unknown>>} options
  * @param {AbortSignal} signal

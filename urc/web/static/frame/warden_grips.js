@@ -1,11 +1,11 @@
 // @ts-check
 /**
- * What hands hold of a foreign widget. The page itself feels the hand: where the widget says that
- * something can be gripped, an element of the page lies over its frame, and takes pointers, keys and
- * gamepads as any other grip. The widget is told where the hand is, and says what that means.
+ * Held controls of third-party widgets. The page handles the input itself. An overlay of the page covers
+ * each control of the frame, and takes pointers, keys and gamepads like any held control. The widget
+ * gets the input, and replies with values.
  *
- * So no frame can drive by itself: without a hand on the page nothing is sent, whatever it says, and
- * with one only for as long as it answers.
+ * So a frame cannot drive by itself: without input on the page nothing is sent, and during a hold only
+ * while the widget replies.
  *
  * @typedef {import("./border.js").Place} Place
  * @typedef {import("./border.js").Said} Said
@@ -14,11 +14,11 @@
  * @typedef {import("./warden.js").Warden} Warden
  */
 
-/** What a hand means, the widget has to say again within this time; else it means nothing. */
+/** Time limit for the widget's reply to an input; later its values no longer count. */
 const SILENT_MS = 150;
 const MOST_GRIPS = 16;
 
-/** One element over a frame. */
+/** One overlay over a frame. */
 class Overlay {
   /**
    * @param {Warden} warden
@@ -29,24 +29,24 @@ class Overlay {
     this.id = id;
     this.el = document.createElement("div");
     this.el.className = "urc-grip";
-    this.el.hidden = true; // until it is known where it is
+    this.el.hidden = true; // until its place is known
     this.el.setAttribute("role", "application");
     /** @type {"none" | "free"} */
     this.page = "none";
     /** @type {Hand | null} */
     this.hand = null;
-    /** What the widget made of this hand; null before it has said so. @type {Record<string, Value> | null} */
+    /** The widget's values for this input; null before the first reply. @type {Record<string, Value> | null} */
     this.values = null;
     this.asked = 0;
-    /** First question of this gesture. */
+    /** Number of the first request of this gesture. */
     this.first = 0;
     this.answered = 0;
-    /** Since when the widget owes an answer. */
+    /** Time of the oldest request without reply. */
     this.owedMs = 0;
   }
 
   /**
-   * What the hand means, as the widget said last.
+   * Return the widget's last values for the input.
    *
    * @param {Hand} hand
    * @param {number} dtS
@@ -110,7 +110,7 @@ export class Overlays {
     this.all = new Map();
   }
 
-  /** Whether a hand was told of that is not answered yet. */
+  /** Whether a request waits for its reply. */
   get isOwed() {
     return [...this.all.values()].some(({ asked, answered }) => asked > answered);
   }
@@ -127,7 +127,7 @@ export class Overlays {
 
   /**
    * @param {number} id
-   * @returns {Overlay | null} null when there are enough, or there is one of that number
+   * @returns {Overlay | null} null if there are too many, or the number is in use
    */
   made(id) {
     if (this.all.has(id) || this.all.size >= MOST_GRIPS) return null;
@@ -149,7 +149,7 @@ export class Overlays {
     const overlay = bound && this.made(id);
     if (!bound || !overlay) return;
     const more = keysOn.flatMap((other) => this.made(other)?.el ?? []);
-    for (const el of more) el.style.pointerEvents = "none"; // for the focus, and keys
+    for (const el of more) el.style.pointerEvents = "none"; // only for focus and keys
     const tapped = taps.map((code) => [code, () => warden.post({ t: "tap", id, code })]);
     warden.doors.input.hold(
       bound,
@@ -161,7 +161,7 @@ export class Overlays {
         pace: (way) => warden.post({ t: "pace", id, way }),
         page: () => overlay.page,
         sample: (hand, dtS) => overlay.sample(hand, dtS),
-        // What the frame has not answered yet was not sampled: it is no empty sample.
+        // Without a reply there is no sample, which differs from an empty sample.
         show: (state) => warden.post({ t: "held", id, state: overlay.values ? state : { ...state, values: null } }),
       },
       warden.life.signal,

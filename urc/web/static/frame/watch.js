@@ -1,64 +1,64 @@
 // @ts-check
 /**
- * Finds frames that do not answer, and the one to blame. Knows no DOM.
+ * The watchdog of frames: it finds frames that do not respond, and the one at fault. It knows no DOM.
  *
- * A browser may run all frames without an origin in one process. Then one that never ends silences
- * the others with it, and nothing frees them while any of them is left: so all are taken out, the
- * one that was at work when it became silent is ended, and the others begin anew.
+ * A browser may run all frames without an origin in one process. An endless loop in one of them then
+ * blocks them all, and the process stays while any of them exists. So all are removed. The frame that
+ * was at work ends, and the others start again.
  *
  * @typedef {object} Watched
- * @property {boolean} isBusy It said that it begins something, and not that this has ended.
- * @property {boolean} isUp It can answer.
+ * @property {boolean} isBusy Whether it has reported the start of work, and not the end.
+ * @property {boolean} isUp Whether it can respond.
  * @property {boolean} isMounted
- * @property {number} strikes How often it was silent together with others.
+ * @property {number} strikes Number of times that it was silent together with others.
  * @property {(n: number) => void} ping
- * @property {() => void} accuse It stopped answering: its cell becomes a card.
- * @property {() => void} leave It is taken out, to come back.
- * @property {() => void} enter It comes back.
+ * @property {() => void} accuse Ends it, because it stopped responding: its cell shows a card.
+ * @property {() => void} leave Removes it for a restart.
+ * @property {() => void} enter Restarts it.
  */
 
 export const TICK_MS = 250;
-/** Ticks without an answer, on a page that was not late itself. */
+/** Ticks without a response after which a frame is silent, on a page that was not delayed. */
 const SILENT_TICKS = 8;
-/** Ticks without an answer that make a frame one of those who are silent with another. */
+/** Ticks without a response after which a frame counts as silent together with others. */
 const QUIET_TICKS = 4;
-/** A page that was held up for longer cannot tell who was late. */
+/** Delay of the page itself above which a tick proves nothing. */
 const LATE_MS = 2 * TICK_MS;
-/** So often a frame may be silent with others when nobody knows who is to blame. */
+/** Number of times that a frame may be silent with others, without a culprit. */
 const MOST_STRIKES = 3;
 /**
- * A browser keeps a process for a while for whoever comes next, also one that never ends: so long
- * nobody comes back, and longer each time that it was not enough.
+ * Pause before restarts. A browser may reuse a blocked process for a while, so the pause grows each time
+ * that it was too short.
  */
 const PAUSE_TICKS = 12;
 const MOST_PAUSE_TICKS = 48;
-/** Ticks that one of those who come back has before the next one comes: to load, and to stand. */
+/** Ticks for one frame to load and mount, before the next one restarts. */
 const LOAD_TICKS = 40;
 const STAND_TICKS = 8;
 
 export class Watch {
   constructor() {
-    /** Frame → ticks since it was asked something that it has not answered. @type {Map<Watched, number>} */
+    /** Frame → ticks since its first unanswered ping. @type {Map<Watched, number>} */
     this.waiting = new Map();
-    /** Those who are to come back. @type {Watched[]} */
+    /** Frames that wait for a restart. @type {Watched[]} */
     this.queue = [];
-    /** The one that has its turn. @type {Watched | null} */
+    /** The frame that is restarting. @type {Watched | null} */
     this.coming = null;
     this.turnTicks = 0;
-    /** Ticks before the first of them comes back. */
+    /** Remaining ticks of the pause. */
     this.pauseTicks = 0;
-    /** How long that will be when all are taken out the next time. */
+    /** Length of the next pause, in ticks. */
     this.empty = PAUSE_TICKS;
     this.lastMs = -Infinity;
     this.asked = 0;
   }
 
-  /** It begins to come up. @param {Watched} one */
+  /** Add a frame at its start. @param {Watched} one */
   add(one) {
     this.waiting.set(one, 0);
   }
 
-  /** It is gone, for good or to come back. @param {Watched} one */
+  /** Remove a frame. @param {Watched} one */
   remove(one) {
     this.waiting.delete(one);
     this.queue = this.queue.filter((other) => other !== one);
@@ -71,25 +71,25 @@ export class Watch {
   }
 
   /**
-   * To be called every TICK_MS, while the page can be seen.
+   * Check all frames; called every TICK_MS while the page is visible.
    *
    * @param {number} nowMs
    */
   tick(nowMs) {
     const gapMs = nowMs - this.lastMs;
     this.lastMs = nowMs;
-    if (gapMs > LATE_MS) return; // so were the frames, perhaps
+    if (gapMs > LATE_MS) return; // the frames may have been delayed, too
     this.asked += 1;
     this.turn();
     for (const [one, ticks] of this.waiting) {
-      if (!one.isUp) continue; // how long it takes to load, others look after
+      if (!one.isUp) continue; // loading has its own time limit
       this.waiting.set(one, ticks + 1);
       if (ticks === 0) one.ping(this.asked);
     }
     if ([...this.waiting.values()].some((ticks) => ticks > SILENT_TICKS)) this.judge();
   }
 
-  /** Let the next one come back, when the one before it stands. */
+  /** Restart the next frame, once the one before it is mounted. */
   turn() {
     this.turnTicks += 1;
     if (this.turnTicks < this.pauseTicks) return;
@@ -97,7 +97,7 @@ export class Watch {
     if (coming && !coming.isMounted) {
       if (this.turnTicks < (coming.isUp ? STAND_TICKS : LOAD_TICKS)) return;
       if (!coming.isUp && this.empty <= MOST_PAUSE_TICKS) {
-        this.clear([]); // it was put where the last one never ends
+        this.clear([]); // it landed in the blocked process
         return;
       }
     }
@@ -109,7 +109,7 @@ export class Watch {
   }
 
   /**
-   * Take all out, and let those who are not guilty come back after a while.
+   * Remove all frames, and restart those without fault after a pause.
    *
    * @param {Watched[]} guilty
    */
@@ -130,17 +130,17 @@ export class Watch {
     if (guilty.length === 0) for (const one of silent) one.strikes += 1;
     guilty.push(...silent.filter((one) => one.strikes >= MOST_STRIKES && !guilty.includes(one)));
     for (const one of guilty) one.accuse();
-    // The others have answered, so it has a process of its own.
+    // The others have responded, so it has a process of its own.
     if (silent.length === 1 && all.every(([one]) => one === silent[0] || one.isUp)) return;
     this.clear(guilty);
   }
 }
 
 /**
- * Return who is to blame: who is alone, who was at work, or who was only coming up.
+ * Return the frame at fault: the only one, the one at work, or the one that is starting.
  *
  * @param {Watched[]} silent
- * @returns {Watched[]} one at most
+ * @returns {Watched[]} at most one
  */
 function blamed(silent) {
   const busy = silent.filter(({ isBusy }) => isBusy);

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Tells a screen reader when a value passes a limit, once; never each new value.
+ * Announces once to a screen reader that a value exceeds a limit, without repeats for new values.
  *
  * @typedef {import("../core/types.js").Alarm} Alarm
  * @typedef {import("./store.js").Store} Store
@@ -17,7 +17,7 @@ export class Alarms {
     this.el = el;
     /** @type {Map<string, Alarm>} */
     this.told = new Map();
-    /** Whether any value was past a limit when they were looked at last. */
+    /** Whether any value exceeded a limit at the last check. */
     this.isAny = false;
   }
 

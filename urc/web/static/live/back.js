@@ -1,19 +1,19 @@
 // @ts-check
 /**
- * Back: what moves is let go and stopped, the controls are given back, then the page is left. The line
- * to the robot closes a moment later, when no other page looks at it.
+ * Back: release and stop all motion, give back the controls, then leave the page. The robot disconnects
+ * a moment later, unless another page watches it.
  *
- * The link works without this, too: a page that goes away is stopped by the server. Here the stop is
- * seen through while somebody still looks.
+ * The link also works without this module: the server stops the robot of a page that is gone. With it,
+ * the operator still sees the stop.
  *
  * @typedef {object} Doors
- * @property {() => void} letGo lets go of whatever is held
+ * @property {() => void} letGo releases all held controls
  * @property {() => boolean} isMine whether this page has the controls
- * @property {() => void} leave gives them back, which stops the robot first
- * @property {() => void} close ends the page's line
+ * @property {() => void} leave gives back the controls, which first stops the robot
+ * @property {() => void} close closes the page's socket
  */
 
-/** A server that does not answer by then is left all the same: it stops when the page is gone. */
+/** Time limit for the server's reply; the page leaves without it, and the server stops the robot. */
 const WITHIN_MS = 600;
 const LOOK_MS = 20;
 
@@ -24,7 +24,7 @@ const LOOK_MS = 20;
 export function backSafely(link, doors) {
   let isLeaving = false;
   link.addEventListener("click", (event) => {
-    // Another tab, another window: this page stays.
+    // Opens in another tab or window: this page stays.
     if (event.defaultPrevented || event.button !== 0 || event.ctrlKey || event.metaKey || event.shiftKey) return;
     event.preventDefault();
     if (isLeaving || !(link instanceof HTMLAnchorElement)) return;

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The link badge: one word on whether what is on the screen is live, and the round trip.
+ * The link badge: one word about the state of the links, and the round-trip time.
  *
  * @typedef {import("../core/types.js").Link} Link
  * @typedef {import("./store.js").Store} Store
@@ -13,7 +13,7 @@ import { t } from "../core/words.js";
 
 const CAUTION_MS = 100;
 const POOR_MS = 250;
-/** From worst to best: the worst link decides. @type {Link["state"][]} */
+/** Link states from worst to best: the worst link decides. @type {Link["state"][]} */
 const WORST_FIRST = ["lost", "silent", "connecting", "idle", "live"];
 
 export class Badge {
@@ -31,7 +31,8 @@ export class Badge {
    */
   frame(store, socket) {
     let [sign, text] = summary(store, socket.failures > 0);
-    if (this.isReplay && sign === "good") [sign, text] = ["replay", t("Replay")]; // nothing of it is live
+    // A playback is never live.
+    if (this.isReplay && sign === "good") [sign, text] = ["replay", t("Replay")];
     if (this.el.dataset["state"] !== sign) this.el.dataset["state"] = sign;
     write(this.text, text);
     const [quality, figure] = tripOf(socket.tripMs);

@@ -1,9 +1,9 @@
 // @ts-check
 /**
- * Signals of which each reading counts: which ones are new, how many were lost, and who hears them.
+ * Signals whose every reading is sent: new readings, number of lost ones, and listeners.
  *
- * The server numbers the readings of such signals. After a cut it tells the newest one again, and by
- * its number that is known; a number that is left out was lost on the way. Knows no page.
+ * The server numbers their readings. After a reconnect it repeats the newest one, which its number shows;
+ * a gap in the numbers means loss. It knows no page.
  */
 
 export class Each {
@@ -16,7 +16,7 @@ export class Each {
   }
 
   /**
-   * The server says in which session of the robot it counts; in another one numbers begin again.
+   * Start a session of the robot; in a new one the numbers begin again.
    *
    * @param {string} session
    */
@@ -28,10 +28,10 @@ export class Each {
   /**
    * Take the next reading of a signal in a frame.
    *
-   * @param {Record<number, number> | undefined} numbers of the next one, by index; counted up
+   * @param {Record<number, number> | undefined} numbers number of the next reading by index; incremented
    * @param {number} index
    * @param {string} name
-   * @returns {number} how many were lost before it; -1 when it is known already
+   * @returns {number} number of lost readings before it; -1 for a known reading
    */
   take(numbers, index, name) {
     const number = numbers?.[index];
@@ -47,7 +47,7 @@ export class Each {
    * Call a listener for each new reading of a signal, as soon as the page has it.
    *
    * @param {string} name
-   * @param {(missed: number) => void} listener is told how many were lost before it
+   * @param {(missed: number) => void} listener gets the number of lost readings before it
    * @param {AbortSignal} signal
    */
   listen(name, listener, signal) {

@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * What the page knows beside signals, told to whoever follows it: at once, and after every change,
- * always in an animation frame. What nobody follows is not looked at.
+ * Data of the page besides signals, for its followers: at once, and after every change, always in an
+ * animation frame. Topics without followers cost nothing.
  *
  * @typedef {import("../core/types.js").Alarm} Alarm
  * @typedef {import("../core/types.js").Alert} Alert
@@ -10,14 +10,14 @@
  * @typedef {import("../core/types.js").Topics} Topics
  * @typedef {import("./store.js").Store} Store
  *
- * @typedef {{[T in keyof Topics]: () => {look: string, value: Topics[T]}}} Sources Each returns what
- *   is known now, and a text that differs when that has changed.
+ * @typedef {{[T in keyof Topics]: () => {look: string, value: Topics[T]}}} Sources Each returns the
+ *   present value, and a text that changes with it.
  */
 
 export class Follows {
   /**
    * @param {Sources} sources
-   * @param {() => void} wake asks for an animation frame
+   * @param {() => void} wake requests an animation frame
    */
   constructor(sources, wake) {
     this.sources = sources;
@@ -68,7 +68,7 @@ export class Log {
   }
 
   /**
-   * After a reconnect the server tells the latest again: those that are known are skipped.
+   * Add lines; known lines, which the server repeats after a reconnect, are skipped.
    *
    * @param {readonly Line[]} lines
    * @param {number} first number of the first one in its session, from 0
@@ -101,7 +101,7 @@ export class Log {
 /** @type {Record<Alarm, number>} */
 const RANKS = { "": 9, lolo: 0, hihi: 0, low: 1, high: 1 };
 
-/** Which signals are past a limit, and since when. */
+/** The signals beyond a limit, with the start of each alarm. */
 export class Alerts {
   constructor() {
     /** @type {Map<string, {alarm: Alarm, since: number}>} */
@@ -132,8 +132,8 @@ export class Alerts {
 }
 
 /**
- * Return how many signals have a limit, and how many of them are known now: of the others nobody can
- * say that they are within it.
+ * Return the number of signals with a limit, and of those with a known value. The others may be beyond
+ * their limit.
  *
  * @param {Store} store
  * @param {number} nowMs
@@ -145,7 +145,7 @@ export function watched(store, nowMs) {
   return { look: JSON.stringify(value), value };
 }
 
-/** Tells when the colours of the page have changed: by choice, or with the device. */
+/** Reports changes of the page's colours: by choice, or by the system. */
 export class Themes {
   /** @param {() => void} wake */
   constructor(wake) {

@@ -1,8 +1,8 @@
 // @ts-check
 /**
- * Binary messages of the server: one image, or whatever bytes a signal holds. See `urc/web/wire/picture.py`.
+ * Binary messages of the server: one image, or bytes of a signal. See `urc/web/wire/picture.py`.
  *
- *     0  u8   1: a picture            4  u32  its age in milliseconds when it was sent
+ *     0  u8   1: an image             4  u32  its age in milliseconds at the moment of sending
  *     1  u8   length of the type      8  f64  the server's clock then, in milliseconds
  *     2  u16  index of the signal    16       media type in ASCII, then the bytes
  *
@@ -19,7 +19,7 @@ const HEADER = 16;
 
 /**
  * @param {ArrayBuffer} data
- * @returns {BinaryFrame | null} null for what this page does not know
+ * @returns {BinaryFrame | null} null for an unknown kind
  */
 export function frameOf(data) {
   if (data.byteLength < HEADER) return null;

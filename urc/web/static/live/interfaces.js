@@ -1,21 +1,21 @@
 // @ts-check
 /**
- * Changes to another interface of the robot while the page goes on: the connection stays, and with it
- * every value. What is held is let go first.
+ * Switches to another interface of the robot without a reload: the connection stays, with all values.
+ * Held controls are released first.
  *
- * The server draws an interface as a whole page, whoever asks; here only its stage is taken out of
- * it. So an address leads to the same whether it is opened or changed to.
+ * The server renders each interface as a whole page; this module extracts its grid. So a URL gives the
+ * same interface, opened or switched to.
  *
  * @typedef {object} Doors
  * @property {(reason: string) => void} letGo
- * @property {() => void} leave ends what is on the stage
- * @property {() => void} enter begins what is there now
+ * @property {() => void} leave ends the present interface
+ * @property {() => void} enter starts the new interface
  */
 import { t } from "urc/kit";
 import { part } from "./badge.js";
 
 const FETCH_MS = 10_000;
-/** So long the styles of widgets may take; after that the page is shown as it is. */
+/** Time limit for the styles of widgets; after it the page is shown without them. */
 const STYLES_MS = 3000;
 const KEPT_S = 365 * 24 * 3600;
 
@@ -32,28 +32,28 @@ export class Interfaces {
     if (!(choice instanceof HTMLSelectElement)) throw new Error("the choice is no select");
     this.choice = choice;
     this.current = choice.value;
-    /** What the page's address was when this one was shown, without the place within the page. */
+    /** URL of the page at the last switch, without the fragment. */
     this.address = addressed();
-    /** Of two that are on their way, the last one counts. */
+    /** Number of the last request: it wins over earlier ones. */
     this.round = 0;
     keep(this.current);
-    // The page's own address may name none, and mean another one when it is come back to.
+    // The page's own URL may name no interface; the history entry then stores the present one.
     history.replaceState({ url: this.url }, "");
     choice.addEventListener("change", () => void this.open(this.url, true));
     addEventListener("popstate", ({ state }) => this.moved(state?.url));
   }
 
   /**
-   * The history has gone a step; also a link within the page makes one.
+   * Handle a step in the history; a link within the page also makes one.
    *
-   * @param {string | undefined} url what the step keeps
+   * @param {string | undefined} url URL in the entry
    */
   moved(url) {
     if (addressed() !== this.address) void this.open(url ?? location.href, false);
     else if (!url) history.replaceState({ url: this.urlOf(this.current) }, ""); // as above
   }
 
-  /** Of the interface that is chosen. */
+  /** URL of the present interface. */
   get url() {
     return this.urlOf(this.choice.value);
   }
@@ -65,7 +65,7 @@ export class Interfaces {
 
   /**
    * @param {string} url
-   * @param {boolean} isNew whether the history gets a step
+   * @param {boolean} isNew whether to add a history entry
    */
   async open(url, isNew) {
     this.round += 1;
@@ -107,14 +107,14 @@ export class Interfaces {
   }
 }
 
-/** The page's address without the place within the page. */
+/** Return the URL of the page without the fragment. */
 function addressed() {
   return location.pathname + location.search;
 }
 
 /**
- * Fetch a page as a document. A parser that takes text is closed to scripts here (trusted types);
- * this one is the browser's own, and runs no script of the page.
+ * Fetch a page as a document. Trusted types forbid a parser of text; this one is the browser's own, and
+ * runs no script of the page.
  *
  * @param {string} url
  * @returns {Promise<Document>}
@@ -140,7 +140,7 @@ function fetched(url) {
 }
 
 /**
- * Add the styles of widgets that the page has not loaded yet, and wait until they are there.
+ * Add the missing styles of widgets, and wait until they have loaded.
  *
  * @param {Document} page
  */
@@ -169,7 +169,7 @@ async function styled(page) {
 }
 
 /**
- * Keep which interface this device shows, for the next time that the robot is opened.
+ * Store the interface as this device's choice for the next visit.
  *
  * @param {string} name
  */

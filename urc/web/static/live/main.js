@@ -24,14 +24,14 @@ import { Store } from "./store.js";
 import { offerSystems } from "../core/units.js";
 import { said, t } from "../core/words.js";
 
-/** What the server says of a stop that nobody's hand made. @type {Record<string, string>} */
+/** Reasons of stops without an operator. @type {Record<string, string>} */
 const STOPPED = {
   expired: t("too long without a sign of this page"),
   revoked: t("the line to the robot was cut"),
 };
-/** So long a yes counts before the server has heard of it. */
+/** Time for which a confirmation waits for the server. */
 const MEANT_MS = 5000;
-/** How often ages are looked at when nothing arrives. */
+/** Interval for checking ages without new data. */
 const AGE_EVERY_MS = 250;
 
 const root = part(document, "[data-robot]");
@@ -42,11 +42,11 @@ const alarms = new Alarms(part(root, "[data-alarms]"));
 
 /** @type {Map<number, {resolve: (values: Record<string, Value>) => void, reject: (error: Error) => void}>} */
 const waiting = new Map();
-/** Commands that somebody has said yes to, and that wait for their tokens. @type {Map<number, {atMs: number, said: object}>} */
+/** Confirmed commands that wait for their tokens. @type {Map<number, {atMs: number, said: object}>} */
 const meant = new Map();
 let lastId = 0;
 let isFrameDue = false;
-/** Whether more than widgets has to be looked at in the next frame. */
+/** Whether the next frame must draw more than widgets. */
 let isAllDue = false;
 let session = "";
 
@@ -76,7 +76,7 @@ const bar = root.querySelector("[data-controls]");
 const stop = new StopButton(drive, input, store, JSON.parse(root.dataset["lines"] ?? "[]"), bar !== null);
 const asks = new Asks(part(root, ".urc-bar"), (message) => socket.send(message));
 stop.onPressed = forgetQuestions;
-/** Where sequences stand. @type {Record<string, import("../core/types.js").Progress>} */
+/** States of the sequences. @type {Record<string, import("../core/types.js").Progress>} */
 let sequences = {};
 const controls = bar instanceof HTMLElement ? new Controls(bar, drive, stop) : null;
 const log = new Log();
@@ -124,7 +124,7 @@ const tell = (/** @type {string} */ text) => {
   note.textContent = text;
 };
 const AT_THE_DOOR = t("URC was started again: open the address that it printed, then this page goes on.");
-/** Say what to do where the server knows this browser no more; STOP works all the same. */
+/** Show how to get access if the server does not know this browser; STOP still works. */
 function tellOfDoor() {
   if (socket.isShutOut) tell(AT_THE_DOOR);
   else if (note.textContent === AT_THE_DOOR) tell("");
@@ -132,16 +132,16 @@ function tellOfDoor() {
 new FullScreen(root.querySelector("[data-fullscreen]"), tell);
 const wakeLock = new WakeLock(tell);
 const stage = new Stage(root, { store, run, input, asks, host, panel: panel.el, wake });
-/** Which images the server was told to send. */
+/** Images that the server sends, as JSON. */
 let shown = "";
 
-/** Ask for the one animation frame in which everything is drawn. */
+/** Request the animation frame in which everything is drawn. */
 function wake() {
   isAllDue = true;
   wakeWidgets();
 }
 
-/** Ask for it where only readings are new, as most often: the page around the widgets shows none. */
+/** Request it for new readings alone, the usual case: no other part of the page shows them. */
 function wakeWidgets() {
   if (isFrameDue) return;
   isFrameDue = true;
@@ -165,7 +165,7 @@ function draw() {
   wakeLock.want(drive.isMine);
 }
 
-/** Ask for the images that can be seen, and for no others. */
+/** Request the visible images, and no others. */
 function askPictures() {
   const signals = [...host.pictures(), ...stage.pictures()];
   const wanted = JSON.stringify(signals);
@@ -186,7 +186,7 @@ function take(message) {
   switch (message.t) {
     case "v":
       store.values(message, nowMs);
-      if (message.s || alarms.isAny) break; // what is past a limit is told outside of widgets too
+      if (message.s || alarms.isAny) break; // alarms are shown outside of widgets, too
       wakeWidgets();
       return;
     case "hello":
@@ -194,7 +194,7 @@ function take(message) {
       store.hello(message, nowMs);
       session = message.session;
       sequences = {};
-      shown = "[]"; // a new connection sends none until it is asked
+      shown = "[]"; // a new connection sends no images before a request
       break;
     case "links":
       store.setLinks(message.links, nowMs);
@@ -254,7 +254,7 @@ function take(message) {
 /**
  * @param {string} command
  * @param {Record<string, import("../core/types.js").Given>} args
- * @param {import("../control/asks.js").Ticket} [ticket] of the question that was answered first
+ * @param {import("../control/asks.js").Ticket} [ticket] the confirmation of the command
  * @returns {Promise<Record<string, Value>>}
  */
 function run(command, args, ticket) {
@@ -274,7 +274,7 @@ function run(command, args, ticket) {
 }
 
 /**
- * Give what somebody has said yes to, unless that was too long ago.
+ * Send a confirmed command, unless the confirmation is too old.
  *
  * @param {{id: number, token: string}} message
  */
@@ -288,7 +288,7 @@ function give({ id, token }) {
   }
 }
 
-/** STOP was pressed: nobody says yes to what was wished before it, and no yes counts. */
+/** Withdraw questions and confirmations after STOP. */
 function forgetQuestions() {
   const why = t("STOP was pressed meanwhile: give it anew");
   asks.stopped(why);
@@ -304,7 +304,7 @@ function settle(reply) {
   else asked?.reject(new Error(said(reply.message ?? reply.code ?? t("it was not done"))));
 }
 
-/** One command, one answer: without a line there will be none. Nothing is ever sent again. */
+/** Fail pending commands: after the loss of the socket no reply can come. Nothing is ever repeated. */
 function giveUpCommands() {
   for (const { reject } of waiting.values()) {
     reject(new Error(t("the connection to URC was lost; whether it was done is not known")));

@@ -1,8 +1,8 @@
 // @ts-check
 /**
- * The panel beside the grid: every link with its state, and the log.
+ * The panel at the side of the grid: every link with its state, and the log.
  *
- * Robots speak in here, so everything is written as text.
+ * All content is written as text, because it comes from robots.
  *
  * @typedef {import("../core/types.js").Line} Line
  * @typedef {import("../core/types.js").Link} Link
@@ -35,13 +35,13 @@ export class Panel {
     this.log = part(el, "[data-log]");
     this.shown = "";
     this.session = "";
-    /** Number of the next line of the log that is expected. */
+    /** Expected number of the next log line. */
     this.next = 0;
     const wide = matchMedia(WIDE);
     const follow = () => el.toggleAttribute("open", wide.matches);
     wide.addEventListener("change", follow);
     follow();
-    // Below the widgets it unfolds where nobody looks: it comes to where it is seen.
+    // Below the widgets it may open outside of the view: scroll to it.
     const show = () => !wide.matches && el.hasAttribute("open") && el.scrollIntoView({ block: "start" });
     part(el, "summary").addEventListener("click", () => requestAnimationFrame(show));
     document.querySelector("[data-badge-why]")?.addEventListener("click", () => {
@@ -53,7 +53,7 @@ export class Panel {
 
   /**
    * @param {Store} store
-   * @param {string} reason why there is no connection, in the server's words
+   * @param {string} reason why there is no connection, from the server
    */
   frame(store, reason) {
     const links = [...store.links.values()];
@@ -68,8 +68,8 @@ export class Panel {
   }
 
   /**
-   * Take lines of the log, newest last. After a reconnect the server tells the latest again; those
-   * that are shown already are skipped by their number.
+   * Add lines of the log, newest last. After a reconnect the server repeats the latest lines; known ones
+   * are skipped by their number.
    *
    * @param {Line[]} lines
    * @param {number} first number of the first line in its session, from 0

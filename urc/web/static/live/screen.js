@@ -1,10 +1,10 @@
 // @ts-check
 /**
- * The screen of the device: the whole of it for the page, and awake while somebody drives.
+ * The screen of the device: fullscreen mode, and wake lock during control.
  */
 import { t } from "urc/kit";
 
-/** The button that gives the page the whole screen; it is not shown where a browser cannot. */
+/** The button for fullscreen mode; hidden where the browser has none. */
 export class FullScreen {
   /**
    * @param {HTMLElement | null} button
@@ -28,11 +28,11 @@ export class FullScreen {
 }
 
 /**
- * Keeps the screen on while this page has the controls. A browser takes that back whenever the page
- * is hidden, so it is asked again when the page returns.
+ * Keeps the screen on while this page has the controls. A browser revokes the lock whenever the page is
+ * hidden, so the page requests it again when it returns.
  */
 export class WakeLock {
-  /** @param {(text: string) => void} tell told once when the screen may go dark */
+  /** @param {(text: string) => void} tell called once if the screen may go dark */
   constructor(tell) {
     this.tell = tell;
     this.isWanted = false;
@@ -60,7 +60,7 @@ export class WakeLock {
       if (!("wakeLock" in navigator)) throw new Error("no wake lock");
       this.lock = await navigator.wakeLock.request("screen");
     } catch {
-      // Without HTTPS there is none, and a weak battery refuses too. Driving goes on either way.
+      // Browsers refuse without HTTPS and on a weak battery. Driving goes on either way.
       if (!this.wasTold) this.tell(t("The screen may go dark while you drive: this browser does not keep it on."));
       this.wasTold = true;
     } finally {

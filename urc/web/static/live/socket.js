@@ -1,23 +1,23 @@
 // @ts-check
 /**
- * The page's one WebSocket: reconnects by itself, and measures the way there and back.
+ * The page's WebSocket: it reconnects by itself, and measures the round-trip time.
  *
- * A connection is only believed while its pings are answered: a cable that is pulled says nothing.
+ * A connection only counts as up while its pings get replies: a pulled cable causes no event.
  *
  * @typedef {object} Listener
- * @property {(message: any) => void} message A message of the server, in order.
- * @property {(data: ArrayBuffer) => void} [picture] A binary message.
+ * @property {(message: any) => void} message Handles a message of the server, in order.
+ * @property {(data: ArrayBuffer) => void} [picture] Handles a binary message.
  * @property {(isUp: boolean) => void} state Called on every change of `isUp`.
- * @property {() => void} trip A new round trip was measured.
+ * @property {() => void} trip Called after each measurement of the round trip.
  */
 
 const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 5000;
 const PING_EVERY_MS = 1000;
-/** So many ticks in a row may find no answer: three seconds, of a page that runs. A page that was
- * held up has had one tick only, however long that was, and then reads what has come meanwhile. */
+/** Ticks without a reply after which the connection is lost: three seconds of a running page. A page
+ * that was blocked has had one tick only, and then reads the messages that arrived meanwhile. */
 const SILENT_TICKS = 3;
-/** How a server that was started again closes: it knows no browser of before. */
+/** Close code of a restarted server: it knows no earlier browser. */
 const NOT_LET_IN = 4401;
 
 export class Socket {
@@ -28,27 +28,27 @@ export class Socket {
   constructor(url, listener) {
     this.url = url;
     this.listener = listener;
-    /** Round trip in milliseconds; null while unknown. @type {number | null} */
+    /** Round-trip time in milliseconds; null while unknown. @type {number | null} */
     this.tripMs = null;
-    /** What has come since the page was opened. */
+    /** Messages since the opening of the page. */
     this.messages = 0;
     this.bytes = 0;
-    /** How far this device's clock is before URC's, in milliseconds; null while unknown. @type {number | null} */
+    /** Lead of this device's clock over URC's, in milliseconds; null while unknown. @type {number | null} */
     this.skewMs = null;
-    /** Connections lost and attempts failed since the last good one. */
+    /** Lost connections and failed attempts since the last good connection. */
     this.failures = 0;
-    /** Why the server closed, in its words. */
+    /** The server's reason for closing. */
     this.reason = "";
     this.isUp = false;
-    /** Whether the server wants its printed address to be opened first. */
+    /** Whether the user must first open the printed address. */
     this.isShutOut = false;
     /** @type {WebSocket | null} */
     this.line = null;
     this.waitMs = FIRST_WAIT_MS;
     this.isWanted = false;
-    /** When the ping that waits for its answer was sent; 0 when none waits. */
+    /** Time of the pending ping; 0 without one. */
     this.pingedMs = 0;
-    /** Ticks since then. */
+    /** Ticks since the pending ping. */
     this.silent = 0;
     /** @type {number | undefined} */
     this.retry = undefined;
@@ -67,23 +67,23 @@ export class Socket {
     this.lose("");
   }
 
-  /** Try now instead of when the back-off says: the network or the page is back. */
+  /** Skip the backoff: the network or the page is back. */
   hurry() {
     if (this.isWanted && !this.line) this.connect();
   }
 
   /**
    * @param {object} message
-   * @returns {boolean} whether it was handed to the browser
+   * @returns {boolean} whether the browser took it
    */
   send(message) {
-    // The browser may know that it is closing before anybody is told by an event.
+    // The browser may know that the socket is closing before its event.
     if (!this.isUp || !this.line || this.line.readyState !== WebSocket.OPEN) return false;
     this.line.send(JSON.stringify(message));
     return true;
   }
 
-  /** Bytes that were handed to the browser and have not left it. */
+  /** Bytes in the browser's send buffer. */
   get unsent() {
     return this.line?.bufferedAmount ?? 0;
   }
@@ -93,7 +93,7 @@ export class Socket {
     const line = new WebSocket(this.url);
     this.line = line;
     line.binaryType = "arraybuffer";
-    this.pingedMs = performance.now(); // an opening that hangs is given up like a missing pong
+    this.pingedMs = performance.now(); // a hanging handshake times out like a missing pong
     this.silent = 0;
     clearInterval(this.beat);
     this.beat = window.setInterval(() => this.tick(), PING_EVERY_MS);
@@ -122,7 +122,8 @@ export class Socket {
       this.pingedMs = 0;
       this.isUp = true;
       this.listener.state(true);
-      this.listener.message(message); // the first ping waits for `tick`: a page that starts is slow
+      // The first ping waits for `tick`: the page is slow at its start.
+      this.listener.message(message);
     } else if (message.t === "pong") {
       this.tripMs = performance.now() - message.c;
       this.pingedMs = 0;
@@ -162,7 +163,7 @@ export class Socket {
     this.failures += 1;
     this.listener.state(false);
     if (!this.isWanted) return;
-    // Jitter, so that many pages do not come back in the same instant.
+    // Jitter, so that many pages do not reconnect at the same moment.
     this.retry = window.setTimeout(() => this.connect(), this.waitMs * (0.8 + 0.4 * Math.random()));
     this.waitMs = Math.min(this.waitMs * 2, LONGEST_WAIT_MS);
   }

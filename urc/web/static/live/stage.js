@@ -1,14 +1,14 @@
 // @ts-check
 /**
- * What is on the stage of the page: the cells of an interface with its tabs, or the interface for
- * finding faults. Another interface takes its place while the page goes on.
+ * The main area of the page: the cells of an interface with its tabs, or the debug interface. It can
+ * switch interfaces without a reload.
  *
  * @typedef {import("../dev/debug.js").Debug} Debug
  * @typedef {import("../dev/debug.js").Doors} DebugDoors
  *
  * @typedef {object} More
  * @property {import("../widgets/host.js").Host} host
- * @property {HTMLElement} panel a details element; it stands open beside the search for faults
+ * @property {HTMLElement} panel a details element; open next to the debug interface
  * @property {() => void} wake
  */
 import { part } from "./badge.js";
@@ -38,7 +38,7 @@ export class Stage {
     });
   }
 
-  /** Names of the images that can be seen and are no widget's. */
+  /** Return the names of visible images that belong to no widget. */
   pictures() {
     return this.debug?.pictures() ?? [];
   }
@@ -48,7 +48,7 @@ export class Stage {
     this.debug?.frame(nowMs);
   }
 
-  /** Begin what is on the stage now. */
+  /** Start the present interface. */
   enter() {
     const { host, input, wake } = this.doors;
     host.mountAll(this.el);
@@ -58,7 +58,7 @@ export class Stage {
     wake();
   }
 
-  /** @param {HTMLElement} el of the interface for finding faults */
+  /** @param {HTMLElement} el root of the debug interface */
   async search(el) {
     const { Debug } = await import("../dev/debug.js");
     if (!el.isConnected) return; // another interface was opened meanwhile
@@ -69,7 +69,7 @@ export class Stage {
     wake();
   }
 
-  /** End what is on the stage. */
+  /** End the present interface. */
   leave() {
     const { host, panel } = this.doors;
     if (this.debug) panel.toggleAttribute("open", this.wasOpen);

@@ -1,11 +1,10 @@
 // @ts-check
 /**
- * The latest value of every signal, and how old it is. Knows no DOM and no socket.
+ * The latest value of every signal, and its age. It knows no DOM and no socket.
  *
- * Ages are counted on the page's own clock from the moment a value was measured. The server sends
- * the age at the moment of sending; what the way added on top of its usual time is found by
- * comparing the two clocks with the fastest message so far, so that a value that lay in a full
- * buffer is as old as it is.
+ * Ages count on the page's own clock from the time of the measurement. The server sends the age at the
+ * moment of sending. The extra delay of a message is found from the fastest message so far, so a value
+ * that waited in a full buffer gets its true age.
  *
  * @typedef {import("../core/types.js").Alarm} Alarm
  * @typedef {import("../core/types.js").Conversion} Conversion
@@ -28,20 +27,20 @@ import { t } from "../core/words.js";
 
 export { ageText, DASH } from "../core/texts.js";
 
-/** After so many times its greatest age a value is not shown any more. */
+/** Multiple of the largest age after which a value is no longer shown. */
 const GONE_AFTER = 10;
 /**
- * Nor after its line has been down for so long: nobody knows then what has become of it, however
- * patient its signal is.
+ * Time after which a value of a lost link is no longer shown, whatever its `stale_after`: it may have
+ * changed meanwhile.
  */
 const CUT_OFF_MS = 60_000;
-/** How fast two good clocks may run apart. */
+/** Largest drift between two good clocks. */
 const DRIFT = 1e-4;
 const SHORT_TRIP_MS = 250;
 const LONG_LAG_MS = 1000;
-/** A signal of which nothing was declared. @type {Signal} */
+/** Stand-in for an undeclared signal. @type {Signal} */
 const UNKNOWN = { name: "", type: "string" };
-/** Types of signals that are images, or may be. */
+/** Types of signals that may hold images. */
 export const PICTURES = new Set(["image", "blob"]);
 
 export class Store {
@@ -54,29 +53,29 @@ export class Store {
     this.samples = new Map();
     /** @type {Map<string, Link>} */
     this.links = new Map();
-    /** Since when each line that is down has been so. @type {Map<string, number>} */
+    /** Time of the loss of each lost link. @type {Map<string, number>} */
     this.downMs = new Map();
     this.isUp = false;
-    /** Whether every line is connected: then nobody has to look at each. */
+    /** Whether every link is connected: a shortcut for the check of each. */
     this.isAllUp = false;
-    /** When the connection to URC was lost. */
+    /** Time of the loss of the connection to URC. */
     this.lostMs = 0;
     this.serial = 0;
-    /** Grows when the server says anew what the signals mean. */
+    /** Grows with each new declaration of signals by the server. */
     this.edition = 0;
-    /** Whether any of them is an image: else nobody has to look for some in each frame. */
+    /** Whether any signal is an image: a shortcut for the search in each frame. */
     this.hasPictures = false;
     this.skewMs = Infinity;
     this.skewSetMs = 0;
     this.each = new Each();
     this.units = new Units();
-    /** Signals in the unit that an input asks for. @type {WeakMap<Conversion, Signal>} */
+    /** Signals in the units that inputs ask for. @type {WeakMap<Conversion, Signal>} */
     this.wanted = new WeakMap();
   }
 
   /**
-   * Take what the server serves. Values stay: they are the last that were seen, with their age. Those
-   * of signals that there are no more go: nothing would ever make them old.
+   * Take the declarations of the server. Values stay with their age. Values of removed signals go, because
+   * they would never become stale.
    *
    * @param {Hello} hello
    * @param {number} nowMs
@@ -134,7 +133,7 @@ export class Store {
   }
 
   /**
-   * Take an image, or whatever bytes a signal holds.
+   * Take an image, or bytes of a signal.
    *
    * @param {import("./frames.js").BinaryFrame} frame
    * @param {number} nowMs
@@ -150,7 +149,7 @@ export class Store {
   }
 
   /**
-   * Show all values to people in the units of a system.
+   * Show all values in the units of a unit system.
    *
    * @param {string} system
    */
@@ -167,15 +166,15 @@ export class Store {
     this.links = new Map(links.map((link) => [link.transport, link]));
     for (const { transport, state, since } of links) {
       if (isConnected(state)) this.downMs.delete(transport);
-      // Lost, connecting, lost again: it has been down since the first of them.
+      // Lost, connecting, lost again: the first loss counts.
       else if (!this.downMs.has(transport)) this.downMs.set(transport, nowMs - since);
     }
     this.countLinks();
   }
 
   /**
-   * A quick round trip proves that nothing lies in a buffer: if messages seem late all the same,
-   * one of the clocks has jumped, as after sleep.
+   * A quick round trip proves empty buffers: if messages still seem late, a clock has jumped, for example
+   * after sleep.
    *
    * @param {number} serverMs
    * @param {number} nowMs
@@ -189,8 +188,8 @@ export class Store {
   }
 
   /**
-   * Return what differs when a reading has to be shown anew. It is asked for each signal in each
-   * frame, so for one that is live it is only its number.
+   * Return a value that changes whenever the reading must be drawn. It is called for each signal in each
+   * frame, so for a live one it is only its serial number.
    *
    * @param {string} name
    * @param {number} nowMs
@@ -217,7 +216,7 @@ export class Store {
   /**
    * @param {string} name
    * @param {number} nowMs
-   * @param {Conversion} [conversion] into the unit that the input asks for
+   * @param {Conversion} [conversion] conversion to the unit that the input asks for
    * @returns {Reading}
    */
   reading(name, nowMs, conversion) {
@@ -233,7 +232,7 @@ export class Store {
       value,
       state,
       alarm: isShown ? sample.alarm : "",
-      // Made when somebody asks: of a scan it is a thousand numbers that nobody reads.
+      // Lazy: a scan has a thousand numbers that are rarely read as text.
       get text() {
         return textOf(value, signal, factorOf(shown));
       },
@@ -247,7 +246,7 @@ export class Store {
   }
 
   /**
-   * The signal as if the robot had declared it in another unit.
+   * Return the signal as if it were declared in another unit.
    *
    * @param {Signal} signal
    * @param {Conversion} conversion
@@ -287,8 +286,8 @@ export class Store {
   }
 
   /**
-   * For how long nothing new could come, because the page or every line that brings it is cut off;
-   * -1 while something can.
+   * Return the time for which the page or all links of a signal have been down, in milliseconds; -1 while
+   * one is up.
    *
    * @param {Signal} signal
    * @param {number} nowMs
@@ -299,7 +298,7 @@ export class Store {
     const sources = signal.sources?.length ? signal.sources : [...this.links.keys()];
     const states = sources.map((source) => this.links.get(source)?.state);
     if (this.isUp && (states.length === 0 || states.some(isConnected))) return -1;
-    // The last of its lines that went down; without URC nothing is known of them any more.
+    // The last link that went down counts; without URC no later state is known.
     const downMs = sources.map((source) => this.downMs.get(source) ?? Infinity);
     const sinceMs = Math.max(-Infinity, ...downMs);
     const isKnown = Number.isFinite(sinceMs);
@@ -308,10 +307,10 @@ export class Store {
   }
 
   /**
-   * Why a command cannot be given now; "" when it can be tried.
+   * Why a command cannot be given now; "" if it can be tried.
    *
-   * @param {string} transport the line that must not be lost; "" when one is made for each command
-   * @param {boolean} isMotion nothing waits for a line that is still being made
+   * @param {string} transport transport that must be up; "" if it is opened for each command
+   * @param {boolean} isMotion whether it is motion, which does not wait for a connection
    */
   hindrance(transport, isMotion = false) {
     if (!this.isUp) return t("no connection to URC");
@@ -321,7 +320,7 @@ export class Store {
   }
 
   /**
-   * How much longer than the fastest one this message took, in milliseconds.
+   * Return the extra delay of this message over the fastest one, in milliseconds.
    *
    * @param {number} serverMs
    * @param {number} nowMs

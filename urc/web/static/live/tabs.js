@@ -2,8 +2,8 @@
 /**
  * The pages of one interface: a bar of tabs, one of which is open.
  *
- * The pages share their cells, so that a camera that is in two of them goes on; the rules of the grid
- * place and hide the cells by the number of the page. A cell that is hidden is sent nothing.
+ * The pages share their cells, so a camera in two of them keeps running; the rules of the grid place and
+ * hide the cells by the number of the page. Hidden cells get no data.
  */
 import { part } from "./badge.js";
 
@@ -16,7 +16,7 @@ export class Tabs {
   /**
    * @param {HTMLElement} bar
    * @param {HTMLElement} grid
-   * @param {() => void} leave called before another page is opened
+   * @param {() => void} leave called before a change of the page
    */
   constructor(bar, grid, leave) {
     this.grid = grid;
@@ -65,7 +65,7 @@ export class Tabs {
 }
 
 /**
- * Return the tabs of what is on the stage now; null when it has none.
+ * Return the tabs of the present interface; null if it has none.
  *
  * @param {ParentNode} root
  * @param {() => void} leave

@@ -1,10 +1,9 @@
 // @ts-check
 /**
- * The bar of a recording: lets it run or stand, and go on from another place.
+ * The playback bar of a recording: play, pause and position.
  *
- * Where it stands the server knows, for all pages that show it; each asks now and then. What a person
- * does with the slider is asked for when the hand rests, so that dragging does not read the recording
- * anew for each pixel.
+ * The server keeps the position for all pages, and each page polls it. A drag of the slider is sent once
+ * the slider rests, so that the server does not read the recording for each pixel.
  *
  * @typedef {{beganS: number, lengthS: number, positionS: number, isPlaying: boolean, speed: number}} State
  */
@@ -14,9 +13,9 @@ import { write } from "../widgets/kit.js";
 import { t } from "../core/words.js";
 
 const EVERY_MS = 250;
-/** Day and time as ISO 8601 has them, on this device's clock. */
+/** Day and time in ISO 8601, on this device's clock. */
 const WHEN = new Intl.DateTimeFormat("sv", { dateStyle: "short", timeStyle: "medium" });
-/** So long the slider has to stand before the recording goes there. */
+/** Time for which the slider must rest before the position is sent. */
 const REST_MS = 150;
 
 const bar = part(document, "[data-tape]");
@@ -28,9 +27,9 @@ const note = part(bar, "[data-tape-note]");
 const said = note.textContent ?? "";
 
 let isPlaying = false;
-/** While a hand is at the slider, what the server says does not move it. */
+/** Whether the operator holds the slider; then the server's position does not move it. */
 let isHeld = false;
-/** Of the newest question: older answers do not count. */
+/** Number of the newest request: older responses do not count. */
 let number = 0;
 /** @type {number | undefined} */
 let resting;

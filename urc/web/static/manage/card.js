@@ -1,13 +1,13 @@
 // @ts-check
 /**
- * Live pictures on the cards of the menu. Only cards that are seen are asked about, one after the
- * other and each at most twice a second, so that thirty cards cost the server no more than eight.
+ * Live images on the cards of the menu. Only visible cards are polled, one after the other and each at
+ * most twice a second, so that thirty cards cost the server no more than eight.
  */
 
 const EVERY_MS = 500;
-/** A robot of which nothing is known is asked about again after this time. */
+/** Interval for polling a robot without data. */
 const QUIET_MS = 5000;
-/** The least time between two questions: eight a second on the whole page. */
+/** Shortest interval of two requests: eight a second on the whole page. */
 const PACE_MS = 125;
 
 /**
@@ -16,7 +16,7 @@ const PACE_MS = 125;
  * @property {string} url
  * @property {boolean} isSeen
  * @property {number} dueMs
- * @property {string} shown object URL of the picture
+ * @property {string} shown object URL of the image
  */
 
 /** @type {Look[]} */
@@ -38,7 +38,7 @@ void go();
 async function go() {
   for (;;) {
     const nowMs = performance.now();
-    // The card is asked about whose turn is longest over; nothing of a page that nobody sees.
+    // The card with the oldest due time is next; a hidden page polls none.
     const due = looks.filter((look) => isWanted(look) && look.dueMs <= nowMs);
     const next = due.sort((one, other) => one.dueMs - other.dueMs)[0];
     if (next && !document.hidden) {
@@ -51,7 +51,7 @@ async function go() {
 
 /** @param {Look} look */
 function isWanted({ el, isSeen }) {
-  return isSeen || el.hidden; // what shows nothing yet is nowhere to be seen
+  return isSeen || el.hidden; // a card without content has no visible area
 }
 
 /** @param {Look} look */
@@ -67,7 +67,7 @@ async function renew(look) {
       list(look, await answer.json());
     }
   } catch {
-    look.dueMs += QUIET_MS; // the server is away, or the picture is none: the last one stays
+    look.dueMs += QUIET_MS; // the server is away, or the image is invalid: the last one stays
   }
 }
 

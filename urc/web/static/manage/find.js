@@ -1,9 +1,9 @@
 // @ts-check
-/** What people type to find one thing among many. */
+/** Full-text search in the lists of a page. */
 
 /**
- * Return whether the text has each of the words, wherever they stand in it. Capitals and accents are no
- * difference; nothing typed fits everything.
+ * Return whether the text has each of the typed words, in any place. Case and accents are ignored; an
+ * empty search fits everything.
  *
  * @param {string} text
  * @param {string} typed

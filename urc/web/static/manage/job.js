@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The one install that is under way, in a dialog: what is fetched, what it may do, yes or no, and what
- * became of it. Closing it gives up what has not been agreed to.
+ * The install job in a dialog: the download, the permissions, the approval, and the result. Closing the
+ * dialog cancels a job without approval.
  *
  * @typedef {import("./rows.js").Job} Job
  */
@@ -16,12 +16,12 @@ export class JobDialog {
   constructor(el, act) {
     this.el = el;
     this.act = act;
-    /** Of the job that this page began. @type {number | null} */
+    /** Number of the job that this page began. @type {number | null} */
     this.number = null;
     /** @type {Job | null} */
     this.job = null;
     this.drawn = "";
-    /** Key of the button that led here. */
+    /** Key of the button that opened the dialog. */
     this.from = "";
     el.addEventListener("cancel", (event) => {
       event.preventDefault();
@@ -29,13 +29,13 @@ export class JobDialog {
     });
   }
 
-  /** Show a job that this page has begun, from now on. @param {Job} job */
+  /** Show a new job of this page. @param {Job} job */
   follow(job) {
     this.number = job.number;
     this.show(job);
   }
 
-  /** @param {Job | null} job as the server tells it; another page's stays there */
+  /** @param {Job | null} job state from the server; jobs of other pages are ignored */
   show(job) {
     if (job === null || job.number !== this.number) return;
     this.job = job;
@@ -47,11 +47,11 @@ export class JobDialog {
   }
 
   /**
-   * Ask before something is removed.
+   * Ask for confirmation of a removal.
    *
    * @param {string} wish
    * @param {string[]} gone
-   * @param {boolean} hasSettings whether something was filled in for it
+   * @param {boolean} hasSettings whether the package has settings
    * @param {(forget: boolean) => void} yes
    */
   confirm(wish, gone, hasSettings, yes) {
@@ -92,7 +92,7 @@ export class JobDialog {
     if (again instanceof HTMLElement) again.focus();
   }
 
-  /** What was pressed to come here may have been drawn anew meanwhile: the focus goes to its like. */
+  /** Close the dialog. The button that opened it may have been redrawn, so the focus goes to its key. */
   close() {
     this.number = null;
     this.drawn = "";
@@ -104,7 +104,7 @@ export class JobDialog {
     next?.focus();
   }
 
-  /** Give up what is under way, and close. */
+  /** Cancel the job, and close. */
   leave() {
     const { job, number } = this;
     const isOpen = number !== null && job !== null && (job.state === "working" || job.state === "asks");
@@ -170,7 +170,7 @@ export class JobDialog {
   }
 
   /**
-   * What a package uses of this machine by itself: a question of its own.
+   * Access of a package to this machine, with an approval of its own.
    *
    * @param {Job} job
    */
@@ -204,7 +204,7 @@ export class JobDialog {
   }
 }
 
-/** @param {Job} job @returns {boolean} whether it takes the place of what is in use */
+/** @param {Job} job @returns {boolean} whether it replaces the version in use */
 function isSwap({ isUpdate, stays }) {
   return isUpdate && stays === "";
 }
@@ -219,7 +219,7 @@ function heading(text) {
   return made("h3", { class: "urc-row-title" }, text);
 }
 
-/** @param {string[]} lines what the server says of documents */
+/** @param {string[]} lines texts of the server about documents */
 function list(lines) {
   if (lines.length === 0) return null;
   return made("ul", { class: "urc-list" }, ...lines.map((one) => made("li", {}, one)));

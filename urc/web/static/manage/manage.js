@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * A manager's page: repositories, what is installed, what could be. The server knows; this shows it,
- * and asks again for as long as something is under way.
+ * A manager's page: repositories, installed packages and available packages. It shows the lists of the
+ * server, and polls them while a job or a refresh is under way.
  *
  * @typedef {import("./rows.js").Shelf} Shelf
  */
@@ -13,7 +13,7 @@ import { availableRow, installedRow, placeRow, row } from "./rows.js";
 import { t } from "../core/words.js";
 
 const BUSY_MS = 400;
-/** So long somebody writes a word before it is looked for. */
+/** Pause in typing after which the search starts. */
 const TYPING_MS = 200;
 
 const root = part(document, "[data-manage]");
@@ -30,7 +30,7 @@ const dialog = new JobDialog(
   (path, body) => act(path, body),
 );
 
-/** Of two that are on their way, the last one counts. */
+/** Number of the last request: it wins over earlier ones. */
 let round = 0;
 /** @type {number | undefined} */
 let again;
@@ -42,7 +42,7 @@ function say(text, kind = "") {
   said.classList.toggle("urc-bad", kind === "bad");
 }
 
-/** @param {boolean} [force] whether the repositories are asked, however new their answers are */
+/** @param {boolean} [force] whether to refresh from the repositories, whatever the age of their lists */
 async function look(force = false) {
   try {
     await ask("/api/v1/repositories/ask", { force });
@@ -75,7 +75,7 @@ function show(shelf) {
   dialog.show(shelf.job);
   const { job, ...rest } = shelf;
   const look = JSON.stringify(rest);
-  if (look === looks) return; // nothing is drawn anew under somebody's finger
+  if (look === looks) return; // unchanged: a redraw could move a button under a finger
   looks = look;
   const doing = shelf.mayManage ? act : null;
   const { installed, available, repositories } = shelf;
@@ -99,11 +99,11 @@ function countText({ total, available, isAsking, repositories }) {
 }
 
 /**
- * Do something, say what became of it, and show what is so now.
+ * Perform an action, show its result, and update the page.
  *
  * @param {string} path
  * @param {object | Blob} body
- * @returns {Promise<any>} the answer; undefined when it was refused
+ * @returns {Promise<any>} the response; undefined for a refusal
  */
 async function act(path, body) {
   say("");
@@ -121,7 +121,7 @@ async function act(path, body) {
 }
 
 /**
- * Say what goes with a package, and remove it once that was agreed to.
+ * List the packages that a removal removes, and remove them after a confirmation.
  *
  * @param {string} wish
  */

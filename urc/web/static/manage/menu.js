@@ -1,5 +1,5 @@
 // @ts-check
-/** Many robots in the menu: what is typed leaves the cards that have each of its words. */
+/** Search in the menu: the cards that have each of the typed words stay visible. */
 import { fits } from "./find.js";
 
 const field = document.querySelector("[data-find-robot]");
@@ -8,7 +8,7 @@ const none = document.querySelector("[data-no-match]");
 
 if (field instanceof HTMLInputElement) {
   field.addEventListener("input", () => find(field.value));
-  find(field.value); // the browser gives back what was typed before
+  find(field.value); // the browser restores earlier input
 }
 
 /** @param {string} typed */

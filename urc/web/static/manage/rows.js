@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * One row of a manager's page: a repository, an installed package, one that could be.
+ * Rows of a manager's page: repositories, installed packages and available packages.
  *
  * @typedef {object} Job
  * @property {number} number
@@ -28,7 +28,7 @@
  * @property {boolean} isPlain
  * @property {string} keeper
  *
- * @typedef {object} Known what all packages have
+ * @typedef {object} Known Common fields of packages.
  * @property {string} package
  * @property {string} name
  * @property {string} kind
@@ -64,7 +64,7 @@
  * @property {boolean} mayManage
  * @property {Job | null} job
  *
- * @typedef {((path: string, body: object) => Promise<any>) | null} Act null: nothing may be done
+ * @typedef {((path: string, body: object) => Promise<any>) | null} Act null: no action is allowed
  */
 import { button, made } from "../core/dom.js";
 import { mark, t } from "../core/words.js";

@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The settings of a robot: sent as they are typed, tried by the server, and marked where they do not
- * fit. What was not saved stays in the fields.
+ * The settings of a robot: sent as text, tested by the server, and marked where they are invalid. Unsaved
+ * input stays in the fields.
  *
  * @typedef {object} Line
  * @property {string} transport
@@ -35,7 +35,7 @@ const root = part(document, "[data-settings]");
 const form = /** @type {HTMLFormElement} */ (part(root, "[data-form]"));
 const said = part(root, "[data-said]");
 const found = part(root, "[data-found]");
-/** Secrets that are to be forgotten. @type {Set<string>} */
+/** Secrets to delete. @type {Set<string>} */
 const forgotten = new Set();
 
 /** @returns {Record<string, string | null>} */
@@ -107,7 +107,7 @@ function offerAnyway() {
 
 function saved() {
   forgotten.clear();
-  // This device shows the interface that was chosen here, whatever it showed last.
+  // The interface chosen here becomes the device's own choice.
   const path = root.dataset["robot"] ?? "/";
   const name = encodeURIComponent(chosen("interface"));
   if (name) document.cookie = `urc-interface=${name}; path=${path}; max-age=${KEPT_S}; samesite=strict`;

@@ -1,17 +1,17 @@
 // @ts-check
 /**
- * Numbers that a hand sets: their bounds, their steps, and where keys lead. Pure.
+ * Numbers of setpoints: their bounds, their steps, and the effect of keys. Pure.
  *
  * @typedef {import("../core/types.js").Argument} Argument
  */
 
 import { symbolOf } from "../core/units.js";
 
-/** How far a control goes where nobody has said it. */
+/** Default range of a control. */
 const ROOM = 100;
 
 /**
- * What stands between two values of a control.
+ * Return the range and the steps of a control.
  *
  * @param {Argument | undefined} argument
  * @param {{step?: unknown, min?: unknown, max?: unknown, unit?: unknown, precision?: unknown}} options
@@ -20,10 +20,10 @@ const ROOM = 100;
 export function boundsOf(argument, options) {
   const [least, most] = [argument?.min ?? -Infinity, argument?.max ?? Infinity];
   const inside = (/** @type {number} */ value) => Math.min(most, Math.max(least, value));
-  // An option may narrow what the command takes, and never widen it.
+  // An option may narrow the range of the command, and never widen it.
   const lowest = typeof options.min === "number" ? inside(options.min) : argument?.min;
   const highest = typeof options.max === "number" ? inside(options.max) : argument?.max;
-  // What nobody has bounded goes from 0 to 100, or as far from the bound that there is.
+  // Without bounds the range is 0 to 100; with one bound it is 100 wide.
   const min = lowest ?? ((highest ?? ROOM) > 0 ? 0 : (highest ?? 0) - ROOM);
   const max = highest ?? (min < ROOM ? ROOM : min + ROOM);
   const isWhole = argument?.type === "integer";
@@ -47,7 +47,7 @@ export function snapped(value, { min, max, step }) {
 }
 
 /**
- * Return where a key of a slider leads; null for a key that means nothing here.
+ * Return the value after a key of a slider; null for other keys.
  *
  * @param {string} key
  * @param {number} value
@@ -76,7 +76,7 @@ export function keyed(key, value, bounds) {
   }
 }
 
-/** @param {number} step the next 1, 2 or 5 of a decade above */
+/** @param {number} step rounded up to 1, 2 or 5 of a decade */
 function niceStep(step) {
   if (!(step > 0) || !Number.isFinite(step)) return 1;
   const decade = 10 ** Math.floor(Math.log10(step));

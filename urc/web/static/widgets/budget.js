@@ -1,22 +1,21 @@
 // @ts-check
 /**
- * How much of the page's time a widget takes, and what it may still have. Knows no DOM.
+ * The share of the page's time that a widget may take. It knows no DOM.
  *
- * A page draws sixty times a second for all its widgets together. One that again and again takes
- * the time of several frames is called once a second only; if even that call takes too long, it is
- * ended. A call that never returns cannot be cut from inside the page: motion then ends by the
- * server's lease.
+ * A page draws sixty times a second for all its widgets together. A widget that often takes the time of
+ * several frames is only called once a second. If even that call takes too long, it is ended. The page
+ * cannot interrupt a call that never returns; then the server's lease ends all motion.
  */
 
-/** A call that takes longer has cost the page frames. */
+/** Duration of a call that costs frames of the page. */
 export const LONG_MS = 50;
 const CALLS_SEEN = 60;
-/** So many long ones of those make it slow. */
+/** Number of long calls among those that makes a widget slow. */
 const LONG_CALLS = 20;
 const SLOW_EVERY_MS = 1000;
-/** Called once a second, it may still not stop the page for so long … */
+/** Duration of a call of a slow widget that blocks the page. */
 const ENDLESS_MS = 500;
-/** … so often. */
+/** Number of blocking calls after which the widget is ended. */
 const ENDLESS_CALLS = 10;
 
 export class Budget {
@@ -30,7 +29,7 @@ export class Budget {
   }
 
   /**
-   * Whether it may be called now.
+   * Return whether the widget may be called now.
    *
    * @param {number} nowMs
    */
@@ -38,15 +37,15 @@ export class Budget {
     return !this.isSlow || nowMs - this.lastMs >= SLOW_EVERY_MS;
   }
 
-  /** Whether it has to end: even once a second it stops the page. */
+  /** Whether the widget must end: it blocks the page even when called once a second. */
   get isSpent() {
     return this.endlessCalls >= ENDLESS_CALLS;
   }
 
   /**
-   * Count one call.
+   * Count one call of the widget.
    *
-   * @param {number} nowMs when it began
+   * @param {number} nowMs start of the call
    * @param {number} tookMs
    */
   count(nowMs, tookMs) {
@@ -56,7 +55,7 @@ export class Budget {
     if (isLong) this.longCalls += 1;
     if (this.calls.length > CALLS_SEEN && this.calls.shift()) this.longCalls -= 1;
     if (this.longCalls >= LONG_CALLS) this.isSlow = true;
-    // A minute without a long call: whatever it was is over.
+    // A minute without a long call: the cause is gone.
     if (this.isSlow && this.calls.length >= CALLS_SEEN && this.longCalls === 0) this.isSlow = false;
     if (this.isSlow && tookMs > ENDLESS_MS) this.endlessCalls += 1;
   }

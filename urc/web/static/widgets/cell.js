@@ -1,9 +1,9 @@
 // @ts-check
 /**
- * One widget in its cell: its context, its frames, and what happens when it breaks.
+ * One widget in its cell: its context, its frames, and its failures.
  *
- * Whatever a widget throws costs its own cell, which then shows a card; so does one that again and
- * again takes the page's time. A cell that cannot be seen is sent nothing.
+ * A widget that throws only loses its own cell, which then shows a card; so does one that takes too much
+ * of the page's time. Hidden cells get no data.
  *
  * @typedef {import("../core/types.js").Conversion} Conversion
  * @typedef {import("../core/types.js").Instance} Instance
@@ -21,21 +21,21 @@
  * @property {string} widget
  * @property {string} title
  * @property {Record<string, string | string[]>} inputs Input → its signal, or its signals.
- * @property {Record<string, (Conversion | null)[]>} conversions Input → for each of its signals, how
- *   it becomes what the input asks for; left out where nothing has to be done.
+ * @property {Record<string, (Conversion | null)[]>} conversions Input → conversion of each of its
+ *   signals to the unit of the input; left out if none is needed.
  * @property {Record<string, Output>} outputs
  * @property {Record<string, unknown>} options
- * @property {boolean} [gate] Whether it is a dead-man.
+ * @property {boolean} [gate] Whether it is a dead-man control.
  *
  * @typedef {(command: string, args: Record<string, Given>, ticket?: import("../control/asks.js").Ticket) => Promise<Record<string, Value>>} Run
  *
- * @typedef {object} Doors Where what widgets do goes.
+ * @typedef {object} Doors Services of the page for widgets.
  * @property {Run} run
  * @property {import("../control/asks.js").Asks} asks
  * @property {(command: string, verb: string) => void} steer
  * @property {(wish: import("../core/types.js").Wish) => void} drive
- * @property {() => void} wake asks for an animation frame
- * @property {() => void} again asks for one in which widgets are drawn, and no more
+ * @property {() => void} wake requests an animation frame
+ * @property {() => void} again requests one for widgets alone
  * @property {Pick<import("../control/input.js").Input, "hold" | "gate" | "gated" | "letGo" | "refusal" | "hindrance" | "isDriving"> & {pads: PadDesk}} input
  * @property {Pick<import("../control/stop.js").StopButton, "press" | "follow">} stop
  * @property {Pick<import("../live/follow.js").Follows, "listen">} follows
@@ -46,16 +46,16 @@ import { contextOf } from "./context.js";
 import { t } from "./kit.js";
 import { PICTURES } from "../live/store.js";
 
-/** A widget that has not come up by then says so. */
+/** Time limit for loading; a later widget shows a note. */
 const LOADING_MS = 5000;
 
 /** @type {readonly string[]} */
 const NONE = Object.freeze([]);
-/** What a widget without outputs is told of them. @type {Record<string, Outlet>} */
+/** Outputs of a widget without outputs. @type {Record<string, Outlet>} */
 const NO_OUTLETS = Object.freeze(Object.create(null));
 
 /**
- * Signals of one input, and what each was like when the widget last saw it.
+ * Signals of one input, with their state at the widget's last call.
  *
  * @typedef {{input: string, signals: string[], isMany: boolean, seen: (number | string)[], alarms: string}} Bound
  */
@@ -84,21 +84,21 @@ export class Cell {
     this.budget = new Budget();
     /** @type {Map<string, ((reading: Reading) => void)[]>} */
     this.listeners = new Map();
-    /** What the outputs were like when the widget last saw them; null: it never did. @type {string | null} */
+    /** State of the outputs at the widget's last call; null before the first. @type {string | null} */
     this.seenOutlets = null;
-    /** Edition of the store of which all was shown. */
+    /** Edition of the store that was last drawn completely. */
     this.edition = -1;
-    /** Whether the widget's code is not ours. */
+    /** Whether it is a third-party widget. */
     this.isForeign = false;
-    /** Its inputs that are images. @type {{edition: number, names: readonly string[]}} */
+    /** Its image inputs. @type {{edition: number, names: readonly string[]}} */
     this.images = { edition: -1, names: NONE };
-    /** Places of the images that the widget shows, by input; without an entry, all. @type {Map<string, ReadonlySet<number>>} */
+    /** Indexes of the visible images, by input; without an entry, all. @type {Map<string, ReadonlySet<number>>} */
     this.looks = new Map();
-    /** What the context said of units. @type {Map<string, {edition: number, symbol: string, factor: (value: number) => number}>} */
+    /** Cached units of the context. @type {Map<string, {edition: number, symbol: string, factor: (value: number) => number}>} */
     this.shownIn = new Map();
     /** @type {{width: number, height: number} | null} */
     this.size = null;
-    /** Said over the widget: that it is still loading, or slow. @type {HTMLElement | null} */
+    /** Note over the widget: loading, or slow. @type {HTMLElement | null} */
     this.note = null;
   }
 
@@ -140,7 +140,7 @@ export class Cell {
   }
 
   /**
-   * Let what a listener throws cost this cell only.
+   * Return the listener, with its exceptions limited to this cell.
    *
    * @template T
    * @param {(news: T) => void} listener
@@ -159,7 +159,7 @@ export class Cell {
 
   /**
    * @param {Bound} bound
-   * @param {number} place which of its signals
+   * @param {number} place index of the signal
    * @param {Store} store
    * @param {number} nowMs
    */
@@ -169,13 +169,13 @@ export class Cell {
     return store.reading(signals[place] ?? "", nowMs, conversion ?? undefined);
   }
 
-  /** Whether the widget may be called now. @param {number} nowMs */
+  /** Return whether the widget may be called now. @param {number} nowMs */
   isDue(nowMs) {
     return this.isMounted && this.isVisible && this.budget.allows(nowMs);
   }
 
   /**
-   * Choose the images of an input that the widget shows; the server sends no others.
+   * Select the visible images of an input; the server sends no others.
    *
    * @param {string} input
    * @param {readonly number[]} places
@@ -186,7 +186,7 @@ export class Cell {
     this.doors.wake();
   }
 
-  /** Names of the images that it shows now. @param {Store} store */
+  /** Return the names of the visible images. @param {Store} store */
   pictures(store) {
     if (!this.isMounted || !this.isVisible) return NONE;
     if (this.images.edition !== store.edition) {
@@ -201,8 +201,8 @@ export class Cell {
   }
 
   /**
-   * Whether the widget has to be called: 0 not, 1 something is new, 2 something is that waits for no
-   * turn (a size, an output, a value that is no longer live, an alarm that comes or goes).
+   * Return the urgency of a call: 0 none, 1 new values, 2 a change that must not wait (a size, an output,
+   * a value that is no longer live, the start or end of an alarm).
    *
    * @param {Store} store
    * @param {number} nowMs
@@ -233,7 +233,7 @@ export class Cell {
   }
 
   /**
-   * Give the widget what has changed, if anything has. Called in an animation frame.
+   * Pass changes to the widget, if there are any. Called in an animation frame.
    *
    * @param {Store} store
    * @param {number} nowMs
@@ -243,13 +243,13 @@ export class Cell {
   }
 
   /**
-   * Give the widget what has changed since it was last shown something.
+   * Pass the changes since its last call to the widget.
    *
    * @param {Store} store
    * @param {number} nowMs
    */
   show(store, nowMs) {
-    /** An input of many signals is a list. @type {Record<string, any>} */
+    /** An input of many signals has a list. @type {Record<string, any>} */
     const readings = Object.create(null);
     /** @type {string[]} */
     const changed = [];
@@ -291,7 +291,7 @@ export class Cell {
   }
 
   /**
-   * Call the widget, and count the time that it takes.
+   * Call the widget, and measure the time of the call.
    *
    * @param {number} nowMs
    * @param {() => void} work
@@ -329,7 +329,7 @@ export class Cell {
   }
 
   /**
-   * Say something over the widget; "" takes it away.
+   * Show a note over the widget; "" removes it.
    *
    * @param {string} text
    */
@@ -345,7 +345,7 @@ export class Cell {
   }
 
   /**
-   * Replace the widget by a card that says what happened.
+   * Replace the widget by a card with the reason.
    *
    * @param {unknown} error
    */

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * What a widget is given, and all it may use: every door out of its cell.
+ * The context of a widget: its complete interface to the page.
  *
  * @typedef {import("./cell.js").Cell} Cell
  * @typedef {import("../core/types.js").Context} Context
@@ -68,11 +68,11 @@ export function contextOf(cell) {
 }
 
 /**
- * Give the command that an output is bound to, after the questions that the driver has for people.
+ * Run the command of an output, after the confirmations that the driver requires.
  *
  * @param {Pick<Cell, "doors" | "el" | "end" | "output" | "isForeign">} cell
  * @param {string} output
- * @param {Record<string, Given>} given by the names of the widget's manifest
+ * @param {Record<string, Given>} given arguments by the names of the widget's manifest
  */
 export async function give(cell, output, given) {
   const bound = cell.output(output);
@@ -81,7 +81,7 @@ export async function give(cell, output, given) {
   const args = argumentsOf(bound, given);
   const questions = questionsOf(bound.asks ?? [], args);
   if (questions.length === 0) {
-    // Foreign code has no hand: a person says yes before it moves anything.
+    // Third-party code cannot prove a user's action: the operator confirms before anything moves.
     if (cell.isForeign && bound.mayMove) await agreed(cell, bound.title || command);
     return cell.doors.run(command, args);
   }
@@ -94,10 +94,10 @@ export async function give(cell, output, given) {
 }
 
 /**
- * Ask whether a foreign widget may give a command that moves the robot; rejects when it may not.
+ * Ask whether a third-party widget may run a command that moves the robot; reject on a no.
  *
  * @param {Pick<Cell, "doors" | "el" | "end">} cell
- * @param {string} title of the command
+ * @param {string} title title of the command
  */
 async function agreed(cell, title) {
   const text = t("This widget wants to give “{command}”. The robot may move.", { command: title });
@@ -117,7 +117,7 @@ function each(cell, input, listener) {
   const bound = cell.inputs.find((one) => one.input === input);
   bound?.signals.forEach((name, place) => {
     const hear = (/** @type {number} */ missed) => {
-      // As it was when it was measured: what comes late is no less a reading.
+      // With the state at its measurement: a late reading still counts.
       const reading = cell.reading(bound, place, store, store.samples.get(name)?.timeMs ?? 0);
       cell.measured(performance.now(), () => listener(reading, missed));
     };

@@ -1,31 +1,31 @@
 // @ts-check
 /**
- * What becomes of a push before it is sent: `import { Pipeline } from "urc/curve"`. Pure maths.
+ * Response curves of held controls: `import { Pipeline } from "urc/curve"`. Pure maths.
  *
- * One pipeline for everything that hands do, in this order: gate, dead zone, expo, invert, scale and
- * speed step, slew. A push is a set of shares by name, each from -1 to 1. `x` and `y` belong
- * together: x is forward, y is left (REP 103); any other name stands alone.
+ * One pipeline for all inputs, in this order: gate, dead zone, expo, invert, scale and speed step, slew
+ * rate. A push is a set of shares by name, each from -1 to 1. `x` and `y` form a vector: x is forward, y
+ * is left (REP 103); any other name is independent.
  *
  * @typedef {"circle" | "square" | "cross"} Gate
  * @typedef {Record<string, number>} Push
  *
  * @typedef {object} Settings
- * @property {Gate} gate How far it goes to the side: within a circle, a square, or along one axis.
- * @property {number} deadZone Share of the way in which nothing moves yet, 0 to 0.5.
- * @property {number} expo 0 is a straight line, 1 a cube.
- * @property {number} scale Share of the command's range that a full push is, 0 to 1.
- * @property {number} slew Change of the share per second while it speeds up; 0 for any.
- * @property {ReadonlySet<string>} inverted Names whose sign is turned.
+ * @property {Gate} gate Shape of the range: a circle, a square, or one axis at a time.
+ * @property {number} deadZone Share of the travel that counts as zero, 0 to 0.5.
+ * @property {number} expo 0 is linear, 1 is cubic.
+ * @property {number} scale Share of the command's range at full deflection, 0 to 1.
+ * @property {number} slew Largest change of the share per second while it speeds up; 0 for no limit.
+ * @property {ReadonlySet<string>} inverted Names with inverted sign.
  *
  * @typedef {object} Moment
- * @property {number} dtS Seconds since the last sample; 0 begins anew, from nothing.
+ * @property {number} dtS Seconds since the last sample; 0 starts from zero.
  * @property {number} [speed] The speed step, 0 to 1.
- * @property {boolean} [isFine] Whether the push is by degrees, so that dead zone and expo count; a
- *   key is either down or not.
+ * @property {boolean} [isFine] Whether the push is continuous, so that dead zone and expo apply; a key is
+ *   either down or not.
  */
 
 /**
- * Nothing within the zone; from its edge on the rest of the way is the whole range.
+ * Return 0 within the dead zone; the rest of the travel covers the whole range.
  *
  * @param {number} share
  * @param {number} zone 0 to below 1
@@ -37,7 +37,7 @@ export function deadZone(share, zone) {
 }
 
 /**
- * Finer around the centre: (1 - e)·x + e·x³.
+ * Return a share with finer response around the centre: (1 - e)·x + e·x³.
  *
  * @param {number} share
  * @param {number} amount
@@ -47,12 +47,12 @@ export function expo(share, amount) {
 }
 
 /**
- * The next share on the way to the target. Slowing down and stopping are never held up, and the way
- * to the other side begins at nothing.
+ * Return the next share on the way to the target. Deceleration is never limited, and a reversal begins
+ * at zero.
  *
  * @param {number} before
  * @param {number} target
- * @param {number} perS largest change per second while it speeds up; 0 for any
+ * @param {number} perS largest change per second while it speeds up; 0 for no limit
  * @param {number} dtS
  */
 export function slew(before, target, perS, dtS) {
@@ -63,7 +63,7 @@ export function slew(before, target, perS, dtS) {
 }
 
 /**
- * Keep a push within the gate.
+ * Limit a push to the gate.
  *
  * @param {number} x
  * @param {number} y
@@ -81,7 +81,7 @@ export function gate(x, y, shape) {
 }
 
 /**
- * Dead zone and expo of a push within its gate: by its length in a circle, else by each axis.
+ * Apply dead zone and expo within the gate: to the length in a circle, else to each axis.
  *
  * @param {number} x
  * @param {number} y
@@ -96,7 +96,7 @@ export function curved(x, y, { gate: shape, deadZone: zone, expo: amount }) {
   return [x * gain, y * gain];
 }
 
-/** Keeps what the last sample was, which only slew needs. */
+/** The pipeline with its last sample, which only the slew rate needs. */
 export class Pipeline {
   /** @param {Settings} settings */
   constructor(settings) {
@@ -106,7 +106,7 @@ export class Pipeline {
   }
 
   /**
-   * Return what is sent, each share rounded to a thousandth.
+   * Return the shares to send, each rounded to a thousandth.
    *
    * @param {Push} push
    * @param {Moment} moment
@@ -148,7 +148,7 @@ export class Pipeline {
 }
 
 /**
- * Return the settings that a widget's options say.
+ * Return the settings in a widget's options.
  *
  * @param {Readonly<Record<string, unknown>>} options
  * @returns {Settings}
@@ -167,7 +167,7 @@ export function settingsOf(options) {
 }
 
 /**
- * Return the speed steps of a widget's options, slowest first; at least one.
+ * Return the speed steps in a widget's options, slowest first; at least one.
  *
  * @param {Readonly<Record<string, unknown>>} options
  * @returns {number[]}
@@ -179,13 +179,13 @@ export function speedsOf(options) {
 }
 
 /**
- * How far a device is tilted from where it rested, as a push.
+ * Return the tilt of a device from its rest position, as a push.
  *
  * @param {{beta: number, gamma: number}} now degrees, as the browser gives them
  * @param {{beta: number, gamma: number}} rest
- * @param {number} angle of the screen, degrees
- * @param {number} range degrees of a full push
- * @returns {{x: number, y: number}} away from the person is x, to the left y; not yet bounded
+ * @param {number} angle angle of the screen, degrees
+ * @param {number} range degrees at full deflection
+ * @returns {{x: number, y: number}} x away from the operator, y to the left; not limited yet
  */
 export function tilted(now, rest, angle, range) {
   const beta = turn(now.beta - rest.beta);
@@ -193,16 +193,16 @@ export function tilted(now, rest, angle, range) {
   const [cos, sin] = [Math.cos((angle * Math.PI) / 180), Math.sin((angle * Math.PI) / 180)];
   const right = gamma * cos + beta * sin;
   const nearer = beta * cos - gamma * sin;
-  return { x: -nearer / range + 0, y: -right / range + 0 }; // no minus zero
+  return { x: -nearer / range + 0, y: -right / range + 0 }; // + 0 avoids -0
 }
 
 /**
- * Return the direction of a cross of arrows at which a pointer is.
+ * Return the direction in a cross of arrows for a pointer position.
  *
- * @param {number} x away from the person, from the middle; 1 is the edge
- * @param {number} y to the left
- * @param {boolean} isDiagonal whether there are arrows between the four
- * @param {number} rest share around the middle that is none
+ * @param {number} x distance from the middle, away from the operator; 1 is the edge
+ * @param {number} y the same to the left
+ * @param {boolean} isDiagonal whether there are diagonal arrows
+ * @param {number} rest share around the middle without direction
  * @returns {{x: number, y: number}} each -1, 0 or 1
  */
 export function arrow(x, y, isDiagonal, rest) {
@@ -213,7 +213,7 @@ export function arrow(x, y, isDiagonal, rest) {
 }
 
 /**
- * Return the position to which a lever snaps: a detent within reach, or where it is.
+ * Return the position of a lever: a detent within reach, or the share itself.
  *
  * @param {number} share
  * @param {readonly number[]} detents
@@ -232,14 +232,14 @@ export function bounded(share) {
   return Math.min(1, Math.max(-1, finite(share)));
 }
 
-/** @param {number} value what is no number moves nothing */
+/** @param {number} value non-finite values count as 0 */
 function finite(value) {
   return Number.isFinite(value) ? value : 0;
 }
 
 /** @param {number} share */
 function rounded(share) {
-  return Math.round(share * 1000) / 1000 + 0; // no minus zero
+  return Math.round(share * 1000) / 1000 + 0; // + 0 avoids -0
 }
 
 /** @param {number} degrees */

@@ -2,7 +2,7 @@
 /**
  * One widget in one state of its demo: the page plays its robot.
  *
- * What is held runs through the same modules as on the live page; only the socket is played.
+ * Held controls run through the same modules as on the live page; only the socket is a stub.
  *
  * @typedef {import("../live/follow.js").Themes} Themes
  * @typedef {import("../core/types.js").Alarm} Alarm
@@ -14,7 +14,7 @@
  * @typedef {import("../core/types.js").Topics} Topics
  * @typedef {import("../core/types.js").Value} Value
  *
- * @typedef {object} Told One reading of a demo; an image is `picture` in base64.
+ * @typedef {object} Told One reading of a demo; an image has `picture` in base64.
  * @property {string} signal
  * @property {number} age In seconds.
  * @property {Alarm} alarm
@@ -22,14 +22,14 @@
  * @property {string} [picture]
  * @property {string} [type]
  *
- * @typedef {object} News What the server read in demo.yaml.
+ * @typedef {object} News Content of demo.yaml from the server.
  * @property {Hello} hello
  * @property {Told[]} readings
- * @property {Record<string, [number, Held][]>} history Signal → older readings, oldest first, each
- *   with its age in seconds.
+ * @property {Record<string, [number, Held][]>} history Signal → older readings, oldest first, each with
+ *   its age in seconds.
  * @property {Partial<Topics> & {stop?: StopState}} follow
- * @property {Record<string, string | Record<string, Value>>} replies Command or output → its values,
- *   or why it fails.
+ * @property {Record<string, string | Record<string, Value>>} replies Command or output → its values, or
+ *   the reason of its failure.
  */
 import { Asks } from "../control/asks.js";
 import { Drive } from "../control/drive.js";
@@ -66,7 +66,7 @@ const FREE = {
   spare: "",
 };
 
-/** Takes what a page says to its server, and gives the controls to whoever asks. */
+/** A stub of the socket; it grants the controls on request. */
 class PlayedSocket {
   /** @param {(text: string) => void} tell */
   constructor(tell) {
@@ -109,7 +109,7 @@ class PlayedSocket {
 export class Exhibit {
   /**
    * @param {HTMLElement} el
-   * @param {HTMLElement} bar where questions of others would stand
+   * @param {HTMLElement} bar element for questions of other pages
    * @param {() => void} wake
    * @param {(state: string, text: string) => void} tell
    * @param {Themes} themes
@@ -210,14 +210,14 @@ export class Exhibit {
         return { look: JSON.stringify([lease, refusal]), value: { lease, isMine, refusal } };
       };
     }
-    made.theme = () => this.themes.news(); // colours are the page's own, whatever is played
+    made.theme = () => this.themes.news(); // the page's own colours, in any state
     return made;
   }
 
   /**
-   * Let the widget come up; resolves when it stands, or is a card that says why it does not.
+   * Start the widget; resolves when it is mounted, or shows a card with the reason.
    *
-   * @param {string} system of units
+   * @param {string} system unit system
    */
   async start(system) {
     const { store, news } = this;
@@ -233,7 +233,7 @@ export class Exhibit {
     await this.host.mountAll(this.el.parentNode ?? document);
   }
 
-  /** Tell the widget what came before, one reading after the other, and then what is now. */
+  /** Play the older readings one after the other, then the present ones. */
   play() {
     const past = Object.entries(this.news.history);
     const steps = Math.max(0, ...past.map(([, readings]) => readings.length));
@@ -247,7 +247,7 @@ export class Exhibit {
     for (const told of this.news.readings) this.say(told);
   }
 
-  /** Keep what was told as old as it is meant to be; it is not told anew, as a new line would be. */
+  /** Keep the readings at their declared age, without a new announcement. */
   keep() {
     const nowMs = performance.now();
     for (const { signal, age } of this.news.readings) {

@@ -1,12 +1,12 @@
 // @ts-check
 /**
- * Starts the gallery: each widget in each state of its demo, with a robot that is only played.
+ * Starts the gallery: each widget in each state of its demo, with a stub of a robot.
  *
- * Every cell has a store, a host and a played robot of its own, so that one state knows nothing of
- * the next. What a widget would send is written into a list.
+ * Every cell has its own store, host and stub, so that states do not influence each other. The commands
+ * of a widget are written into a list.
  *
- * When all of them stand and what they were told is drawn, the page says so: `data-ready` on the
- * element with `data-gallery`.
+ * Once all of them are mounted and drawn, the page sets `data-ready` on the element with
+ * `data-gallery`.
  */
 import { part } from "../live/badge.js";
 import { t } from "./kit.js";
@@ -14,7 +14,7 @@ import { Exhibit } from "./exhibit.js";
 import { Themes } from "../live/follow.js";
 import { chosenSystem } from "../core/units.js";
 
-/** What stands there must not grow old by itself. */
+/** Interval for repeating readings, so that they do not become stale. */
 const REPEAT_MS = 1000;
 const STAMP_EVERY_MS = 700;
 const LINES_KEPT = 100;
@@ -24,7 +24,7 @@ const sent = part(gallery, "[data-sent]");
 const bar = part(document, "[data-bar]");
 
 /**
- * Write down what would be sent.
+ * Add a command to the list.
  *
  * @param {string} state
  * @param {string} text
@@ -75,7 +75,7 @@ async function frames(count) {
   }
 }
 
-/** Load the page anew when a file of its widgets has been saved since the server read them. */
+/** Reload the page when a file of its widgets was saved after the server read them. */
 async function watch() {
   const url = gallery.dataset["stamp"];
   if (!url) return;
@@ -88,7 +88,7 @@ async function watch() {
         return;
       }
     } catch {
-      // The server is being started anew: the next try may find it.
+      // The server is restarting: the next try may reach it.
     }
     await new Promise((resolve) => setTimeout(resolve, STAMP_EVERY_MS));
   }

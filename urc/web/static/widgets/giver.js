@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * One command that a widget gives, and what became of it. Knows no socket and no store.
+ * One command of a widget, with its state. It knows no socket and no store.
  *
  * @typedef {import("../core/types.js").Outlet} Outlet
  * @typedef {import("../core/types.js").StopState} StopState
@@ -9,20 +9,20 @@
  * @typedef {"" | "pending" | "done" | "failed"} Phase
  */
 
-/** How long what was done is told. */
+/** Time for which a result is shown. */
 const TELL_MS = 4000;
 
-/** One command: given, under way, done or failed. What it shows is what became of it. */
+/** One command: sent, pending, done or failed. */
 export class Giver {
   /**
    * @param {object} spec
    * @param {(args: Record<string, Value>) => Promise<unknown>} spec.give
-   * @param {() => void} spec.show called when any of it has changed
+   * @param {() => void} spec.show called for each change of the state
    * @param {T} spec.t
    * @param {AbortSignal} spec.signal
-   * @param {number} [spec.everyMs] `newest` gives no more often
-   * @param {(listener: (state: StopState) => void) => void} [spec.onStop] by which `newest` learns of
-   *   STOP: what still waits then is not given
+   * @param {number} [spec.everyMs] shortest interval of `newest`
+   * @param {(listener: (state: StopState) => void) => void} [spec.onStop] reports STOP, which cancels a
+   *   pending `newest`
    */
   constructor({ give, show, t, signal, everyMs = 100, onStop }) {
     this.give = give;
@@ -35,7 +35,7 @@ export class Giver {
     this.reason = t("not ready yet");
     this.isAnswered = false;
     this.isOver = false;
-    /** What is to be given next. @type {Record<string, Value> | null} */
+    /** Arguments of the next command. @type {Record<string, Value> | null} */
     this.next = null;
     this.givenMs = -Infinity;
     /** @type {number | undefined} */
@@ -61,19 +61,19 @@ export class Giver {
     return this.phase === "pending";
   }
 
-  /** @param {Outlet | undefined} outlet as `update` was given it */
+  /** @param {Outlet | undefined} outlet the argument of `update` */
   take(outlet) {
     this.reason = outlet ? outlet.reason : this.t("no command is bound to it");
     this.isAnswered = outlet?.isAnswered ?? false;
-    if (this.reason) this.next = null; // what could not be given is not given later
+    if (this.reason) this.next = null; // a blocked command is never sent later
     this.show();
   }
 
   /**
-   * Give it, unless it is under way already.
+   * Send the command, unless it is pending already.
    *
    * @param {Record<string, Value>} [args]
-   * @returns {Promise<boolean>} whether it was done
+   * @returns {Promise<boolean>} whether it succeeded
    */
   async once(args = {}) {
     if (!this.isReady || this.isPending || this.isOver) return false;
@@ -93,7 +93,7 @@ export class Giver {
   }
 
   /**
-   * Give it as soon as may be; a newer one takes the place of one that still waits.
+   * Send the command as soon as possible; a newer one replaces one that still waits.
    *
    * @param {Record<string, Value>} args
    */
@@ -121,7 +121,7 @@ export class Giver {
   /**
    * @param {Phase} phase
    * @param {string} outcome
-   * @param {number} forMs 0: until something happens
+   * @param {number} forMs time for which it is shown; 0: until the next change
    */
   become(phase, outcome = "", forMs = 0) {
     if (this.isOver) return;
@@ -133,7 +133,7 @@ export class Giver {
   }
 
   /**
-   * What is to be read below the control.
+   * Return the note below the control.
    *
    * @param {...string} more
    */

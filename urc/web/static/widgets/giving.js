@@ -1,8 +1,8 @@
 // @ts-check
 /**
- * What widgets that give commands need again and again: `import { Giver, slide } from "urc/giving"`.
+ * The toolkit for widgets with commands: `import { Giver, slide } from "urc/giving"`.
  *
- * Knows no socket and no store; a widget brings its own `send`.
+ * It knows no socket and no store; a widget passes its own `send`.
  */
 
 export { boundsOf, keyed, snapped } from "./bounds.js";

@@ -1,9 +1,9 @@
 // @ts-check
 /**
- * The life of the widgets: each in its cell, each on its own.
+ * The lifecycle of the widgets, each in its cell.
  *
- * The server has drawn the templates already. Here the modules are loaded and mounted, and called in
- * animation frames when an input of theirs has changed; a cell that cannot be seen is sent nothing.
+ * The server has rendered the templates. This module loads and mounts the modules, and calls them in
+ * animation frames after a change of their inputs; hidden cells get no data.
  *
  * @typedef {import("./cell.js").Doors} Doors
  * @typedef {import("../live/store.js").Store} Store
@@ -23,18 +23,18 @@ export class Host {
     /** @type {Map<Element, Cell>} */
     this.cells = new Map();
     this.pace = new Pace();
-    /** Cells that wait for their turn, longest first. @type {Set<Cell>} */
+    /** Cells that wait for their turn, oldest first. @type {Set<Cell>} */
     this.waiting = new Set();
-    /** Drawn in the frame that is being painted; 0 when none is. */
+    /** Number of widgets drawn in the frame that is being painted; 0 without one. */
     this.drawn = 0;
     this.begunMs = 0;
-    // A message that is sent in a frame comes when that frame was painted.
+    // A message posted in a frame arrives after its painting.
     this.painted = new MessageChannel();
     this.painted.port1.onmessage = () => {
       this.pace.learn(this.drawn, performance.now() - this.begunMs, this.cells.size);
       this.drawn = 0;
     };
-    /** Whether also cells that cannot be seen are called. */
+    /** Whether hidden cells are called, too. */
     this.isAllInSight = false;
     this.sight = new IntersectionObserver((entries) => {
       for (const entry of entries) {
@@ -53,7 +53,7 @@ export class Host {
   }
 
   /**
-   * Let the widgets in `root` come up; resolves when all of them stand or have failed.
+   * Start the widgets in `root`; resolves when all of them are mounted or have failed.
    *
    * @param {ParentNode} root
    */
@@ -76,17 +76,17 @@ export class Host {
   }
 
   /**
-   * A widget that does not ship with URC lives in a frame.
+   * Mount a third-party widget in a frame.
    *
    * @param {HTMLElement} el
    */
   async mountForeign(el) {
-    const { Warden } = await import("../frame/warden.js"); // most pages have none
+    const { Warden } = await import("../frame/warden.js"); // most pages need none
     if (el.isConnected && !this.cells.has(el)) await this.mount(new Warden(el, this.doors));
   }
 
   /**
-   * End the widgets that live in `root`; their elements are the caller's.
+   * End the widgets in `root`; their elements belong to the caller.
    *
    * @param {Node} root
    */
@@ -103,7 +103,7 @@ export class Host {
   }
 
   /**
-   * Let the widgets draw what is new; where that is too much for one frame, in turn.
+   * Let the widgets draw their news; if one frame is too short for all, in turn.
    *
    * @param {number} nowMs
    */
@@ -138,7 +138,7 @@ export class Host {
     this.painted.port2.postMessage(null);
   }
 
-  /** Names of the images that can be seen now, each once, in a steady order. */
+  /** Return the names of the visible images, each once, in a stable order. */
   pictures() {
     if (!this.store.hasPictures) return [];
     const names = new Set();

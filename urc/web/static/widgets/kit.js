@@ -1,9 +1,9 @@
 // @ts-check
 /**
- * What widgets need again and again: `import { part, write } from "urc/kit"`.
+ * The toolkit for widgets: `import { part, write } from "urc/kit"`.
  *
- * Nothing here reads the layout, and what writes does so on change only, so all of it may be called
- * in `update`. Knows no widget, no socket, no store.
+ * No function reads the layout, and those that write do so on change only, so all of them may be called
+ * in `update`. It knows no widget, no socket and no store.
  *
  * @typedef {import("../core/types.js").Alarm} Alarm
  * @typedef {import("../core/types.js").Reading} Reading
@@ -18,15 +18,15 @@ export { digitsIn, figure } from "../core/figures.js";
 export { inTurn, wordOf } from "../core/texts.js";
 export { mark, t } from "../core/words.js";
 
-/** "None": what is not known is never shown as 0. */
+/** "None": an unknown value is never shown as 0. */
 export const DASH = "—";
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** A browser that asks where to save a file reads it only after the answer. */
+/** Lifetime of a saved file's URL: browsers with a save dialog read it only after the dialog. */
 const KEPT_MS = 10_000;
 
-/** How a limit that was passed is written: a shape and a word, since colour is never alone. */
+/** Text of an exceeded limit: a shape and a word, since colour alone is not enough. */
 export const ALARMS = Object.freeze({
   "": "",
   lolo: mark("▲ Very low"),
@@ -36,7 +36,7 @@ export const ALARMS = Object.freeze({
 });
 
 /**
- * Return the element of the template that a widget cannot do without.
+ * Return a required element of the template.
  *
  * @param {ParentNode} root
  * @param {string} selector
@@ -49,7 +49,7 @@ export function part(root, selector) {
 }
 
 /**
- * The same for a drawing.
+ * Return a required element of a drawing.
  *
  * @param {ParentNode} root
  * @param {string} selector
@@ -62,7 +62,7 @@ export function drawing(root, selector) {
 }
 
 /**
- * Return the time of day for people, the same on logs and plots: 24 hours, in this device's zone.
+ * Return the time of day as text, equal in logs and plots: 24 hours, in this device's time zone.
  *
  * @param {Date} time
  */
@@ -71,7 +71,7 @@ export function clock(time) {
 }
 
 /**
- * Write a text, on change only.
+ * Write a text if it has changed.
  *
  * @param {Element} el
  * @param {string} text
@@ -79,7 +79,7 @@ export function clock(time) {
 export function write(el, text) {
   const only = el.childNodes.length === 1 ? el.firstChild : null;
   if (text && only instanceof Text) {
-    // The node stays: another one would have the browser match the page's selectors anew.
+    // The text node stays: a new one would make the browser match the page's selectors again.
     if (only.data !== text) only.data = text;
   } else if (el.textContent !== text) {
     el.textContent = text;
@@ -87,7 +87,7 @@ export function write(el, text) {
 }
 
 /**
- * Write an attribute, on change only; null takes it away.
+ * Write an attribute if it has changed; null removes it.
  *
  * @param {Element} el
  * @param {string} name
@@ -101,15 +101,15 @@ export function attribute(el, name, value) {
   }
 }
 
-/** What was written: reading it back from the element costs more. @type {WeakMap<Element, Map<string, string>>} */
+/** Written styles: reading them back from the element costs more. @type {WeakMap<Element, Map<string, string>>} */
 const styles = new WeakMap();
 
 /**
- * Write a property of the element's style, on change only. Whoever uses it for a property writes
- * that one by nothing else.
+ * Write a property of the element's style if it has changed. All writes of a property must use this
+ * function.
  *
  * @param {Element} el
- * @param {string} name as "--value-share" or "transform"
+ * @param {string} name such as "--value-share" or "transform"
  * @param {string} value
  */
 export function style(el, name, value) {
@@ -121,19 +121,19 @@ export function style(el, name, value) {
   el.style.setProperty(name, value);
 }
 
-/** For how long a text has to be shorter before it is written larger. */
+/** Time for which a text must be shorter before it is drawn larger. */
 const LARGER_AFTER_MS = 2000;
-/** For how many characters each place has room, and until when more than it needs. @type {WeakMap<Element, {room: number, untilMs: number}>} */
+/** Room of each element in characters, and the time until which it may be too much. @type {WeakMap<Element, {room: number, untilMs: number}>} */
 const rooms = new WeakMap();
 
 /**
- * Tell the style sheet, by a property, for how many characters a text has to have room. In steps of
- * two, larger at once and smaller only after a while, so that digits which change change no size.
+ * Write the room for a text, in characters, to a property of the style. It grows in steps of two at
+ * once, and shrinks only after a while, so that changing digits do not change the font size.
  *
  * @param {Element} el
- * @param {string} name as "--value-characters"
+ * @param {string} name such as "--value-characters"
  * @param {number} characters
- * @param {boolean} [isExact] in no steps: the text fills all the room that it has
+ * @param {boolean} [isExact] without steps: the text fills all its room
  */
 export function fit(el, name, characters, isExact = false) {
   const needed = isExact ? characters : clamp(2 * Math.ceil(characters / 2), 4, 40);
@@ -145,16 +145,16 @@ export function fit(el, name, characters, isExact = false) {
   style(el, name, String(needed));
 }
 
-/** What has to be told when a while has passed. @type {Map<Element, Readonly<Record<string, string | null>>>} */
+/** Attributes that wait for their next write. @type {Map<Element, Readonly<Record<string, string | null>>>} */
 const untold = new Map();
-/** When each element told last. @type {WeakMap<Element, number>} */
+/** Time of each element's last write. @type {WeakMap<Element, number>} */
 const toldMs = new WeakMap();
 const TELL_EVERY_MS = 500;
 
 /**
- * Write attributes that only screen readers read, on change only: at once, and then at most twice a
- * second, the newest winning. Nobody hears more, and a meter that moves in each frame need not pay
- * for it.
+ * Write attributes for screen readers if they have changed: at once, and then at most twice a second,
+ * newest first. A screen reader reads no faster, and a meter that moves in each frame need not pay for
+ * it.
  *
  * @param {Element} el
  * @param {Readonly<Record<string, string | null>>} attributes
@@ -178,7 +178,7 @@ function tellRest() {
 }
 
 /**
- * Make an element of a drawing.
+ * Make an element of an SVG drawing.
  *
  * @template {keyof SVGElementTagNameMap} T
  * @param {T} name
@@ -192,12 +192,12 @@ export function svg(name, attributes = {}) {
 }
 
 /**
- * Make a button.
+ * Make a button element.
  *
  * @param {string} className
  * @param {string} text
  * @param {() => void} press
- * @param {{signal: AbortSignal, label?: string}} more `label` is its name where `text` is only a sign
+ * @param {{signal: AbortSignal, label?: string}} more `label` is its name if `text` is only a symbol
  */
 export function button(className, text, press, { signal, label = "" }) {
   const made = document.createElement("button");
@@ -219,10 +219,10 @@ export function clamp(value, least, most) {
 }
 
 /**
- * Return a number for people; "—" for whatever is none.
+ * Return a number as text; "—" for any other value.
  *
  * @param {unknown} value
- * @param {number} [digits] after the point; when left out, four that mean something, and all before it
+ * @param {number} [digits] digits after the point; by default four significant ones, and the whole integer part
  */
 export function format(value, digits) {
   if (typeof value !== "number" || !Number.isFinite(value)) return DASH;
@@ -230,7 +230,7 @@ export function format(value, digits) {
 }
 
 /**
- * Return the number that a reading holds; null when it holds none that can be drawn.
+ * Return the number in a reading; null if it has none that can be drawn.
  *
  * @param {Reading | undefined} reading
  * @returns {number | null}
@@ -241,7 +241,7 @@ export function number(reading) {
 }
 
 /**
- * Return what the robot says for a word; the word itself where it has no other.
+ * Return the robot's value for a word of a signal; the word itself if there is none.
  *
  * @param {Pick<Signal, "states"> | undefined} signal
  * @param {unknown} word
@@ -252,8 +252,7 @@ export function keyOf(signal, word) {
 }
 
 /**
- * Return the numbers that a reading of an array holds, null for those that are not known; null when
- * there is no array.
+ * Return the numbers in a reading of an array, with null for unknown ones; null without an array.
  *
  * @param {Reading | undefined} reading
  * @returns {(number | null)[] | null}
@@ -265,7 +264,7 @@ export function numbers(reading) {
 }
 
 /**
- * Return the readings of an input that takes many signals, in the order in which they are bound.
+ * Return the readings of an input of many signals, in the order of the binding.
  *
  * @param {Reading | undefined} readings
  * @returns {readonly Reading[]}
@@ -275,10 +274,10 @@ export function many(readings) {
 }
 
 /**
- * Return what is to be said beside a value: that there is none, how old it is, which limit it passed.
+ * Return the note at a value: missing, its age, or the exceeded limit.
  *
  * @param {Pick<Reading, "state" | "age" | "alarm">} reading
- * @param {(text: string, names?: Record<string, string | number>) => string} t the context's
+ * @param {(text: string, names?: Record<string, string | number>) => string} t `t` of the context
  */
 export function noteOf({ state, age, alarm }, t) {
   if (state === "none") return t("no value yet");
@@ -288,8 +287,8 @@ export function noteOf({ state, age, alarm }, t) {
 }
 
 /**
- * Return how several readings are that are shown as one, for `noteOf`: the oldest of those that are
- * known, and the gravest alarm. Readings that are not there do not count beside others that are.
+ * Return the common state of several readings, for `noteOf`: the oldest of the known ones, and the worst
+ * alarm. Missing readings are ignored if others are known.
  *
  * @param {readonly (Reading | undefined)[]} readings
  * @returns {{state: Reading["state"], age: string, alarm: Alarm}}
@@ -303,13 +302,12 @@ export function worst(readings) {
   return { state: found?.state ?? "none", age: found?.age ?? "", alarm };
 }
 
-/** What `board` draws on. @type {WeakMap<HTMLCanvasElement, Sheet>} */
+/** Offscreen canvases of `board`. @type {WeakMap<HTMLCanvasElement, Sheet>} */
 const sheets = new WeakMap();
 
 /**
- * Return what draws on a canvas, sized to the box it has in the page and to the screen's pixels, and
- * wiped. Call it whenever all is drawn anew, and draw at once: it is shown when the code that runs
- * has ended.
+ * Return a cleared drawing context for a canvas, in the size of its box and in the pixels of the screen.
+ * Call it for each redraw, and draw at once: the result is shown at the end of the running code.
  *
  * @param {HTMLCanvasElement} canvas
  * @param {{width: number, height: number}} size in CSS pixels
@@ -329,7 +327,7 @@ export function board(canvas, { width, height }) {
 
 /**
  * Return the colours of the theme by their tokens, for a canvas: `{ level: "rgb(…)" }` for
- * `--urc-level`. It reads styles: ask when mounting, and whenever `ctx.follow("theme", …)` calls.
+ * `--urc-level`. It reads styles: call it when mounting, and for each call of `ctx.follow("theme", …)`.
  *
  * @template {string} T
  * @param {Element} el
@@ -337,7 +335,7 @@ export function board(canvas, { width, height }) {
  * @returns {Record<T, string>}
  */
 export function colours(el, names) {
-  // Only a used colour is resolved: the token itself may say `light-dark(…)`, or a system colour.
+  // Only a used colour is resolved: the token may hold `light-dark(…)` or a system colour.
   const probe = document.createElement("span");
   probe.hidden = true;
   el.append(probe);
@@ -350,21 +348,21 @@ export function colours(el, names) {
   return /** @type {Record<T, string>} */ (Object.fromEntries(pairs));
 }
 
-/** Whether a person has asked for less motion. */
+/** Return whether the user prefers reduced motion. */
 export function isStill() {
   still ??= matchMedia("(prefers-reduced-motion: reduce)");
   return still.matches;
 }
 
-/** Asked for in each frame. @type {MediaQueryList | undefined} */
+/** Cached, because it is read in each frame. @type {MediaQueryList | undefined} */
 let still;
 
 /**
- * Let the browser keep a text as a file on this device.
+ * Save a text as a file on this device.
  *
  * @param {string} text
  * @param {string} name
- * @param {string} type its media type, as "text/csv"
+ * @param {string} type media type, such as "text/csv"
  */
 export function save(text, name, type) {
   const link = document.createElement("a");

@@ -1,5 +1,5 @@
 // @ts-check
-/** What a widget keeps for as long as the tab is open: one value for each slot of a page. */
+/** Stored state of widgets for the lifetime of the tab: one value for each slot of a page. */
 
 const MOST_CHARACTERS = 20_000;
 
@@ -9,7 +9,7 @@ const MOST_CHARACTERS = 20_000;
  */
 export function memoryOf(slot) {
   const key = `urc-memory ${location.pathname} ${slot}`;
-  /** Where the browser keeps nothing. @type {unknown} */
+  /** Fallback without storage. @type {unknown} */
   let own = null;
   return {
     read() {
@@ -27,7 +27,7 @@ export function memoryOf(slot) {
       try {
         sessionStorage.setItem(key, text);
       } catch {
-        // It is kept until the page is left, at least.
+        // Without storage the value lasts until the page closes.
       }
     },
   };

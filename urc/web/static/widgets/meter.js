@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * One value on a scale, with its figure below: what is the same whatever the scale looks like.
+ * One value on a scale, with its number below: the common part of all scales.
  * `import { Meter } from "urc/meter"`.
  *
  * @typedef {import("../core/types.js").Context} Context
@@ -9,17 +9,17 @@
  *
  * @callback DrawScale
  * @param {Signal} signal
- * @param {[number, number]} scale its ends, in the signal's unit
- * @param {(value: number) => number} factor to the unit that is shown
+ * @param {[number, number]} scale ends of the scale, in the signal's unit
+ * @param {(value: number) => number} factor conversion to the displayed unit
  */
 import { attribute, digitsIn, format, noteOf, number, part, tell, write } from "./kit.js";
 import { ends } from "./scale.js";
 
 export class Meter {
   /**
-   * @param {Context} ctx its input `value`, and its options min, max, precision
-   * @param {string} name the widget's; it has `.NAME`, `.NAME-meter`, `-text`, `-unit` and `-note`
-   * @param {DrawScale} draw called when the scale is another one
+   * @param {Context} ctx uses its input `value`, and its options min, max, precision
+   * @param {string} name name of the widget; its template has `.NAME`, `.NAME-meter`, `-text`, `-unit`, `-note`
+   * @param {DrawScale} draw called for each change of the scale
    */
   constructor(ctx, name, draw) {
     this.ctx = ctx;
@@ -31,16 +31,16 @@ export class Meter {
     this.note = part(ctx.el, `.${name}-note`);
     /** @type {[number, number]} */
     this.scale = [0, 1];
-    /** What the scale was drawn for. @type {Signal | null} */
+    /** Signal of the drawn scale. @type {Signal | null} */
     this.drawn = null;
     this.shownIn = "";
-    /** How wide the figure is, in characters; its unit is half as large. */
+    /** Width of the number in characters; its unit is half as large. */
     this.characters = 1;
   }
 
   /**
    * @param {Reading} value
-   * @returns {number | null} it, in the signal's unit; null while nobody knows it
+   * @returns {number | null} the value in the signal's unit; null while it is unknown
    */
   show(value) {
     const { ctx, root, meter } = this;

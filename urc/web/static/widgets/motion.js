@@ -1,12 +1,11 @@
 // @ts-check
 /**
- * What widgets that drive have in common: `import { Motion, signed } from "urc/motion"`.
+ * The common part of widgets that drive: `import { Motion, signed } from "urc/motion"`.
  *
- * A widget says how far a hand pushes, and draws what was made of it. In between lie the options of
- * `urc/curve`, the speed steps with their buttons, keys and buttons of the gamepad, and the line
- * that says why nothing moves. Its template has `.NAME` with `data-phase`, `.NAME-note`, and, for the
- * speed steps, buttons with `data-speed`. Beside them comes one that goes to the next step, for cells
- * too low for all.
+ * A widget reports the push of the hand, and draws the result. This module adds the options of
+ * `urc/curve`, the speed steps with their buttons, keys and gamepad buttons, and the note with the reason
+ * why nothing moves. The template has `.NAME` with `data-phase`, `.NAME-note`, and, for the speed steps,
+ * buttons with `data-speed`. A single button for the next step is added for cells of low height.
  *
  * @typedef {import("./curve.js").Push} Push
  * @typedef {import("../core/types.js").Context} Context
@@ -16,15 +15,15 @@
  * @typedef {import("../core/types.js").HoldState} HoldState
  * @typedef {import("../core/types.js").Instance} Instance
  *
- * @typedef {object} Look What is to be drawn.
+ * @typedef {object} Look The state to draw.
  * @property {HoldPhase | "locked"} phase
- * @property {Push | null} push Where the hand is, as the widget said; null while nothing holds it.
- * @property {Push} values What the robot is told; all nothing while it is not.
+ * @property {Push | null} push Push of the hand, as the widget reported it; null while it is not held.
+ * @property {Push} values Values for the robot; all zero while it is not driven.
  *
- * @typedef {object} Own What a widget that drives says of itself.
+ * @typedef {object} Own The part of one widget.
  * @property {(hand: Hand, isNew: boolean) => {push: Push, isFine?: boolean, speed?: number}} push
- *   How far the hand pushes, from -1 to 1 by name. `isFine` when by degrees, as a pointer does;
- *   `speed` where it is not the chosen step; `isNew` in the first call of a gesture.
+ *   Returns the push of the hand, from -1 to 1 by name. `isFine` marks continuous input, as of a pointer;
+ *   `speed` overrides the chosen step; `isNew` is true in the first call of a gesture.
  * @property {(look: Look) => void} draw
  */
 import { Pipeline, settingsOf, speedsOf } from "./curve.js";
@@ -33,7 +32,7 @@ import { attribute, part, write } from "./kit.js";
 export class Motion {
   /**
    * @param {Context} ctx
-   * @param {string} name of the widget: its classes begin with it
+   * @param {string} name name of the widget: its classes begin with it
    * @param {string} output
    */
   constructor(ctx, name, output) {
@@ -45,7 +44,7 @@ export class Motion {
     this.pipeline = new Pipeline(settingsOf(options));
     this.speeds = speedsOf(options);
     const chosen = typeof options["speed"] === "number" ? options["speed"] : this.speeds.length;
-    /** Which speed step, from 0. */
+    /** Index of the speed step, from 0. */
     this.step = Math.min(this.speeds.length, Math.max(1, Math.round(chosen))) - 1;
     this.reason = ctx.t("not ready yet");
     /** @type {HoldState} */
@@ -58,7 +57,7 @@ export class Motion {
     for (const [index, button] of this.buttons.entries()) {
       button.addEventListener("click", () => this.choose(index), { signal: ctx.signal });
     }
-    /** What it says of the step. */
+    /** The button for the next step. */
     this.next = this.makeNext();
   }
 
@@ -66,7 +65,7 @@ export class Motion {
     return this.speeds[this.step] ?? 1;
   }
 
-  /** One button in the place of the steps, where a cell is too low for them: it goes to the next. */
+  /** Make the button for the next step, for cells of low height. */
   makeNext() {
     const { signal, t } = this.ctx;
     const group = this.buttons[0]?.parentElement;
@@ -84,7 +83,7 @@ export class Motion {
   }
 
   /**
-   * Make an element the grip.
+   * Make an element the handle of the held control.
    *
    * @param {Own & Omit<HoldSpec, "sample" | "show" | "taps" | "pace">} spec
    */
@@ -97,13 +96,13 @@ export class Motion {
       sample: (hand, dtS) => this.sample(hand, dtS),
       show: (state) => {
         this.state = state;
-        if (!state.values) this.at = null; // it springs back; what counts was sent before
+        if (!state.values) this.at = null; // the lever springs back; the robot was told before
         this.draw();
       },
     });
   }
 
-  /** One key for each speed step. */
+  /** Return the keys of the speed steps. */
   taps() {
     const steps = this.speeds.length > 1 ? this.speeds : [];
     return Object.fromEntries(steps.map((_, index) => [`Digit${index + 1}`, () => this.choose(index)]));
@@ -119,7 +118,7 @@ export class Motion {
     return this.pipeline.step(push, { dtS, speed, isFine });
   }
 
-  /** @param {number} index of a speed step; beyond the ends nothing happens */
+  /** @param {number} index index of a speed step; others are ignored */
   choose(index) {
     if (index < 0 || index >= this.speeds.length) return;
     this.step = index;
@@ -155,7 +154,7 @@ export class Motion {
   }
 }
 
-/** @param {string} name of its class */
+/** @param {string} name class of the element */
 function made(name) {
   const span = document.createElement("span");
   span.className = name;
@@ -163,7 +162,7 @@ function made(name) {
 }
 
 /**
- * Return a share for people: two digits, and a sign where there is a direction.
+ * Return a share as text: two digits, and a sign for directions.
  *
  * @param {unknown} value
  */
@@ -174,12 +173,12 @@ export function signed(value) {
 }
 
 /**
- * Keep one axis of a control as a slider for those who cannot see it. What is said changes by tenths
- * only: nobody wants to hear every step of a moving hand.
+ * Keep one axis of a control readable as a slider for screen readers. Its text changes by tenths only,
+ * so that a moving hand does not cause constant speech.
  *
- * @param {Element | null} el with the role of a slider
+ * @param {Element | null} el element with the role of a slider
  * @param {unknown} value
- * @param {string} ahead in words, for what is above nothing
+ * @param {string} ahead word for positive values
  * @param {string} back
  */
 export function speak(el, value, ahead, back) {
@@ -191,12 +190,12 @@ export function speak(el, value, ahead, back) {
 }
 
 /**
- * Return how far a pointer was pulled from where it went down, in shares of `reach`: what was
- * touched first is the centre, so nothing jumps.
+ * Return the drag of a pointer from its start, in shares of `reach`: the start is the centre, so nothing
+ * jumps.
  *
  * @param {Hand} hand
- * @param {number} reach CSS pixels of a full push
- * @returns {{x: number, y: number}} away from the person is x, to the left y
+ * @param {number} reach CSS pixels at full deflection
+ * @returns {{x: number, y: number}} x away from the operator, y to the left
  */
 export function pulled({ x, y, startX, startY }, reach) {
   const span = reach > 0 ? reach : 1;
@@ -204,8 +203,8 @@ export function pulled({ x, y, startX, startY }, reach) {
 }
 
 /**
- * Return of a push what a control with these axes has: another control of the same command may give
- * the other one.
+ * Return the part of a push for a control with these axes: another control of the same command may give
+ * the other axis.
  *
  * @param {string} axes "both", "x" or "y"
  * @param {{x: number, y: number}} push
@@ -215,7 +214,7 @@ export function along(axes, { x, y }) {
   return axes === "x" ? { x } : axes === "y" ? { y } : { x, y };
 }
 
-/** Codes of the keys of each direction: by place, so that they are the same on every layout. */
+/** Key codes of each direction: by position, so that they are the same on every keyboard layout. */
 export const DIRECTIONS = Object.freeze({
   ahead: Object.freeze(["ArrowUp", "KeyW"]),
   back: Object.freeze(["ArrowDown", "KeyS"]),
@@ -224,7 +223,7 @@ export const DIRECTIONS = Object.freeze({
 });
 
 /**
- * Return where the keys that are down point.
+ * Return the direction of the held keys.
  *
  * @param {ReadonlySet<string>} keys
  * @returns {{x: number, y: number}} each -1, 0 or 1

@@ -1,40 +1,39 @@
 // @ts-check
 /**
- * From what a widget gives to what a command takes. Knows no widget, no socket.
+ * From the values of a widget to the arguments of a command. It knows no widget and no socket.
  *
  * @typedef {import("../core/types.js").Given} Given
  * @typedef {import("../core/types.js").Value} Value
  *
- * @typedef {object} Range Where -1, 0 and 1 of a widget lie in an argument of the command.
+ * @typedef {object} Range Values of an argument for -1, 0 and 1 of a widget.
  * @property {number} min
  * @property {number} max
- * @property {number} rest What stops it.
+ * @property {number} rest Value that stops the motion.
  * @property {boolean} isWhole
  *
- * @typedef {object} Output What an output of a widget is bound to.
+ * @typedef {object} Output The binding of a widget's output.
  * @property {string} command
- * @property {Record<string, string>} names Argument of the command → argument of the output, where
- *   they are not called the same.
- * @property {Record<string, Value>} fixed Argument of the command → value that it always has.
- * @property {Record<string, Range>} ranges Argument of the command → what a widget's -1 to 1 means.
- * @property {Record<string, Value>} neutral Argument of the command → value that stops it, for those
- *   that a hand may let go one by one.
- * @property {string} line The transport without which the command cannot be given; "" when one is
- *   made for each command.
- * @property {string} refusal Why a widget can never give it; "" when it can.
- * @property {boolean} isHeld Whether it is motion, and given by holding.
- * @property {boolean} [moves] Whether it moves something by itself, without a hand that holds it.
- * @property {boolean} [mayMove] Whether it moves something with some arguments.
- * @property {number} leaseMs How long motion lasts when nothing is heard.
- * @property {boolean} isAnswered Whether the robot says that it was done.
- * @property {string} [title] What the command is called; "" when the driver does not say.
- * @property {Record<string, import("../core/types.js").Argument>} [arguments] Those that are not fixed.
- * @property {import("../core/types.js").Question[]} [asks] What people are asked before it.
- * @property {{text: string, what: string}[]} [steps] Of a sequence.
+ * @property {Record<string, string>} names Argument of the command → argument of the output, where their
+ *   names differ.
+ * @property {Record<string, Value>} fixed Argument of the command → its fixed value.
+ * @property {Record<string, Range>} ranges Argument of the command → its values for -1 to 1 of a widget.
+ * @property {Record<string, Value>} neutral Argument of the command → value that stops it, for arguments
+ *   that can be released one by one.
+ * @property {string} line The transport that the command needs; "" if it is opened for each command.
+ * @property {string} refusal Why a widget can never run it, or "".
+ * @property {boolean} isHeld Whether it is a held command.
+ * @property {boolean} [moves] Whether it always starts autonomous motion.
+ * @property {boolean} [mayMove] Whether it starts motion with some arguments.
+ * @property {number} leaseMs Time for which motion outlives the last tick, in milliseconds.
+ * @property {boolean} isAnswered Whether the robot acknowledges it.
+ * @property {string} [title] Title of the command; "" if the driver has none.
+ * @property {Record<string, import("../core/types.js").Argument>} [arguments] Arguments that are not fixed.
+ * @property {import("../core/types.js").Question[]} [asks] Confirmations before it.
+ * @property {{text: string, what: string}[]} [steps] Steps of a sequence.
  */
 
 /**
- * Return what a widget may know of the command that an output of it is bound to.
+ * Return the public description of an output's command.
  *
  * @param {Output | undefined} output
  * @returns {import("../core/types.js").Described | null}
@@ -50,17 +49,17 @@ export function describe(output) {
 /**
  * Return the command's arguments.
  *
- * A value goes where `names` says, else to the argument of its own name. What is fixed, no widget
- * can change.
+ * A value goes to the argument in `names`, else to the argument of its own name. Widgets cannot change
+ * fixed values.
  *
  * @template {Given} V
  * @param {Output} output
- * @param {Record<string, V>} given by the names that the widget's manifest declares
+ * @param {Record<string, V>} given values by the names of the widget's manifest
  * @returns {Record<string, V | Value>}
  */
 export function argumentsOf({ names, fixed, ranges = {}, isHeld }, given) {
   const renamed = new Set(Object.values(names));
-  // What a control that is held gives beyond what the command takes, it gives to nobody.
+  // A held control may have more values than the command has arguments; the others are dropped.
   const pairs = Object.entries(given).filter(([name]) => !isHeld && !renamed.has(name));
   for (const [target, name] of Object.entries(names)) {
     const value = Object.hasOwn(given, name) ? given[name] : undefined;

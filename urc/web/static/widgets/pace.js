@@ -1,27 +1,26 @@
 // @ts-check
 /**
- * How many widgets are drawn in one frame. Knows no DOM.
+ * The number of widgets that are drawn in one frame. It knows no DOM.
  *
- * Where all that is new fits into a frame, all of it is drawn. On a device that is too slow for that,
- * widgets take turns, so that the frames keep coming: what is then drawn is the newest, and each has
- * its turn several times a second.
+ * If all news fits into a frame, all of it is drawn. On slower devices widgets take turns, so that the
+ * frame rate stays: each draws its newest values several times a second.
  *
- * On one that is too slow for half of them, widgets are drawn in every second frame only. To draw
- * anything at all costs the browser as much as several widgets, so more are drawn in a second in that
- * way; and every other frame is free for hands.
+ * On a device that is too slow for half of them, widgets are drawn in every second frame only. The first
+ * change of a frame costs the browser as much as several widgets, so more of them are drawn each second
+ * this way, and every other frame is free for input.
  */
 
-/** The widgets' share of a frame: styles, layout and painting included; the rest is for hands. */
+/** The widgets' share of a frame, with styles, layout and painting; the rest is for input. */
 export const SHARE_MS = 8;
-/** Their share of a frame whose next one is free. */
+/** The widgets' share of a frame before a free one. */
 export const SHARE_OF_TWO_MS = 12;
-/** In so many frames in which widgets are drawn each has its turn, however slow the device is. */
+/** Largest number of drawing frames until each widget has had its turn, on any device. */
 export const LONGEST_TURN = 10;
-/** Fewer widgets than these never take turns: looking at what they cost would cost more. */
+/** Number of widgets below which there are no turns: measuring would cost more. */
 export const FEW = 8;
 const FASTER = 1.1;
 const SLOWER = 0.75;
-/** What all of them may take in every second frame, in shares, before each frame is tried again. */
+/** Load of all widgets in every second frame below which each frame is tried again, in shares. */
 const NEARLY = 1.25;
 
 export class Pace {
@@ -29,15 +28,15 @@ export class Pace {
     this.most = Infinity;
     /** Whether widgets are drawn in every second frame only. */
     this.isHalved = false;
-    /** Whether the last frame drew widgets, and many had something new. */
+    /** Whether the last frame drew widgets, and many had news. */
     this.isLastFull = false;
   }
 
   /**
-   * Begin a frame; return how many widgets may be drawn in it. In a free one nothing is, not even
-   * what waits for no turn: all that is new has its frame with the next one.
+   * Begin a frame; return the number of widgets to draw. In a free frame none is drawn, not even urgent
+   * news, which waits for the next frame.
    *
-   * @param {number} count how many there are
+   * @param {number} count number of widgets
    */
   begin(count) {
     if (this.isHalved && this.isLastFull) {
@@ -48,12 +47,11 @@ export class Pace {
   }
 
   /**
-   * End a frame that was not free; return whether it is worth learning from. Those that wait count as
-   * well: where turns are short, few are drawn in each frame, and it could never be found out that
-   * there is room for more.
+   * End a frame that was not free; return whether it is worth learning from. Waiting widgets count, too:
+   * with short turns few are drawn in each frame, so a larger budget could never be found.
    *
-   * @param {number} drawn how many widgets it drew
-   * @param {number} waiting how many wait for their turn
+   * @param {number} drawn number of drawn widgets
+   * @param {number} waiting number of widgets that wait for their turn
    */
   end(drawn, waiting) {
     this.isLastFull = drawn > 0 && drawn + waiting >= FEW;
@@ -61,11 +59,11 @@ export class Pace {
   }
 
   /**
-   * Learn from a frame.
+   * Learn the cost of widgets from a frame.
    *
-   * @param {number} drawn how many widgets it drew, at least 1
-   * @param {number} tookMs from its first callback to when it was painted
-   * @param {number} count how many widgets there are
+   * @param {number} drawn number of drawn widgets, at least 1
+   * @param {number} tookMs time from its first callback to its painting
+   * @param {number} count number of widgets
    */
   learn(drawn, tookMs, count) {
     const share = (this.isHalved ? SHARE_OF_TWO_MS : SHARE_MS) / Math.max(0.1, tookMs);

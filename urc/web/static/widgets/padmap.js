@@ -1,23 +1,23 @@
 // @ts-check
 /**
- * Where the sticks and buttons of a gamepad are: by the browser's standard, or as a person has said
- * for that device. Pure.
+ * The mapping of a gamepad's sticks and buttons: the browser's standard, or the operator's mapping of the
+ * device. Pure.
  *
  * @typedef {"left" | "right"} Side
  *
  * @typedef {object} PadMap
- * @property {number[]} axes Place of left across, left along, right across, right along; -1 for none.
- * @property {boolean[]} turned Whether the sign of each of those is turned.
- * @property {number[]} left Buttons that let the left stick move something while one is down.
+ * @property {number[]} axes Indexes of left across, left along, right across, right along; -1 for none.
+ * @property {boolean[]} turned Whether each of those is inverted.
+ * @property {number[]} left Buttons that enable the left stick while one is held.
  * @property {number[]} right The same for the right stick.
- * @property {number} slower Button for the speed step below; -1 for none.
- * @property {number} faster Button for the one above.
+ * @property {number} slower Button for the next lower speed step; -1 for none.
+ * @property {number} faster Button for the next higher speed step; -1 for none.
  */
 
 const MOST = 64;
 const AXES = 4;
 
-/** The layout that a browser calls "standard". @type {Readonly<PadMap>} */
+/** The layout that browsers call "standard". @type {Readonly<PadMap>} */
 export const STANDARD = Object.freeze({
   axes: [0, 1, 2, 3],
   turned: [false, false, false, false],
@@ -28,7 +28,7 @@ export const STANDARD = Object.freeze({
 });
 
 /**
- * Return a stored mapping, or null when it is none: what is stored may be of anybody's making.
+ * Return a stored mapping, or null if it is invalid: stored text cannot be trusted.
  *
  * @param {string | null} text
  * @returns {PadMap | null}
@@ -73,7 +73,7 @@ export function sticksOf(map, axes) {
 }
 
 /**
- * Return the mapping with one of its parts changed.
+ * Return the mapping with one button changed.
  *
  * @param {PadMap} map
  * @param {"left" | "right" | "slower" | "faster"} name
@@ -101,8 +101,8 @@ export function withAxis(map, which, place, isTurned) {
 }
 
 /**
- * Return the axis that was moved farthest from where it rested, and whether it went the negative
- * way; null while none went far.
+ * Return the axis with the largest change from its rest position, with its direction; null without a
+ * large change.
  *
  * @param {readonly number[]} rest
  * @param {readonly number[]} now

@@ -1,10 +1,10 @@
 // @ts-check
 /**
- * Colours for measured fields: `import { palette } from "urc/palette"`.
+ * Colour maps for measured fields: `import { palette } from "urc/palette"`.
  *
- * Cividis reads nearly the same with and without red-green blindness, and its brightness rises from
- * end to end, so that it also works in grey. The map is that of Nuñez, Anderton and Renslow (2018),
- * at every eighth step; between two steps lies a straight line. Knows no DOM.
+ * Cividis looks nearly the same with and without red-green blindness, and its brightness rises from end
+ * to end, so it also works in grey. The map is that of Nuñez, Anderton and Renslow (2018), at every
+ * eighth step, with linear interpolation. It knows no DOM.
  */
 
 const CIVIDIS =
@@ -18,7 +18,7 @@ const STEPS = CIVIDIS.split(" ").map((text) => Number.parseInt(text, 16));
 /**
  * Return red, green and blue, 0 to 255.
  *
- * @param {number} share 0 to 1; what lies outside is at the end
+ * @param {number} share 0 to 1; values outside are clamped
  * @param {Palette} [name]
  * @returns {[number, number, number]}
  */
@@ -38,7 +38,7 @@ export function colour(share, name = "cividis") {
 }
 
 /**
- * Return the map in 256 steps, each a pixel as `ImageData` holds it, read as one 32-bit number.
+ * Return the map in 256 steps, each a pixel of `ImageData` as one 32-bit number.
  *
  * @param {Palette} [name]
  */
@@ -49,7 +49,7 @@ export function palette(name = "cividis") {
 }
 
 /**
- * Return a colour of the page, as `rgb(1, 2, 3)` or `#123456`, as one pixel; black when it is neither.
+ * Return a colour, as `rgb(1, 2, 3)` or `#123456`, as one pixel; black for any other text.
  *
  * @param {string} text
  * @param {number} [alpha] 0 to 255

@@ -1,22 +1,22 @@
 // @ts-check
 /**
- * Images of one input, decoded as fast as this device can: the newest wins, none waits in a queue.
+ * Decoder for the images of one input, at the speed of the device: the newest wins, none is queued.
  *
  * @typedef {import("../core/types.js").Picture} Picture
  */
 
 export class Decoder {
   /**
-   * @param {(bitmap: ImageBitmap, picture: Picture) => void} show The bitmap is closed when the next
-   *   one has been shown.
-   * @param {(error: unknown) => void} failed An image could not be decoded.
+   * @param {(bitmap: ImageBitmap, picture: Picture) => void} show Shows an image. The bitmap is closed
+   *   after the next one is shown.
+   * @param {(error: unknown) => void} failed Handles an image that cannot be decoded.
    * @param {(blob: Blob) => Promise<ImageBitmap>} [decode]
    */
   constructor(show, failed, decode = (blob) => createImageBitmap(blob)) {
     this.show = show;
     this.failed = failed;
     this.decode = decode;
-    /** Came while another one was being decoded. @type {Picture | null} */
+    /** Newest image that arrived during decoding. @type {Picture | null} */
     this.next = null;
     this.isBusy = false;
     this.isOver = false;

@@ -1,24 +1,24 @@
 // @ts-check
 /**
- * The arithmetic of scales, for every widget that draws one: `import { ticks } from "urc/scale"`.
+ * Arithmetic of scales: `import { ticks } from "urc/scale"`.
  *
- * Pure: knows no page, so that it is tested without one.
+ * Pure: it knows no page, so tests need none.
  *
  * @typedef {import("../core/types.js").Alarm} Alarm
  * @typedef {import("../core/types.js").Signal} Signal
  *
- * @typedef {{from: number, to: number, alarm: Alarm}} Band A part of a scale in which a value has
- *   passed a limit; `from` and `to` in the scale's unit.
+ * @typedef {{from: number, to: number, alarm: Alarm}} Band Part of a scale beyond a limit; `from` and
+ *   `to` in the scale's unit.
  */
 
-/** Tick distances that people read with ease, within a decade. */
+/** Readable tick distances within a decade. */
 const STEPS = [1, 2, 5, 10];
 
-/** Numbers whose difference is a smaller share of them are drawn as one. */
+/** Relative difference below which two numbers are drawn as one. */
 const NEAREST = 1e-12;
 
 /**
- * Return where a value stands on a scale, as a share from 0 to 1; ends clamp.
+ * Return the position of a value on a scale, as a share from 0 to 1; clamped.
  *
  * @param {number} value
  * @param {number} least
@@ -30,30 +30,29 @@ export function share(value, least, most) {
 }
 
 /**
- * Return round values of a scale, both ends included where they are round.
+ * Return round values of a scale, with its ends if they are round.
  *
  * @param {number} least
  * @param {number} most
- * @param {number} count about how many; never more than twice as many
- * @returns {number[]} rising
+ * @param {number} count approximate number; never more than twice as many
+ * @returns {number[]} in rising order
  */
 export function ticks(least, most, count) {
   if (!(most > least) || !Number.isFinite(most - least)) return [];
   const rough = (most - least) / Math.max(1, count);
   const decade = 10 ** Math.floor(Math.log10(rough));
   const step = decade * (STEPS.find((each) => each * decade >= rough * 0.999) ?? 10);
-  // Multiplied, not added up: ten times 0.1 is not 1.
+  // Multiplied, not added up: adding 0.1 ten times does not give 1.
   const places = wholes(Math.ceil(least / step - 1e-9), Math.floor(most / step + 1e-9));
   return places.map((place) => Number((place * step).toPrecision(12)) + 0);
 }
 
 /**
- * Return the whole numbers from one to another, both included; none so far from zero that a number and
- * the next one are not told apart.
+ * Return the integers from `first` to `last`, both included; [] beyond the range of exact integers.
  *
  * @param {number} first
  * @param {number} last
- * @returns {number[]} rising
+ * @returns {number[]} in rising order
  */
 export function wholes(first, last) {
   if (!Number.isSafeInteger(first) || !Number.isSafeInteger(last)) return [];
@@ -61,7 +60,7 @@ export function wholes(first, last) {
 }
 
 /**
- * Return how many digits after the point such round values need.
+ * Return the digits after the point that round values need.
  *
  * @param {readonly number[]} values
  */
@@ -75,8 +74,8 @@ export function digitsOf(values) {
 }
 
 /**
- * Return the ends of a scale: what was asked for, else what the signal can be, else 0 to 100 for
- * percent and 0 to 1.
+ * Return the ends of a scale: those of the options, else of the signal, else 0 to 100 for percent and 0
+ * to 1 for other units.
  *
  * @param {Pick<Signal, "min" | "max" | "unit">} signal
  * @param {{min?: unknown, max?: unknown}} wanted
@@ -90,7 +89,7 @@ export function ends(signal, wanted) {
 }
 
 /**
- * Return the parts of a scale that lie past a limit.
+ * Return the parts of a scale beyond a limit.
  *
  * @param {Signal["limits"]} limits
  * @param {number} least
@@ -113,17 +112,17 @@ export function bands(limits, least, most) {
 }
 
 /**
- * Return what a drawing goes from and to so that all values are seen, with the limits that are near.
+ * Return the range of a drawing that shows all values, and the limits near them.
  *
- * @param {number} least of the values
- * @param {number} most of the values
- * @param {readonly number[]} limits those further off than three times the height are left out
+ * @param {number} least smallest value
+ * @param {number} most largest value
+ * @param {readonly number[]} limits limits farther away than three times the height are left out
  * @returns {[number, number]}
  */
 export function spanOf(least, most, limits) {
   if (!(most >= least)) return [0, 1];
   let [bottom, top] = [least, most];
-  // Too near each other to be counted between: as good as one value.
+  // Too close together for ticks between them: treated as one value.
   if (top - bottom <= Math.max(Math.abs(top), Math.abs(bottom)) * NEAREST) {
     const room = Math.abs(top) / 10 || 1;
     [bottom, top] = [bottom - room, top + room];

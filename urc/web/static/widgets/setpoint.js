@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * A number that a hand sets: what is given when, what is shown, and what the robot says about it.
- * Draws nothing; a slider, a knob and a number field are three looks of it.
+ * A setpoint that the operator sets: its commands, its displayed value, and the robot's confirmation. It
+ * draws nothing; slider, knob and number field are three views of it.
  *
  * @typedef {import("../core/types.js").Value} Value
  * @typedef {import("../core/types.js").Context} Context
@@ -15,8 +15,8 @@ import { Wish } from "./wish.js";
 
 export class Setpoint {
   /**
-   * @param {Context} ctx its options: send, every_ms, step, min, max, unit, precision, echo, echo_s
-   * @param {() => void} show called when anything has changed
+   * @param {Context} ctx uses its options send, every_ms, step, min, max, unit, precision, echo, echo_s
+   * @param {() => void} show called after each change
    */
   constructor(ctx, show) {
     const { options, signal, send, t, onStop } = ctx;
@@ -25,11 +25,11 @@ export class Setpoint {
     this.isLive = options["send"] !== "release";
     this.isOptimistic = options["echo"] === "optimistic";
     this.bounds = boundsOf(Object.values(ctx.command("change")?.arguments ?? {})[0], options);
-    /** Where the hand is; null when there is none. @type {number | null} */
+    /** Value of the gesture; null without one. @type {number | null} */
     this.hand = null;
-    /** Takes the hand away. Set by what the hand is on. */
+    /** Cancels the gesture. Set by the view. */
     this.drop = () => this.cancel();
-    /** What was given last. @type {number | null} */
+    /** Last sent value. @type {number | null} */
     this.last = null;
     /** @type {Reading | undefined} */
     this.state = undefined;
@@ -43,29 +43,29 @@ export class Setpoint {
       isSame: (wished, said) => Math.abs(Number(wished) - Number(said)) <= this.bounds.step / 2,
     });
     onStop(({ phase }) => {
-      if (phase !== "" && this.hand !== null) this.drop(); // what it draws from now on sets nothing
+      if (phase !== "" && this.hand !== null) this.drop(); // the rest of this gesture sets nothing
     });
   }
 
-  /** What the robot says; null when it does not. */
+  /** Value that the robot reports, or null. */
   get said() {
     return number(this.state);
   }
 
-  /** What the control shows: the hand, else the robot, else what was given. */
+  /** Displayed value: of the gesture, else of the robot, else the last sent one. */
   get shown() {
     if (this.hand !== null) return this.hand;
     if (this.isOptimistic && this.wish.isWaiting) return Number(this.wish.value);
     return this.state ? this.said : this.last;
   }
 
-  /** Where a hand begins that only steps. */
+  /** Start value of a step. */
   get from() {
     const wished = this.wish.isWaiting ? Number(this.wish.value) : null;
     return this.hand ?? wished ?? this.said ?? this.last ?? Math.max(this.bounds.min, Math.min(0, this.bounds.max));
   }
 
-  /** 0 to 1 between the bounds; null for none. */
+  /** Return 0 to 1 between the bounds; null for null. */
   shareOf(/** @type {number | null} */ value) {
     const { min, max } = this.bounds;
     if (value === null || max <= min) return null;
@@ -95,7 +95,7 @@ export class Setpoint {
     if (!this.giver.isReady && this.hand !== null) this.drop();
   }
 
-  /** @param {number} value where the hand is now */
+  /** @param {number} value present value of the gesture */
   move(value) {
     if (!this.giver.isReady) return;
     const isNews = this.hand !== value;
@@ -104,7 +104,7 @@ export class Setpoint {
     this.show();
   }
 
-  /** The hand has gone. */
+  /** End the gesture. */
   release() {
     const value = this.hand;
     this.hand = null;
@@ -112,13 +112,13 @@ export class Setpoint {
     this.show();
   }
 
-  /** The hand is gone, and meant nothing. */
+  /** Cancel the gesture. */
   cancel() {
     this.hand = null;
     this.show();
   }
 
-  /** @param {number} value set at once, without a hand that stays */
+  /** @param {number} value value to set at once, without a gesture */
   set(value) {
     if (!this.giver.isReady) return;
     this.put(value);
@@ -127,7 +127,7 @@ export class Setpoint {
 
   /**
    * @param {string} key
-   * @returns {boolean} whether it means something here
+   * @returns {boolean} whether the key has a meaning here
    */
   key(key) {
     const value = keyed(key, this.from, this.bounds);

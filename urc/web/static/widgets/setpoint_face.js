@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * What a knob, a slider and a number field show of a setpoint in the same way, and how a hand on a
- * dial or a track sets it.
+ * The common view of a setpoint for knob, slider and number field, with the gestures on a dial or a
+ * track.
  *
  * @typedef {import("./setpoint.js").Setpoint} Setpoint
  */
@@ -10,21 +10,21 @@ import { attribute, part, write } from "./kit.js";
 
 export class SetpointFace {
   /**
-   * @param {HTMLElement} el the cell; in it are `.NAME`, `.NAME-text` and `.NAME-note`
-   * @param {string} name the widget's
+   * @param {HTMLElement} el the cell with `.NAME`, `.NAME-text` and `.NAME-note`
+   * @param {string} name name of the widget
    */
   constructor(el, name) {
     this.root = part(el, `.${name}`);
     this.text = part(el, `.${name}-text`);
     this.note = part(el, `.${name}-note`);
     this.name = name;
-    /** All that nobody can use while it is locked. */
+    /** Elements that are disabled while it is locked. */
     this.locked = [...this.root.querySelectorAll("[aria-disabled]")];
   }
 
   /**
    * @param {Setpoint} setpoint
-   * @param {string} [fault] what is wrong with what was typed
+   * @param {string} [fault] mistake in the typed text
    */
   show(setpoint, fault = "") {
     const { root, text, note, locked } = this;
@@ -39,7 +39,7 @@ export class SetpointFace {
   }
 
   /**
-   * Show it on an element of the role slider.
+   * Show the setpoint on an element with the role slider.
    *
    * @param {HTMLElement} control
    * @param {Setpoint} setpoint
@@ -51,13 +51,13 @@ export class SetpointFace {
   }
 
   /**
-   * Let a hand set it: on an element of the role slider, and by the buttons `.NAME-less` and
-   * `.NAME-more` beside it.
+   * Let gestures set it: on an element with the role slider, and by the buttons `.NAME-less` and
+   * `.NAME-more`.
    *
    * @param {HTMLElement} control
    * @param {Setpoint} setpoint
-   * @param {(event: PointerEvent, isNew: boolean) => number} at the value under a pointer
-   * @param {import("../control/grasp.js").Way} way how a finger draws it; any other way it scrolls the page
+   * @param {(event: PointerEvent, isNew: boolean) => number} at returns the value under a pointer
+   * @param {import("../control/grasp.js").Way} way drag direction; other directions scroll the page
    * @param {AbortSignal} signal
    */
   listen(control, setpoint, at, way, signal) {

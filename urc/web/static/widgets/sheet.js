@@ -2,13 +2,12 @@
 /**
  * A canvas that changes less often than the page around it: `import { Sheet } from "urc/sheet"`.
  *
- * Where a browser draws without a graphics processor, it copies each canvas that can be seen as often
- * as anything on the page changes, whether that canvas has changed or not. A finished picture that was
- * handed over it does not copy again. So this is drawn on out of sight, and shown when it is done.
+ * A browser without a graphics processor copies each visible canvas whenever anything on the page
+ * changes. It does not copy a finished bitmap. So this class draws offscreen, and shows the result.
  */
 
 export class Sheet {
-  /** @param {HTMLCanvasElement} canvas Shows it; nobody else may have drawn on it. */
+  /** @param {HTMLCanvasElement} canvas canvas in the page; no other code may have drawn on it */
   constructor(canvas) {
     this.canvas = canvas;
     const surface = typeof OffscreenCanvas === "function" ? new OffscreenCanvas(1, 1) : null;
@@ -18,15 +17,15 @@ export class Sheet {
     if (!pen) throw new Error("this browser draws no canvas");
     this.screen = screen;
     this.surface = screen && surface ? surface : canvas;
-    /** Draws on it. All that a canvas in the page can be drawn with, this one can be. */
+    /** Drawing context of the offscreen canvas. */
     this.pen = /** @type {CanvasRenderingContext2D} */ (pen);
     this.isDue = false;
   }
 
   /**
-   * Wipe it when it has another size now.
+   * Clear the canvas after a change of its size.
    *
-   * @param {number} width pixels of the picture
+   * @param {number} width pixels
    * @param {number} height
    */
   resize(width, height) {
@@ -36,7 +35,7 @@ export class Sheet {
     }
   }
 
-  /** Show it when the code that runs has ended: before the next frame is painted. */
+  /** Show it at the end of the running code, before the next frame is painted. */
   showSoon() {
     if (this.isDue) return;
     this.isDue = true;
@@ -47,9 +46,9 @@ export class Sheet {
   }
 
   /**
-   * Show what was drawn.
+   * Show the drawing.
    *
-   * @param {boolean} [isKept] whether what is drawn next comes on top of it; else it begins empty
+   * @param {boolean} [isKept] whether the next drawing adds to it; else the canvas is cleared
    */
   show(isKept = false) {
     const { screen, surface, pen } = this;

@@ -1,17 +1,17 @@
 // @ts-check
 /**
- * Lines that people draw: `import { simplified, polar } from "urc/stroke"`. Pure maths.
+ * Drawn lines: `import { simplified, polar } from "urc/stroke"`. Pure maths.
  *
  * @typedef {readonly [number, number]} Point x forward, y left (REP 103), in the command's unit
  */
 
-/** How often a line is simplified more: after that the tolerance is beyond every pad. */
+/** Most rounds of simplification: after them the tolerance is larger than any pad. */
 const ROUNDS = 24;
 
 /**
- * Return a line of fewer points that is nowhere farther from the given one than `tolerance`.
+ * Return a line of fewer points with a distance of at most `tolerance` from the given one.
  *
- * Keeps the first and the last point. Douglas and Peucker's way, without recursion.
+ * It keeps the first and the last point (Douglas and Peucker, without recursion).
  *
  * @param {readonly Point[]} points
  * @param {number} tolerance
@@ -37,7 +37,7 @@ export function simplified(points, tolerance) {
  * @param {readonly Point[]} points
  * @param {number} first
  * @param {number} last
- * @returns {[number, number]} place and distance of the point farthest from the span's chord
+ * @returns {[number, number]} index and distance of the point farthest from the chord
  */
 function farthest(points, first, last) {
   let [place, far] = [first, -1];
@@ -50,7 +50,7 @@ function farthest(points, first, last) {
 }
 
 /**
- * How far a point is from a stretch between two others.
+ * Return the distance of a point from a line segment.
  *
  * @param {Point} point
  * @param {Point} from
@@ -65,8 +65,8 @@ export function distance([x, y], [fromX, fromY], [toX, toY]) {
 }
 
 /**
- * Return one line of several strokes, of at most so many points: each stroke is simplified, and more
- * so while there are too many.
+ * Return one line from several strokes, with at most `most` points: each stroke is simplified until the
+ * number fits.
  *
  * @param {readonly (readonly Point[])[]} strokes
  * @param {number} tolerance
@@ -84,7 +84,7 @@ export function fitted(strokes, tolerance, most) {
 }
 
 /**
- * How long a line is.
+ * Return the length of a line.
  *
  * @param {readonly Point[]} points
  */
@@ -98,7 +98,7 @@ export function lengthOf(points) {
 }
 
 /**
- * Return heading and distance of a vector: ahead is 0, to the left positive, radians.
+ * Return heading and distance of a vector: ahead is 0, left is positive, in radians.
  *
  * @param {number} dx
  * @param {number} dy
@@ -108,7 +108,7 @@ export function polar(dx, dy) {
 }
 
 /**
- * Cut a vector to the longest that is allowed.
+ * Limit a vector to the longest allowed length.
  *
  * @param {number} dx
  * @param {number} dy

@@ -1,15 +1,15 @@
 // @ts-check
 /**
- * Style sheets of third-party modules: found by the module's name in the import map, loaded once.
+ * Style sheets of third-party modules, found by the module's name in the import map, loaded once.
  */
 
 /** @type {Map<string, Promise<void>>} */
 const loaded = new Map();
 
 /**
- * Load the style sheet of a module, below the widgets' own so that those can change it.
+ * Load the style sheet of a module, below the widgets' own styles, which may override it.
  *
- * @param {string} module as it is imported
+ * @param {string} module name in the import map
  * @returns {Promise<void>}
  */
 export function loadStyle(module) {
@@ -23,9 +23,9 @@ export function loadStyle(module) {
 
 /** @param {string} module */
 async function load(module) {
-  const url = import.meta.resolve(`${module}/style.css`); // throws when the map has none
+  const url = import.meta.resolve(`${module}/style.css`); // throws if the map has none
   const el = document.createElement("style");
-  // A sheet that is linked would stand above every layer, and so above the widgets.
+  // A linked sheet would be above every layer, and so above the widgets' styles.
   const script = document.querySelector("script[nonce]");
   el.nonce = script instanceof HTMLScriptElement ? script.nonce : "";
   el.textContent = `@import url(${JSON.stringify(url)}) layer(widgets.vendor);`;

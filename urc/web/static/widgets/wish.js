@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * What was wished for, until the robot says the same; then, or when it does not, it is told so. What
- * a control shows is what the robot says.
+ * A requested value, until the robot confirms it or the time is over. A control shows the robot's value
+ * in the end.
  *
  * @typedef {import("../core/types.js").Reading} Reading
  * @typedef {import("../core/types.js").Value} Value
@@ -10,8 +10,8 @@
 export class Wish {
   /**
    * @param {object} spec
-   * @param {number} spec.withinMs how long the robot may take to say the same
-   * @param {() => void} spec.show called when any of it has changed by time
+   * @param {number} spec.withinMs time limit of the confirmation
+   * @param {() => void} spec.show called for changes by time
    * @param {AbortSignal} spec.signal
    * @param {(wished: Value, said: unknown) => boolean} [spec.isSame]
    */
@@ -19,12 +19,12 @@ export class Wish {
     this.withinMs = withinMs;
     this.show = show;
     this.isSame = isSame;
-    /** null: nothing is wished. @type {Value} */
+    /** Requested value; null without a request. @type {Value} */
     this.value = null;
     this.isMissed = false;
-    /** Readings up to this one do not answer the wish. */
+    /** Readings up to this one do not confirm the request. */
     this.serial = 0;
-    /** What the robot says now. @type {Reading | undefined} */
+    /** Present reading of the robot. @type {Reading | undefined} */
     this.said = undefined;
     /** @type {number | undefined} */
     this.timer = undefined;
@@ -37,7 +37,7 @@ export class Wish {
 
   /**
    * @param {Value} value
-   * @param {Reading | undefined} reading what the robot says now
+   * @param {Reading | undefined} reading present reading of the robot
    */
   make(value, reading) {
     this.value = value;
@@ -48,7 +48,7 @@ export class Wish {
     this.timer = window.setTimeout(() => this.end(), this.withinMs);
   }
 
-  /** Its time is over. A robot that tells changes only is silent about what it had done before. */
+  /** End the wait. A robot that only reports changes is silent about a value that it had already. */
   end() {
     if (this.value !== null && this.isSaid(this.said)) this.drop();
     else this.isMissed = this.value !== null;
@@ -60,7 +60,7 @@ export class Wish {
     return reading !== undefined && reading.value !== null && this.isSame(this.value, reading.value);
   }
 
-  /** It was not even given. */
+  /** Drop a request that was not sent. */
   drop() {
     this.value = null;
     this.isMissed = false;
