@@ -11,7 +11,7 @@ from urc.cli.main import main
 from urc.config.codes import Page, pages
 from urc.config.load import Shelf, check
 from urc.runtime.catalog import built_in_catalog
-from urc.runtime.selftest import run_tests
+from urc.runtime.selftest import exercise
 
 ROOT = Path(__file__).resolve().parents[2]
 BROKEN = ROOT / "tests" / "broken"
@@ -25,6 +25,7 @@ TAKERS: dict[str, int | None] = {
     "warn": 1,
     "problem": 1,
     "refused": 1,
+    "unknown": 1,
     "Problem": 0,
     "_report": 1,
     "Failed": 2,
@@ -161,7 +162,7 @@ def findings(example: str, folder: Path) -> dict[str, str]:
     checked = check(file, built_in_catalog(), Shelf(BROKEN / "shelf"))
     problems = list(checked.problems)
     if checked.profile is not None:
-        problems += run_tests(checked.profile)
+        problems += exercise(checked.profile).problems
     return {problem.code: problem.severity for problem in problems}
 
 

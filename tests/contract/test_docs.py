@@ -16,7 +16,7 @@ from urc.cli.main import VERBS, main
 from urc.config.load import Shelf, check
 from urc.model.values import Limits, Signal
 from urc.runtime.catalog import built_in_catalog
-from urc.runtime.selftest import run_tests
+from urc.runtime.selftest import exercise
 from urc.runtime.shelves import shelf_of
 from urc.web.show.cells import WidgetContext, render_widget
 
@@ -74,7 +74,7 @@ def test_a_document_of_the_pages_is_without_a_finding(folder: Path, block: Block
     assert checked.problems == ()
     if checked.kind == "robot":
         assert checked.profile is not None
-        assert run_tests(checked.profile) == []
+        assert exercise(checked.profile).problems == []
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from tests.documentation import Block, blocks
 from urc.config.load import Shelf, check
 from urc.config.schemas import read_schema
 from urc.runtime.catalog import built_in_catalog
-from urc.runtime.selftest import run_tests
+from urc.runtime.selftest import exercise
 from urc.transports.table import TRANSPORTS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -46,7 +46,7 @@ def test_robot_of_a_page_is_without_a_finding(block: Block, tmp_path: Path) -> N
     assert [str(problem) for problem in checked.problems] == []
     assert checked.profile is not None
     assert checked.profile.tests
-    assert run_tests(checked.profile) == []
+    assert exercise(checked.profile).problems == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

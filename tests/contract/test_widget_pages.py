@@ -9,7 +9,7 @@ import pytest
 from tests.documentation import blocks
 from urc.config.load import Shelf, check
 from urc.runtime.catalog import built_in_catalog
-from urc.runtime.selftest import run_tests
+from urc.runtime.selftest import exercise
 from urc.shipped import shipped
 from urc.source import read_document
 
@@ -99,4 +99,4 @@ def test_the_robot_of_a_page_is_without_a_finding(name: str, tmp_path: Path) -> 
         assert [str(problem) for problem in checked.problems] == []
         assert checked.profile is not None
         assert name in checked.profile.widgets
-        assert run_tests(checked.profile) == []
+        assert exercise(checked.profile).problems == []

@@ -6,9 +6,10 @@ can see the keys in use. All functions here assume that the shape pass found no 
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, Final, NamedTuple
 
+from urc.config.suggest import did_you_mean
 from urc.expressions import ExpressionError, Template, compile_expression, compile_template
 from urc.model.values import Value
 from urc.patterns import Pattern, PatternError, compile_pattern
@@ -119,6 +120,12 @@ class Findings:
     def warn(self, part: Part, code: str, message: str, **place: Any) -> None:
         """Add a warning."""
         self._add(part, code, message, "warning", **place)
+
+    def unknown(self, part: Part, code: str, name: str, known: Iterable[str], **place: Any) -> None:
+        """Report a name that is not among the `known` ones; `code` is ``unknown-NOUN``."""
+        noun = code.removeprefix("unknown-")
+        hint = did_you_mean(name, known, f"{noun}s")
+        self.error(part, code, f"there is no {noun} {name!r}", hint=hint, **place)
 
     def _add(
         self, part: Part, code: str, message: str, severity: Severity, *, at: str = "", **place: Any

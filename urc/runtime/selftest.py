@@ -19,7 +19,7 @@ from urc.runtime.remedy import Remedy
 from urc.runtime.trial import Exercised, Trial
 from urc.runtime.verdicts import check_bytes, check_reply, check_values, first
 
-__all__ = ["Outcome", "exercise", "run_tests", "sample_settings"]
+__all__ = ["Outcome", "exercise", "sample_settings"]
 
 _SAMPLE: Final[Mapping[str, Value]] = {"host": "127.0.0.1", "port": 1, "integer": 0, "number": 0.0}
 _ROUNDS: Final = 16
@@ -39,11 +39,6 @@ class _Complaint(NamedTuple):
     text: str
     step: int | None = None
     """Index of the step, from 0; None for a test without steps."""
-
-
-def run_tests(profile: Profile) -> list[Problem]:
-    """Run every test of `profile`; return a problem for each failure."""
-    return exercise(profile).problems
 
 
 def exercise(profile: Profile) -> Outcome:

@@ -86,6 +86,12 @@ class CommandFailed(UrcError):
         self.message = message
 
 
+def _check_settings(profile: Profile, settings: Mapping[str, Value]) -> None:
+    missing = [name for name in profile.settings if settings.get(name) is None]
+    if missing:
+        raise UrcError(f"{profile.name} needs a value for: {', '.join(missing)}")
+
+
 class Session:
     """One robot, connected for the duration of the context. It opens once.
 
@@ -116,9 +122,7 @@ class Session:
         Raises:
             UrcError: a setting has no value, or a transport cannot be built with these settings.
         """
-        missing = [name for name in profile.settings if settings.get(name) is None]
-        if missing:
-            raise UrcError(f"{profile.name} needs a value for: {', '.join(missing)}")
+        _check_settings(profile, settings)
         self.profile = profile
         self.settings = dict(settings)
         driver = profile.driver

@@ -61,11 +61,6 @@ class MultipartCutter:
         self._from = 0
         self._length = 0
 
-    @property
-    def is_ended(self) -> bool:
-        """Whether the closing delimiter has come: what follows is no part."""
-        return self._state == "ended"
-
     def feed(self, data: bytes) -> list[bytes]:
         """Take the next piece of the body and return the parts that are complete with it.
 

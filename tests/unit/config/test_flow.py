@@ -126,11 +126,11 @@ tests:
     path = f"{tmp_path}/talker.yaml"
     with open(path, "w", encoding="utf-8") as file:
         file.write(HEAD + text)
-    from urc.runtime.selftest import run_tests
+    from urc.runtime.selftest import exercise
 
     profile = check(path, built_in_catalog()).profile
     assert profile is not None
-    assert [problem.message for problem in run_tests(profile)] == []
+    assert [problem.message for problem in exercise(profile).problems] == []
 
 
 @pytest.mark.parametrize(("said", "is_told"), [("", True), (", answers: never", False)])

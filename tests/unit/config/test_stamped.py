@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.unit.config.folder import Folder, head
-from urc.runtime.selftest import run_tests
+from urc.runtime.selftest import exercise
 
 ROS = "transports: { ros: { type: rosbridge, host: robot, stale_after: 3s, ros: auto } }\n"
 DRIVE = """
@@ -41,7 +41,7 @@ def test_a_stamped_message_has_a_header_and_its_field(
     folder.write(rover=rover(kind, field))
     checked = folder.check("rover")
     assert checked.profile is not None, checked.problems
-    assert run_tests(checked.profile) == []
+    assert exercise(checked.profile).problems == []
 
 
 def test_a_type_without_a_stamped_kind_is_refused(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from urc.model.profile import DocumentTest, Profile, Setting
 from urc.model.values import Signal
 from urc.patterns import compile_pattern
 from urc.problems import Problem
-from urc.runtime.selftest import run_tests, sample_settings
+from urc.runtime.selftest import exercise, sample_settings
 from urc.runtime.verdicts import is_same
 from urc.testing.profile import line_profile, regex, text
 
@@ -31,7 +31,7 @@ def robot(*, is_per_request: bool = False) -> Profile:
 
 def complaint(test: DocumentTest, profile: Profile | None = None) -> str:
     """Run one test; return what is said about it, or "" when it passes."""
-    problems = run_tests((profile or robot())._replace(tests=(test,)))
+    problems = exercise((profile or robot())._replace(tests=(test,))).problems
     if not problems:
         return ""
     (problem,) = problems
@@ -286,7 +286,7 @@ def test_finding_stands_where_the_test_stands() -> None:
         path="tests",
         source="  - { name: it works }",
     )
-    assert run_tests(profile) == [first, first._replace(file="liner.yaml")]
+    assert exercise(profile).problems == [first, first._replace(file="liner.yaml")]
 
 
 @pytest.mark.parametrize(

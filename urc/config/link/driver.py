@@ -89,13 +89,7 @@ class _Linker:
             return
         names = self.driver.transports
         if key in part.data:
-            self.findings.error(
-                part,
-                "unknown-transport",
-                f"there is no transport {name!r}",
-                at=key,
-                hint=did_you_mean(name, names, "transports"),
-            )
+            self.findings.unknown(part, "unknown-transport", name, names, at=key)
         else:
             self.findings.error(
                 part,
@@ -331,13 +325,7 @@ def link_simulator(
     for name, found in simulated.rules.items():
         part = sources.rules[name]
         if name not in driver.transports:
-            findings.error(
-                part,
-                "unknown-transport",
-                f"there is no transport {name!r}",
-                key=True,
-                hint=did_you_mean(name, driver.transports, "transports"),
-            )
+            findings.unknown(part, "unknown-transport", name, driver.transports, key=True)
             continue
         link_rules(linker, part, found, state, world)
     return link_values(parts, driver, findings), world

@@ -228,12 +228,7 @@ def find_command(linker: Linker, part: Part, name: str) -> Command | None:
     """Return the command or sequence that `part` names, or report its absence."""
     command = linker.driver.commands.get(name)
     if command is None:
-        linker.findings.error(
-            part,
-            "unknown-command",
-            f"there is no command {name!r}",
-            hint=did_you_mean(name, linker.driver.commands, "commands"),
-        )
+        linker.findings.unknown(part, "unknown-command", name, linker.driver.commands)
     return command
 
 

@@ -243,12 +243,7 @@ def _check_signal(
 ) -> None:
     signal = driver.signals.get(part.data)
     if signal is None:
-        findings.error(
-            part,
-            "unknown-signal",
-            f"there is no signal {part.data!r}",
-            hint=did_you_mean(part.data, driver.signals, "signals"),
-        )
+        findings.unknown(part, "unknown-signal", part.data, driver.signals)
         return
     wrong = misfit(port, signal)
     if wrong:

@@ -5,7 +5,7 @@ from typing import Final
 
 from urc.config.link.flow import check_value
 from urc.config.part import Findings, Part
-from urc.config.suggest import did_you_mean, listed
+from urc.config.suggest import listed
 from urc.config.values import known_argument
 from urc.model.binding import targets
 from urc.model.driver import Argument, Command, Driver
@@ -39,12 +39,8 @@ def link_output(
         return name, given
     command = driver.commands.get(name)
     if command is None:
-        findings.error(
-            part,
-            "unknown-command",
-            f"there is no command {name!r}",
-            at="" if is_short else "command",
-            hint=did_you_mean(name, driver.commands, "commands"),
+        findings.unknown(
+            part, "unknown-command", name, driver.commands, at="" if is_short else "command"
         )
         return name, given
     is_right = _check_hold(part, port, widget, command, findings)

@@ -86,13 +86,7 @@ def _check_transport(
     name: str, part: Part, driver: Driver, findings: Findings, *, key: bool = False
 ) -> None:
     if name not in driver.transports:
-        findings.error(
-            part,
-            "unknown-transport",
-            f"there is no transport {name!r}",
-            key=key,
-            hint=did_you_mean(name, driver.transports, "transports"),
-        )
+        findings.unknown(part, "unknown-transport", name, driver.transports, key=key)
 
 
 def _check_polls(part: Part, driver: Driver, findings: Findings) -> None:
@@ -169,13 +163,7 @@ def _state(name: str, part: Part, driver: Driver, findings: Findings) -> Expecte
 def _setting(part: Part, settings: Mapping[str, Setting], findings: Findings) -> Value:
     setting = settings.get(part.name)
     if setting is None:
-        findings.error(
-            part,
-            "unknown-setting",
-            f"there is no setting {part.name!r}",
-            key=True,
-            hint=did_you_mean(part.name, settings, "settings"),
-        )
+        findings.unknown(part, "unknown-setting", part.name, settings, key=True)
         return None
     value = setting_value(part, setting.type, setting.choices, findings)
     check_within(value, setting.min, setting.max, part, findings)
@@ -188,13 +176,7 @@ def _expected(
     """Return the value at `part`, or None for a `part` of an expected value."""
     signal = driver.signals.get(name)
     if signal is None:
-        findings.error(
-            part,
-            "unknown-signal",
-            f"there is no signal {name!r}",
-            key=True,
-            hint=did_you_mean(name, driver.signals, "signals"),
-        )
+        findings.unknown(part, "unknown-signal", name, driver.signals, key=True)
         return None
     if part.data is None or is_part:
         return None
@@ -284,13 +266,7 @@ def _check_run(
         return
     command = driver.commands.get(run)
     if command is None:
-        findings.error(
-            part,
-            "unknown-command",
-            f"there is no command {run!r}",
-            at="run",
-            hint=did_you_mean(run, driver.commands, "commands"),
-        )
+        findings.unknown(part, "unknown-command", run, driver.commands, at="run")
         return
     for name, inner in part.named("args").items():
         _check_argument(name, inner, command, findings, may_fail=may_fail)

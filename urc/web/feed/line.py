@@ -23,9 +23,6 @@ class Line(Protocol):
     async def send_text(self, data: str) -> None:
         """Send one text message."""
 
-    async def send_bytes(self, data: bytes) -> None:
-        """Send one binary message."""
-
     async def close(self, code: int = 1000, reason: str | None = None) -> None:
         """Begin the closing handshake."""
 

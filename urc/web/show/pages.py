@@ -131,7 +131,6 @@ def robot_page(
     """
     uses = _uses(profile, interface)
     slots = tuple(uses)
-    render_foreign(((use, profile) for use in uses.values()), border)
     styles = _styles(profile, interface, uses, border)
     place = quote(name, safe="")
     url, watch = f"/robots/{place}/", "&watch" if is_watching else ""
@@ -152,10 +151,7 @@ def robot_page(
         is_turned=is_turned(interface, slots),
         is_part=is_part,
         debug=debug_part(profile, wire) if interface is DEBUGGING else None,
-        cells=tuple(
-            widget_cell(index, use, profile, border, is_background=slot == interface.background)
-            for index, (slot, use) in enumerate(uses.items())
-        ),
+        cells=_cells(profile, interface, uses, border),
         stop_url=f"/api/v1/robots/{place}/stop",
         lines=json.dumps(motion_lines(profile.driver)),
         can_move=can_move(profile.driver) and not tape,
@@ -186,6 +182,16 @@ def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
         name: interface.widgets.get(name) or profile.slots.get(name) for name in interface.shown
     }
     return {name: use for name, use in found.items() if use is not None}
+
+
+def _cells(
+    profile: Profile, interface: Interface, uses: Mapping[str, WidgetUse], border: Border
+) -> tuple[Cell, ...]:
+    render_foreign(((use, profile) for use in uses.values()), border)
+    return tuple(
+        widget_cell(index, use, profile, border, is_background=slot == interface.background)
+        for index, (slot, use) in enumerate(uses.items())
+    )
 
 
 def _styles(
