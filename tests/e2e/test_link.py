@@ -153,7 +153,7 @@ async def test_robot_that_closes_at_once_is_called_ever_less() -> None:
     """Attempts are counted one by one, and told once."""
     async with robot_on(closes) as robot, connected(quick_profile(), robot.port) as session:
         await until(session, lambda: session.hub.links["wire"].attempts >= 5)
-        assert session.hub.links["wire"].detail == "the robot closed the line"
+        assert session.hub.links["wire"].detail == "the robot closed the connection"
         assert len(session.hub.notes) < 5
 
 
@@ -249,7 +249,7 @@ async def test_send_waits_for_a_robot_that_does_not_read() -> None:
         await asyncio.sleep(0.3)
         assert not sending.done()
         await line.close()
-        with pytest.raises(PeerClosed, match="the line is closed"):
+        with pytest.raises(PeerClosed, match="the connection is closed"):
             await sending
 
 
@@ -267,7 +267,7 @@ async def test_bytes_before_the_end_are_received_before_the_end() -> None:
         await asyncio.sleep(0.1)
         assert await line.receive() == b"42\n"
         for _ in range(2):
-            with pytest.raises(PeerClosed, match=r"^the robot closed the line$"):
+            with pytest.raises(PeerClosed, match=r"^the robot closed the connection$"):
                 await line.receive()
         with pytest.raises(PeerClosed):
             await line.send(b"more")

@@ -18,7 +18,7 @@ from urc.transports.base import ConnectFailed, PeerClosed, TransportError
 
 __all__ = ["GuardedTransport"]
 
-_CLOSED: Final = "the line is closed"
+_CLOSED: Final = "the connection is closed"
 _OPEN_GRACE_S: Final = 0.7
 _CLOSE_S: Final = 1.0
 _CREDIT_BYTES: Final = WINDOW_BYTES // 4

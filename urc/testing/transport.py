@@ -50,7 +50,7 @@ class MemoryTransport:
         self._arriving.extend(chunks)
         self._changed.set()
 
-    def hang_up(self, reason: str = "the robot closed the line") -> None:
+    def hang_up(self, reason: str = "the robot closed the connection") -> None:
         """Let the robot close the line, after what was fed before."""
         self._arriving.append(PeerClosed(reason))
         self._changed.set()
@@ -83,7 +83,7 @@ class MemoryTransport:
         """Return the next chunk fed."""
         while not self._arriving:
             if not self.is_open:
-                raise PeerClosed("the line is closed")
+                raise PeerClosed("the connection is closed")
             self._changed.clear()
             await self._changed.wait()
         chunk = self._arriving.popleft()
@@ -96,7 +96,7 @@ class MemoryTransport:
         """Record `data`, and let the robot answer."""
         await self._flowing.wait()
         if not self.is_open:
-            raise PeerClosed("the line is closed")
+            raise PeerClosed("the connection is closed")
         self.sent.append(data)
         if self._answer is not None:
             self.feed(*self._answer(data))

@@ -1,1 +1,1 @@
-"""One module a transport: the only place where sockets live."""
+"""The transports, one module per type. All sockets of robots are in this package."""

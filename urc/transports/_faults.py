@@ -1,4 +1,4 @@
-"""One shape of sentence for whatever goes wrong on a line, whichever transport it is."""
+"""Uniform error texts for all transports."""
 
 import errno
 import socket
@@ -8,40 +8,40 @@ from urc.transports.own_doors import OwnDoor
 
 __all__ = ["CLOSED", "HUNG_UP", "broke", "explain", "late", "one_line", "place_of", "reason"]
 
-CLOSED = "the line is closed"
-"""By us."""
-HUNG_UP = "the robot closed the line"
+CLOSED = "the connection is closed"
+"""Closed by URC."""
+HUNG_UP = "the robot closed the connection"
 
 
 _SHOWN = 200
 
 
 def one_line(said: str, most: int = _SHOWN) -> str:
-    """Return what the other side said as part of a line for people.
+    """Return a text of the other side as part of a one-line message.
 
-    Control characters are written as escapes, and what is longer than `most` characters is cut.
+    Control characters are escaped, and texts of more than `most` characters are cut.
     """
     text = printable(" ".join(said[: 4 * most].split()))
     return text if len(text) <= most else f"{text[: most - 1]}…"
 
 
 def place_of(host: str, port: int) -> str:
-    """Return a host and port as people write them."""
+    """Return a host and port in their usual notation."""
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 def late(place: str, timeout_s: float) -> str:
-    """Say that nobody answered in time."""
+    """Return the text for a connection timeout."""
     return f"no answer from {place} within {timeout_s:g} s"
 
 
 def broke(fault: BaseException) -> str:
-    """Say that an open line broke, and why."""
-    return f"the line broke ({reason(fault)})"
+    """Return the text for a broken connection, with the reason."""
+    return f"the connection broke ({reason(fault)})"
 
 
 def explain(host: str, place: str, fault: OSError | UnicodeError) -> str:
-    """Return one line about why a line to `place` could not be opened."""
+    """Return one line with the reason why a connection to `place` could not be opened."""
     if isinstance(fault, OwnDoor):
         return f"{place}: {fault.strerror}"
     if isinstance(fault, socket.gaierror | UnicodeError):
@@ -56,6 +56,6 @@ def explain(host: str, place: str, fault: OSError | UnicodeError) -> str:
 
 
 def reason(fault: BaseException) -> str:
-    """Return the system's words for `fault`, in lower case, without the number."""
+    """Return the system's text for `fault`, in lower case, without the error number."""
     text = getattr(fault, "strerror", None) or str(fault) or type(fault).__name__
     return one_line(str(text).lower())

@@ -1,4 +1,4 @@
-"""Looks names up without ever holding up the loop, or its end."""
+"""Address lookups that block neither the event loop nor the end of the program."""
 
 import asyncio
 import errno
@@ -12,30 +12,30 @@ from urc._daemon import in_daemon
 __all__ = ["Address", "Lookup"]
 
 Address = tuple[socket.AddressFamily, tuple[str | int, ...] | tuple[int, bytes]]
-"""As a socket is made and connected with."""
+"""Address family and address, as for a socket."""
 _Connected = TypeVar("_Connected")
 
 
 class Lookup:
-    """The addresses of one host and port.
+    """The address lookup of one host and port.
 
-    The loop's pool of threads is waited for when the program ends, and a resolver without a network
-    may take half a minute: so each look-up has a thread of its own. One at a time: a retry joins
-    the one under way.
+    The thread pool of the event loop delays the end of the program, and a resolver without a
+    network may take half a minute. So each lookup has a thread of its own. Only one lookup runs at
+    a time: a retry joins it.
     """
 
     def __init__(self, host: str, port: int, kind: socket.SocketKind) -> None:
-        """Prepare it for sockets of `kind`; `addresses` does it."""
+        """Initialise for sockets of `kind`, without a lookup."""
         self._host = host
         self._port = port
         self._kind = kind
         self._answer: asyncio.Future[list[Address]] | None = None
 
     async def addresses(self) -> list[Address]:
-        """Return every address the name leads to.
+        """Return every address of the host.
 
         Raises:
-            OSError, UnicodeError: there is none. The wait has no bound of its own.
+            OSError, UnicodeError: the lookup failed. It has no timeout of its own.
         """
         if self._answer is None or self._answer.done():
             self._answer = _look_up(self._host, self._port, self._kind)
@@ -61,7 +61,8 @@ class Lookup:
                 async with asyncio.timeout(share_s):
                     return await connect(family, address)
             except TimeoutError:
-                # The last address gets all that is left: then the time of the whole is up as well.
+                # The last address gets all the remaining time, so its timeout ends the whole
+                # attempt.
                 fault = fault or TimeoutError(errno.ETIMEDOUT, "timed out")
             except OSError as refused:
                 fault = refused
@@ -74,13 +75,13 @@ def _look_up(host: str, port: int, kind: socket.SocketKind) -> asyncio.Future[li
         known.set_result(given)
         return known
     answer = in_daemon(partial(_resolve, host, port, kind), f"look up {host}")
-    # Nobody may be waiting any more when the look-up fails: then its error is not news.
+    # Without a waiting task, the error of a failed lookup is retrieved here.
     answer.add_done_callback(lambda done: done.cancelled() or done.exception())
     return answer
 
 
 def _numeric(host: str, port: int, kind: socket.SocketKind) -> list[Address] | None:
-    """Return what is an address already: that needs no thread."""
+    """Return the addresses of a numeric host, which needs no thread."""
     try:
         return _resolve(host, port, kind, socket.AI_NUMERICHOST)
     except (OSError, UnicodeError):

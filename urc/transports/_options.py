@@ -1,4 +1,4 @@
-"""Reads the options of a document, with one clear line for each that cannot be used."""
+"""Readers of transport options, with a one-line error for each invalid option."""
 
 from collections.abc import Mapping
 
@@ -11,7 +11,7 @@ def host(kind: str, options: Mapping[str, object], key: str = "host") -> str:
     """Return a host name or address.
 
     Raises:
-        TransportError: it is missing or none.
+        TransportError: the option is missing or invalid.
     """
     found = options.get(key)
     if not isinstance(found, str) or not found.strip():
@@ -23,7 +23,7 @@ def port(kind: str, options: Mapping[str, object], key: str = "port") -> int:
     """Return a port from 1 to 65535.
 
     Raises:
-        TransportError: it is missing or none.
+        TransportError: the option is missing or invalid.
     """
     found = options.get(key)
     if isinstance(found, bool) or not isinstance(found, int) or not 1 <= found <= 65535:
@@ -32,10 +32,10 @@ def port(kind: str, options: Mapping[str, object], key: str = "port") -> int:
 
 
 def text(kind: str, options: Mapping[str, object], key: str, default: str = "") -> str:
-    """Return a text, `default` when the option is left out or empty.
+    """Return a text, or `default` for a missing or empty option.
 
     Raises:
-        TransportError: it is no text.
+        TransportError: the option is not text.
     """
     found = options.get(key)
     if found is None or found == "":
@@ -46,10 +46,10 @@ def text(kind: str, options: Mapping[str, object], key: str, default: str = "") 
 
 
 def flag(kind: str, options: Mapping[str, object], key: str, *, default: bool) -> bool:
-    """Return a yes or no, `default` when the option is left out.
+    """Return a boolean, or `default` for a missing option.
 
     Raises:
-        TransportError: it is neither.
+        TransportError: the option is not a boolean.
     """
     found = options.get(key)
     if found is None:
@@ -62,10 +62,10 @@ def flag(kind: str, options: Mapping[str, object], key: str, *, default: bool) -
 def choice(
     kind: str, options: Mapping[str, object], key: str, among: tuple[str, ...], default: str
 ) -> str:
-    """Return one of the words in `among`, `default` when the option is left out.
+    """Return one of the words in `among`, or `default` for a missing option.
 
     Raises:
-        TransportError: it is none of them.
+        TransportError: the option is another word.
     """
     found = options.get(key)
     if found is None:

@@ -1,4 +1,4 @@
-"""Opens a stream to a host and port: directly or through another transport, with TLS or not."""
+"""Streams to a host and port: direct or tunnelled, with or without TLS."""
 
 import asyncio
 import socket
@@ -15,7 +15,7 @@ __all__ = ["Reach"]
 
 
 class Reach:
-    """The way to one host and port; `open` may be called as often as needed."""
+    """A dialer for one host and port; `open` may be called repeatedly."""
 
     def __init__(
         self,
@@ -26,7 +26,7 @@ class Reach:
         tls: Tls | None = None,
         read_ahead_bytes: int = READ_AHEAD_BYTES,
     ) -> None:
-        """Prepare the way to `host` (name or address), `port` 1..65535. Nothing is opened yet."""
+        """Initialise for `host` (name or address) and `port` 1..65535, without connecting."""
         self.host = host
         self.port = port
         self.place = place_of(host, port)
@@ -39,7 +39,7 @@ class Reach:
     async def open(self, timeout_s: float) -> ByteStream:
         """Return an open stream, or raise `ConnectFailed` within `timeout_s` seconds.
 
-        Every address of a name is tried in turn, each with a fair share of the time that is left.
+        The addresses of a name are tried in turn, each with an equal share of the remaining time.
         """
         try:
             async with asyncio.timeout(timeout_s):
@@ -60,7 +60,7 @@ class Reach:
 
 
 async def _dial(family: int, address: object, read_ahead_bytes: int) -> Stream:
-    """Connect one socket, which is closed again when that fails or is cancelled."""
+    """Connect one socket; close it on failure or cancellation."""
     line = await connected(family, address)
     try:
         return await adopt(line, read_ahead_bytes)

@@ -1,4 +1,4 @@
-"""One open port of serialx as a byte stream. Imported only when a port is opened."""
+"""An open serialx port as a byte stream. Imported only when a port is opened."""
 
 import asyncio
 import socket
@@ -22,31 +22,32 @@ from urc.transports.base import PeerClosed
 __all__ = ["FAULTS", "SerialPort", "open_port"]
 
 FAULTS: tuple[type[Exception], ...] = (OSError, SerialException, ValueError, LookupError)
-"""What the library raises; the last of what is no RFC 2217."""
+"""Exceptions of the library; LookupError comes from servers without valid RFC 2217."""
 UNTAKEN_BYTES = 1_048_576
-"""Answers to options that a server may leave untaken."""
+"""Limit of unsent option replies to a server, in bytes."""
 if sys.platform != "win32":
     import termios
 
     FAULTS = (*FAULTS, termios.error)
 _KEPT_OPTIONS, _AT_ONCE = 64, 4096
-"""Options that wait for a question of ours, and bytes that are looked at before they are cut."""
+"""Limits of pending unsolicited options, and of the bytes in one processing step."""
 _DRAIN_S, _LOOK_S = 0.3, 0.01
-"""How long closing waits for bytes that are on their way to a slow wire."""
+"""Longest wait for unsent bytes when closing, and its polling interval, in seconds."""
 
 
 async def open_port(
     port: str, arguments: Mapping[str, object], tune: Callable[[socket.socket], None]
 ) -> "SerialPort":
-    """Open `port` and set it up; what came in before is dropped.
+    """Open and configure `port`; discard earlier input.
 
     Args:
         port: a path or name, or ``rfc2217://HOST:PORT``.
-        arguments: the settings, as the library names them.
-        tune: set on the socket, where there is one.
+        arguments: settings, with the names of the library.
+        tune: configures the socket, if there is one.
 
     Raises:
-        OSError, SerialException, termios.error, ValueError: it cannot be.
+        OSError, SerialException, termios.error, ValueError: the port cannot be opened or
+            configured.
     """
     loop = asyncio.get_running_loop()
     stream = SerialPort()
@@ -55,7 +56,7 @@ async def open_port(
         loop, lambda: stream, port, transport_cls=kind, **cast("dict[str, Any]", arguments)
     )
     carrier: asyncio.Transport | None = getattr(transport, "_tcp_transport", None)
-    if carrier is not None:  # the library has no other way to its socket
+    if carrier is not None:  # the library offers no other access to its socket
         stream.socket = carrier.get_extra_info("socket")
         tune(stream.socket)
     else:
@@ -65,24 +66,25 @@ async def open_port(
 
 
 class _Rfc2217(RFC2217SerialTransport):
-    """Does not insist on an answer about notifications that it has no use for.
+    """An RFC 2217 connection that needs no confirmation of unused notifications.
 
-    The library waits for one until its time is up; ser2net, the usual server, gives none.
+    The library waits for it until its timeout; ser2net, the usual server, never sends it.
     """
 
     def _data_received(self, data: bytes) -> None:
-        """Take what came; a server that lies, or takes none of our answers, ends the line."""
+        """Process received data; invalid data or too many unsent replies close the connection."""
         for start in range(0, len(data), _AT_ONCE):
             line, serial = self._tcp_transport, self._serial
             if line is None or serial is None or line.is_closing():
                 return
             try:
                 super()._data_received(data[start : start + _AT_ONCE])
-            except Exception as fault:  # the library checks little of what arrives
+            except Exception as fault:  # the library checks little of its input
                 self._give_up(f"what the server sends is no RFC 2217 ({reason(fault)})")
                 return
-            # What nobody has asked for would be kept there for ever, and searched each time.
-            del serial._engine._pending_telnet[:-_KEPT_OPTIONS]  # noqa: SLF001 - no other way
+            # Discard old unsolicited options: the library would keep them and search them each
+            # time.
+            del serial._engine._pending_telnet[:-_KEPT_OPTIONS]  # noqa: SLF001 - no public way
             if line.get_write_buffer_size() > UNTAKEN_BYTES:
                 self._give_up("the server asks, and takes none of the answers")
 
@@ -99,7 +101,10 @@ class _Rfc2217(RFC2217SerialTransport):
 
 
 class SerialPort(asyncio.Protocol):
-    """A `ByteStream`, with `unsent` and `reset`. A port nobody reads is not read by us either."""
+    """A `ByteStream` with `unsent` and `reset`.
+
+    Without a reader, it stops reading from the port.
+    """
 
     def __init__(self) -> None:
         self._arrived_bytes = bytearray()
@@ -111,18 +116,18 @@ class SerialPort(asyncio.Protocol):
         self._gone = asyncio.Event()
         self._transport: BaseSerialTransport
         self.socket: socket.socket | None = None
-        """Of a port behind a server."""
+        """Socket of a port behind a server."""
 
     # -- called by the library
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Take the port over."""
-        assert isinstance(transport, BaseSerialTransport)  # noqa: S101 - the library's own promise
+        """Take over the open port."""
+        assert isinstance(transport, BaseSerialTransport)  # noqa: S101 - guaranteed by the library
         self._transport = transport
         transport.set_write_buffer_limits(high=0)
 
     def data_received(self, data: bytes) -> None:
-        """Keep what has come."""
+        """Buffer the received bytes."""
         self._arrived_bytes += data
         if len(self._arrived_bytes) >= READ_AHEAD_BYTES and not self._is_paused:
             self._is_paused = True
@@ -130,22 +135,22 @@ class SerialPort(asyncio.Protocol):
         self._arrived.set()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Note that the port is gone: unplugged, or closed by us."""
+        """Record that the port is closed or unplugged."""
         self._end(broke(exc) if exc else HUNG_UP)
         self._gone.set()
 
     def pause_writing(self) -> None:
-        """Let `put` wait."""
+        """Block `put`."""
         self._writable.clear()
 
     def resume_writing(self) -> None:
-        """Let `put` go on."""
+        """Let `put` continue."""
         self._writable.set()
 
     # -- a `ByteStream`
 
     async def take(self) -> bytes:
-        """Return the next bytes, at least one; raise `PeerClosed` when no more will come."""
+        """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
         while not self._arrived_bytes:
             if self._ended is not None:
                 raise PeerClosed(self._ended)
@@ -159,7 +164,7 @@ class SerialPort(asyncio.Protocol):
         return data
 
     async def put(self, data: bytes) -> None:
-        """Hand `data` to the system, waiting while it is full; raise `PeerClosed` if it broke."""
+        """Pass `data` to the system, waiting for buffer space; raise `PeerClosed` on an error."""
         await self._until_writable()
         try:
             self._transport.write(data)
@@ -168,24 +173,24 @@ class SerialPort(asyncio.Protocol):
         await self._until_writable()
 
     async def abort(self) -> None:
-        """Close, after a moment for bytes that are on their way; never raises."""
+        """Close after a short wait for unsent bytes; never raises."""
         with suppress(TimeoutError):
             async with asyncio.timeout(_DRAIN_S):
-                # Nobody tells when the wire has taken the last byte.
+                # The system does not report the transmission of the last byte.
                 while self._ended is None and self._writable.is_set() and self.unsent():  # noqa: ASYNC110
                     await asyncio.sleep(_LOOK_S)
-        # A pseudo terminal has nothing unsent, and forgets all the same what was not read yet.
+        # A pseudo terminal reports no unsent bytes, but discards unread ones.
         if self.socket is None and self.unsent():
             self._forget_unsent()
         await self._close()
 
     async def reset(self) -> None:
-        """Close at once and let the system forget what is not on the wire; never raises."""
+        """Close at once and discard the unsent bytes; never raises."""
         self._forget_unsent()
         await self._close()
 
     def unsent(self) -> int:
-        """Return the bytes handed over that are not on the wire yet."""
+        """Return the number of bytes that have not been transmitted yet."""
         waiting = self._transport.get_write_buffer_size()
         if self.socket is not None:
             return waiting + (unsent_in(self.socket) if self.socket.fileno() >= 0 else 0)
@@ -194,7 +199,7 @@ class SerialPort(asyncio.Protocol):
         return waiting
 
     def _forget_unsent(self) -> None:
-        """Empty the system's buffer, which would hold up the close until a slow wire took it."""
+        """Empty the output buffer of the system, which would delay closing on a slow port."""
         if self.socket is not None:
             forget_unsent(self.socket)
         else:

@@ -1,8 +1,8 @@
-"""One open TCP connection, and a line that reads and writes one.
+"""An open TCP connection, and a transport on top of a stream.
 
-Bytes arrive in one fixed buffer a connection: when it is full the socket is not read until somebody
-takes it, so a robot that floods fills its own kernel's queue and not our memory. `put` returns once
-the kernel has every byte, so a connection may be closed right after the last one.
+Each connection receives into one fixed buffer. While it is full, the socket is not read: a flooding
+robot fills its own kernel's queue instead of our memory. `put` returns once the kernel has every
+byte, so a connection may be closed right after the last one.
 """
 
 import asyncio
@@ -41,58 +41,61 @@ __all__ = [
 ]
 
 READ_AHEAD_BYTES = 65536
-"""Most bytes that are read before somebody takes them."""
+"""Size of the receive buffer, in bytes."""
 
 _KEEPALIVE_IDLE_S, _KEEPALIVE_EVERY_S, _KEEPALIVE_COUNT = 5, 2, 3
 _UNANSWERED_MS = 5000
-"""A peer that acknowledges nothing for this long is gone (half-open line, pulled cable)."""
+"""Timeout for TCP acknowledgements, in milliseconds (half-open connection, pulled cable)."""
 _UNSENT_BYTES = 16384
-"""How much unsent data the kernel may hold; more would only grow old there."""
+"""Limit of unsent data in the kernel, in bytes; more data would only become outdated there."""
 _UNSENT = array("i", [0])
-"""Where the system puts its answer."""
+"""Output buffer of the system call."""
 _CAN_WRITE = os.name == "posix"
-"""Elsewhere a socket is no descriptor."""
+"""Whether a socket is a file descriptor."""
 _LINGER_NOT = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
 
 
 class Stream(asyncio.BufferedProtocol):
-    """One open connection. The stock `asyncio.Protocol` would allocate 256 KiB for every read."""
+    """One open connection.
+
+    The standard `asyncio.Protocol` would allocate 256 KiB for every read.
+    """
 
     def __init__(self, read_ahead_bytes: int = READ_AHEAD_BYTES) -> None:
-        """Made by `adopt`."""
+        """Initialise for `adopt`."""
         self._buffer = memoryview(bytearray(read_ahead_bytes))
         self._filled = 0
         self._ended: str | None = None
-        """Why nothing more will come; None while the line is up."""
+        """Reason of the end of the stream; None while the connection is open."""
         self._arrived = asyncio.Event()
         self._writable = asyncio.Event()
         self._writable.set()
         self.is_writable = True
-        """Whether the kernel has everything that was handed over."""
+        """Whether the kernel has accepted all data."""
         self._gone = asyncio.Event()
         self._transport: asyncio.Transport
         self._line: socket.socket | None = None
         self._number = -1
-        """Of its descriptor, for as long as nothing has ended."""
+        """File descriptor of the socket, until the connection ends."""
         self.sink: Callable[[bytes], bool] | None = None
-        """Has what arrives while nothing waits; returns whether it took it."""
+        """Receives data while the buffer is empty; returns whether it accepted the data."""
 
     # -- called by asyncio
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Take the connection over."""
-        # Not checked: uvloop's transports are none by their class.
+        """Take over the open connection."""
+        # No isinstance check: the transports of uvloop have another base class.
         self._transport = cast("asyncio.Transport", transport)
         self._transport.set_write_buffer_limits(high=0)
         self._line = line = self._transport.get_extra_info("socket")
         self._number = -1 if line is None else line.fileno()
 
     def get_buffer(self, sizehint: int) -> memoryview:
-        """Say where the next bytes go."""
+        """Return the free part of the buffer."""
         return self._buffer[self._filled :] if self._filled else self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:
-        """Pass on the bytes that have come, or note that there are some."""
+        """Pass on the received bytes to the sink, or buffer them."""
         if self.sink is not None and not self._filled and self.sink(bytes(self._buffer[:nbytes])):
             return
         self._filled += nbytes
@@ -101,29 +104,29 @@ class Stream(asyncio.BufferedProtocol):
         self._arrived.set()
 
     def eof_received(self) -> bool:
-        """Note that no more will come, and close."""
+        """Record the end of the stream, and close."""
         self.end(HUNG_UP)
         return False
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Note that the connection is over."""
+        """Record the end of the connection."""
         self.end(broke(exc) if exc else HUNG_UP)
         self._gone.set()
 
     def pause_writing(self) -> None:
-        """Let `put` wait."""
+        """Block `put`."""
         self.is_writable = False
         self._writable.clear()
 
     def resume_writing(self) -> None:
-        """Let `put` go on."""
+        """Let `put` continue."""
         self.is_writable = True
         self._writable.set()
 
     # -- a `ByteStream`
 
     async def take(self) -> bytes:
-        """Return the next bytes, at least one; raise `PeerClosed` when no more will come."""
+        """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
         while not self._filled:
             if self._ended is not None:
                 raise PeerClosed(self._ended)
@@ -136,28 +139,29 @@ class Stream(asyncio.BufferedProtocol):
         return data
 
     async def put(self, data: bytes) -> None:
-        """Hand `data` to the kernel, waiting while it is full; raise `PeerClosed` if it broke."""
+        """Pass `data` to the kernel, waiting for buffer space; raise `PeerClosed` on an error."""
         await self._until_writable()
         self._transport.write(data)
         await self._until_writable()
 
     async def abort(self) -> None:
-        """Close at once, dropping what the kernel has not been given."""
+        """Close at once, discarding data that the kernel has not accepted."""
         self.end(CLOSED)
         self._transport.abort()
-        await self._gone.wait()  # one turn of the loop: then the socket is closed, too
+        await self._gone.wait()  # one turn of the event loop, after which the socket is closed, too
 
-    # -- beyond
+    # -- further methods
 
     def offer(self, data: bytes) -> bool:
-        """Hand `data` over if nothing waits before it; return whether it was taken."""
+        """Send `data` if no earlier data waits; return whether it was accepted."""
         if self._ended is not None or not self.is_writable:
             return False
         if _CAN_WRITE and not self._transport.get_write_buffer_size():
-            # Straight to the kernel: the way through the loop takes longer than the rest of a tick.
+            # Write to the kernel directly: the event loop would take longer than the rest of a
+            # tick.
             try:
                 taken = os.write(self._number, data)
-            except OSError:  # it is full, or broken: the loop knows what is to be done
+            except OSError:  # full or broken: the event loop handles both
                 taken = 0
             if taken == len(data):
                 return True
@@ -167,22 +171,22 @@ class Stream(asyncio.BufferedProtocol):
 
     @property
     def has_ended(self) -> bool:
-        """Whether nothing more will come, and nothing more goes."""
+        """Whether the connection has ended in both directions."""
         return self._ended is not None
 
     def unsent(self) -> int:
-        """Return the bytes handed over that the other side has not acknowledged."""
-        # Asked before each motion: what is writable has nothing in its own buffer.
+        """Return the number of bytes that the other side has not acknowledged."""
+        # Called before each motion: a writable connection has an empty buffer of its own.
         waiting = 0 if self._writable.is_set() else self._transport.get_write_buffer_size()
         return waiting if self._line is None else waiting + unsent_in(self._line)
 
     async def reset(self) -> None:
-        """Close at once and let the kernel forget what it has not sent: nothing comes late."""
+        """Close at once and discard unsent data in the kernel, so that nothing arrives late."""
         self.drop()
         await self._gone.wait()
 
     def drop(self) -> None:
-        """Do what `reset` does, without waiting until the socket is closed."""
+        """Do the same as `reset`, without waiting until the socket is closed."""
         line: socket.socket | None = self._transport.get_extra_info("socket")
         if line is not None:
             forget_unsent(line)
@@ -190,7 +194,7 @@ class Stream(asyncio.BufferedProtocol):
         self._transport.abort()
 
     def end(self, why: str) -> None:
-        """Let everybody who waits know that it is over; the first reason stays."""
+        """Wake all waiting tasks with the end of the stream; the first reason stays."""
         if self._ended is None:
             self._ended = why
         self._arrived.set()
@@ -203,38 +207,38 @@ class Stream(asyncio.BufferedProtocol):
 
 
 class StreamLine:
-    """The four members of a transport that need nothing but an open stream, and two more."""
+    """The methods of a transport that need only an open stream."""
 
     def __init__(self) -> None:
         self._stream: ByteStream | None = None
 
     async def receive(self) -> bytes:
-        """Return the next bytes, at least one; raise `PeerClosed` when no more will come."""
+        """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
         if self._stream is None:
             raise PeerClosed(CLOSED)
         return await self._stream.take()
 
     async def send(self, data: Payload) -> None:
-        """Hand `data` to the kernel, waiting while it is full; raise `PeerClosed` when it broke."""
+        """Pass `data` to the kernel, waiting for buffer space; raise `PeerClosed` on an error."""
         if self._stream is None:
             raise PeerClosed(CLOSED)
         await self._stream.put(as_bytes(data))
 
     async def close(self) -> None:
-        """Close at once, dropping what is unsent. Never raises, may be called twice."""
+        """Close at once, discarding unsent data. Never raises, may be called twice."""
         stream, self._stream = self._stream, None
         if stream is not None:
             await stream.abort()
 
     def unsent(self) -> int:
-        """Return the bytes handed over that have not left this machine for good.
+        """Return the number of bytes that the other side has not acknowledged.
 
-        0 where that cannot be known: through another transport, or on a system that does not tell.
+        Unknown counts as 0: through a tunnel, or on a system without this information.
         """
         return unsent_of(self._stream)
 
     async def abort(self) -> None:
-        """Close at once; what the robot has not got by now it never gets. Never raises."""
+        """Close at once and discard unsent data. Never raises."""
         stream = self._stream
         if stream is not None and isinstance(stream, SupportsReset):
             self._stream = None
@@ -244,14 +248,14 @@ class StreamLine:
 
 
 async def adopt(line: socket.socket, read_ahead_bytes: int = READ_AHEAD_BYTES) -> Stream:
-    """Make a stream of a connected socket, which it owns from then on."""
+    """Return a stream for a connected socket; the stream owns the socket from then on."""
     loop = asyncio.get_running_loop()
     _, stream = await loop.create_connection(lambda: Stream(read_ahead_bytes), sock=line)
     return stream
 
 
 def tune(line: socket.socket) -> None:
-    """Send at once, hold little unsent, and notice a peer that is gone, where the system can."""
+    """Disable delays, limit unsent data, and detect lost peers, if the system can."""
     line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     line.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for name, value in (
@@ -263,15 +267,15 @@ def tune(line: socket.socket) -> None:
     ):
         option = getattr(socket, name, None)
         if option is not None:
-            with suppress(OSError):  # known to Python, unknown to this kernel
+            with suppress(OSError):  # known to Python, but not to this kernel
                 line.setsockopt(socket.IPPROTO_TCP, option, value)
 
 
 def as_bytes(payload: Payload) -> bytes:
-    """Return a payload of a line that carries bytes.
+    """Return the payload for a connection that carries bytes.
 
     Raises:
-        TransportError: it is an envelope.
+        TransportError: the payload is an envelope.
     """
     if isinstance(payload, bytes):
         return payload
@@ -279,15 +283,15 @@ def as_bytes(payload: Payload) -> bytes:
 
 
 def forget_unsent(line: socket.socket) -> None:
-    """Let closing `line` reset the connection: what the kernel has not sent is never sent."""
-    with suppress(OSError):  # it is gone already
+    """Make the close of `line` reset the connection, which discards unsent data."""
+    with suppress(OSError):  # already closed
         line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _LINGER_NOT)
 
 
 def unsent_in(line: socket.socket) -> int:
-    """Return the bytes in the kernel that the other side has not acknowledged.
+    """Return the number of bytes in the kernel that the other side has not acknowledged.
 
-    0 where the system does not tell; 1 for a line that is closed: what became of them is not known.
+    Unknown counts as 0. A closed socket counts as 1, because the fate of its data is unknown.
     """
     if sys.platform != "linux":
         return 0
@@ -295,7 +299,7 @@ def unsent_in(line: socket.socket) -> int:
     if number < 0:
         return 1
     try:
-        ioctl(number, TIOCOUTQ, _UNSENT)  # SIOCOUTQ has its number
+        ioctl(number, TIOCOUTQ, _UNSENT)  # SIOCOUTQ has the same number
     except OSError:
         return 0
     return _UNSENT[0]

@@ -1,8 +1,8 @@
-"""TLS over any stream: a socket, or a connection that another transport carries.
+"""TLS over any stream: a socket, or a tunnelled connection.
 
-The library's own TLS needs a socket; here it works on two buffers in memory, which the stream
-underneath fills and empties. TLS 1.2 at least, and the certificate is checked unless that was
-switched off.
+The standard library implements TLS over sockets; here it works on two buffers in memory, which the
+underlying stream fills and empties. The minimum is TLS 1.2, and the certificate is verified unless
+disabled.
 """
 
 import asyncio
@@ -33,32 +33,32 @@ _PEM = "-----BEGIN"
 _EXPIRED, _NOT_YET = 10, 9
 _WRONG_NAME = (62, 64)
 _UNKNOWN = (2, 18, 19, 20, 21)
-"""OpenSSL's numbers (X509_V_ERR_…) of what can be wrong with a certificate."""
+"""OpenSSL error numbers (X509_V_ERR_…) of invalid certificates."""
 
 
 class Tls:
-    """How a line is made secret, as the option ``tls`` says it."""
+    """The TLS settings of a connection, from the option ``tls``."""
 
     def __init__(
         self, context: ssl.SSLContext, server_name: str = "", *, is_server: bool = False
     ) -> None:
-        """Use `context`; `server_name` is what the certificate must be for, "": the host."""
+        """Use `context`; the certificate must be for `server_name`, or for the host if ""."""
         self._context = context
         self._server_name = server_name
         self._is_server = is_server
 
     @classmethod
     def of(cls, kind: str, option: object, *, is_server: bool = False) -> Self | None:
-        """Return what the option asks for, None for none.
+        """Return the settings of the option, or None without TLS.
 
         Args:
-            kind: of the transport, for messages.
-            option: ``true``, ``false``, None, or a mapping with ``ca``, ``cert``, ``key`` (files,
-                or the text of one), ``server_name`` and ``verify``.
-            is_server: the robot connects to us, and we show it our certificate.
+            kind: type of the transport, for messages.
+            option: ``true``, ``false``, None, or a mapping with ``ca``, ``cert``, ``key`` (each a
+                file name or a text), ``server_name`` and ``verify``.
+            is_server: whether the robot connects to us, and we present our certificate.
 
         Raises:
-            TransportError: an option or a file cannot be used.
+            TransportError: an option or a file is invalid.
         """
         if option is None or option is False:
             return None
@@ -70,10 +70,10 @@ class Tls:
         return cls(context, _options.text(kind, option, "server_name"), is_server=is_server)
 
     async def secure(self, stream: ByteStream, host: str, place: str) -> ByteStream:
-        """Agree on keys over `stream`, which is closed when that fails or is cancelled.
+        """Do the TLS handshake over `stream`; close it on failure or cancellation.
 
         Raises:
-            ConnectFailed: the other side cannot be trusted, or speaks no TLS.
+            ConnectFailed: the other side is not trusted, or does not speak TLS.
         """
         name = None if self._is_server else self._server_name or host
         try:
@@ -92,7 +92,7 @@ class Tls:
 
 
 class _TlsStream:
-    """A `ByteStream` over another one."""
+    """An encrypted `ByteStream` on top of another one."""
 
     def __init__(self, stream: ByteStream, context: ssl.SSLContext, name: str | None) -> None:
         self._stream = stream
@@ -102,7 +102,7 @@ class _TlsStream:
             self._arrived, self._leaving, server_side=name is None, server_hostname=name
         )
         self._turn = asyncio.Lock()
-        """Records must go out in the order in which they were made."""
+        """Keeps the TLS records in the order of their encryption."""
 
     async def shake_hands(self) -> None:
         while True:
@@ -112,7 +112,7 @@ class _TlsStream:
                 await self._flush()
                 self._arrived.write(await self._stream.take())
             except ssl.SSLError:
-                await self._flush()  # the alert that tells the other side why
+                await self._flush()  # the alert, which tells the other side the reason
                 raise
             else:
                 await self._flush()
@@ -122,7 +122,7 @@ class _TlsStream:
         while True:
             data = self._decrypted()
             if self._leaving.pending:
-                await self._flush()  # an answer to a change of keys
+                await self._flush()  # the reply to a key update
             if data:
                 return data
             self._arrived.write(await self._stream.take())
@@ -150,7 +150,7 @@ class _TlsStream:
                 await self._stream.put(data)
 
     def _decrypted(self) -> bytes:
-        """Return what can be read by now, b"" when nothing can."""
+        """Return the decrypted data so far, possibly b""."""
         parts: list[bytes] = []
         while True:
             try:
@@ -159,10 +159,10 @@ class _TlsStream:
                 break
             except ssl.SSLError as fault:
                 if parts:
-                    break  # told with the next call
+                    break  # reported by the next call
                 if isinstance(fault, ssl.SSLZeroReturnError):
                     raise PeerClosed(HUNG_UP) from fault
-                raise PeerClosed(f"the line broke (TLS: {_words(fault)})") from fault
+                raise PeerClosed(f"the connection broke (TLS: {_words(fault)})") from fault
             if not part:
                 if not parts:
                     raise PeerClosed(HUNG_UP)
@@ -175,7 +175,7 @@ def _guarded(work: Callable[[], _T]) -> _T:
     try:
         return work()
     except ssl.SSLError as fault:
-        raise PeerClosed(f"the line broke (TLS: {_words(fault)})") from fault
+        raise PeerClosed(f"the connection broke (TLS: {_words(fault)})") from fault
 
 
 def _context_of(where: str, options: Mapping[str, object], *, is_server: bool) -> ssl.SSLContext:
@@ -186,7 +186,7 @@ def _context_of(where: str, options: Mapping[str, object], *, is_server: bool) -
         context = ssl.create_default_context(side)
         if authority:
             if not is_server:
-                context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # this authority and no other
+                context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # trust this authority only
             context.load_verify_locations(cadata=_pem(authority))
     except (OSError, ValueError) as fault:
         raise TransportError(f"{where} cannot use ca ({reason(fault)})") from fault
@@ -203,7 +203,7 @@ def _context_of(where: str, options: Mapping[str, object], *, is_server: bool) -
 def _load_own(
     where: str, context: ssl.SSLContext, options: Mapping[str, object], *, is_server: bool
 ) -> None:
-    """Load our own certificate, if there is one."""
+    """Load the own certificate, if there is one."""
     certificate = _options.text(where, options, "cert")
     key = _options.text(where, options, "key")
     if not certificate:
@@ -211,8 +211,8 @@ def _load_own(
             raise TransportError(f"{where} it needs a certificate as cert")
         return
     try:
-        # The library reads files only, and a key may be a secret setting: it is on the disk for as
-        # long as that takes, in a folder that nobody else may enter.
+        # The library reads only files, and a key may be a secret setting: it is on the disk only
+        # during the call, in a private folder.
         with tempfile.TemporaryDirectory(prefix="urc-") as folder:
             files = [Path(folder, name) for name in ("cert", "key")]
             files[0].write_text(_pem(certificate), "ascii")
@@ -227,12 +227,12 @@ def _no_password() -> str:
 
 
 def _pem(given: str) -> str:
-    """Return the text of a file, or the text that was given instead."""
+    """Return the text of a file, or the text given instead."""
     return given if _PEM in given else Path(given).expanduser().read_text("ascii")
 
 
 def _explain(place: str, name: str, fault: ssl.SSLError) -> str:
-    """Return one line about why there is no TLS with `place`."""
+    """Return one line about the reason of a failed TLS handshake with `place`."""
     if isinstance(fault, ssl.SSLCertVerificationError):
         code = fault.verify_code
         if code == _EXPIRED:
@@ -250,7 +250,7 @@ def _explain(place: str, name: str, fault: ssl.SSLError) -> str:
 
 
 def _words(fault: BaseException) -> str:
-    """Return OpenSSL's words without its numbers and source lines."""
+    """Return the error text of OpenSSL without numbers and source lines."""
     if isinstance(fault, ssl.SSLError) and fault.reason:
         return str(fault.reason).replace("_", " ").lower()
     return reason(fault)

@@ -1,9 +1,10 @@
-"""The seam to the outside world: five members, and one small tree of errors.
+"""Interfaces of transports, and their errors.
 
-A transport moves payloads and knows no meaning: bytes where the line is a stream or datagrams,
-envelopes where it carries messages (topics, requests, calls). Whatever a library underneath raises
-is translated at the transport's edge into one of the errors below; nothing foreign passes.
-`urc.runtime.link` is the only user, and must not care in which process a transport lives.
+A transport carries payloads without interpreting them: bytes for streams and datagrams, envelopes
+for messages (topics, requests, calls). It translates every exception of a library into one of the
+errors below.
+
+`urc.runtime.link` is the only user; it is independent of the process in which a transport runs.
 """
 
 from collections.abc import Callable, Mapping
@@ -39,33 +40,36 @@ __all__ = [
 
 
 NOTICE: Final = "notice"
-"""Verb of an envelope that a transport itself gives: its body is one line for people, about a fault
-that the robot does not tell. It goes to the robot's log and does not count as a heartbeat."""
+"""Verb of envelopes that a transport itself creates. The body is a one-line text for people
+about an error that the robot does not report. It goes to the log of the robot and is no sign
+of liveness."""
 
 
 class TransportError(UrcError):
-    """The line cannot be used, or not any more.
+    """The connection is unusable, or no longer usable.
 
-    TransportError
-    ├── ConnectFailed    it could not be opened: refused, no such host, timed out
-    └── PeerClosed       the robot closed it, in good order or not
+    TransportError ├── ConnectFailed    opening failed: refused, no such host, timed out └──
+    PeerClosed       the robot closed the connection, in order or not
     """
 
 
 class ConnectFailed(TransportError):
-    """The line could not be opened."""
+    """The connection could not be opened."""
 
 
 class PeerClosed(TransportError):
-    """The other side closed the line, or it broke."""
+    """The other side closed the connection, or it broke."""
 
 
 class Transport(Protocol):
-    """One line to a robot. Opened at most once at a time; may be opened again after `close`."""
+    """One connection to a robot.
+
+    It may be opened again after `close`, but never twice at a time.
+    """
 
     @property
     def address(self) -> str:
-        """Where it leads, for people: ``tcp 192.168.1.5:6789``."""
+        """Target of the connection as text for people: ``tcp 192.168.1.5:6789``."""
 
     async def open(self, timeout_s: float) -> None:
         """Connect, or raise `ConnectFailed` within `timeout_s` seconds."""
@@ -74,78 +78,77 @@ class Transport(Protocol):
         """Return the next bytes, at least one, or the next envelope.
 
         Raises:
-            PeerClosed: no more will come.
+            PeerClosed: the stream has ended.
         """
 
     async def send(self, data: Payload) -> None:
-        """Hand `data` over, waiting while the line is full; raise `TransportError` if it broke."""
+        """Send `data`, waiting for buffer space; raise `TransportError` if the connection broke."""
 
     async def close(self) -> None:
         """Close at once. Never raises, may be called twice."""
 
 
 def bytes_of(data: Payload) -> bytes:
-    """Return `data` for a line that carries bytes alone; raise `TransportError` for a message."""
+    """Return `data` for a connection that carries bytes; raise `TransportError` for an envelope."""
     if isinstance(data, bytes):
         return data
     raise TransportError(f"a line of bytes cannot carry a message ({data.verb})")
 
 
 class ByteStream(Protocol):
-    """One open connection that another transport carries."""
+    """One open connection inside a tunnel."""
 
     async def take(self) -> bytes:
-        """Return the next bytes, at least one; raise `PeerClosed` when no more will come."""
+        """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
 
     async def put(self, data: bytes) -> None:
-        """Hand `data` over, waiting while the stream is full; raise `PeerClosed` if it broke."""
+        """Send `data`, waiting for buffer space; raise `PeerClosed` if the connection broke."""
 
     async def abort(self) -> None:
         """Close at once. Never raises, may be called twice."""
 
 
 class Carrier(Protocol):
-    """A transport that others go through: SSH, which forwards connections."""
+    """A transport that tunnels others, such as SSH port forwarding."""
 
     async def connect(self, host: str, port: int, timeout_s: float) -> ByteStream:
         """Connect to `host` and `port` as seen from the far end; raise `ConnectFailed`."""
 
 
 class Subscription(NamedTuple):
-    """What a driver's messages listen to on a transport that carries messages."""
+    """A topic of a driver's messages, on a transport that carries messages."""
 
     topic: str
     attributes: Mapping[str, Value] = NOTHING
-    """What the transport's own way of subscribing takes: type, throttle, quality of service …"""
+    """Options of the subscription: type, throttle, quality of service …"""
 
 
 class Setup(NamedTuple):
-    """What a transport's factory makes it from."""
+    """The input of a transport factory."""
 
     name: str
-    """Of the transport in the driver."""
+    """Name of the transport in the driver."""
     options: Mapping[str, object] = NOTHING
-    """As the document gives them, evaluated: plain values, and lists and mappings of them."""
+    """Evaluated options: plain values, and lists and mappings of them."""
     subscriptions: tuple[Subscription, ...] = ()
     via: Carrier | None = None
-    """What it goes through; None: this machine's own network."""
+    """Tunnel of the connection; None: the network of this machine."""
 
 
-# Optional abilities. Users ask with `isinstance` once, when they are made, and do without where an
-# ability is missing.
+# Optional abilities. Users check them once with `isinstance`, and work without them.
 
 
 @runtime_checkable
 class SupportsSettle(Protocol):
-    """A transport on which a message that was handed over may not have arrived yet."""
+    """A transport whose sent messages may not have arrived yet."""
 
     async def settle(self) -> str:
-        """Keep the line until all sent data has arrived, as far as the system tells.
+        """Keep the connection until all sent data has arrived, as far as the system tells.
 
-        Bounded to a few seconds.
+        The wait is bounded to a few seconds.
 
         Returns:
-            What did not arrive, in one line; "" where all did, or nothing can be known.
+            One line about data that has not arrived; "" if all arrived or the state is unknown.
         """
 
 
@@ -154,10 +157,10 @@ class SupportsProbe(Protocol):
     """A transport that can probe the program at the other end."""
 
     async def probe(self) -> None:
-        """Return when anything has come from that program since the call.
+        """Return when that program has sent anything since the call.
 
         Raises:
-            TransportError: the line broke.
+            TransportError: the connection broke.
         """
 
 
@@ -166,15 +169,15 @@ class SupportsUnsent(Protocol):
     """A transport or stream that counts its unsent bytes."""
 
     def unsent(self) -> int:
-        """Return the bytes handed over that have not left for good; 0 where it is unknown."""
+        """Return the number of unacknowledged bytes; 0 if it is unknown."""
 
 
 @runtime_checkable
 class SupportsForget(Protocol):
-    """A transport that does not keep the order of messages: a later one may arrive sooner."""
+    """A transport that may reorder messages."""
 
     def forget(self) -> None:
-        """Discard unsent data: it would arrive after its stop."""
+        """Discard unsent data, which could arrive after its stop."""
 
 
 @runtime_checkable
@@ -182,23 +185,23 @@ class SupportsAbort(Protocol):
     """A transport that can be closed without sending the rest."""
 
     async def abort(self) -> None:
-        """Close at once; what the robot has not got by now, it never gets. Never raises."""
+        """Close at once and discard unsent data. Never raises."""
 
 
 @runtime_checkable
 class SupportsOffer(Protocol):
-    """A transport that can take bytes without waiting."""
+    """A transport that can send without waiting."""
 
     def offer(self, data: bytes) -> bool:
-        """Hand `data` over if nothing waits before it; return whether it was taken. Never waits."""
+        """Send `data` if no earlier data waits; return whether it was accepted. Never waits."""
 
 
 @runtime_checkable
 class Prompt(SupportsOffer, Protocol):
-    """A transport of bytes that saves a task's turn for each message, both ways.
+    """A byte transport that saves a task switch per message in both directions.
 
-    The order of bytes is kept: `offer` takes none while others wait, and a sink gets none while
-    `receive` has some to give.
+    The order of bytes is kept. `offer` refuses data while earlier data waits, and a sink receives
+    nothing while `receive` has buffered data.
     """
 
     @property
@@ -206,9 +209,9 @@ class Prompt(SupportsOffer, Protocol):
         """Whether some accepted data is still to be written; ``send(b"")`` waits for it."""
 
     def divert(self, sink: Callable[[bytes], bool]) -> None:
-        """Let `sink` have what arrives until the line is closed; it returns whether it took it.
+        """Pass received data to `sink` until the connection is closed.
 
-        What it does not take is for `receive`.
+        The sink returns whether it accepted the data; `receive` returns refused data.
         """
 
 
@@ -225,16 +228,16 @@ class SupportsEnd(Protocol):
     """A stream that this side can end with a reason for people."""
 
     def end(self, why: str) -> None:
-        """Let `take` and `put` raise `PeerClosed` with `why` from now on."""
+        """Make `take` and `put` raise `PeerClosed` with the reason `why` from now on."""
 
 
 def unsent_of(stream: ByteStream | None) -> int:
-    """Return the unsent bytes of a stream; 0 where it cannot count them."""
+    """Return the unsent bytes of a stream; 0 if it cannot count them."""
     if stream is not None and isinstance(stream, SupportsUnsent):
         return stream.unsent()
     return 0
 
 
 async def reset(stream: ByteStream) -> None:
-    """Close a stream, without sending the rest where it can do so."""
+    """Close a stream, discarding unsent data if the stream supports it."""
     await (stream.reset() if isinstance(stream, SupportsReset) else stream.abort())

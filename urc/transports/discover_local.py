@@ -1,4 +1,4 @@
-"""Ports on which something listens: one connection to each, closed at once, nothing sent."""
+"""Detection of listening ports: one connection to each, closed at once without sending data."""
 
 import asyncio
 from collections.abc import Iterable
@@ -7,12 +7,12 @@ from contextlib import suppress
 __all__ = ["listening"]
 
 CONNECT_S = 1.0
-"""How long one may take to answer; on this machine it is at once."""
+"""Timeout of one connection, in seconds; on this machine, a reply is immediate."""
 _AT_ONCE = 16
 
 
 async def listening(places: Iterable[tuple[str, int]]) -> list[tuple[str, int]]:
-    """Return those of `places` (host, port) at which something takes connections, in order."""
+    """Return the `places` (host, port) that accept connections, in order."""
     turns = asyncio.Semaphore(_AT_ONCE)
 
     async def is_there(place: tuple[str, int]) -> bool:

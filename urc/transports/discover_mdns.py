@@ -1,6 +1,6 @@
-"""Listens to what is announced over multicast DNS, for types of services that are asked for.
+"""Discovery of announced services over multicast DNS.
 
-The library (zeroconf, extra ``mdns``) is imported only when it is used.
+The library (zeroconf, extra ``mdns``) is imported only on use.
 """
 
 import asyncio
@@ -13,15 +13,15 @@ from urc.transports.base import TransportError
 __all__ = ["Announced", "announced"]
 
 RESOLVE_S = 1.0
-"""How long one service may take to tell where it is."""
+"""Timeout for resolving one service, in seconds."""
 MAX_SERVICES = 256
 
 
 class Announced(NamedTuple):
-    """One service that somebody announces."""
+    """One announced service."""
 
     type: str
-    """As asked for: ``_rosbridge._tcp``."""
+    """Requested service type: ``_rosbridge._tcp``."""
     name: str
     host: str
     """Address."""
@@ -31,15 +31,15 @@ class Announced(NamedTuple):
 async def announced(
     types: Sequence[str], seconds: float, interfaces: Sequence[str] = ()
 ) -> list[Announced]:
-    """Return what is announced within `seconds`, in the order of type and name.
+    """Return the services announced within `seconds`, sorted by type and name.
 
     Args:
-        types: of services, such as ``_rosbridge._tcp``; at least one.
-        seconds: how long to listen.
-        interfaces: addresses of this machine to listen on; all when left out.
+        types: service types, such as ``_rosbridge._tcp``; at least one.
+        seconds: duration of the search.
+        interfaces: addresses of this machine to listen on; () for all.
 
     Raises:
-        TransportError: the library is not there, or there is no network to listen on.
+        TransportError: the library is missing, or no network is available.
     """
     if find_spec("zeroconf") is None:
         raise TransportError("mDNS needs the package zeroconf: pip install 'urc[mdns]'")
@@ -74,7 +74,7 @@ async def announced(
 
 
 async def _resolve(zeroconf: Any, kind: str, name: str) -> list[Announced]:
-    """Return where a service is; an announcement without an address is none."""
+    """Return the addresses of a service; an announcement without an address gives none."""
     from zeroconf import IPVersion
     from zeroconf.asyncio import AsyncServiceInfo
 

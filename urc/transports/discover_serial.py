@@ -1,4 +1,4 @@
-"""The serial ports of this machine. The library is serialx, of the extra ``serial``."""
+"""The serial ports of this machine, listed by serialx (extra ``serial``)."""
 
 from importlib.util import find_spec
 from typing import NamedTuple
@@ -13,16 +13,16 @@ class SerialPort(NamedTuple):
 
     device: str
     usb: str
-    """Vendor and product, ``2341:0043``; "" where it is no USB device."""
+    """Vendor and product, ``2341:0043``; "" for other devices than USB."""
     product: str
     serial_number: str
 
 
 def serial_ports() -> list[SerialPort]:
-    """Return every port that the system knows, USB devices first.
+    """Return all serial ports of the system, USB devices first.
 
     Raises:
-        TransportError: the library is not there, or the system does not tell.
+        TransportError: the library is missing, or the system does not list its ports.
     """
     if find_spec("serialx") is None:
         raise TransportError("serial ports need the package serialx: pip install 'urc[serial]'")

@@ -1,8 +1,8 @@
-"""HTTP to a robot: requests and their answers, and streams of pictures, events and lines.
+"""HTTP to a robot: requests and responses, and streams of pictures, events and lines.
 
-A request is handed over once its bytes are in the kernel; its answer comes from `receive` like
-everything else. So many may be under way at once; when one more is made and none of them ends soon,
-the oldest is given up. Nothing waits for a connection to come: what cannot be sent now fails now.
+A request counts as sent once its bytes are in the kernel; `receive` returns its response. The
+number of concurrent requests is limited. When a further request waits too long, the oldest one is
+dropped. No request waits for a lost connection: it fails at once.
 """
 
 import asyncio
@@ -30,17 +30,17 @@ MAX_BODY_BYTES = 8_388_608
 IN_FLIGHT = 4
 ANSWER_S = 10.0
 PATIENCE_S = 1.0
-"""How long a request waits for a place before the oldest one is given up."""
+"""Longest wait of a request for a free place, in seconds, before the oldest one is dropped."""
 
 
 class HttpTransport:
-    """One robot's web server, opened as often as it is needed."""
+    """The web server of one robot; it may be opened repeatedly."""
 
     def __init__(self, setup: Setup) -> None:
-        """Read the options of `setup`; nothing is opened yet.
+        """Read the options of `setup`, without connecting.
 
         Raises:
-            TransportError: an option or a subscription is not usable.
+            TransportError: an option or a subscription is invalid.
         """
         options = Options("http", setup.options)
         self._place = options.place("http")
@@ -56,12 +56,12 @@ class HttpTransport:
 
     @property
     def address(self) -> str:
-        """Where it leads, for people: ``http http://192.168.4.1:80/``."""
+        """Target of the transport as text for people: ``http http://192.168.4.1:80/``."""
         place = self._place
         return f"http http{'s' * place.is_secure}://{place.authority}{place.path}"
 
     async def open(self, timeout_s: float) -> None:
-        """See whether the robot can be reached, or raise `ConnectFailed` within `timeout_s` s."""
+        """Check the connection, or raise `ConnectFailed` within `timeout_s` seconds."""
         await self.close()
         client = Client(
             self._place,
@@ -87,21 +87,21 @@ class HttpTransport:
         self._talk = talk
 
     async def receive(self) -> Envelope:
-        """Return the next answer, picture or event.
+        """Return the next response, picture or event.
 
         Raises:
-            PeerClosed: the robot cannot be reached any more.
+            PeerClosed: the robot is no longer reachable.
         """
         if self._talk is None:
             raise PeerClosed(CLOSED)
         return await self._talk.receive()
 
     async def send(self, data: Payload) -> None:
-        """Hand a request to the kernel; its answer, or why there is none, comes from `receive`.
+        """Send a request; `receive` returns its response or its failure.
 
         Raises:
-            PeerClosed: the line is closed.
-            TransportError: `data` is no request.
+            PeerClosed: the transport is closed.
+            TransportError: `data` is not a request.
         """
         if not isinstance(data, Envelope) or data.verb != "request":
             what = f"{data.verb} anything" if isinstance(data, Envelope) else "send bare bytes"
@@ -111,19 +111,19 @@ class HttpTransport:
         await self._talk.send(data)
 
     def unsent(self) -> int:
-        """Return the bytes of requests that have not left this machine for good."""
+        """Return the number of request bytes that have not been acknowledged."""
         return 0 if self._talk is None else self._talk.unsent()
 
     def forget(self) -> None:
-        """Give up every request of which bytes are unsent.
+        """Cancel every request with unsent bytes.
 
-        Each has a connection of its own: it would come after those that are made from now on.
+        Each request has a connection of its own, so it could arrive after newer ones.
         """
         if self._talk is not None:
             self._talk.forget()
 
     async def close(self) -> None:
-        """Close every connection at once; what is unsent is never sent.
+        """Close every connection at once and discard unsent data.
 
         Never raises, may be called twice.
         """
@@ -133,12 +133,12 @@ class HttpTransport:
 
 
 def from_setup(setup: Setup) -> Transport:
-    """Make a transport out of a document's options; raise `TransportError` for an unusable one."""
+    """Return a transport for the options of a document, or raise `TransportError`."""
     return HttpTransport(setup)
 
 
 class _Talk:
-    """All that belongs to one opening of the transport."""
+    """The state of one opening of the transport."""
 
     def __init__(self, client: Client, most: int, answer_s: float, max_body_bytes: int) -> None:
         self.inbox = Inbox()
@@ -151,10 +151,10 @@ class _Talk:
         self._number = 0
         self._is_looking = False
         self._requests: dict[int, asyncio.Task[None]] = {}
-        """By place, oldest first: under way, or answered and not taken yet."""
+        """Place → request, oldest first: in progress, or with an unread response."""
         self._has_place = asyncio.Event()
         self._tasks: set[asyncio.Task[None]] = set()
-        """All that run, given up or not."""
+        """All running tasks, including those of dropped requests."""
 
     def listen(self, stream: Stream) -> None:
         self._start(stream.run())
@@ -204,7 +204,7 @@ class _Talk:
         await self._client.close()
 
     async def _until_place(self) -> None:
-        """Wait until a request may be made; after a while the oldest one makes room."""
+        """Wait for a free place; after a while, drop the oldest request."""
         try:
             async with asyncio.timeout(PATIENCE_S):
                 while len(self._requests) >= self._most:
@@ -217,9 +217,9 @@ class _Talk:
                 self.inbox.give_up(place)
 
     async def _request(self, place: int, data: Envelope, handed: asyncio.Event) -> None:
-        """Make one request, and put its answer into the inbox."""
+        """Send one request, and put its response into the queue."""
         fault: HttpFault | None = None
-        # A robot that has closed idle connections is heard first: none of them is used then.
+        # Read first: the robot may have closed idle connections, which must not be used.
         await asyncio.sleep(0)
         try:
             async with asyncio.timeout(self._answer_s):
@@ -238,7 +238,7 @@ class _Talk:
             await self._conclude(fault)
 
     async def _conclude(self, fault: HttpFault) -> None:
-        """Find out whether a robot that has not answered is still there, and say when it is not."""
+        """Check whether an unresponsive robot is still reachable, and report it if not."""
         if fault.is_unreachable:
             self.inbox.end(str(fault))
         elif fault.is_unanswered and not self._is_looking:
@@ -269,7 +269,7 @@ class _Talk:
 
 
 class _Handed(httpx2.AsyncByteStream):
-    """The body of a request, which notes that all of it is in the kernel."""
+    """A request body that records when all of it is in the kernel."""
 
     def __init__(self, body: bytes, handed: asyncio.Event) -> None:
         self._body = body
@@ -282,7 +282,7 @@ class _Handed(httpx2.AsyncByteStream):
 
 
 def _request_of(client: Client, data: Envelope) -> httpx2.Request:
-    """Return the library's request for ours."""
+    """Return the library's request for an envelope."""
     attributes = data.attributes
     path, query = str(attributes.get("path", "/")), attributes.get("query")
     if isinstance(query, Mapping):

@@ -1,4 +1,4 @@
-"""Reads the body of an answer with a bound, and says in one line what a bad answer is about."""
+"""Bounded reading of response bodies, and one-line texts for error responses."""
 
 import zlib
 from http import HTTPStatus
@@ -13,14 +13,14 @@ __all__ = ["body_of", "complaint", "fault_of", "read_body"]
 
 _COMPLAINT_BYTES: Final = 65536
 _FORMATS: Final = {"gzip": 31, "x-gzip": 31, "deflate": 47}
-"""Content-Encoding → what zlib calls it: gzip, or whichever of the two it is."""
+"""Content-Encoding → window bits of zlib: gzip, or automatic detection."""
 
 
 async def read_body(response: httpx2.Response, max_bytes: int) -> bytes:
-    """Return the whole body, unpacked.
+    """Return the whole body, decompressed.
 
     Raises:
-        HttpFault: it is longer than `max_bytes`, packed or not, or packed in an unknown way.
+        HttpFault: it is longer than `max_bytes`, compressed or not, or has an unknown encoding.
     """
     too_long = f"the answer is longer than {max_bytes} bytes"
     if int(response.headers.get("content-length") or 0) > max_bytes:
@@ -37,7 +37,7 @@ async def read_body(response: httpx2.Response, max_bytes: int) -> bytes:
         raise HttpFault(f"the answer is packed as {packing[:40]!r}, which was not asked for")
     unpacker = zlib.decompressobj(_FORMATS[packing])
     try:
-        # One byte more than is taken tells a longer one, and nothing is unpacked beyond it.
+        # One byte more than the limit reveals a longer body, and limits the decompression.
         plain = unpacker.decompress(body, max_bytes + 1)
     except zlib.error as fault:
         raise HttpFault(f"the answer is not {packing} as it says ({fault})") from fault
@@ -49,28 +49,28 @@ async def read_body(response: httpx2.Response, max_bytes: int) -> bytes:
 
 
 async def body_of(response: httpx2.Response, max_bytes: int) -> bytes:
-    """Return the body of any answer; of a bad one what there is of it, and not more than 64 KiB.
+    """Return the body of any response; for an error response, at most 64 KiB of it.
 
     Raises:
-        HttpFault: as `read_body`, of a good answer.
+        HttpFault: as in `read_body`, for a successful response.
     """
     if response.status_code < HTTPStatus.MULTIPLE_CHOICES:
         return await read_body(response, max_bytes)
     try:
         return await read_body(response, min(max_bytes, _COMPLAINT_BYTES))
     except HttpFault:
-        return b""  # its status says enough
+        return b""  # the status is informative enough
 
 
 async def fault_of(response: httpx2.Response) -> str:
-    """Return why a stream does not begin, "" when it does; the body of a good one is not read."""
+    """Return the failure of a stream request, or ""; the body of a success is not read."""
     if response.status_code < HTTPStatus.MULTIPLE_CHOICES:
         return ""
     return complaint(response, await body_of(response, _COMPLAINT_BYTES))
 
 
 def complaint(response: httpx2.Response, body: bytes) -> str:
-    """Return why an answer is none that can be used, "" when it can: status, and what it says."""
+    """Return the error text of a response, or "" for a success."""
     target = response.headers.get("location")
     if 300 <= response.status_code < 400 and target is not None:
         return f"robot redirected to {one_line(target)}; redirects are not followed"
@@ -79,6 +79,6 @@ def complaint(response: httpx2.Response, body: bytes) -> str:
     status = one_line(f"{response.status_code} {response.reason_phrase}")
     text = body.decode("utf-8", "replace")
     if "html" in response.headers.get("content-type", ""):
-        return status  # a page for people, whose first line says nothing
+        return status  # an HTML page, whose first line is not informative
     first = next((line for line in text.splitlines() if line.strip()), "")
     return f"{status}: {one_line(first)}" if first else status

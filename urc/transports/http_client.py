@@ -1,8 +1,8 @@
-"""HTTP/1.1 to one place, on the library `httpx2`: connections, credentials, errors in one line.
+"""HTTP/1.1 to one server, with the library `httpx2`: connections, credentials, one-line errors.
 
-The library's own way of connecting is replaced: every connection leads to the place of the
-document, whatever the request says; proxies of the environment and redirects are not followed; and
-names are looked up as the TCP transport does it, in no thread that the program waits for.
+The library's own way of connecting is replaced. Every connection leads to the server of the
+document, even if a request names another host. Proxies of the environment and redirects are
+ignored. Address lookups use no thread that delays the end of the program.
 """
 
 import asyncio
@@ -24,24 +24,24 @@ from urc.transports.web_place import Credentials, WebPlace
 __all__ = ["Client", "HttpFault", "leads_up"]
 
 KEPT_S = 3.0
-"""An idle connection is used again for this long; small robots close theirs after five seconds."""
+"""Reuse time of an idle connection, in seconds; small robots close theirs after five."""
 CONNECT_S = 3.0
-"""Longest wait for a connection, its TLS included."""
+"""Longest wait for a connection, including TLS, in seconds."""
 MAX_COOKIES = 50
 
 
 class HttpFault(TransportError):
-    """A request failed. Its text is for people."""
+    """A failed request, with a text for people."""
 
     def __init__(
         self, text: str, *, is_unreachable: bool = False, is_unanswered: bool = False
     ) -> None:
-        """Tell what failed.
+        """Initialise the error.
 
         Args:
-            text: for people.
-            is_unreachable: there was no connection at all.
-            is_unanswered: there was one, and nothing that can be called an answer came on it.
+            text: text for people.
+            is_unreachable: whether no connection could be opened.
+            is_unanswered: whether a connection was opened, but gave no usable response.
         """
         super().__init__(text)
         self.is_unreachable = is_unreachable
@@ -49,7 +49,7 @@ class HttpFault(TransportError):
 
 
 class Client:
-    """All connections of one transport, while it is open."""
+    """All connections of one open transport."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class Client:
         headers: Mapping[str, str],
         connections: int,
     ) -> None:
-        """Prepare; nothing is connected yet. At most `connections` at a time."""
+        """Initialise without connecting. At most `connections` are open at a time."""
         self._place = place
         self._credentials = credentials
         self._backend = _Backend(dialer)
@@ -82,20 +82,20 @@ class Client:
 
     @property
     def where(self) -> str:
-        """Host and port, for people."""
+        """Host and port as text for people."""
         return self._place.authority
 
     async def reach(self, timeout_s: float = CONNECT_S) -> None:
-        """Connect once, for the next request; raise `ConnectFailed`."""
+        """Open one connection for the next request; raise `ConnectFailed`."""
         await self._backend.reach(timeout_s)
 
     def request(
         self, method: str, path: str, headers: Mapping[str, str], body: bytes | None
     ) -> httpx2.Request:
-        """Return a request for `path`, which goes on from the path of the document's URL.
+        """Return a request for `path`, relative to the path of the document's URL.
 
         Raises:
-            HttpFault: it cannot be said in HTTP, or would lead elsewhere.
+            HttpFault: it is not valid HTTP, or leaves the base path.
         """
         if leads_up(path):
             base = self._base.removeprefix(self._origin)
@@ -105,10 +105,10 @@ class Client:
     def follow(
         self, method: str, reference: str, headers: Mapping[str, str], body: bytes | None
     ) -> httpx2.Request:
-        """Return a request for a URL that the robot has named: whole, or from its root.
+        """Return a request for a URL from the robot: absolute, or relative to its root.
 
         Raises:
-            HttpFault: it cannot be said in HTTP, or leads to another host, port or protocol.
+            HttpFault: it is not valid HTTP, or leads to another host, port or protocol.
         """
         try:
             base = httpx2.URL(f"{self._base}/")
@@ -122,12 +122,12 @@ class Client:
             b"",
         ):
             where = f"{self._place.authority}"
-            raise HttpFault(f"{one_line(reference)!r} is not on {where}: nobody else is asked")
+            raise HttpFault(f"{one_line(reference)!r} is not on {where}: only the robot is asked")
         return self._built(method, str(url.copy_with(fragment=None)), headers, body)
 
     @property
     def _base(self) -> str:
-        """The document's URL, without the slash at its end."""
+        """URL of the document, without a trailing slash."""
         return self._origin + self._place.path.partition("?")[0].rstrip("/")
 
     def _built(
@@ -145,13 +145,13 @@ class Client:
     async def answer(
         self, request: httpx2.Request, silence_s: float | None = None
     ) -> AsyncIterator[httpx2.Response]:
-        """Send `request` and give its answer, whose body is still to be read, for the context.
+        """Send `request`, and yield its response with an unread body, for the context.
 
-        Whatever goes wrong in the context, too, is raised as `HttpFault`.
+        All errors inside the context are raised as `HttpFault`, too.
 
         Args:
-            request: as from `request`.
-            silence_s: longest wait between two pieces of the answer; None: as long as it takes.
+            request: a result of `request`.
+            silence_s: longest wait between two pieces of the response, in seconds; None: unlimited.
         """
         if silence_s is not None:
             request.extensions["timeout"] = {**request.extensions["timeout"], "read": silence_s}
@@ -171,8 +171,8 @@ class Client:
             return await self._client.send(request, stream=True)
         except (httpcore2.TimeoutException, httpcore2.NetworkError, httpcore2.ProtocolError):
             raise
-        except Exception as fault:  # the library reads challenges and cookies without much care
-            # It would answer a senseless challenge again and again.
+        except Exception as fault:  # the library parses challenges and cookies without much care
+            # A new object: the old one would answer an invalid challenge forever.
             if (fresh := _auth(self._credentials)) is not None:
                 self._client.auth = fresh
             if isinstance(fault, _FAULTS):
@@ -181,17 +181,17 @@ class Client:
             raise HttpFault(f"what {where} answers is not understood ({_short(fault)})") from fault
 
     def unsent(self) -> int:
-        """Return the bytes of all requests that have not left this machine for good."""
+        """Return the number of request bytes that have not been acknowledged."""
         return self._backend.unsent()
 
     def forget(self) -> None:
-        """Close the connections on which bytes are unsent: the robot never gets these."""
+        """Close the connections with unsent bytes, and discard the bytes."""
         self._backend.forget()
 
     async def close(self) -> None:
-        """Close every connection; what is unsent is never sent. Never raises."""
+        """Close every connection and discard unsent data. Never raises."""
         await self._backend.close()
-        with suppress(Exception):  # of connections that are broken already
+        with suppress(Exception):  # connections that are already broken
             await self._client.aclose()
 
     def _translated(self, fault: Exception, waited_s: float) -> HttpFault:
@@ -204,7 +204,7 @@ class Client:
             return HttpFault(late(where, waited_s), is_unanswered=True)
         if isinstance(fault, httpcore2.RemoteProtocolError | httpx2.ProtocolError):
             if "without sending" in str(fault):
-                text = "the robot closed the line without an answer"
+                text = "the robot closed the connection without an answer"
                 return HttpFault(text, is_unanswered=True)
             return HttpFault(f"what {where} sends is not HTTP ({_short(fault)})")
         if isinstance(fault, httpcore2.LocalProtocolError | NotImplementedError):
@@ -213,9 +213,9 @@ class Client:
 
 
 def leads_up(path: str) -> bool:
-    """Return whether a path has a part that means another folder, however it is written."""
+    """Return whether a path contains "." or ".." in any encoding."""
     plain = path.partition("?")[0].partition("#")[0]
-    for _ in range(_UNPACKED):  # some servers unpack what was packed twice
+    for _ in range(_UNPACKED):  # some servers decode twice
         plain = unquote(plain)
     return any(part in (".", "..") for part in plain.replace("\\", "/").split("/"))
 
@@ -226,10 +226,10 @@ _FAULTS = (
     httpcore2.NetworkError,
     httpcore2.ProtocolError,
     httpx2.ProtocolError,
-    NotImplementedError,  # Digest with auth-int alone
+    NotImplementedError,  # Digest with auth-int only
 )
 _NO_TLS = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-"""For the pool, which would otherwise read the system's certificates: streams bring their TLS."""
+"""An empty context for the pool, which would otherwise read the certificates of the system."""
 
 
 def _short(fault: Exception) -> str:
@@ -250,19 +250,19 @@ class _Bearer(httpx2.Auth):
     def __init__(self, header: str) -> None:
         self._header = header
 
-    def auth_flow(self, request: httpx2.Request) -> Any:  # a generator of the library's own types
+    def auth_flow(self, request: httpx2.Request) -> Any:  # a generator with types of the library
         request.headers["Authorization"] = self._header
         yield request
 
 
 class _Backend(httpcore2.AsyncNetworkBackend):
-    """Connects to one place alone. The connection of `reach` is the first one that is used."""
+    """Connects to one server. The first request uses the connection of `reach`."""
 
     def __init__(self, dialer: Dialer) -> None:
         self._dialer = dialer
         self._spare: ByteStream | None = None
         self._connections: set[_Connection] = set()
-        """All that are open and in the library's hands."""
+        """All open connections in use by the library."""
 
     def unsent(self) -> int:
         return sum(one.unsent() for one in self._connections)
@@ -297,7 +297,7 @@ class _Backend(httpcore2.AsyncNetworkBackend):
         spare, self._spare = self._spare, None
         if spare is not None:
             connection = self._lent(spare)
-            if not connection.is_readable():  # else the robot did not want to wait
+            if not connection.is_readable():  # otherwise the robot has closed it
                 return connection
             await connection.aclose()
         try:
@@ -310,7 +310,7 @@ class _Backend(httpcore2.AsyncNetworkBackend):
 
 
 class _Connection(httpcore2.AsyncNetworkStream):
-    """One of our streams, as the library's pool wants it."""
+    """A stream with the interface of the library's pool."""
 
     def __init__(self, stream: ByteStream, ended: Callable[["_Connection"], None]) -> None:
         self._stream = stream
@@ -343,24 +343,24 @@ class _Connection(httpcore2.AsyncNetworkStream):
             raise httpcore2.WriteError(str(ended)) from ended
 
     def unsent(self) -> int:
-        """Return the bytes that have not left this machine for good; 0 where nobody knows.
+        """Return the number of unacknowledged bytes; 0 if unknown.
 
-        The robot may have closed a connection that the library still keeps: that holds nothing up.
+        A connection that the robot has closed counts as 0, even while the library keeps it.
         """
         stream = self._stream
         return 0 if isinstance(stream, Stream) and stream.has_ended else unsent_of(stream)
 
     def drop(self) -> None:
-        """End it now: what is unsent is never sent. Whoever waits for it is told.
+        """Close now and discard unsent data; waiting tasks get an error.
 
-        What goes through another transport keeps its order, and stays.
+        A tunnelled connection keeps its order, and stays open.
         """
         if isinstance(self._stream, Stream):
             self._ended(self)
             self._stream.drop()
 
     async def aclose(self) -> None:
-        if self.unsent():  # a request that was given up would come late, after newer ones
+        if self.unsent():  # a dropped request would arrive late, after newer ones
             self.drop()
         self._ended(self)
         await self._stream.abort()
@@ -371,15 +371,15 @@ class _Connection(httpcore2.AsyncNetworkStream):
         server_hostname: str | None = None,
         timeout: float | None = None,
     ) -> httpcore2.AsyncNetworkStream:
-        return self  # it has been started, by `Reach`
+        return self  # already started by `Reach`
 
     def get_extra_info(self, info: str) -> object:
         return self.is_readable() if info == "is_readable" else None
 
     def is_readable(self) -> bool:
-        """Whether `read` would not wait: of an idle connection, that the robot has closed it.
+        """Return whether `read` would return at once; an idle connection is then closed.
 
-        A stream has no other way to ask than to begin to take, and to leave it when it waits.
+        A stream has no other test than to begin `take`, and to cancel it if it waits.
         """
         if self._early:
             return True
@@ -396,14 +396,14 @@ class _Connection(httpcore2.AsyncNetworkStream):
 
 
 class _Wire(httpx2.AsyncBaseTransport):
-    """Hands the library's requests to a pool of ours, and its errors on as they are."""
+    """Passes the library's requests to our connection pool, and errors unchanged."""
 
     def __init__(self, pool: httpcore2.AsyncConnectionPool) -> None:
         self._pool = pool
 
     async def handle_async_request(self, request: httpx2.Request) -> httpx2.Response:
         url = request.url
-        assert isinstance(request.stream, httpx2.AsyncByteStream)  # noqa: S101 - as the client makes it
+        assert isinstance(request.stream, httpx2.AsyncByteStream)  # noqa: S101 - made so
         answer = await self._pool.handle_async_request(
             httpcore2.Request(
                 method=request.method,

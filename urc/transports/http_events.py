@@ -1,8 +1,8 @@
-"""Cuts ``text/event-stream`` and plain lines out of a body. Pure: bytes in, messages out.
+"""Parsers for ``text/event-stream`` and plain lines. Pure: bytes in, messages out.
 
-Server-sent events are read as the HTML standard says (section 9.2.6, "Interpreting an event
-stream"), except that data stays bytes. Everything has a bound: an event or a line that is longer is
-left out whole and counted, and what follows it is read again.
+Server-sent events follow the HTML standard (section 9.2.6, "Interpreting an event stream"), except
+that data stays bytes. Sizes are bounded: an event or line that is too long is skipped and counted,
+and parsing continues after it.
 """
 
 from typing import Final, NamedTuple
@@ -11,43 +11,43 @@ __all__ = ["Event", "EventCutter", "LineCutter"]
 
 _BOM: Final = b"\xef\xbb\xbf"
 _MAX_NAME: Final = 200
-"""Characters of an event's name or id that are kept."""
+"""Longest kept event name or id, in characters."""
 _TOO_LONG: Final = b"\0 too long"
-"""Stands for a line that is; compared by identity."""
+"""Placeholder of a line that is too long; compared by identity."""
 
 
 class Event(NamedTuple):
     """One event of a stream."""
 
     name: str
-    """"" for one without a name (the standard's ``message``)."""
+    """Name of the event; "" for the default (``message`` in the standard)."""
     data: bytes
-    """Its data lines, joined by LF."""
+    """Data lines, joined by LF."""
     id: str
-    """The newest id of the stream so far; what a new connection starts after."""
+    """Newest id of the stream, from which a new connection continues."""
 
 
 class LineCutter:
-    """Takes a body in any pieces, and gives its lines without their ends (CR LF, LF or CR)."""
+    """Splits a body, received in any pieces, into lines without their ends (CR LF, LF or CR)."""
 
     def __init__(self, max_bytes: int, instead: bytes | None = None) -> None:
-        """Leave out lines of more than `max_bytes`, or give `instead`."""
+        """Skip lines of more than `max_bytes`, or replace them by `instead`."""
         self._most = max_bytes
         self._instead = instead
         self._buffer = bytearray()
         self._is_skipping = False
         self._was_cr = False
         self.left_out = 0
-        """Lines that were too long."""
+        """Number of skipped lines."""
 
     def feed(self, data: bytes) -> list[bytes]:
-        """Take the next piece of the body and return the lines that are complete with it."""
+        """Process the next piece of the body and return the completed lines."""
         if self._was_cr and data.startswith(b"\n"):
             data = data[1:]
             self._was_cr = False
         if data:
             self._was_cr = data.endswith(b"\r")
-        # A body of CR LF or LF alone is the usual one, and is split without looking at each byte.
+        # Most bodies use only CR LF or LF, and can be split without scanning each byte.
         plain = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
         first, *others = plain.split(b"\n")
         if not others:
@@ -64,7 +64,7 @@ class LineCutter:
         return lines
 
     def end(self) -> bytes:
-        """Return what came after the last end of a line, once the body is over."""
+        """Return the incomplete last line at the end of the body."""
         rest = b"" if self._is_skipping else bytes(self._buffer)
         self._buffer.clear()
         return rest
@@ -88,10 +88,10 @@ class LineCutter:
 
 
 class EventCutter:
-    """Takes an event stream in any pieces, and gives its events."""
+    """Parses an event stream, received in any pieces."""
 
     def __init__(self, max_bytes: int, last_id: str = "") -> None:
-        """Leave out events of more than `max_bytes`; `last_id` is that of the connection before."""
+        """Skip events of more than `max_bytes`; `last_id` is that of the previous connection."""
         self._most = max_bytes
         self._lines = LineCutter(max_bytes + _MAX_NAME, _TOO_LONG)
         self._is_start = True
@@ -101,14 +101,14 @@ class EventCutter:
         self._is_too_long = False
         self._next_id = last_id
         self.last_id = last_id
-        """The id of the newest event, for the header Last-Event-ID."""
+        """Id of the newest event, for the header Last-Event-ID."""
         self.left_out = 0
-        """Events that were too long."""
+        """Number of skipped events."""
         self.retry_s: float | None = None
-        """Wait before a new connection, as the robot wishes; None: it has no wish."""
+        """Retry delay requested by the robot, in seconds; None without a request."""
 
     def feed(self, data: bytes) -> list[Event]:
-        """Take the next piece of the stream and return the events that are complete with it."""
+        """Process the next piece of the stream and return the completed events."""
         events: list[Event] = []
         for line in self._lines.feed(data):
             text = line.removeprefix(_BOM) if self._is_start else line

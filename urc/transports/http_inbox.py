@@ -1,4 +1,4 @@
-"""What has arrived over HTTP and has not been taken yet: answers, pictures, events; all bounded."""
+"""The bounded queue of received HTTP responses, pictures and events."""
 
 import asyncio
 from collections.abc import Mapping
@@ -9,16 +9,16 @@ from urc.transports.base import PeerClosed
 __all__ = ["Inbox"]
 
 EVENTS_BYTES = 1_048_576
-"""Size of the events and lines that wait at most; their robot is not read until some are taken."""
+"""Limit of queued events and lines, in bytes; beyond it, the robot is not read."""
 EVENTS = 64
 
 
 class Inbox:
-    """A bounded queue in the order of arrival. A newer picture takes the place of the older one."""
+    """A bounded queue in the order of arrival. A newer picture replaces the queued one."""
 
     def __init__(self) -> None:
         self._waiting: dict[object, Envelope] = {}
-        """By its place: a stream's name for a picture, else a number."""
+        """Place → envelope; the place of a picture is its topic, all others have a number."""
         self._number = 0
         self._events = 0
         self._events_bytes = 0
@@ -27,25 +27,25 @@ class Inbox:
         self._has_room.set()
         self._ended: str | None = None
         self.dropped = 0
-        """Pictures that were given up for newer ones."""
+        """Number of pictures that were replaced by newer ones."""
 
     def answer(self, place: int, envelope: Envelope) -> None:
-        """Add the answer to a request; there are no more of them than requests may be made."""
+        """Add the response to a request; the number of requests bounds the responses."""
         self._waiting["answer", place] = envelope
         self._arrived.set()
 
     def give_up(self, place: int) -> None:
-        """Forget an answer that has not been taken."""
+        """Remove an unread response."""
         self._waiting.pop(("answer", place), None)
 
     def picture(self, topic: str, body: bytes) -> None:
-        """Add a picture, instead of the one of that topic that waits."""
+        """Add a picture, replacing the queued one of the same topic."""
         self.dropped += topic in self._waiting
         self._waiting[topic] = Envelope("message", {"topic": topic, "dropped": self.dropped}, body)
         self._arrived.set()
 
     async def event(self, attributes: Mapping[str, object], body: bytes) -> None:
-        """Add an event or a line, waiting while too many wait already."""
+        """Add an event or a line, waiting while the queue is full."""
         while self._events >= EVENTS or self._events_bytes >= EVENTS_BYTES:
             self._has_room.clear()
             await self._has_room.wait()
@@ -56,7 +56,7 @@ class Inbox:
         self._arrived.set()
 
     def end(self, reason: str) -> None:
-        """No more will come; what waits can still be taken."""
+        """End the queue; queued envelopes can still be read."""
         if self._ended is None:
             self._ended = reason
         self._arrived.set()
@@ -64,14 +64,14 @@ class Inbox:
 
     @property
     def ended(self) -> str | None:
-        """Why no more will come; None while the line is up."""
+        """Reason of the end; None while the connection is open."""
         return self._ended
 
     async def take(self) -> tuple[Envelope, int | None]:
-        """Return the next envelope, and the place of the request when it is an answer.
+        """Return the next envelope, and the place of the request if it is a response.
 
         Raises:
-            PeerClosed: no more will come.
+            PeerClosed: the queue is empty and has ended.
         """
         while not self._waiting:
             if self._ended is not None:

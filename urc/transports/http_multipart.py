@@ -1,9 +1,9 @@
-"""Cuts a ``multipart/x-mixed-replace`` body (MJPEG) into its parts. Pure: bytes in, parts out.
+"""Parser for ``multipart/x-mixed-replace`` bodies (MJPEG). Pure: bytes in, parts out.
 
-Cameras are careless with the format (RFC 2046, section 5.1): the boundary is quoted or not, the
-header may already have the two dashes that belong to the body, a part may lack Content-Length, and
-lines may end in LF alone. All of that is read. Every piece has a bound; past it the stream is no
-multipart stream, and that is an error.
+Many cameras violate the format (RFC 2046, section 5.1). The boundary may be quoted or not, the
+header may include the two dashes of the body, a part may lack Content-Length, and lines may end in
+LF alone. The parser accepts all of these. Every piece has a bound; beyond it, the stream is
+invalid.
 """
 
 import re
@@ -13,22 +13,22 @@ from typing import Final, Literal
 __all__ = ["MAX_BOUNDARY", "MAX_HEADER_BYTES", "MultipartCutter", "MultipartFault", "boundary_of"]
 
 MAX_BOUNDARY: Final = 200
-"""Characters; RFC 2046 allows 70, cameras do not all keep to it."""
+"""Longest boundary in characters; RFC 2046 allows 70, but not all cameras comply."""
 MAX_HEADER_BYTES: Final = 8192
-"""Headers of one part, and whatever is between two parts."""
+"""Limit for the headers of one part, and for the bytes between two parts."""
 
 _LENGTH: Final = re.compile(rb"^content-length[ \t]*:[ \t]*(\d{1,15})[ \t]*$", re.I | re.M)
 
 
 class MultipartFault(ValueError):
-    """What came is no multipart stream, or more than is taken."""
+    """An invalid multipart stream, or one that exceeds a bound."""
 
 
 def boundary_of(content_type: str) -> bytes:
-    """Return the boundary that a Content-Type names, without the dashes before it.
+    """Return the boundary in a Content-Type, without the leading dashes.
 
     Raises:
-        MultipartFault: it is not of a multipart body, or the boundary is missing or too long.
+        MultipartFault: the type is not multipart, or the boundary is missing or too long.
     """
     header = Message()
     header["content-type"] = content_type
@@ -45,16 +45,16 @@ def boundary_of(content_type: str) -> bytes:
 
 
 class MultipartCutter:
-    """Takes a body in any pieces, and gives its parts without their headers."""
+    """Splits a body, received in any pieces, into parts without their headers."""
 
     def __init__(self, boundary: bytes, max_part_bytes: int) -> None:
-        """Cut at `boundary`, as from `boundary_of`; a part has at most `max_part_bytes`."""
-        # Between parts the line before, and the dashes, may be missing; inside a part they are
-        # what tells a delimiter from the picture.
+        """Split at `boundary`, a result of `boundary_of`; a part has at most `max_part_bytes`."""
+        # Between parts, the preceding line break and the dashes may be missing. Inside a part, they
+        # distinguish a delimiter from the picture.
         self._loose = re.compile(rb"(?:\A|\r?\n)-*" + re.escape(boundary))
         self._strict = re.compile(rb"\r?\n-+" + re.escape(boundary))
         self._keep = len(boundary) + 80
-        """So much of the end is searched again: a delimiter may have come in half."""
+        """Number of last bytes to search again: they may contain an incomplete delimiter."""
         self._most = max_part_bytes
         self._buffer = bytearray()
         self._state: Literal["seek", "rest", "head", "counted", "open", "ended"] = "seek"
@@ -62,10 +62,10 @@ class MultipartCutter:
         self._length = 0
 
     def feed(self, data: bytes) -> list[bytes]:
-        """Take the next piece of the body and return the parts that are complete with it.
+        """Process the next piece of the body and return the completed parts.
 
         Raises:
-            MultipartFault: something has no end, or a part is larger than is taken.
+            MultipartFault: a part or header has no end, or is too large.
         """
         self._buffer += data
         parts: list[bytes] = []
@@ -78,7 +78,7 @@ class MultipartCutter:
         return parts
 
     def _seek(self, parts: list[bytes]) -> bool:
-        """Skip what is before the next delimiter."""
+        """Skip the bytes before the next delimiter."""
         found = self._loose.search(self._buffer, self._from)
         if found is None:
             self._from = max(0, len(self._buffer) - self._keep)
@@ -103,7 +103,7 @@ class MultipartCutter:
         return True
 
     def _head(self, parts: list[bytes]) -> bool:
-        """Read the headers of a part up to the empty line."""
+        """Parse the headers of a part up to the empty line."""
         found = _EMPTY_LINE.search(self._buffer)
         if found is None:
             self._check_header()
@@ -119,7 +119,7 @@ class MultipartCutter:
         return True
 
     def _counted(self, parts: list[bytes]) -> bool:
-        """Take a part whose length is known."""
+        """Extract a part of known length."""
         if len(self._buffer) < self._length:
             return False
         parts.append(bytes(self._buffer[: self._length]))
@@ -127,7 +127,7 @@ class MultipartCutter:
         return True
 
     def _open(self, parts: list[bytes]) -> bool:
-        """Take a part that ends where the next delimiter begins."""
+        """Extract a part that ends at the next delimiter."""
         found = self._strict.search(self._buffer, self._from)
         end = found.start() if found else len(self._buffer) - self._keep
         if end > self._most:

@@ -1,8 +1,8 @@
-"""What a robot sends over HTTP by itself: pictures, events, lines. Each stream is a task.
+"""Streams from a robot over HTTP: pictures, events, lines. Each stream is a task.
 
-A stream that fails is asked for again, later each time, and the line stands; its first failure and
-its recovery are logged, the failures between are not. Only when there is no connection to the robot
-at all, and nothing else has come from it for a while either, is the line given up.
+A failed stream is requested again after growing delays, while the transport stays open. The first
+failure and the recovery are logged, but not the failures between them. The transport ends only when
+the robot refuses connections and has sent nothing else for a while.
 """
 
 import asyncio
@@ -28,34 +28,34 @@ KINDS: Final = ("mjpeg", "stills", "sse", "lines")
 MAX_STREAMS: Final = 16
 MAX_EVENT_BYTES: Final = 262_144
 SILENCE_S: Final = 5.0
-"""Pictures that stay out for this long are asked for again."""
+"""Timeout for pictures, in seconds, after which the stream is requested again."""
 _FIRST_WAIT_S: Final = 0.5
 _LONGEST_WAIT_S: Final = 5.0
 SHORTEST_RETRY_S: Final = 0.2
-"""However soon the robot would like to be asked again."""
+"""Shortest delay before a retry in seconds, even if the robot requests less."""
 _LONGEST_RETRY_S: Final = 60.0
 _NO_MORE: Final = 204
 _GONE_S: Final = 2.0
-"""With nothing from the robot for this long, a refused connection means that it is gone."""
+"""Silence after which a refused connection means that the robot is gone, in seconds."""
 
 log = logging.getLogger(__name__)
 
 
 class StreamSpec(NamedTuple):
-    """One stream, as the driver's messages listen to it."""
+    """One stream that the messages of the driver need."""
 
     kind: str
     path: str
     every_s: float
     topics: frozenset[str]
-    """All topics of that path: of events, those with ``#NAME`` at the end are of one name alone."""
+    """All topics of that path; for events, a topic with ``#NAME`` has only events of that name."""
 
 
 def streams_of(subscriptions: Sequence[Subscription]) -> list[StreamSpec]:
-    """Return the streams that are to be asked for; several topics may come out of one.
+    """Return the streams of all subscriptions; several topics may share one.
 
     Raises:
-        TransportError: a subscription that HTTP cannot serve.
+        TransportError: HTTP cannot serve a subscription.
     """
     found: dict[str, StreamSpec] = {}
     for topic, how in subscriptions:
@@ -79,36 +79,36 @@ def streams_of(subscriptions: Sequence[Subscription]) -> list[StreamSpec]:
 
 
 class Pulse:
-    """When anything came from the robot, on whichever connection."""
+    """The time of the last data from the robot, on any connection."""
 
     def __init__(self) -> None:
         self._clock = asyncio.get_running_loop().time
         self._beat_s = self._clock()
 
     def beat(self) -> None:
-        """Something came."""
+        """Record received data."""
         self._beat_s = self._clock()
 
     @property
     def silence_s(self) -> float:
-        """Seconds since then."""
+        """Seconds since the last data."""
         return self._clock() - self._beat_s
 
 
 class Stream:
-    """One stream of an open transport; `run` does the work until it is cancelled."""
+    """One stream of an open transport; `run` works until it is cancelled."""
 
     def __init__(
         self, spec: StreamSpec, client: Client, inbox: Inbox, pulse: Pulse, max_body_bytes: int
     ) -> None:
-        """Prepare the stream.
+        """Initialise the stream.
 
         Args:
-            spec: what is asked for.
-            client: asks.
-            inbox: takes what comes.
-            pulse: of the transport.
-            max_body_bytes: of one picture.
+            spec: the requested stream.
+            client: makes the requests.
+            inbox: receives the data.
+            pulse: last activity of the transport.
+            max_body_bytes: size limit of one picture.
         """
         self._spec = spec
         self._client = client
@@ -122,7 +122,7 @@ class Stream:
         self._is_over = False
 
     async def run(self) -> None:
-        """Ask for the stream again and again, until the robot says that there will be no more."""
+        """Request the stream repeatedly, until the robot ends it for good."""
         once = {"mjpeg": self._mjpeg, "stills": self._still, "sse": self._sse, "lines": self._lines}
         clock = asyncio.get_running_loop().time
         while not self._is_over:
@@ -137,7 +137,7 @@ class Stream:
             )
 
     async def _mjpeg(self) -> None:
-        # A byte now and then is an answer, yet no picture.
+        # An occasional byte keeps the response alive, but is no picture.
         patience = _Bound(SILENCE_S, "no picture")
         async with self._open({}, SILENCE_S) as response, patience:
             boundary = boundary_of(response.headers.get("content-type", ""))
@@ -193,7 +193,7 @@ class Stream:
             await self._inbox.event({"topic": self._topic}, line)
 
     async def _deliver(self, event: Event) -> None:
-        """Hand an event to whoever listens to its name, else to whoever listens to the path."""
+        """Pass an event to the topic of its name, or else to the topic of the path."""
         named = f"{self._spec.path}#{event.name}"
         topic = named if named in self._spec.topics else self._spec.path
         if topic in self._spec.topics:
@@ -205,7 +205,7 @@ class Stream:
         self, headers: Mapping[str, str], silence_s: float | None
     ) -> AsyncIterator[httpx2.Response]:
         request = self._client.request("GET", self._spec.path, headers, None)
-        # The head of the answer has a bound even where the stream may be silent for hours.
+        # The response header has a timeout even if the stream may be silent for hours.
         head = _Bound(SILENCE_S if silence_s is None else 2 * silence_s, "no answer")
         async with head, self._client.answer(request, silence_s) as response:
             head.lift()
@@ -220,18 +220,18 @@ class Stream:
 
     @property
     def _shown(self) -> str:
-        """Which stream of which robot, for people."""
+        """Name of the stream as text for people."""
         return f"http {self._client.where} {self._spec.path}"
 
     def _pause_s(self) -> float:
-        """Return the wait before the next attempt: longer each time, and never quite the same."""
+        """Return the delay before the next attempt: growing, with random jitter."""
         if self._retry_s is not None and not self._failures:
             return self._retry_s
         wait_s, self._wait_s = self._wait_s, min(2 * self._wait_s, _LONGEST_WAIT_S)
         return wait_s * (1 - 0.25 * random.random())  # noqa: S311 - spreads attempts, no secret
 
     def _came(self) -> None:
-        """Note that the stream gives what it should."""
+        """Record valid data of the stream."""
         self._pulse.beat()
         self._wait_s = _FIRST_WAIT_S
         if self._failures:
@@ -248,7 +248,7 @@ class Stream:
 
 
 class _Bound:
-    """A time-out that can be put off and lifted; late, it raises `HttpFault`."""
+    """An extensible timeout that raises `HttpFault`."""
 
     def __init__(self, limit_s: float, lack: str) -> None:
         self._limit_s = limit_s
@@ -270,7 +270,7 @@ class _Bound:
             raise HttpFault(f"{self._lack} within {self._limit_s:g} s") from late
 
     def extend(self) -> None:
-        """Begin anew."""
+        """Restart the timeout."""
         self._timeout.reschedule(asyncio.get_running_loop().time() + self._limit_s)
 
     def lift(self) -> None:

@@ -1,8 +1,8 @@
-"""Connecting to a robot that may come back any moment.
+"""Fast connecting to a robot that may come back at any moment.
 
-A try that was made while nobody could be reached is repeated by the system only after a second, and
-later ones after longer. Whoever cannot wait so long says so by `HURRY`: then another try is begun
-every few moments, while those before it still wait, because the way may also just be a long one.
+The system repeats a failed connection attempt only after a second, and then after longer delays.
+With `HURRY` set, further attempts start at short intervals, while earlier ones continue, because
+the robot may also just be far away.
 """
 
 import asyncio
@@ -17,25 +17,25 @@ __all__ = ["HURRY", "Hurry", "connected"]
 
 
 class Hurry:
-    """How often another try is begun."""
+    """The interval between connection attempts."""
 
     __slots__ = ("every_s", "is_used")
 
     def __init__(self, every_s: float) -> None:
         self.every_s = every_s
         self.is_used = False
-        """Whether the line was opened in this way; some are by others."""
+        """Whether a connection was opened in this way; some transports use other ways."""
 
 
 HURRY: ContextVar[Hurry | None] = ContextVar("HURRY", default=None)
-"""Set by who opens a line in a hurry."""
+"""Set by a caller that needs a fast connection."""
 
 
 async def connected(family: int, address: object) -> socket.socket:
-    """Return a connected socket that does not block; whoever waits bounds the time.
+    """Return a connected non-blocking socket; the caller sets the timeout.
 
     Raises:
-        OSError: the robot, or this machine, refuses.
+        OSError: the robot or this machine refuses the connection.
     """
     hurry = HURRY.get()
     if hurry is None:
@@ -61,15 +61,15 @@ async def connected(family: int, address: object) -> socket.socket:
 
 
 async def _once(family: int, address: object) -> socket.socket:
-    """Connect one socket, which is closed again when that fails or is cancelled."""
+    """Connect one socket; close it on failure or cancellation."""
     loop = asyncio.get_running_loop()
     line = socket.socket(family, socket.SOCK_STREAM)
     try:
         line.setblocking(False)
         tune(line)
-        await loop.sock_connect(line, address)  # type: ignore[arg-type] # as getaddrinfo gave it
+        await loop.sock_connect(line, address)  # type: ignore[arg-type] # a result of getaddrinfo
         if line.getsockname() == line.getpeername():
-            # A port of this machine that nobody listens on, and the kernel chose it for our end.
+            # The kernel chose an unused port of this machine as both ends of the connection.
             raise ConnectionRefusedError(errno.ECONNREFUSED, "connected to itself")
         OWN_DOORS.check(line)
     except BaseException:

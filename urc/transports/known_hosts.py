@@ -1,7 +1,7 @@
-"""Which SSH host keys are trusted: a file of our own, and what the options name.
+"""Trusted SSH host keys: those of URC's own file, and those in the options.
 
-The file has the form of OpenSSH's ``known_hosts``. Nothing is ever added to it but by `remember`,
-which runs when a person has said so (``urc trust``).
+The file has the format of OpenSSH's ``known_hosts``. Only `remember` adds keys, after a
+confirmation by a person (``urc trust``).
 """
 
 from pathlib import Path
@@ -19,7 +19,7 @@ DEFAULT_PORT = 22
 
 
 class Known(NamedTuple):
-    """What is known about one server."""
+    """The known keys of one server."""
 
     trusted: tuple[asyncssh.SSHKey, ...] = ()
     authorities: tuple[asyncssh.SSHKey, ...] = ()
@@ -28,35 +28,35 @@ class Known(NamedTuple):
 
 
 def own_file() -> Path:
-    """Return the file in which URC keeps the keys that were confirmed."""
+    """Return URC's own file of confirmed host keys."""
     return data_folder() / "known_hosts"
 
 
 def fingerprint(key: asyncssh.SSHKey) -> str:
-    """Return the key's ``SHA256:…``, as ``ssh-keygen -l`` prints it."""
+    """Return the fingerprint ``SHA256:…`` of the key, as ``ssh-keygen -l`` prints it."""
     return str(key.get_fingerprint("sha256"))
 
 
 class HostKeys:
-    """What one transport trusts."""
+    """The trusted host keys of one transport."""
 
     def __init__(self, pinned: str = "", file: str = "") -> None:
-        """Trust one fingerprint only, or our own file and another one.
+        """Trust a single fingerprint, or URC's own file and an additional one.
 
         Args:
-            pinned: ``SHA256:…``; "": the files decide.
-            file: a ``known_hosts`` file beside our own; "": none.
+            pinned: ``SHA256:…``; "" to use the files.
+            file: an additional ``known_hosts`` file; "" for none.
         """
         self._pinned = pinned.rstrip("=")
         self._file = file
 
     @property
     def is_pinned(self) -> bool:
-        """Whether the document itself says which key is right."""
+        """Whether the document itself pins the host key."""
         return bool(self._pinned)
 
     def known(self, host: str, port: int) -> Known:
-        """Return what the files say about a server.
+        """Return the known keys of a server.
 
         Raises:
             TransportError: a file cannot be read.
@@ -70,7 +70,7 @@ class HostKeys:
         return found
 
     def judge(self, key: asyncssh.SSHKey, known: Known) -> str:
-        """Return "" when `key` is trusted, else what was expected: a fingerprint or ``unknown``."""
+        """Return "" for a trusted `key`, else a fingerprint, ``revoked`` or ``unknown``."""
         if self._pinned:
             return "" if fingerprint(key) == self._pinned else self._pinned
         if key in known.revoked:
@@ -81,10 +81,10 @@ class HostKeys:
 
 
 def remember(host: str, port: int, key: asyncssh.SSHKey) -> Path:
-    """Write `key` into our own file as the one key of that server; return the file.
+    """Write `key` into URC's own file as the only key of that server; return the file.
 
     Raises:
-        TransportError: it cannot be written.
+        TransportError: the file cannot be written.
     """
     file = own_file()
     name = _name(host, port)
@@ -112,7 +112,7 @@ def _read(file: Path, host: str, port: int, *, is_asked_for: bool) -> Known:
     except (OSError, UnicodeError) as fault:
         raise TransportError(f"cannot read the known-hosts file {file} ({_why(fault)})") from fault
     try:
-        # Told the port, asyncssh would take the key of the host's port 22 for that of any port.
+        # With a port, asyncssh would accept the key of port 22 for any other port.
         found = asyncssh.match_known_hosts(
             asyncssh.import_known_hosts(text), _name(host, port), "", None
         )
@@ -123,7 +123,7 @@ def _read(file: Path, host: str, port: int, *, is_asked_for: bool) -> Known:
 
 
 def _write(file: Path, text: str) -> None:
-    """Replace the file as a whole, readable by its owner alone."""
+    """Replace the whole file; only its owner can read it."""
     put_private(file, text.encode())
 
 

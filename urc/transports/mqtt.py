@@ -1,6 +1,6 @@
-"""Robots that talk through an MQTT broker: the door to the transport.
+"""Factory of the MQTT transport, for robots behind a broker.
 
-It needs no MQTT library, so that a document that names one is told what is missing.
+It needs no MQTT library, so that it can report a missing one.
 """
 
 from importlib.util import find_spec
@@ -14,10 +14,10 @@ __all__ = ["from_setup"]
 
 
 def from_setup(setup: Setup) -> Transport:
-    """Make a transport out of a document's options; see docs/transports/mqtt.md.
+    """Return a transport for the options of a document; see docs/transports/mqtt.md.
 
     Raises:
-        TransportError: an option is missing or not usable, or the library is not there.
+        TransportError: an option is missing or invalid, or the library is missing.
     """
     options = read_options(setup)
     if find_spec("paho") is None:

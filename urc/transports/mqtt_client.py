@@ -1,12 +1,12 @@
-"""Robots that talk through an MQTT broker, version 5 or 3.1.1.
+"""Robots behind an MQTT broker, version 5 or 3.1.1.
 
-Theory of operation. The protocol is paho's, the connection is ours: each `open` dials a socket, as
-all transports do, and gives it to a new paho client, which is thrown away with it. So no message of
-an earlier connection can be said late; paho alone would keep those that want an acknowledgement,
-and send them again. Nothing of it runs in a thread.
+Theory of operation. The library paho implements the protocol; the connection is our own. Each
+`open` dials a socket and passes it to a new paho client, which lives as long as the connection. So
+no message of an earlier connection can be sent late: paho alone would keep unacknowledged messages
+and send them again. No thread is involved.
 
-The session is always a clean one. With a last will the broker publishes it whenever the line ends,
-also when it is ended here: a stop that is sent once too often does no harm.
+The session is always clean. The broker publishes a last will whenever the connection ends, also
+when URC closes it: an extra stop is harmless.
 """
 
 import asyncio
@@ -31,36 +31,36 @@ from urc.transports.web_dial import Dialer
 __all__ = ["MqttTransport"]
 
 KEEPALIVE_S = 5
-"""A broker that is asked after this silence, and says nothing for as long again, is gone."""
+"""Keepalive interval in seconds; a broker is lost after twice this silence."""
 MAX_BYTES = 16 * 1024 * 1024
-"""Largest message that is taken."""
+"""Largest accepted message, in bytes."""
 MAX_UNACKNOWLEDGED = 256
-"""Messages that wait for the broker to acknowledge them."""
+"""Largest number of unacknowledged messages."""
 MAX_HALF = 64
-"""Messages of quality of service 2 that may be half delivered."""
+"""Largest number of incomplete deliveries with quality of service 2."""
 MAX_UNTAKEN = 4096
-"""Packets that wait for the kernel to take them: the line's own, and acknowledgements."""
+"""Largest number of packets that wait for the kernel, acknowledgements included."""
 _CHECK_S = 1.0
 _READ_BYTES = 65536
 _PACKETS_A_TURN = 64
-"""How many are read before others have their turn on the loop."""
+"""Packets per turn of the event loop."""
 _WITH_WILL = "Disconnect with will message"
 
 log = logging.getLogger(__name__)
 
 
 class MqttTransport:
-    """One connection to a broker, opened as often as it is needed."""
+    """One connection to a broker; it may be opened repeatedly."""
 
     def __init__(self, options: Options, dialer: Dialer) -> None:
-        """Prepare a line to where `dialer` leads; nothing is opened yet."""
+        """Initialise for the broker of `dialer`, without connecting."""
         self._options = options
         self._dialer = dialer
         self._session: _Session | None = None
 
     @property
     def address(self) -> str:
-        """Where it leads, for people: ``mqtt 192.168.1.5:1883``."""
+        """Target of the transport as text for people: ``mqtt 192.168.1.5:1883``."""
         return f"mqtt {self._options.where}"
 
     async def open(self, timeout_s: float) -> None:
@@ -79,7 +79,7 @@ class MqttTransport:
                 await self._dialer.close()
 
     async def receive(self) -> Envelope:
-        """Return the next message; raise `PeerClosed` when no more will come."""
+        """Return the next message; raise `PeerClosed` at the end of the connection."""
         if self._session is None:
             raise PeerClosed(CLOSED)
         return await self._session.inbox.take()
@@ -88,8 +88,8 @@ class MqttTransport:
         """Publish a message; return once the kernel has it.
 
         Raises:
-            PeerClosed: the line broke.
-            TransportError: it is nothing that MQTT can send.
+            PeerClosed: the connection broke.
+            TransportError: MQTT cannot send `data`.
         """
         if self._session is None:
             raise PeerClosed(CLOSED)
@@ -100,18 +100,18 @@ class MqttTransport:
         await self._session.publish(data)
 
     async def close(self) -> None:
-        """Close at once, with all that is unsent. Never raises, may be called twice."""
+        """Close at once, discarding unsent data. Never raises, may be called twice."""
         session, self._session = self._session, None
         if session is not None:
             session.end()
         await self._dialer.close()
 
     def unsent(self) -> int:
-        """Return the bytes handed over that have not left this machine for good."""
+        """Return the number of bytes that have not been acknowledged."""
         return 0 if self._session is None else self._dialer.unsent(self._session.line)
 
     async def abort(self) -> None:
-        """Close at once; what the broker has not got by now it never gets. Never raises."""
+        """Close at once and discard unsent data. Never raises."""
         session, self._session = self._session, None
         if session is not None:
             await self._dialer.reset(session.line)
@@ -134,7 +134,7 @@ class MqttTransport:
 
 
 class _Session:
-    """One open connection and the paho client that serves it."""
+    """One open connection and its paho client."""
 
     def __init__(self, options: Options, line: socket.socket) -> None:
         self.inbox = Inbox()
@@ -142,11 +142,11 @@ class _Session:
         self.line = line
         self._loop = asyncio.get_running_loop()
         self._answered: asyncio.Future[str] = self._loop.create_future()
-        """What the broker says to the log-in: "" or why not."""
+        """Result of the login: "" or the reason of a refusal."""
         self._granted: dict[int | None, asyncio.Future[list[ReasonCode]]] = {}
         self._seen = 0
         self._writable: asyncio.Future[None] | None = None
-        """Done when the kernel takes more; None while nobody waits for it."""
+        """Done when the kernel accepts more data; None while no task waits."""
         self._check: asyncio.TimerHandle | None = None
         self._client = self._make()
 
@@ -188,7 +188,7 @@ class _Session:
                 )
 
     async def publish(self, envelope: Envelope) -> None:
-        """Hand one message to the kernel."""
+        """Pass one message to the kernel."""
         self._raise_if_ended()
         attributes = envelope.attributes
         topic, qos = attributes.get("topic"), attributes.get("qos") or 0
@@ -213,7 +213,7 @@ class _Session:
         """Close at once. The broker publishes the will, if there is one.
 
         Args:
-            has_farewell: say good-bye; that pushes what is unsent before it.
+            has_farewell: whether to send DISCONNECT, which also sends all earlier data.
         """
         is_open = self.inbox.ended is None
         self.inbox.end(CLOSED)
@@ -235,20 +235,20 @@ class _Session:
             raise PeerClosed(self.inbox.ended)
 
     def _forget(self, line: Any) -> None:
-        """Do not watch a socket that is about to be closed."""
+        """Stop watching a socket that is about to be closed."""
         if line.fileno() >= 0:
             self._loop.remove_reader(line)
             self._loop.remove_writer(line)
         self._release()
 
     async def _until_writable(self) -> None:
-        """Wait until the kernel takes more, or the line has ended."""
+        """Wait until the kernel accepts more data, or the connection has ended."""
         if self._writable is None:
             self._writable = self._loop.create_future()
             self._loop.add_writer(self.line, self._drained)
         await asyncio.shield(self._writable)
 
-    # -- called by the loop
+    # -- called by the event loop
 
     def _drained(self) -> None:
         self._loop.remove_writer(self.line)
@@ -260,7 +260,7 @@ class _Session:
             writable.set_result(None)
 
     def _readable(self) -> None:
-        """Let paho read what is there; it takes one packet a call and does not say whether."""
+        """Let paho read all received packets; it reads one per call, without reporting it."""
         try:
             for _ in range(_PACKETS_A_TURN):
                 before = self._seen
@@ -270,11 +270,11 @@ class _Session:
                     return
                 if self._seen == before:
                     return
-        except Exception as fault:  # paho checks little of what arrives
+        except Exception as fault:  # paho checks little of its input
             self._lose(f"what the broker sent is not understood ({reason(fault)})")
 
     def _tick(self) -> None:
-        """Ask the broker whether it is there, and give up one that has not answered."""
+        """Send keepalives, and close a connection without replies."""
         self._check = self._loop.call_later(_CHECK_S, self._tick)
         self._client.loop_misc()
 
@@ -313,7 +313,7 @@ class _Session:
             self._lose(HUNG_UP)
 
     def _lose(self, reason: str) -> None:
-        """Tell everybody who waits that the line is over."""
+        """Wake all waiting tasks with the end of the connection."""
         self.inbox.end(reason)
         self._forget(self.line)
         if not self._answered.done():
@@ -325,7 +325,7 @@ class _Session:
 
 
 class _Client(Client):
-    """paho's protocol on a socket that is given, not on one that it makes."""
+    """A paho client on a given socket, instead of one of its own."""
 
     def __init__(self, options: Options, line: socket.socket) -> None:
         version = MQTTProtocolVersion.MQTTv5 if options.is_v5 else MQTTProtocolVersion.MQTTv311
@@ -357,12 +357,12 @@ class _Client(Client):
         self.reconnect()
 
     def drop(self) -> None:
-        """Close the socket, whatever paho thinks of it."""
+        """Close the socket in any state of paho."""
         self._sock_close()
         self._given.close()
 
     def excess(self) -> str:
-        """Return what there is too much of, "" when there is nothing; paho has no bounds."""
+        """Return the exceeded limit as text, or ""; paho itself has no limits."""
         if self._in_packet["remaining_length"] > MAX_BYTES:
             return f"the broker sent a message of more than {MAX_BYTES} bytes"
         if len(self._out_packet) > MAX_UNTAKEN:
@@ -378,10 +378,10 @@ class _Client(Client):
         return self._given
 
     def _sock_recv(self, bufsize: int) -> bytes:
-        """Read some of a message: paho wants the whole, and room would be made for all it claims.
+        """Read a part of a message: paho would allocate memory for the whole claimed size.
 
         Raises:
-            BlockingIOError: it claims more than may be, see `excess`; none of it is read.
+            BlockingIOError: the message claims more than the limit, see `excess`; nothing is read.
         """
         if bufsize > MAX_BYTES:
             raise BlockingIOError

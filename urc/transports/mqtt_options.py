@@ -1,4 +1,4 @@
-"""The options of an MQTT transport, read; and how a body becomes bytes. Needs no MQTT library."""
+"""Options of an MQTT transport, and the encoding of bodies. Needs no MQTT library."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -25,7 +25,7 @@ class Topic(NamedTuple):
 
 
 class Will(NamedTuple):
-    """What the broker publishes when the line ends."""
+    """The message that the broker publishes when the connection ends."""
 
     topic: str
     payload: bytes
@@ -34,14 +34,14 @@ class Will(NamedTuple):
 
 
 class Options(NamedTuple):
-    """All of one transport."""
+    """All options of one transport."""
 
     host: str
     port: int
     is_v5: bool = True
-    """MQTT 5; else 3.1.1."""
+    """Whether the protocol is MQTT 5; otherwise 3.1.1."""
     client_id: str = ""
-    """"": one that the library makes up."""
+    """Client id; "" for one that the library generates."""
     username: str = ""
     password: str | None = None
     tls: Tls | None = None
@@ -50,12 +50,12 @@ class Options(NamedTuple):
 
     @property
     def where(self) -> str:
-        """Host and port as people write them."""
+        """Host and port in their usual notation."""
         return place_of(self.host, self.port)
 
 
 def read_options(setup: Setup) -> Options:
-    """Return the options of `setup`; raise `TransportError` with one line for a wrong one."""
+    """Return the options of `setup`; raise `TransportError` with one line for an invalid one."""
     given: Mapping[str, object] = setup.options
     tls = Tls.of("mqtt", given.get("tls"))
     port = DEFAULT_TLS_PORT if tls is not None else DEFAULT_PORT
@@ -80,10 +80,10 @@ def read_options(setup: Setup) -> Options:
 
 
 def body_bytes(body: object) -> bytes:
-    """Return the bytes of a message: bytes as they are, anything else as JSON.
+    """Return the bytes of a message: bytes unchanged, all other values as JSON.
 
     Raises:
-        TransportError: it has no JSON.
+        TransportError: the value cannot be written as JSON.
     """
     if isinstance(body, bytes):
         return body

@@ -1,8 +1,8 @@
-"""The listeners of this program's own dashboard: no line to a robot may lead there.
+"""The listeners of URC's own dashboard, which no transport may connect to.
 
-A document that connects to the dashboard would speak to it as any program of this machine does.
-Each connection is looked at when it is made: names, redirections and forms of an address make no
-difference then. What a router, a proxy or another machine leads back here is not known.
+A document that connects to the dashboard would act as a local program. Each new connection is
+checked, so host names, redirects and address notations make no difference. Forwarding by a router,
+a proxy or another machine is not detected.
 """
 
 import ipaddress
@@ -16,22 +16,22 @@ __all__ = ["OWN_DOORS", "OwnDoor", "OwnDoors"]
 
 
 class OwnDoor(OSError):
-    """A line leads to this program's own dashboard."""
+    """A connection leads to URC's own dashboard."""
 
     def __init__(self) -> None:
         super().__init__(None, "that is this dashboard itself: no robot may be reached there")
 
 
 class OwnDoors:
-    """Where this program listens."""
+    """The listening addresses of this program."""
 
     def __init__(self) -> None:
-        """Know none."""
+        """Initialise without listeners."""
         self._doors: list[tuple[Address, int]] = []
 
     @contextmanager
     def kept(self, listener: socket.socket) -> Iterator[None]:
-        """Let no line lead to `listener` for as long as the context lasts."""
+        """Reject connections to `listener` during the context."""
         place = listener.getsockname()
         door = (_address(place[0]), int(place[1]))
         self._doors.append(door)
@@ -41,28 +41,28 @@ class OwnDoors:
             self._doors.remove(door)
 
     def words(self) -> list[str]:
-        """Return them as words for `learn`, in another process of this program."""
+        """Return the addresses as words for `learn`, in another process of this program."""
         return [f"{address}#{port}" for address, port in self._doors]
 
     def learn(self, words: Iterable[str]) -> None:
-        """Know the listeners of another process of this program, for as long as this one runs."""
+        """Add the listeners of another process of this program, until this process ends."""
         for word in words:
             address, _, port = word.partition("#")
             self._doors.append((_address(address), int(port)))
 
     def check(self, line: socket.socket) -> None:
-        """Raise `OwnDoor` when a connected socket leads to one of them."""
+        """Raise `OwnDoor` if a connected socket leads to an own listener."""
         peer = line.getpeername()
         if line.family in (socket.AF_INET, socket.AF_INET6):
             self.check_place(_address(peer[0]), peer[1])
 
     def check_place(self, address: Address, port: int, *, is_near: bool = True) -> None:
-        """Raise `OwnDoor` when a connection to that place leads to one of them.
+        """Raise `OwnDoor` if a connection to that address would lead to an own listener.
 
         Args:
-            address: where to.
-            port: where to.
-            is_near: whether it is made on this machine; elsewhere a loopback address is another.
+            address: target address.
+            port: target port.
+            is_near: whether it starts on this machine; elsewhere, loopback means another machine.
         """
         wanted = unmapped(address)
         if not is_near and (wanted.is_loopback or wanted.is_unspecified):
@@ -81,4 +81,4 @@ def _address(text: str) -> Address:
 
 
 OWN_DOORS = OwnDoors()
-"""Of this process: a listener belongs to the program as a whole."""
+"""Listeners of this process; they belong to the program as a whole."""

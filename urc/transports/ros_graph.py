@@ -1,8 +1,8 @@
-"""What a ROS system says of its topics, and how the use of a topic can be wrong.
+"""Checks of topics against the ROS graph.
 
-A ROS line answers nothing when a topic does not exist, has another type, or has no subscriber: all
-of that is silence. A line that can ask (rosapi, for one) tells its `TopicGraph` the answers, and
-the graph puts each fault in one line, once. No input or output.
+A ROS connection gives no reply for a topic that does not exist, has another type, or has no
+subscriber. A connection with access to the graph (such as rosapi) passes the answers to its
+`TopicGraph`, which reports each mistake once, in one line. No I/O.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -11,18 +11,18 @@ from typing import Final
 __all__ = ["TopicGraph", "version_of"]
 
 MAX_TOLD: Final = 256
-"""Faults that are remembered as told; beyond that none is told any more."""
+"""Limit of remembered reports; beyond it, no further mistake is reported."""
 
 
 class TopicGraph:
-    """Topics of one ROS system, and what was told of them."""
+    """The topics of one ROS system, and the reported mistakes."""
 
     def __init__(self, tell: Callable[[str], None], ros: int | None) -> None:
-        """Know nothing yet.
+        """Initialise without topics.
 
         Args:
-            tell: has one line for each fault.
-            ros: the version that the document names; None where it names none.
+            tell: receives one line for each mistake.
+            ros: ROS version in the document; None if undeclared.
         """
         self._tell = tell
         self._declared = ros
@@ -31,7 +31,7 @@ class TopicGraph:
         self._looked: set[str] = set()
 
     def learn(self, types: Mapping[str, str]) -> None:
-        """Take the topics that there are, each with its type ("" where it is not known)."""
+        """Set the existing topics, each with its type ("" if unknown)."""
         self._types = types
         self._looked.clear()
         found = version_of(types.values())
@@ -39,16 +39,16 @@ class TopicGraph:
             self._say(f"this bridge is ROS {found}: write 'ros: {found}' or 'ros: auto'")
 
     def subscribed(self, wanted: Mapping[str, str]) -> None:
-        """Compare what is subscribed to, each topic with its type, with what there is."""
+        """Check the subscribed topics and their types against the existing ones."""
         for topic, kind in sorted(wanted.items()):
-            # In ROS 2 the feedback of an action is no topic of its own.
+            # In ROS 2, the feedback of an action is not an ordinary topic.
             if topic not in self._types and not topic.endswith("/feedback"):
                 self._say(f"nobody publishes {topic}")
             else:
                 self._compare(topic, kind, "carries")
 
     def publishes(self, topic: str, kind: str) -> bool:
-        """Compare the type of what is published; return whether to ask who subscribes."""
+        """Check the type of a published topic; return whether to query its subscribers."""
         if topic in self._looked:
             return False
         self._looked.add(topic)
@@ -56,7 +56,7 @@ class TopicGraph:
         return True
 
     def subscribers(self, topic: str, nodes: Iterable[object]) -> None:
-        """Take the nodes that subscribe to a topic on which something is published."""
+        """Check the subscribers of a published topic."""
         if not list(nodes):
             self._say(f"nothing subscribes to {topic}: what is sent there moves nothing")
 
@@ -72,7 +72,7 @@ class TopicGraph:
 
 
 def version_of(types: Iterable[str]) -> int | None:
-    """Return the version of ROS that spells these names of types; None where none tells."""
+    """Return the ROS version whose type names these are; None if unknown."""
     words = [len(name.split("/")) for name in types if name]
     if not words:
         return None
@@ -80,6 +80,6 @@ def version_of(types: Iterable[str]) -> int | None:
 
 
 def _plain(kind: str) -> str:
-    """Return ``pkg/Type`` of a type, however it is spelled."""
+    """Return a type name in the form ``pkg/Type``."""
     words = kind.split("/")
     return f"{words[0]}/{words[-1]}"

@@ -1,19 +1,19 @@
 """ROS 1 and ROS 2 robots behind a rosbridge server: topics, services and actions.
 
-Theory of operation. One WebSocket a connection, which is URC's own transport of that kind: opened,
-watched by pings, closed. What is said on it is roslibpy's (`urc.transports.rosbridge_client`), and
-is thrown away with the connection, so nothing can be said late. A task reads all the time, however
-slowly the messages are taken: one reader that stalls freezes the topic for every client of the
-bridge.
+Theory of operation. Each connection is one WebSocket of URC's own transport, with pings. The
+protocol on it is that of roslibpy (`urc.transports.rosbridge_client`). Its state ends with the
+connection, so nothing can be sent late. A task always reads, however slowly the messages are
+consumed: one stalled reader freezes the topic for every client of the bridge.
 
-A bridge hands a first message on when its publisher is connected to the subscribers, and forgets it
-when its client leaves before that. `settle` is for who leaves: it asks rosapi, whose answer also
-says that the bridge has worked off all before it, and stays for the time of such a connection.
+A bridge delivers a first message only after its publisher has connected to the subscribers, and
+drops it when its client leaves before that. `settle` is for leaving clients: it queries rosapi,
+whose reply also shows that the bridge has processed all earlier data, and waits for such
+connections.
 
-The bridge tells no errors: a topic that nobody publishes, a wrong type, a white-list, all are
-silence. So rosapi is asked at the start which topics there are, and at the first message on a topic
-who subscribes to it; `urc.transports.ros_graph` tells what is wrong. With ``ros: auto`` the answer
-comes before the subscriptions, because it says how types are spelled.
+The bridge reports no errors: a topic without a publisher, a wrong type and an access list all cause
+silence. So rosapi is asked for the topics at the start, and for the subscribers of a topic at its
+first message; `urc.transports.ros_graph` reports mistakes. With ``ros: auto`` the reply precedes
+the subscriptions, because it decides the form of type names.
 """
 
 import asyncio
@@ -37,22 +37,22 @@ __all__ = ["RosbridgeTransport", "from_setup"]
 DEFAULT_PORT = 9090
 AUTO: Final = "auto"
 _WEBSOCKET = ("auth", "headers")
-"""Options that are the WebSocket's own."""
+"""Options of the WebSocket itself."""
 
 _ANSWER_S = 3.0
-"""How long rosapi may take to answer, before it is taken to be missing."""
+"""Timeout for rosapi in seconds, after which it counts as missing."""
 _CONNECTS_S = 1.0
-"""How long a bridge keeps a message for subscribers that have not connected yet."""
+"""Time for which a bridge keeps a message for new subscribers, in seconds."""
 _LOOK_S = 0.2
 
 _TURN_S = 0.005
-"""How long frames are read before others have their turn on the loop."""
+"""Time for reading frames per turn of the event loop, in seconds."""
 
 log = logging.getLogger(__name__)
 
 
 class RosbridgeTransport:
-    """One connection to a rosbridge server, opened as often as it is needed."""
+    """One connection to a rosbridge server; it may be opened repeatedly."""
 
     def __init__(
         self,
@@ -61,14 +61,13 @@ class RosbridgeTransport:
         subscriptions: tuple[Listening, ...] = (),
         ros: int | Literal["auto"] | None = None,
     ) -> None:
-        """Prepare a line; nothing is opened yet.
+        """Initialise without connecting.
 
         Args:
-            wire: leads to the bridge; ours from now on.
-            where: for people: ``192.168.1.5:9090``.
-            subscriptions: sent whenever the line is opened, one a topic.
-            ros: 1 or 2: how the names of types are spelled; "auto": as the bridge's own are; None:
-                as they are written.
+            wire: WebSocket to the bridge, owned by this transport.
+            where: target as text for people: ``192.168.1.5:9090``.
+            subscriptions: subscriptions on each opening, one per topic.
+            ros: 1 or 2: form of type names; "auto": that of the bridge; None: as written.
         """
         self._wire = wire
         self._where = where
@@ -79,7 +78,7 @@ class RosbridgeTransport:
 
     @property
     def address(self) -> str:
-        """Where it leads, for people: ``rosbridge 192.168.1.5:9090``."""
+        """Target of the transport as text for people: ``rosbridge 192.168.1.5:9090``."""
         return f"rosbridge {self._where}"
 
     async def open(self, timeout_s: float) -> None:
@@ -101,26 +100,26 @@ class RosbridgeTransport:
             raise
 
     async def receive(self) -> Envelope:
-        """Return the next message, response or feedback; `PeerClosed` when no more will come."""
+        """Return the next message, response or feedback; raise `PeerClosed` at the end."""
         if self._session is None:
-            raise PeerClosed("the line is closed")
+            raise PeerClosed("the connection is closed")
         return await self._session.inbox.take()
 
     async def send(self, data: Payload) -> None:
-        """Publish, call, start a goal or cancel it; return once the kernel has it.
+        """Publish, call a service, start or cancel a goal; return once the kernel has the data.
 
         Raises:
-            PeerClosed: the line broke.
-            TransportError: it is nothing that rosbridge can send.
+            PeerClosed: the connection broke.
+            TransportError: rosbridge cannot send `data`.
         """
         if self._session is None:
-            raise PeerClosed("the line is closed")
+            raise PeerClosed("the connection is closed")
         if not isinstance(data, Envelope):
             raise TransportError("rosbridge carries messages, not bytes; use publish or call")
         await self._session.perform(data)
 
     async def close(self) -> None:
-        """Close at once, with all that is unsent or unanswered. Never raises, twice is fine."""
+        """Close at once, discarding unsent data. Never raises, may be called twice."""
         session, self._session = self._session, None
         try:
             if session is not None:
@@ -129,23 +128,23 @@ class RosbridgeTransport:
             await self._wire.close()
 
     async def settle(self) -> str:
-        """Stay until what was published first on a topic has reached its subscribers.
+        """Wait until the first messages of all topics have reached their subscribers.
 
         Returns:
-            The topics that nothing subscribes to, in one line, or "".
+            The topics without subscribers in one line, or "".
         """
         return "" if self._session is None else await self._session.settle()
 
     async def probe(self) -> None:
-        """Ask the bridge for a sign of life, and return when anything has come since."""
+        """Probe the bridge, and return when it has sent anything since."""
         await self._wire.probe()
 
     def unsent(self) -> int:
-        """Return the bytes handed over that have not left this machine for good."""
+        """Return the number of bytes that have not been acknowledged."""
         return self._wire.unsent()
 
     async def abort(self) -> None:
-        """Close at once; what the bridge has not got by now it never gets. Never raises."""
+        """Close at once and discard unsent data. Never raises."""
         session, self._session = self._session, None
         try:
             if session is not None:
@@ -159,10 +158,10 @@ class RosbridgeTransport:
 
 
 def from_setup(setup: Setup) -> Transport:
-    """Make a transport out of a document's options; see docs/transports/rosbridge.md.
+    """Return a transport for the options of a document; see docs/transports/rosbridge.md.
 
     Raises:
-        TransportError: an option is missing or not usable.
+        TransportError: an option is missing or invalid.
     """
     options = setup.options
     host, port = options.get("host"), options.get("port", DEFAULT_PORT)
@@ -209,7 +208,7 @@ def _listening(topic: str, attributes: Mapping[str, Value]) -> Listening:
 
 
 def _merged(wanted: list[Listening]) -> tuple[Listening, ...]:
-    """Return one subscription a topic: a second one would cancel the first one's throttle."""
+    """Return one subscription per topic: a second one would cancel the throttle of the first."""
     found: dict[str, Listening] = {}
     for one in wanted:
         other = found.setdefault(one.topic, one)
@@ -224,7 +223,7 @@ def _merged(wanted: list[Listening]) -> tuple[Listening, ...]:
 
 
 class _Session:
-    """What belongs to one open connection, and goes with it."""
+    """The state of one open connection."""
 
     def __init__(
         self, wire: WebSocketTransport, ros: int | Literal["auto"] | None, graph: TopicGraph
@@ -236,29 +235,29 @@ class _Session:
         self._frames = FrameReader()
         self._graph = graph
         self._learnt = asyncio.Event()
-        """Set once rosapi has said which topics there are, or that it cannot."""
+        """Set after rosapi has listed the topics, or has failed."""
         self._bad = 0
         self._reader: asyncio.Task[None] | None = None
         self._fresh: dict[str, None] = {}
-        """Topics on which something was published that may not have arrived yet, in order."""
+        """Topics with a first message that may not have arrived yet, in order."""
 
     async def begin(self, subscriptions: tuple[Listening, ...]) -> None:
-        """Ask which topics there are, subscribe, and read from now on."""
+        """Query the topics, subscribe, and start reading."""
         self._reader = asyncio.create_task(self._read())
-        # Asked first: later, ROS 1 would count our own subscriptions.
+        # Query first: later, ROS 1 would include our own subscriptions.
         asked = self._client.ask(
             "/rosapi/topics", lambda said: self._learn(subscriptions, said), errback=self._unknown
         )
         await self._write(asked)
         if self._is_auto:
-            with suppress(TimeoutError):  # rosapi is missing: types go out as they are written
+            with suppress(TimeoutError):  # without rosapi, type names are sent as written
                 async with asyncio.timeout(_ANSWER_S):
                     await self._learnt.wait()
         for one in subscriptions:
             await self._write(self._client.listen(one))
 
     async def perform(self, envelope: Envelope) -> None:
-        """Send what an envelope asks for."""
+        """Send the operation of an envelope."""
         frames = self._client.perform(envelope)
         if envelope.verb == "publish":
             topic = str(envelope.attributes.get("topic"))
@@ -269,7 +268,7 @@ class _Session:
         await self._write(frames)
 
     def _look_at(self, topic: str, kind: str) -> list[bytes]:
-        """Return what asks who subscribes to a topic, at its first message."""
+        """Return the query for the subscribers of a topic, at its first message."""
         if not self._graph.publishes(topic, kind):
             return []
 
@@ -281,7 +280,7 @@ class _Session:
         return self._client.ask("/rosapi/subscribers", told, {"topic": topic})
 
     async def settle(self) -> str:
-        """Stay until what was published has arrived; return what did not."""
+        """Wait until the published messages have arrived; return the undelivered topics."""
         topics = list(self._fresh)
         self._fresh.clear()
         heard = await asyncio.gather(*map(self._is_heard, topics))
@@ -289,7 +288,7 @@ class _Session:
         return f"nothing subscribes to {', '.join(lost)}" if lost else ""
 
     async def _is_heard(self, topic: str) -> bool:
-        """Stay until a topic's publisher is connected; return False where nothing subscribes."""
+        """Wait until the publisher of a topic is connected; return False without subscribers."""
         clock = asyncio.get_running_loop().time
         subscribers = await self._subscribers(topic)
         ends_s = clock() + _CONNECTS_S
@@ -302,7 +301,7 @@ class _Session:
         return True
 
     async def _subscribers(self, topic: str) -> list[object] | None:
-        """Return the nodes that subscribe to a topic; None where rosapi does not say."""
+        """Return the subscribing nodes of a topic; None if rosapi does not reply."""
         said: asyncio.Future[Mapping[str, Any]] = asyncio.get_running_loop().create_future()
 
         def told(values: Mapping[str, Any]) -> None:
@@ -322,8 +321,8 @@ class _Session:
         return found if isinstance(found, list) else None
 
     async def end(self) -> None:
-        """Stop reading, and give up whoever waits."""
-        self.inbox.end("the line is closed")
+        """Stop reading, and wake all waiting tasks."""
+        self.inbox.end("the connection is closed")
         if self._reader is not None:
             self._reader.cancel()
             await asyncio.gather(self._reader, return_exceptions=True)
@@ -333,13 +332,13 @@ class _Session:
             await self._wire.send(frame)
 
     async def _read(self) -> None:
-        """Take every frame as it comes, until the connection ends."""
+        """Process every received frame until the connection ends."""
         clock = asyncio.get_running_loop().time
         began_s = clock()
         try:
             while True:
                 self._take(await self._wire.receive())
-                # Frames that are there already are not waited for, and some take long to read.
+                # Frames in the buffer need no wait, and some take long to parse.
                 if self.inbox.is_filling or clock() - began_s > _TURN_S:
                     await asyncio.sleep(0)
                     began_s = clock()
@@ -357,7 +356,7 @@ class _Session:
                 log.warning("rosbridge: %s (%d such frames)", problem, self._bad)
 
     def _learn(self, subscriptions: tuple[Listening, ...], said: Mapping[str, Any]) -> None:
-        """Take the topics that rosapi names, with their types."""
+        """Process the topics and types from rosapi."""
         names, types = said.get("topics"), said.get("types")
         if isinstance(names, list):
             kinds = types if isinstance(types, list) and len(types) == len(names) else []

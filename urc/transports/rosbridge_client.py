@@ -1,13 +1,12 @@
-"""roslibpy's side of a rosbridge connection, without its connection.
+"""roslibpy's part of a rosbridge connection, without its network connection.
 
-roslibpy knows the operations, their ids and who waits for which answer; all of that is used as it
-is. Its connections are not: they replay what was published while there was none, die of a binary
-frame and never ask whether the other side still lives (docs/decisions names the figures). So its
-protocol writes into a list here, which the transport sends over its own socket, and is told what
-that socket received. One object serves one connection and is thrown away with it: nothing can be
-left over for the next.
+roslibpy implements the operations, their ids and pending requests. Its network connections are not
+used: they replay old messages after a reconnection, fail on binary frames, and never probe the
+other side. The figures are in docs/decisions. Here, its protocol writes into a list, which the
+transport sends over its own socket, and gets the received data of that socket. One object serves
+one connection, so nothing remains for the next one.
 
-No input or output, no task, no thread.
+No I/O, no task, no thread.
 """
 
 from collections.abc import Callable, Mapping
@@ -28,10 +27,10 @@ from urc.transports.topics import Inbox
 __all__ = ["Listening", "RosClient"]
 
 MAX_PENDING = 256
-"""Calls and goals that may be unanswered; beyond it the oldest is forgotten."""
+"""Limit of pending calls and goals; beyond it, the oldest is dropped."""
 _NAME_SHOWN = 80
 KNOWN_TOPICS = 256
-"""Topics, services and actions that are remembered as advertised or called."""
+"""Limit of remembered topics, services and actions."""
 
 
 class Listening(NamedTuple):
@@ -45,10 +44,10 @@ class Listening(NamedTuple):
 
 
 class RosClient:
-    """Turns envelopes into operations and operations into envelopes, for one connection."""
+    """Converts envelopes to operations and back, for one connection."""
 
     def __init__(self, inbox: Inbox, ros: int | None) -> None:
-        """Deliver to `inbox`; `ros` (1, 2 or None: as written) says how types are spelled."""
+        """Deliver to `inbox`; `ros` (1, 2 or None: as written) selects the form of type names."""
         self._inbox = inbox
         self._ros_version = ros
         self._protocol = _Protocol()
@@ -57,18 +56,18 @@ class RosClient:
         self._topics: dict[str, Any] = {}
         self._services: dict[str, Any] = {}
         self._goals: dict[str, tuple[str, object]] = {}
-        """roslibpy's id of a goal that runs → its action and the line's own id."""
+        """roslibpy's id of a running goal → its action and the id of the request."""
 
     @property
     def unanswered(self) -> int:
-        """Calls and goals whose answers are outstanding."""
+        """Number of pending calls and goals."""
         return self._protocol.unanswered
 
     def spell(self, ros: int | None) -> None:
-        """Spell types as that version of ROS from now on; None: as they are written."""
+        """Use the type names of that ROS version from now on; None: as written."""
         self._ros_version = ros
 
-    # -- what is sent; each returns the frames to write
+    # -- sending; each method returns the frames to write
 
     def listen(self, wanted: Listening) -> list[bytes]:
         """Subscribe to one topic."""
@@ -91,16 +90,16 @@ class RosClient:
         arguments: Mapping[str, object] = NOTHING,
         errback: Callable[[object], None] | None = None,
     ) -> list[bytes]:
-        """Call a service for ourselves; where it fails or is not there, only `errback` hears it."""
+        """Call a service internally; on failure, only `errback` is called."""
         call = Service(self._ros, service, "").call
         call(dict(arguments), callback=callback, errback=errback or _ignore)
         return self._protocol.written()
 
     def perform(self, envelope: Envelope) -> list[bytes]:
-        """Carry out what the line asks for.
+        """Execute the operation of an envelope.
 
         Raises:
-            TransportError: it cannot be sent over rosbridge.
+            TransportError: rosbridge cannot send it.
         """
         work = {
             "publish": self._publish,
@@ -119,7 +118,7 @@ class RosClient:
 
     def _publish(self, attributes: Mapping[str, object], body: object) -> None:
         name, kind = _text(attributes, "topic"), str(attributes.get("type") or "")
-        if not kind:  # the bridge knows the type if anybody else uses the topic
+        if not kind:  # the bridge knows the type if any other client uses the topic
             operation = {"op": "publish", "topic": name, "msg": _fields(body)}
             self._protocol.send_ros_message(Message(operation))
             return
@@ -167,7 +166,7 @@ class RosClient:
         self._goals[goal] = name, number
 
     def _cancel(self, attributes: Mapping[str, object], body: object) -> None:
-        """Cancel the goal with that id, or the last one of the action that runs."""
+        """Cancel the goal with that id, or else the last running one of the action."""
         name, number = _text(attributes, "action"), attributes.get("id")
         running = [goal for goal, (action, _) in self._goals.items() if action == name]
         named = [goal for goal in running if self._goals[goal][1] == number]
@@ -175,13 +174,13 @@ class RosClient:
         for goal in named or running[-1:]:
             client.cancel_goal(goal)
 
-    # -- what arrives
+    # -- receiving
 
     def arrived(self, operation: dict[str, Any], size_bytes: int) -> None:
-        """Take one operation of the bridge.
+        """Process one operation of the bridge.
 
         Raises:
-            BadFrame: it makes no sense.
+            BadFrame: the operation is invalid.
         """
         self._size_bytes = size_bytes
         self._protocol.arrived(operation)
@@ -216,7 +215,7 @@ _ENDS = frozenset(_OUTCOMES.values())
 
 
 class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no types
-    """roslibpy's protocol over a list."""
+    """roslibpy's protocol, writing into a list."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -230,46 +229,46 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
         return len(self._pending_service_requests) + len(self._pending_action_requests)
 
     def written(self) -> list[bytes]:
-        """Return what is to be written since the last time."""
+        """Remove and return the frames written since the last call."""
         frames, self._frames = self._frames, []
         return frames
 
     def arrived(self, operation: dict[str, Any]) -> None:
-        """Let roslibpy take an operation; what it cannot take is a `BadFrame`."""
+        """Let roslibpy process an operation; raise `BadFrame` for an unknown or invalid one."""
         handler: Callable[[Any], None] | None = self._message_handlers.get(operation["op"])
         if handler is None:
             unknown = one_line(repr(operation["op"]), _NAME_SHOWN)
             raise BadFrame(f"the bridge sent an operation {unknown} that is not known")
         try:
             handler(operation)
-        except Exception as problem:  # roslibpy checks nothing that arrives
+        except Exception as problem:  # roslibpy does not validate its input
             name = operation.get("id") or operation.get("topic")
             shown = one_line(repr(name), _NAME_SHOWN) if isinstance(name, str) else "?"
             raise BadFrame(f"{operation['op']} of {shown} is not understood") from problem
 
-    # -- roslibpy's own, mended
+    # -- overridden methods of roslibpy
 
     def send_message(self, payload: bytes) -> None:
         self._frames.append(payload)
 
     def send_ros_message(self, message: Any) -> None:
-        """Write an operation; unlike roslibpy's, tell when that cannot be done."""
+        """Write an operation; unlike roslibpy, report failures."""
         self.send_message(encode_operation(dict(message)))
 
     def send_ros_service_request(self, message: Any, callback: Any, errback: Any) -> None:
-        """As roslibpy's, with JSON for not-a-number and a bound."""
+        """Like roslibpy's method, with JSON for not-a-number and a bound."""
         self.send_ros_message(message)
         _keep(self._pending_service_requests, message["id"], (callback, errback))
 
     def send_ros_action_goal(
         self, message: Any, resultback: Any, feedback: Any, errback: Any
     ) -> None:
-        """As roslibpy's, with JSON for not-a-number and a bound."""
+        """Like roslibpy's method, with JSON for not-a-number and a bound."""
         self.send_ros_message({**message, "feedback": self.wants_feedback})
         _keep(self._pending_action_requests, message["id"], (resultback, feedback, errback))
 
     def _handle_action_result(self, message: Any) -> None:
-        """As roslibpy's, with whatever number the status has."""
+        """Like roslibpy's method, with any status number."""
         resultback, _, errback = self._pending_action_requests.pop(message["id"])
         values = message.get("values", {})
         status = message.get("status")
@@ -280,7 +279,7 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
 
 
 class _Factory(EventEmitterMixin):  # type: ignore[misc] # roslibpy ships no types
-    """What roslibpy asks for a connection: always there, because this one lives as long."""
+    """roslibpy's connection factory, always connected, since it lives as long."""
 
     is_connected = True
 
@@ -293,7 +292,7 @@ class _Factory(EventEmitterMixin):  # type: ignore[misc] # roslibpy ships no typ
 
 
 class _Ros(Ros):  # type: ignore[misc] # roslibpy ships no types
-    """roslibpy's client on a protocol that is given, not on a connection that it makes."""
+    """roslibpy's client on a given protocol, instead of a connection of its own."""
 
     def __init__(self, protocol: _Protocol) -> None:
         self._id_counter = 0
@@ -302,13 +301,13 @@ class _Ros(Ros):  # type: ignore[misc] # roslibpy ships no types
 
 
 class _Topic(Topic):  # type: ignore[misc] # roslibpy ships no types
-    """A topic whose messages may come as CBOR; the frames are read before roslibpy sees them."""
+    """A topic with optional CBOR messages, which are decoded before roslibpy gets them."""
 
     SUPPORTED_COMPRESSION_TYPES = ("none", "png", "cbor")
 
 
 def _ignore(said: object) -> None:
-    """A status, or why a question of our own was not answered: the bridge's own log says more."""
+    """Ignore a status, or the failure of an internal query, since the bridge logs it."""
 
 
 def _keep(table: dict[str, object], name: str, waiting: object) -> None:

@@ -1,8 +1,8 @@
-"""The frames of the rosbridge protocol: WebSocket messages ⇄ operations, bounded.
+"""Conversion between WebSocket frames and rosbridge operations, with bounds.
 
-Pure. A frame is JSON text, or CBOR where a subscription asked for it; an operation may come in
-fragments, or as a PNG image whose pixels are its JSON. Not-a-number and the infinities have no
-JSON: the bridge writes null for them, and what comes as CBOR is made the same.
+Pure. A frame is JSON text, or CBOR for subscriptions that request it. An operation may arrive in
+fragments, or as a PNG image whose pixels are its JSON. JSON has no not-a-number and no infinities:
+the bridge writes null for them, and CBOR values are converted in the same way.
 """
 
 import base64
@@ -18,22 +18,22 @@ import msgspec
 __all__ = ["BadFrame", "FrameReader", "encode_operation"]
 
 MAX_BYTES = 16 * 1024 * 1024
-"""Largest operation, however it is packed; the bridge's own limit is 10 MB."""
+"""Largest operation in bytes, in any encoding; the limit of the bridge itself is 10 MB."""
 MAX_FRAGMENTED = 8
-"""Operations that may be half there at one time; with more the oldest is given up."""
+"""Limit of incomplete operations; beyond it, the oldest is dropped."""
 MAX_FRAGMENTS = 4096
 MAX_PNG_BYTES = 2 * 1024 * 1024
-"""Of the text in an image: it is unpacked byte by byte, which takes a second for so many."""
+"""Limit of the text in an image, in bytes; its decoding in Python takes a second at this size."""
 MAX_VALUES = 2_000_000
-"""Commas and brackets of an operation: an empty list takes three bytes there and fifty here."""
+"""Limit of commas and brackets: an empty list takes three bytes as text, but fifty in memory."""
 _MANY_VALUES = 100_000
-"""Of CBOR that names values again: they take a tenth of a second."""
+"""Limit of values in CBOR with shared references: they take a tenth of a second."""
 _CBOR_MAP = b"\xa0"
-"""A map in CBOR starts with this byte or a higher one, JSON with none of them."""
+"""First byte of a CBOR map, or a higher one; JSON never begins with these."""
 _LONGEST_ID = 256
 _PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 _NUMBERS = {
-    # RFC 8746: the tags of arrays of numbers, little-endian.
+    # RFC 8746: tags of number arrays, little-endian.
     69: "H", 70: "I", 71: "Q", 72: "b", 77: "h", 78: "i", 79: "q", 85: "f", 86: "d",
 }  # fmt: skip
 
@@ -42,14 +42,14 @@ _encode_json = msgspec.json.Encoder().encode
 
 
 class BadFrame(ValueError):
-    """A frame that is none, in one line."""
+    """An invalid frame or operation, with a one-line text."""
 
 
 def encode_operation(operation: Mapping[str, object]) -> bytes:
-    """Return an operation as JSON; bytes become base64, not-a-number null.
+    """Return an operation as JSON; bytes become base64, not-a-number becomes null.
 
     Raises:
-        BadFrame: something in it has no JSON.
+        BadFrame: a value cannot be written as JSON.
     """
     try:
         return _encode_json(operation)
@@ -58,24 +58,24 @@ def encode_operation(operation: Mapping[str, object]) -> bytes:
 
 
 class FrameReader:
-    """Makes operations of frames; knows the fragments of one connection."""
+    """Decodes frames into operations, and joins the fragments of one connection."""
 
     def __init__(self) -> None:
         self._halves: dict[str, dict[int, str]] = {}
-        """Fragmented operation → its pieces by number."""
+        """Fragmented operation → its fragments by number."""
         self._sizes: dict[str, int] = {}
-        """Fragmented operation → characters of its pieces."""
+        """Fragmented operation → characters of its fragments."""
 
     def read(self, frame: bytes) -> dict[str, Any] | None:
-        """Return the operation of a frame, or None when it is not complete yet.
+        """Return the operation of a frame, or None if it is incomplete.
 
         Raises:
-            BadFrame: it is no operation.
+            BadFrame: the frame is invalid.
         """
         if frame[:1] >= _CBOR_MAP:
             return _operation(_read_cbor(frame))
         operation = _read_json(frame)
-        # One within the other at most: fragments of a PNG.
+        # At most two levels of nesting: fragments of a PNG.
         for _ in range(2):
             match operation.get("op"):
                 case "fragment":
@@ -142,7 +142,7 @@ def _read_cbor(data: bytes) -> object:
 
 
 def _tagged(first: Any, second: Any) -> object:
-    """Return the numbers of a tagged array; in cbor2 6 the tag comes first, before it second."""
+    """Return the numbers of a tagged array; the tag comes first in cbor2 6, second before."""
     tag = first if hasattr(first, "tag") else second
     code, data = _NUMBERS.get(tag.tag), tag.value
     if code is None or not isinstance(data, bytes) or len(data) % struct.calcsize(code):
@@ -151,22 +151,22 @@ def _tagged(first: Any, second: Any) -> object:
 
 
 class _Plain:
-    """Makes of CBOR what JSON can say, and no more of it than was sent.
+    """Converts CBOR values to JSON-like ones, with a bound on their expansion.
 
-    CBOR may name a value that it has said before, and that one named others: a few bytes would
-    become more than any memory holds.
+    CBOR may refer to earlier values, which may refer to others: a few bytes could exceed any
+    memory.
     """
 
     def __init__(self, size: int) -> None:
-        """Make it for a frame of `size` bytes: each value that it says takes one at least."""
+        """Initialise for a frame of `size` bytes: each of its values takes at least one."""
         self._room = MAX_BYTES
-        """Bytes that may still be said; a value is at least one."""
+        """Remaining bytes of the result; a value counts at least one."""
         self._values = max(size, _MANY_VALUES)
         self._left = self._values
-        """Values that may still be said: each takes time, however small it is."""
+        """Remaining number of values, since each takes time, however small it is."""
 
     def of(self, value: Any) -> Any:
-        """Return `value` with null for every number that JSON has not."""
+        """Return `value` with null for every number that JSON lacks."""
         self._room -= 1 + (len(value) if isinstance(value, str | bytes) else 0)
         if self._room < 0:
             raise ValueError(f"it stands for more than {MAX_BYTES} bytes")
@@ -193,7 +193,7 @@ def _key(name: object) -> str:
 
 
 def _png_text(operation: Mapping[str, Any]) -> bytes:
-    """Return the JSON in the pixels of a PNG; it is padded with newlines."""
+    """Return the JSON in the pixels of a PNG, without the padding by newlines."""
     try:
         image = base64.b64decode(operation.get("data", ""), validate=True)
     except (binascii.Error, TypeError, ValueError) as problem:
@@ -202,7 +202,7 @@ def _png_text(operation: Mapping[str, Any]) -> bytes:
 
 
 def _pixels(image: bytes) -> bytes:
-    """Return the bytes of an 8-bit RGB image that is not interlaced, as the bridge makes them."""
+    """Return the pixel bytes of a non-interlaced 8-bit RGB image, as the bridge makes them."""
     if not image.startswith(_PNG_MAGIC):
         raise BadFrame("the data of a png is no PNG image")
     width = height = 0
@@ -231,7 +231,7 @@ def _pixels(image: bytes) -> bytes:
 
 
 def _unfiltered(rows: bytes, stride: int) -> bytes:
-    """Undo the filters of a PNG: each row says which, in its first byte."""
+    """Reverse the filters of a PNG; the first byte of each row selects its filter."""
     out = bytearray()
     above = bytes(stride)
     for start in range(0, len(rows), stride + 1):
@@ -251,7 +251,7 @@ def _unfiltered(rows: bytes, stride: int) -> bytes:
 
 
 def _undo_left(kind: int, row: bytearray, above: bytes) -> None:
-    """Undo a filter that looks at the pixel to the left, in place."""
+    """Reverse a filter that uses the pixel to the left, in place."""
     for place in range(len(row)):
         left = row[place - 3] if place >= 3 else 0
         up = above[place]

@@ -1,15 +1,15 @@
-"""How ROS 1 and ROS 2 spell the name of a type."""
+"""Type names of ROS 1 and ROS 2."""
 
 __all__ = ["spelled"]
 
 
 def spelled(name: str, kind: str, ros: int | None) -> str:
-    """Return `name` as that version of ROS spells it.
+    """Return `name` in the form of that ROS version.
 
     Args:
         name: ``pkg/Type`` or ``pkg/msg/Type``; "" stays "".
         kind: the middle word: ``msg``, ``srv`` or ``action``.
-        ros: 1, 2, or None: as it is written.
+        ros: 1, 2, or None: as written.
     """
     words = name.split("/")
     if ros is None or not all(words) or len(words) not in (2, 3):

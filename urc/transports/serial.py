@@ -1,7 +1,7 @@
 """A serial port: on this machine, or behind a server (``socket://``, ``rfc2217://``).
 
-The library underneath is serialx, of the extra ``serial``. What ``socket://`` names is a plain TCP
-line and treated as one: whoever runs that server has set the port up.
+The library is serialx, of the extra ``serial``. A ``socket://`` address is a plain TCP connection:
+its server has already configured the port.
 """
 
 import asyncio
@@ -28,7 +28,7 @@ _SOCKET, _RFC2217 = "socket://", "rfc2217://"
 
 
 class Settings(NamedTuple):
-    """How bytes are put on the wire."""
+    """Settings of a serial port."""
 
     baud: int = 115_200
     """Bits a second."""
@@ -37,17 +37,17 @@ class Settings(NamedTuple):
     stop_bits: float = 1
     flow_control: str = "none"
     rts: bool | None = None
-    """What the pin is at when the port has been opened; None: as usual, which is high."""
+    """Initial level of the RTS pin; None: the default, which is high."""
     dtr: bool | None = None
     is_exclusive: bool = True
-    """Keep other programs out."""
+    """Whether other programs are locked out."""
 
 
 class SerialTransport(StreamLine):
-    """One serial port, opened as often as it is needed."""
+    """One serial port; it may be opened repeatedly."""
 
     def __init__(self, port: str, settings: Settings) -> None:
-        """Prepare the line; `port` is a path or name, or an address with its scheme."""
+        """Initialise; `port` is a path or name, or an address with its scheme."""
         super().__init__()
         self._port = port
         self._settings = settings
@@ -58,11 +58,11 @@ class SerialTransport(StreamLine):
 
     @property
     def address(self) -> str:
-        """Where it leads, for people: ``serial /dev/ttyUSB0``."""
+        """Target of the transport as text for people: ``serial /dev/ttyUSB0``."""
         return f"serial {self._port}"
 
     async def open(self, timeout_s: float) -> None:
-        """Open the port and set it up, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Open and configure the port, or raise `ConnectFailed` within `timeout_s` seconds."""
         await self.close()
         if self._is_raw and self._reach is not None:
             self._stream = await self._reach.open(timeout_s)
@@ -86,10 +86,10 @@ class SerialTransport(StreamLine):
 
 
 def from_setup(setup: Setup) -> Transport:
-    """Make a transport out of a document's options.
+    """Return a transport for the options of a document.
 
     Raises:
-        TransportError: an option is missing or not usable, or the extra is not installed.
+        TransportError: an option is missing or invalid, or the extra is not installed.
     """
     options = setup.options
     port = _options.text("serial", options, "port").strip()
@@ -103,7 +103,7 @@ def from_setup(setup: Setup) -> Transport:
 
 
 def explain(port: str, shown: str, fault: BaseException) -> str:
-    """Return one line about why a port could not be opened."""
+    """Return one line with the reason why a port could not be opened."""
     code = getattr(fault, "errno", None) or (fault.args[0] if fault.args else None)
     if isinstance(fault, ConnectionRefusedError):
         return f"nothing listens on {shown} (connection refused)"
@@ -122,7 +122,7 @@ def explain(port: str, shown: str, fault: BaseException) -> str:
 
 
 def _remedy(port: str) -> str:
-    """Say which group may use the port, where the system has groups."""
+    """Return a hint with the group of the port, on systems with groups."""
     if sys.platform == "win32":
         return ""
     import grp
@@ -172,7 +172,7 @@ def _pin(options: Mapping[str, object], key: str) -> bool | None:
 
 
 def _arguments_of(settings: Settings) -> dict[str, object]:
-    """Return the settings as the library names them."""
+    """Return the settings with the names of the library."""
     from serialx import PinState
 
     arguments: dict[str, object] = {

@@ -1,8 +1,8 @@
-"""SSH to a robot: a shell, a program, or nothing but the way for other transports.
+"""SSH to a robot: a shell, a program, or only a tunnel for other transports.
 
-One connection is shared by all that goes through it: the transport's own channel, where its mode
-has one, and the connections of the transports that name it in ``via``. The first who needs it opens
-it, the last who leaves closes it, and when it dies everybody is told.
+All users share one connection: the transport's own channel, if its mode has one, and the transports
+that name it in ``via``. The first user opens it, the last one closes it, and all users learn of its
+loss.
 """
 
 import asyncio
@@ -44,18 +44,18 @@ _ALIVE_S: Final = (0.2, 60.0)
 
 
 class Program(NamedTuple):
-    """What runs at the far end."""
+    """The program at the far end."""
 
     mode: Mode = "shell"
     command: str = ""
-    """Of the mode ``exec``."""
+    """Command of the mode ``exec``."""
     has_pty: bool = True
-    """Whether it believes that a person sits there, and so prompts and echoes."""
+    """Whether it runs on a pseudo-terminal, and so prompts and echoes."""
     environment: tuple[tuple[str, str], ...] = ()
 
 
 def read_target(setup: Setup) -> Target:
-    """Return where to and how to get in; raise `TransportError`."""
+    """Return the server and login of the options; raise `TransportError`."""
     options = setup.options
     username = _text(options, "username")
     if not username:
@@ -82,7 +82,7 @@ def read_target(setup: Setup) -> Target:
 
 
 def read_program(setup: Setup) -> Program:
-    """Return what runs at the far end; raise `TransportError`."""
+    """Return the remote program of the options; raise `TransportError`."""
     options = setup.options
     mode = _options.choice("ssh", options, "mode", ("shell", "exec", "forward"), "shell")
     command = _options.text("ssh", options, "command")
@@ -104,7 +104,7 @@ def _address(options: Mapping[str, object]) -> Address:
 
 
 def _text(options: Mapping[str, object], name: str) -> str:
-    """Return a text; what was found is not repeated, it may be a secret."""
+    """Return a text; errors don't repeat the value, which may be a secret."""
     value = options.get(name)
     if value is None:
         return ""
@@ -137,7 +137,7 @@ def _environment(value: object) -> tuple[tuple[str, str], ...]:
 
 
 _COLUMNS, _ROWS = 240, 24
-"""Of the pseudo-terminal: so wide that no shell breaks a robot's line."""
+"""Size of the pseudo-terminal, wide enough that shells do not wrap the lines of a robot."""
 
 
 class SshTransport:
@@ -146,18 +146,18 @@ class SshTransport:
     def __init__(
         self, target: Target, program: Program, outer: "SshTransport | None" = None
     ) -> None:
-        """Prepare a line to `target`, through `outer` if there is one. Nothing is opened yet."""
+        """Initialise for `target`, tunnelled through `outer` if given, without connecting."""
         self.target = target
         self._program = program
         self._outer = outer
         self._shared = Shared(self._dial)
         self._connection: Connection | None = None
-        """While open: we are one of its users."""
+        """Connection while open, of which this transport is a user."""
         self._channel: Channel | None = None
 
     @property
     def address(self) -> str:
-        """Where it leads, for people: ``ssh 192.168.1.5:22``."""
+        """Target of the transport as text for people: ``ssh 192.168.1.5:22``."""
         return f"ssh {self.target.address.text}"
 
     async def open(self, timeout_s: float) -> None:
@@ -173,7 +173,7 @@ class SshTransport:
             self._connection = connection
 
     async def receive(self) -> bytes:
-        """Return the next bytes, at least one; raise `PeerClosed` when no more will come."""
+        """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
         if self._channel is not None:
             return await self._channel.take()
         if self._connection is None:
@@ -181,15 +181,18 @@ class SshTransport:
         return await self._connection.ended()
 
     async def send(self, data: Payload) -> None:
-        """Hand `data` to the kernel, waiting while it is full; raise `PeerClosed` when it broke."""
+        """Pass `data` to the kernel, waiting for buffer space; raise `PeerClosed` on an error."""
         if self._connection is None:
             raise PeerClosed(CLOSED)
         if self._channel is None:
-            raise PeerClosed("this line only carries others ('mode: forward')")
+            raise PeerClosed("this connection only tunnels others ('mode: forward')")
         await self._channel.put(bytes_of(data))
 
     async def close(self) -> None:
-        """Close at once. Never raises, may be called twice. Others that go through here go on."""
+        """Close at once, without affecting tunnelled transports.
+
+        Never raises, may be called twice.
+        """
         channel, self._channel = self._channel, None
         connection, self._connection = self._connection, None
         if channel is not None:
@@ -198,22 +201,22 @@ class SshTransport:
             await self._shared.leave()
 
     def unsent(self) -> int:
-        """Return the bytes handed over that have not left this machine for good."""
+        """Return the number of bytes that have not been acknowledged."""
         return 0 if self._channel is None else self._channel.unsent()
 
     async def abort(self) -> None:
-        """Close at once, for all that go through here; what is unsent is never sent."""
+        """Close at once, including all tunnelled transports; discard unsent data."""
         self.break_off()
         await self.close()
 
     def break_off(self) -> None:
-        """End the connection, and the one that it goes through: the robot has not got it all."""
+        """Reset the connection and its outer tunnel, so that unsent data is discarded."""
         self._shared.break_off()
         if self._outer is not None:
             self._outer.break_off()
 
     async def connect(self, host: str, port: int, timeout_s: float) -> ByteStream:
-        """Return a connection to `host` and `port` as the server sees them.
+        """Return a connection to `host` and `port` as seen from the server.
 
         Raises:
             ConnectFailed: within `timeout_s` seconds.
@@ -228,7 +231,7 @@ class SshTransport:
         return _Carried(channel, self._shared, self.break_off)
 
     async def look_at_key(self, timeout_s: float) -> Offer:
-        """Return the host key that the server shows, without logging in there.
+        """Return the host key of the server, without logging in.
 
         Raises:
             ConnectFailed: within `timeout_s` seconds.
@@ -243,11 +246,11 @@ class SshTransport:
                 await self._outer.leave()
 
     async def join(self, timeout_s: float) -> asyncssh.SSHClientConnection:
-        """Return asyncssh's connection for another SSH connection inside; `leave` when done."""
+        """Return the asyncssh connection for an inner SSH connection; call `leave` afterwards."""
         return (await self._shared.join(timeout_s)).ssh
 
     async def leave(self) -> None:
-        """Give up what `join` returned."""
+        """Give up a connection of `join`."""
         await self._shared.leave()
 
     async def _dial(self, timeout_s: float) -> Connection:
@@ -277,7 +280,7 @@ class SshTransport:
 
 
 class _Carried:
-    """A connection through the server, which keeps the SSH connection open while it lasts."""
+    """A forwarded connection, which keeps the SSH connection open."""
 
     def __init__(self, channel: Channel, shared: Shared, break_off: Callable[[], None]) -> None:
         self._channel = channel
@@ -306,10 +309,10 @@ class _Carried:
 
 
 def from_setup(setup: Setup) -> SshTransport:
-    """Make a transport out of a document's options; docs/transports/ssh.md explains each.
+    """Return a transport for the options of a document; see docs/transports/ssh.md.
 
     Raises:
-        TransportError: an option is missing or not usable.
+        TransportError: an option is missing or invalid.
     """
     if setup.via is not None and not isinstance(setup.via, SshTransport):
         raise TransportError("ssh goes through another ssh only, or through nothing")

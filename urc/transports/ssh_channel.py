@@ -1,8 +1,7 @@
-"""One channel of an SSH connection as a stream of bytes.
+"""A channel of an SSH connection, as a stream of bytes.
 
-What arrives is held until somebody takes it; beyond `READ_AHEAD_BYTES` the channel is not read any
-more, and the window of the protocol holds the other side up. `put` returns once the kernel has
-every byte.
+Received data is buffered up to `READ_AHEAD_BYTES`. Beyond that, the channel is not read, and the
+window of the protocol stops the sender. `put` returns once the kernel has every byte.
 """
 
 import asyncio
@@ -18,25 +17,25 @@ from urc.transports.ssh_wire import Wire, why_lost
 __all__ = ["MAX_PACKET", "WINDOW", "Channel"]
 
 READ_AHEAD_BYTES = 65536
-"""Most bytes that are held before somebody takes them."""
+"""Size of the receive buffer, in bytes."""
 WINDOW = 262_144
-"""Bytes that the other side may send beyond that."""
+"""Window of the channel, in bytes beyond that buffer."""
 MAX_PACKET = 32768
 _CLOSES_WITHIN_S = 1.0
-"""A program that has closed its output should have ended by then."""
+"""Timeout for the exit of a program that has closed its output, in seconds."""
 _LAST_WORDS = 200
-"""Bytes of what a program says about its own end."""
+"""Most bytes of standard error in the message about the end of a program."""
 
 
 class Channel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
     """A shell, a program, or a forwarded connection."""
 
     def __init__(self, wire: Wire, program: str = "") -> None:
-        """Prepare a channel.
+        """Initialise a channel.
 
         Args:
-            wire: below the SSH connection; full when the kernel takes no more.
-            program: what its end is told of, ``the shell``; "": a forwarded connection.
+            wire: socket of the SSH connection; full when the kernel accepts no more data.
+            program: name of the program in messages, ``the shell``; "" for a forwarded connection.
         """
         self._wire = wire
         self._program = program
@@ -46,7 +45,7 @@ class Channel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
         self._last_words = b""
         self._outcome = ""
         self._ended: str | None = None
-        """Why nothing more will come; None while the channel is up."""
+        """Reason of the end; None while the channel is open."""
         self._late: asyncio.TimerHandle | None = None
         self._arrived = asyncio.Event()
         self._writable = asyncio.Event()
@@ -56,12 +55,12 @@ class Channel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
     # -- called by asyncssh
 
     def connection_made(self, chan: object) -> None:
-        """Take the channel."""
+        """Take over the open channel."""
         self._channel = chan  # type: ignore[assignment] # of either base
         self._channel.set_write_buffer_limits(high=0)
 
     def data_received(self, data: bytes, datatype: int | None) -> None:
-        """Hold what comes, beside complaints."""
+        """Buffer received data, except for standard error."""
         if datatype == EXTENDED_DATA_STDERR:
             self._last_words = (self._last_words + data)[-_LAST_WORDS:]
             return
@@ -73,15 +72,15 @@ class Channel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
         self._arrived.set()
 
     def exit_status_received(self, status: int) -> None:
-        """Note how the program ended."""
+        """Record the exit status of the program."""
         self._outcome = f"{self._program} ended with status {status}"
 
     def exit_signal_received(self, signal: str, core_dumped: bool, msg: str, lang: str) -> None:
-        """Note how the program ended."""
+        """Record the signal that ended the program."""
         self._outcome = f"{self._program} was ended by signal {one_line(signal, 20)}"
 
     def eof_received(self) -> bool:
-        """Nothing more will come; of a program, we wait for how it ended."""
+        """Handle the end of the output; for a program, wait for its exit."""
         if not self._program:
             self._end(HUNG_UP)
         elif self._late is None:
@@ -90,23 +89,23 @@ class Channel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
         return False
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """The channel is gone, alone or with its connection."""
+        """Record the loss of the channel or of its connection."""
         if exc is not None:
             self._wire.end(why_lost(exc))
         self._end(self._wire.fault or self._farewell())
 
     def pause_writing(self) -> None:
-        """The other side takes no more."""
+        """Block `put` while the other side accepts no data."""
         self._writable.clear()
 
     def resume_writing(self) -> None:
-        """The other side has taken everything."""
+        """Unblock `put`."""
         self._writable.set()
 
     # -- a `ByteStream`
 
     async def take(self) -> bytes:
-        """Return the next bytes, at least one; raise `PeerClosed` when no more will come."""
+        """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
         while not self._parts:
             if self._ended is not None:
                 raise PeerClosed(self._ended)
@@ -121,11 +120,11 @@ class Channel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
         return data
 
     async def put(self, data: bytes) -> None:
-        """Hand `data` over, waiting while the line is full; raise `PeerClosed` if it broke."""
+        """Send `data`, waiting for buffer space; raise `PeerClosed` on an error."""
         await self._until_writable()
         try:
             self._channel.write(data)
-        except OSError as closed:  # by either side
+        except OSError as closed:  # closed by either side
             raise PeerClosed(self._ended or self._farewell()) from closed
         await self._until_writable()
 
@@ -139,9 +138,9 @@ class Channel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
         self._channel.abort()
 
     def unsent(self) -> int:
-        """Return the bytes handed over that the server has not acknowledged.
+        """Return the number of bytes that the server has not acknowledged.
 
-        The SSH connection's own, and those of its other channels, are counted as well.
+        Includes those of the SSH connection itself and of its other channels.
         """
         return self._channel.get_write_buffer_size() + self._wire.unsent()
 
@@ -161,7 +160,7 @@ class Channel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
         if not self._program or not (self._outcome or said):
             return HUNG_UP
         words = f" ({one_line(said[-1])})" if said else ""
-        return (self._outcome or f"{self._program} closed the line") + words
+        return (self._outcome or f"{self._program} closed the connection") + words
 
     def _end(self, reason: str) -> None:
         if self._late is not None:

@@ -1,4 +1,4 @@
-"""One SSH connection, and the sharing of it by everything that goes through it."""
+"""One SSH connection, and its sharing by several users."""
 
 import asyncio
 import ipaddress
@@ -21,7 +21,7 @@ from urc.transports.topic_socket import Address
 __all__ = ["Connection", "Shared"]
 
 _GONE_WITHIN_S = 0.5
-"""What a closed connection may take to be gone."""
+"""Timeout for the close of a connection, in seconds."""
 _LOOK_UP_S = 2.0
 
 
@@ -29,13 +29,13 @@ class Connection:
     """An SSH connection after its login."""
 
     def __init__(self, ssh: asyncssh.SSHClientConnection, wire: Wire, address: Address) -> None:
-        """Take over a connection and what is below it."""
+        """Take over an SSH connection and its socket."""
         self.ssh = ssh
         self._wire = wire
         self._address = address
         self._strays: set[asyncio.Task[Any]] = set()
         self.when_closed: Callable[[], Awaitable[None]] | None = None
-        """Called once, when `close` has closed it: gives up what it goes through."""
+        """Called once after `close`, to release the outer tunnel."""
 
     @property
     def is_up(self) -> bool:
@@ -44,11 +44,11 @@ class Connection:
 
     @property
     def fault(self) -> str:
-        """Why it is over; "" while it is up."""
+        """Reason of the end; "" while the connection is open."""
         return self._wire.fault
 
     async def ended(self) -> NoReturn:
-        """Wait for its end; raise `PeerClosed` then."""
+        """Wait for the end of the connection; raise `PeerClosed` then."""
         await self.ssh.wait_closed()
         raise PeerClosed(self._wire.fault or HUNG_UP)
 
@@ -65,7 +65,7 @@ class Connection:
         )  # fmt: skip
 
     async def forwarded(self, host: str, port: int) -> Channel:
-        """Return a connection to `host` and `port` as the server sees them."""
+        """Return a connection to `host` and `port` as seen from the server."""
         place = Address(host, port).text
         try:
             host = await self._checked(host, port)
@@ -80,10 +80,10 @@ class Connection:
         )
 
     async def _checked(self, host: str, port: int) -> str:
-        """Return what to connect to for `host`; raise `OwnDoor` where this program listens there.
+        """Return the target address for `host`; raise `OwnDoor` for the own dashboard.
 
-        An SSH server on this machine would lead to all that listens on it. There a name is looked
-        up here, once, so that the server does not find another address for it.
+        An SSH server on this machine can reach all its listeners. In that case a name is looked up
+        here, once, so that the server cannot find another address for it.
         """
         is_near = self._is_on_this_machine()
         addresses = [host]
@@ -101,7 +101,7 @@ class Connection:
         return addresses[0]
 
     def _is_on_this_machine(self) -> bool:
-        """Return whether the server runs here, as far as its address says it."""
+        """Return whether the server runs on this machine, according to its address."""
         peer = self.ssh.get_extra_info("peername")
         place = str(peer[0]) if isinstance(peer, tuple) and peer else self._address.host
         try:
@@ -124,15 +124,15 @@ class Connection:
             await when_closed()
 
     def reset(self) -> None:
-        """End it without a word, not even a good-bye: that would push what is unsent before it."""
+        """Reset the connection without a close message, which would also send unsent data."""
         self._wire.reset()
 
     async def _opened(
         self, begin: Callable[[Channel], Awaitable[Any]], channel: Channel, failure: str
     ) -> Channel:
-        """Open `channel`; when nobody waits for it any more, it is closed once it is open.
+        """Open `channel`; after a cancellation, close it as soon as it is open.
 
-        asyncssh would forget about a channel whose opening is cancelled, the server would not.
+        asyncssh would forget a channel whose opening is cancelled, but the server would not.
         """
         task = asyncio.ensure_future(begin(channel))
         try:
@@ -159,27 +159,26 @@ class Connection:
 
 
 class Shared:
-    """The one connection of a transport: open while somebody uses it, opened by the first."""
+    """The shared connection of a transport: opened by the first user, closed by the last."""
 
     def __init__(self, dial: Callable[[float], Awaitable[Connection]]) -> None:
-        """Prepare.
+        """Initialise.
 
         Args:
-            dial: opens a connection, given the seconds there are for it; leaves nothing when it is
-                cancelled.
+            dial: opens a connection within the given seconds; leaves nothing behind when cancelled.
         """
         self._dial = dial
         self._users = 0
         self._attempt: asyncio.Task[Connection] | None = None
-        """Opens the connection, then holds it."""
+        """Task that opens the connection, and then holds it."""
 
     async def join(self, timeout_s: float) -> Connection:
-        """Return the connection, opening it if need be; `leave` it when done with it.
+        """Return the connection, opened if necessary; call `leave` afterwards.
 
-        The caller bounds the wait; whoever else waits for the same attempt goes on.
+        The caller sets the timeout; other callers that wait for the same attempt continue.
 
         Raises:
-            ConnectFailed: it could not be opened. Then there is nothing to leave.
+            ConnectFailed: opening failed. No `leave` is needed then.
         """
         self._users += 1
         try:
@@ -191,27 +190,27 @@ class Shared:
             raise
 
     async def leave(self) -> None:
-        """Give the connection up; the last one who does closes it."""
+        """Release the connection; the last user closes it."""
         self._users -= 1
         if self._users:
             return
         attempt, self._attempt = self._attempt, None
         if attempt is None:
             return
-        attempt.cancel()  # nothing happens when it is done
+        attempt.cancel()  # no effect on a completed attempt
         await asyncio.wait([attempt])
         if not attempt.cancelled() and attempt.exception() is None:
             await attempt.result().close()
 
     def break_off(self) -> None:
-        """End the connection for everybody who uses it; what is unsent is never sent."""
+        """Reset the connection for all users; discard unsent data."""
         if self._attempt is not None and self._attempt.done() and self._is_good(self._attempt):
             self._attempt.result().reset()
 
     async def _again(
         self, before: "asyncio.Task[Connection] | None", timeout_s: float
     ) -> Connection:
-        """Put the dead connection away, if there was one, and open a new one."""
+        """Close a dead connection, if any, and open a new one."""
         if before is not None and not before.cancelled() and before.exception() is None:
             await before.result().close()
         return await self._dial(timeout_s)

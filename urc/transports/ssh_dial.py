@@ -1,4 +1,4 @@
-"""How an SSH connection is opened: the socket, the host key, the login, and what may go wrong."""
+"""Opening of an SSH connection: socket, host key, login, and error texts."""
 
 from typing import Any, NamedTuple
 
@@ -15,16 +15,16 @@ from urc.transports.topic_socket import Address
 __all__ = ["Offer", "Target", "dial", "look_at_key"]
 
 ALIVE_COUNT = 2
-"""Questions whether it is still there that a server may leave unanswered."""
+"""Largest number of unanswered keepalives."""
 
 
 class Offer(NamedTuple):
-    """The host key that a server showed."""
+    """The host key of a server."""
 
     key: asyncssh.SSHKey
     expected: str = ""
-    """What was expected instead: fingerprints, ``revoked``, or ``unknown`` when nothing is known
-    of this server; "" when the key is trusted."""
+    """Expected key: fingerprints, ``revoked``, or ``unknown`` for an unknown server; "" when the
+    key is trusted."""
 
     @property
     def fingerprint(self) -> str:
@@ -38,19 +38,19 @@ class Offer(NamedTuple):
 
 
 class Target(NamedTuple):
-    """One server, and how to get in."""
+    """One server, with its login and trusted keys."""
 
     address: Address
     login: Login
     keys: HostKeys
     alive_every_s: float = 2.0
-    """Silence after which the server is asked whether it is still there."""
+    """Silence after which a keepalive is sent, in seconds."""
     name: str = ""
-    """Of the transport, for the command that trusts a key."""
+    """Name of the transport, for the command that trusts a key."""
 
 
 class _Client(asyncssh.SSHClient):
-    """Judges the host key, and notes why the connection ended."""
+    """Checks the host key, and records the reason of the end."""
 
     def __init__(self, target: Target, known: Known, *, only_looks: bool) -> None:
         self._keys = target.keys
@@ -77,11 +77,11 @@ async def dial(
 
     Args:
         target: the server.
-        outer: another SSH connection to go through; None: this machine's own network.
-        timeout_s: what each of the server's addresses gets a share of; the caller bounds the whole.
+        outer: another SSH connection as a tunnel; None: the network of this machine.
+        timeout_s: total time for all addresses of the server; the caller sets the timeout.
 
     Raises:
-        ConnectFailed: with one line that says what to do, where something can be done.
+        ConnectFailed: with one line that includes a hint, if there is one.
     """
     client = _Client(target, _known(target), only_looks=False)
     async with credentials(target.login) as secrets:
@@ -91,7 +91,7 @@ async def dial(
 async def look_at_key(
     target: Target, outer: asyncssh.SSHClientConnection | None, timeout_s: float
 ) -> Offer:
-    """Return the key that the server shows, without logging in; see `dial`."""
+    """Return the host key of the server, without logging in; see `dial`."""
     client = _Client(target, _known(target), only_looks=True)
     try:
         connection = await _connect(target, client, outer, timeout_s, {"client_keys": None})
@@ -121,7 +121,7 @@ async def _connect(
             target.address.host,
             target.address.port,
             client_factory=lambda: client,
-            config=None,  # ~/.ssh/config is this user's, the document must mean the same to all
+            config=None,  # ignore ~/.ssh/config: the document must mean the same for all users
             tunnel=through,
             known_hosts=([], list(known.authorities), list(known.revoked)),
             server_host_key_algs=host_key_algorithms(
@@ -151,7 +151,7 @@ def _known(target: Target) -> Known:
 
 
 def _explain(target: Target, client: _Client, fault: Exception) -> str:
-    """Return one line for people about why there is no connection."""
+    """Return one line for people with the reason of a failed connection."""
     place, login = target.address.text, target.login
     if client.offer is not None and client.offer.expected:
         return _explain_key(target, client.offer)
@@ -172,7 +172,7 @@ def _explain(target: Target, client: _Client, fault: Exception) -> str:
             hint = "" if login.legacy else "; 'legacy: true' allows old ones"
             return f"{place} speaks no algorithm that URC takes{hint} ({_first(fault.reason)})"
         case asyncssh.ConnectionLost():
-            return f"{place} closed the line before the login was done"
+            return f"{place} closed the connection before the login was done"
         case asyncssh.ProtocolError() | asyncssh.ProtocolNotSupported():
             return f"{place} does not speak SSH as expected ({_first(fault.reason).lower()})"
         case asyncssh.DisconnectError():
@@ -199,7 +199,7 @@ def _explain_key(target: Target, offer: Offer) -> str:
         remedy = f"{command} trusts the new one"
     return (
         f"the host key of {place} is another one: expected {offer.expected}, it shows {shown}; "
-        f"somebody may be listening in. If the robot was set up anew, {remedy}"
+        f"the connection may be intercepted. If the robot was reinstalled, {remedy}"
     )
 
 

@@ -1,4 +1,4 @@
-"""How to get into an SSH server: who we are, what we show, which algorithms we take."""
+"""Login to an SSH server: user, credentials, and accepted algorithms."""
 
 import asyncio
 import os
@@ -23,7 +23,7 @@ _CERTIFICATES = tuple(
     for name in ("ssh-ed25519", "ecdsa-sha2-nistp256", "rsa-sha2-512", "rsa-sha2-256")
 )
 _LEGACY = {
-    # What servers of 2005 to 2015 speak; weak, and only where the document says so.
+    # Algorithms of servers from 2005 to 2015; weak, and used only on request of the document.
     "kex_algs": "+diffie-hellman-group14-sha1,diffie-hellman-group1-sha1,"
     "diffie-hellman-group-exchange-sha1",
     "encryption_algs": "+aes256-cbc,aes192-cbc,aes128-cbc,3des-cbc",
@@ -33,28 +33,28 @@ _LEGACY = {
 
 
 class Login(NamedTuple):
-    """Who we are to the server."""
+    """The user and credentials for a server."""
 
     username: str
     password: str = ""
     key: str = ""
-    """Path of a private key's file, or the key itself."""
+    """Path of a private key file, or the key itself."""
     passphrase: str = ""
     agent: bool = False
-    """Ask the agent of ``SSH_AUTH_SOCK`` for keys."""
+    """Whether to use the keys of the agent at ``SSH_AUTH_SOCK``."""
     legacy: bool = False
-    """Take algorithms that are no longer safe."""
+    """Whether to accept algorithms that are no longer secure."""
 
     def __repr__(self) -> str:
-        """Name the user alone: the rest must get into no log."""
+        """Return the user name alone, so that no secret enters a log."""
         return f"Login({self.username!r})"
 
 
 def algorithms(login: Login) -> dict[str, Any]:
-    """Return asyncssh's options for what may be negotiated, beside host keys."""
+    """Return asyncssh's options for the accepted algorithms, except for host keys."""
     if not login.legacy:
         return {}
-    # Whoever writes 'legacy: true' knows; the warning would come in the middle of other output.
+    # 'legacy: true' is a deliberate choice; the warning would disturb other output.
     warnings.filterwarnings("ignore", message="Diffie-Hellman over finite fields")
     return dict(_LEGACY)
 
@@ -62,7 +62,7 @@ def algorithms(login: Login) -> dict[str, Any]:
 def host_key_algorithms(
     known: Sequence[asyncssh.SSHKey], *, has_authorities: bool, legacy: bool
 ) -> list[str]:
-    """Return the kinds of host key we take, those that we know first: servers have several."""
+    """Return the accepted types of host keys, known ones first: servers have several."""
     familiar = [
         name.decode("ascii")
         for key in known
@@ -76,10 +76,10 @@ def host_key_algorithms(
 
 @asynccontextmanager
 async def credentials(login: Login):  # type: ignore[no-untyped-def]
-    """Give asyncssh's options for the login; the agent is asked while the context lasts.
+    """Yield asyncssh's options for the login; the agent is available during the context.
 
     Raises:
-        ConnectFailed: the key cannot be used, or there is no agent.
+        ConnectFailed: the key is unusable, or the agent is missing.
     """
     keys: list[Any] = []
     agent: asyncssh.SSHAgentClient | None = None
@@ -92,7 +92,7 @@ async def credentials(login: Login):  # type: ignore[no-untyped-def]
         yield {
             "username": login.username,
             "password": login.password or None,
-            # None: nothing is looked for in ~/.ssh, which is not the document's business.
+            # None: ignore the keys in ~/.ssh, which do not belong to the document.
             "client_keys": keys or None,
             "agent_path": None,
             "kbdint_auth": bool(login.password),
@@ -106,7 +106,7 @@ async def credentials(login: Login):  # type: ignore[no-untyped-def]
 
 
 async def _private_key(login: Login) -> asyncssh.SSHKey:
-    """Read the key in a thread: a passphrase costs up to a second of arithmetic."""
+    """Read the key in a thread: a passphrase takes up to a second of computation."""
     try:
         return await asyncio.to_thread(_read_key, login)
     except asyncssh.KeyEncryptionError as fault:
@@ -123,7 +123,7 @@ async def _private_key(login: Login) -> asyncssh.SSHKey:
 
 def _read_key(login: Login) -> asyncssh.SSHKey:
     if "-----BEGIN" in login.key:
-        # A setting is one line on some screens: what was the end of a line is a space there.
+        # A setting is one line on some pages: its line ends became spaces there.
         return asyncssh.import_private_key(login.key.strip() + "\n", login.passphrase or None)
     return asyncssh.read_private_key(os.path.expanduser(login.key), login.passphrase or None)
 

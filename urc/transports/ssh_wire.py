@@ -1,7 +1,7 @@
 """The socket below an SSH connection.
 
-asyncssh writes to its transport without ever asking whether there is room, so a robot that takes
-nothing would fill our memory. This protocol sits between the two and knows when the kernel is full.
+asyncssh writes without checking for buffer space, so a stalled robot would fill our memory. This
+protocol is between asyncssh and the socket, and knows when the kernel is full.
 """
 
 import asyncio
@@ -18,18 +18,18 @@ __all__ = ["Through", "Wire", "why_lost"]
 
 _READ_BYTES = 65536
 UNTAKEN_BYTES = 8_388_608
-"""What a server may make us say without taking any of it: more than it lets a channel send."""
+"""Limit of unsent replies to a server, in bytes; larger than the window of a channel."""
 _LAST_TURNS = 10
-"""Turns of the loop that asyncssh has for the last bytes before it is told that no more come. It
-reads some packets in tasks, and whoever refuses us often closes right behind the packet that tells
-why: told of the end before such a task is done, it would know no reason."""
+"""Turns of the event loop for the last bytes, before asyncssh learns of the end of the stream. It
+reads some packets in tasks. A refusing server often closes right after the packet with the reason:
+without these turns, the reason would be lost."""
 
 
 def why_lost(exc: Exception | None) -> str:
-    """Return one line about the end of a connection, in the words of all transports."""
+    """Return one line about the end of a connection, in the texts of all transports."""
     if exc is None or isinstance(exc, asyncssh.ConnectionLost):
         if "keepalive" in str(exc):
-            return "the line broke (the robot does not answer any more)"
+            return "the connection broke (the robot does not answer any more)"
         return HUNG_UP
     if isinstance(exc, asyncssh.DisconnectError):
         return f"{HUNG_UP} ({one_line(exc.reason.lower())})"
@@ -37,10 +37,10 @@ def why_lost(exc: Exception | None) -> str:
 
 
 class Wire(asyncio.BufferedProtocol):
-    """Passes bytes to and from asyncssh's connection; see `is_full` and `fault`."""
+    """Passes bytes between asyncssh and the socket; see `is_full` and `fault`."""
 
     def __init__(self, inner: asyncio.Protocol) -> None:
-        """Stand below `inner`."""
+        """Initialise below `inner`."""
         self._inner = inner
         self._buffer = memoryview(bytearray(_READ_BYTES))
         self._room = asyncio.Event()
@@ -49,21 +49,21 @@ class Wire(asyncio.BufferedProtocol):
         self._transport: Any
         self._untaken = 0
         self.fault = ""
-        """Why the connection as a whole is over; "" while it is up."""
+        """Reason of the end of the whole connection; "" while it is open."""
 
     def unsent(self) -> int:
-        """Return the bytes handed over that the server has not acknowledged."""
-        count: int = self._transport.get_write_buffer_size()  # a channel has it, too
+        """Return the number of bytes that the server has not acknowledged."""
+        count: int = self._transport.get_write_buffer_size()  # channels have this method, too
         line = self._transport.get_extra_info("socket")
         return count + (unsent_in(line) if line is not None and line.fileno() >= 0 else 0)
 
     @property
     def is_full(self) -> bool:
-        """Whether the kernel has not taken everything yet."""
+        """Whether some data still waits for the kernel."""
         return not self._room.is_set()
 
     async def drained(self) -> None:
-        """Wait until the kernel has everything, or the connection is over."""
+        """Wait until the kernel has all data, or the connection has ended."""
         await self._room.wait()
 
     async def gone(self) -> None:
@@ -71,12 +71,12 @@ class Wire(asyncio.BufferedProtocol):
         await self._gone.wait()
 
     def end(self, reason: str) -> None:
-        """Note why the connection is over; the first reason counts."""
+        """Record the reason of the end; the first reason counts."""
         self.fault = self.fault or reason
         self._room.set()
 
     def reset(self) -> None:
-        """Close at once, and let the kernel forget what it has not sent: nothing comes late."""
+        """Close at once and discard unsent data in the kernel, so that nothing arrives late."""
         line = self._transport.get_extra_info("socket")
         if line is not None and line.fileno() >= 0:
             forget_unsent(line)
@@ -86,50 +86,50 @@ class Wire(asyncio.BufferedProtocol):
     # -- called by asyncio
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Let asyncssh begin."""
+        """Pass the connection to asyncssh."""
         self._transport = transport
         self._transport.set_write_buffer_limits(high=0)
         self._inner.connection_made(transport)
 
     def get_buffer(self, sizehint: int) -> memoryview:
-        """Return where to read to."""
+        """Return the receive buffer."""
         return self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:
-        """Pass on what was read."""
+        """Pass on the received bytes."""
         self.passes(bytes(self._buffer[:nbytes]))
 
     def passes(self, data: bytes) -> None:
-        """Pass on what came, and end the line when it makes us answer without end."""
+        """Pass on received data; too many unsent replies close the connection."""
         before = self._transport.get_write_buffer_size()
         self._inner.data_received(data)
         after = self._transport.get_write_buffer_size()
         self._untaken = self._untaken + after - before if before else after
         if self._untaken > UNTAKEN_BYTES:
-            self.end("the line broke (the robot asks, and takes none of the answers)")
+            self.end("the connection broke (the robot asks, and takes none of the answers)")
             self._transport.abort()
 
     def eof_received(self) -> bool:
-        """Pass it on, once what came before is read; then the socket is closed."""
+        """Pass on the end of the stream after all earlier data; then close the socket."""
         self._at_last(self._no_more_comes)
         return True  # stay open until then
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Pass it on, once what came before is read, and let go of who waits."""
+        """Pass on the loss of the connection after all earlier data, and wake waiting tasks."""
         self._at_last(self._lost, exc)
 
     def pause_writing(self) -> None:
-        """The kernel is full."""
+        """Block writers while the kernel is full."""
         self._room.clear()
 
     def resume_writing(self) -> None:
-        """The kernel has taken everything."""
+        """Unblock writers."""
         self._room.set()
 
     # -- the end
 
     def _at_last(self, act: Callable[..., None], *words: Any, turns: int = _LAST_TURNS) -> None:
-        """Call `act` some turns of the loop from now: of two, the first one first."""
+        """Call `act` after some turns of the event loop, in the order of the calls."""
         loop = asyncio.get_running_loop()
         if turns:
             loop.call_soon(lambda: self._at_last(act, *words, turns=turns - 1))
@@ -138,7 +138,7 @@ class Wire(asyncio.BufferedProtocol):
 
     def _no_more_comes(self) -> None:
         self._inner.eof_received()
-        self.end(HUNG_UP)  # unless asyncssh knew better: what breaks from here on follows from it
+        self.end(HUNG_UP)  # unless asyncssh has a better reason; later errors follow from this end
         self._transport.close()
 
     def _lost(self, exc: Exception | None) -> None:
@@ -148,10 +148,10 @@ class Wire(asyncio.BufferedProtocol):
 
 
 class Through:
-    """What asyncssh calls a tunnel: hands it the connection that is to carry the SSH one."""
+    """A tunnel for asyncssh: provides the connection below the SSH connection."""
 
     def __init__(self, line: socket.socket | asyncssh.SSHClientConnection) -> None:
-        """Go over a connected socket, or over another SSH connection that forwards."""
+        """Use a connected socket, or another SSH connection that forwards."""
         self._line = line
         self._is_used = False
         self.wire: Wire
@@ -173,19 +173,19 @@ class Through:
         return channel, inner
 
     def give_up_unused(self) -> None:
-        """Close the socket, unless it has become a connection's own."""
+        """Close the socket, unless a connection uses it."""
         if isinstance(self._line, socket.socket) and not self._is_used:
             self._line.close()
 
 
 class _Nested(asyncssh.SSHTCPSession[bytes]):
-    """A channel of another SSH connection as what is below this one."""
+    """A channel of another SSH connection, as the socket of this one."""
 
     def __init__(self, wire: Wire) -> None:
         self._wire = wire
 
     def connection_made(self, chan: asyncssh.SSHTCPChannel[bytes]) -> None:
-        self._wire.connection_made(chan)  # type: ignore[arg-type] # as good as a transport
+        self._wire.connection_made(chan)  # type: ignore[arg-type] # compatible with a transport
 
     def data_received(self, data: bytes, datatype: int | None) -> None:
         self._wire.passes(data)

@@ -1,4 +1,4 @@
-"""The kinds of transport a document may name, imported only when used."""
+"""The types of transports in documents, imported only on use."""
 
 from urc.registry import Table
 
@@ -18,4 +18,4 @@ TRANSPORTS = Table(
         "mqtt": "urc.transports.mqtt:from_setup",
     },
 )
-"""Each row's factory takes a `urc.transports.base.Setup` and returns a `Transport`."""
+"""Type → factory, which takes a `urc.transports.base.Setup` and returns a `Transport`."""

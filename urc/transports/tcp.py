@@ -1,4 +1,4 @@
-"""TCP to a robot, or from one (``mode: listen``), with TLS where it is asked for."""
+"""TCP to a robot, or from one (``mode: listen``), with optional TLS."""
 
 import asyncio
 import errno
@@ -26,32 +26,32 @@ __all__ = ["READ_AHEAD_BYTES", "TcpListener", "TcpTransport", "from_setup"]
 
 
 HANDOVER_S = 6.0
-"""How long a robot that took the place of another waits for the line to be opened anew: a little
-longer than the back-off between attempts."""
+"""Lifetime of a robot's connection that has replaced another one, in seconds, until the next
+`open`. It is slightly longer than the backoff between attempts."""
 _WAITING = 8
 _AGAIN_S = 0.1
-"""Wait after a caller that could not be let in."""
+"""Delay after a failed accept, in seconds."""
 
 _Caller = tuple[socket.socket, str]
-"""A connection, and where it comes from."""
+"""A connection, and its remote address."""
 
 
 class TcpListener(StreamLine):
-    """Listens on a port; one robot at a time, and a newer one takes the place of the older.
+    """Listens on a port for one robot at a time; a newer robot replaces the older one.
 
-    A failed `open` goes on listening, so that a robot which comes between two attempts is not
-    refused. So does the first `close` after a newer robot came: it is the next `open` that gets it,
-    within `HANDOVER_S`. Any other `close` leaves nothing.
+    A failed `open` keeps listening, so that a robot between two attempts is not refused. The first
+    `close` after a replacement keeps listening, too: the next `open` gets the newer robot, within
+    `HANDOVER_S`. Any other `close` stops listening.
     """
 
     def __init__(self, bind: str, port: int, *, only: str = "", tls: Tls | None = None) -> None:
-        """Prepare the line.
+        """Initialise without listening.
 
         Args:
-            bind: own address; "" for all of them.
+            bind: own address; "" for all.
             port: own port, 0..65535; 0 lets the system choose.
-            only: host that may connect; "": any.
-            tls: how the line is made secret.
+            only: host that may connect; "" for any.
+            tls: TLS settings.
         """
         super().__init__()
         self._bind = bind
@@ -62,21 +62,21 @@ class TcpListener(StreamLine):
         self._listener: socket.socket | None = None
         self._newer: _Caller | None = None
         self._door: asyncio.Task[None] | None = None
-        """Lets callers in where the loop cannot watch sockets."""
+        """Accepts connections if the event loop cannot watch sockets."""
         self._allowed_now: tuple[frozenset[str] | None] | None = None
-        """Who may come in; None while nobody is let in at all."""
+        """Addresses that may connect; None while no connection is accepted."""
         self._again: asyncio.TimerHandle | None = None
         self._came = asyncio.Event()
         self._shut: asyncio.TimerHandle | None = None
 
     @property
     def address(self) -> str:
-        """Where robots connect to: ``tcp 0.0.0.0:6789 (listening)``."""
+        """Listening address as text for people: ``tcp 0.0.0.0:6789 (listening)``."""
         return f"tcp {self._place} (listening)"
 
     @property
     def port(self) -> int:
-        """The own port, once it is listened on."""
+        """Own port, known while listening."""
         return self._port if self._listener is None else int(self._listener.getsockname()[1])
 
     @property
@@ -108,7 +108,7 @@ class TcpListener(StreamLine):
             await self._shut_down()
 
     async def abort(self) -> None:
-        """Close at once; what the robot has not got by now it never gets. Never raises."""
+        """Close at once and discard unsent data. Never raises."""
         await super().abort()
         await self._shut_down()
 
@@ -154,7 +154,7 @@ class TcpListener(StreamLine):
             self._allowed_now = (allowed,)
             try:
                 self._watch()
-            except NotImplementedError:  # the usual loop of Windows
+            except NotImplementedError:  # the default event loop of Windows
                 self._door = asyncio.create_task(self._let_in(self._listener))
 
     def _watch(self) -> None:
@@ -162,15 +162,15 @@ class TcpListener(StreamLine):
             asyncio.get_running_loop().add_reader(self._listener, self._knock, self._listener)
 
     def _knock(self, listener: socket.socket) -> None:
-        """Take a caller in; called by the loop.
+        """Accept a connection; called by the event loop.
 
-        The loop's own way to accept, when it is cancelled, may lose a connection that has come.
+        The loop's own accept may lose a new connection when it is cancelled.
         """
         try:
             line, address = listener.accept()
         except BlockingIOError:
             return
-        except OSError:  # no descriptors left, or the caller has gone again
+        except OSError:  # no descriptors left, or the caller has gone
             loop = asyncio.get_running_loop()
             loop.remove_reader(listener)
             self._again = loop.call_later(_AGAIN_S, self._watch)
@@ -179,7 +179,7 @@ class TcpListener(StreamLine):
         self._meet(line, address)
 
     async def _let_in(self, listener: socket.socket) -> None:
-        """Take callers in, where the loop cannot watch sockets."""
+        """Accept connections if the event loop cannot watch sockets."""
         loop = asyncio.get_running_loop()
         while True:
             try:
@@ -192,7 +192,7 @@ class TcpListener(StreamLine):
             self._meet(line, address)
 
     def _meet(self, line: socket.socket, address: tuple[str, int]) -> None:
-        """Let the newest caller wait for `open`, and end the connection that stands."""
+        """Keep the newest connection for `open`, and end the present one."""
         allowed = self._allowed_now[0] if self._allowed_now is not None else None
         if allowed is not None and _plain(address[0]) not in allowed:
             line.close()
@@ -204,7 +204,7 @@ class TcpListener(StreamLine):
         self._replace()
 
     def _replace(self) -> None:
-        """Let the connection that stands know that it is over."""
+        """Inform the present connection of its end."""
         stream = self._stream
         if stream is None or self._newer is None:
             return
@@ -243,7 +243,7 @@ class TcpListener(StreamLine):
 
 
 def _plain(address: str) -> str:
-    """Return an IPv4 address that came in over IPv6 as people write it, without a zone."""
+    """Return an IPv4-mapped address in IPv4 notation, without a zone."""
     return address.removeprefix("::ffff:").partition("%")[0]
 
 
@@ -251,7 +251,7 @@ _LOOPBACK = "127.0.0.1"
 
 
 class TcpTransport(StreamLine):
-    """One TCP connection, opened as often as it is needed."""
+    """One TCP connection; it may be opened repeatedly."""
 
     def __init__(
         self,
@@ -262,19 +262,19 @@ class TcpTransport(StreamLine):
         tls: Tls | None = None,
         read_ahead_bytes: int = READ_AHEAD_BYTES,
     ) -> None:
-        """Prepare a line to `host` (name or address), `port` 1..65535. Nothing is opened yet."""
+        """Initialise for `host` (name or address) and `port` 1..65535, without connecting."""
         super().__init__()
         self._reach = Reach(host, port, via=via, tls=tls, read_ahead_bytes=read_ahead_bytes)
 
     @property
     def address(self) -> str:
-        """Where it leads, for people: ``tcp 192.168.1.5:6789``."""
+        """Target of the transport as text for people: ``tcp 192.168.1.5:6789``."""
         return f"tcp {self._reach.place}"
 
     async def open(self, timeout_s: float) -> None:
         """Connect, or raise `ConnectFailed` within `timeout_s` seconds.
 
-        Every address of a name is tried in turn, each with a fair share of the time that is left.
+        The addresses of a name are tried in turn, each with an equal share of the remaining time.
         """
         await self.close()
         self._stream = await self._reach.open(timeout_s)
@@ -282,30 +282,31 @@ class TcpTransport(StreamLine):
     # -- a `Prompt`
 
     def offer(self, data: bytes) -> bool:
-        """Hand `data` over if nothing waits before it; return whether it was taken."""
+        """Send `data` if no earlier data waits; return whether it was accepted."""
         stream = self._stream
         return type(stream) is Stream and stream.offer(data)
 
     @property
     def is_clogged(self) -> bool:
-        """Whether some of what was taken waits for the kernel; `send` waits for it."""
+        """Whether accepted data waits for the kernel; `send` waits for it."""
         stream = self._stream
         return type(stream) is Stream and not stream.is_writable
 
     def divert(self, sink: Callable[[bytes], bool]) -> None:
-        """Let `sink` have what arrives, before `receive`, until the line is closed."""
+        """Pass received data to `sink`, before `receive`, until the connection is closed."""
         if isinstance(self._stream, Stream):
             self._stream.sink = sink
 
 
 def from_setup(setup: Setup) -> Transport:
-    """Make a transport out of a document's options.
+    """Return a transport for the options of a document.
 
-    ``host`` and ``port`` lead to the robot; with ``mode: listen`` it comes to ``bind`` (loopback
-    unless told otherwise) and ``port``, and ``host`` is who may come, unless ``from: any``.
+    ``host`` and ``port`` are the address of the robot. With ``mode: listen`` the robot connects to
+    ``bind`` (loopback by default) and ``port``, and only ``host`` may connect, unless ``from:
+    any``.
 
     Raises:
-        TransportError: an option is missing or not usable.
+        TransportError: an option is missing or invalid.
     """
     options = setup.options
     mode = _options.choice("tcp", options, "mode", ("connect", "listen"), "connect")

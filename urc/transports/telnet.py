@@ -1,6 +1,6 @@
-"""Telnet to a robot: a stream of bytes beside which the two ends agree on options.
+"""Telnet to a robot: a stream of bytes with a negotiation of options.
 
-The line below is a TCP connection of this machine, or one that another transport carries.
+The connection below is a TCP connection of this machine, or a tunnelled one.
 """
 
 import asyncio
@@ -30,30 +30,30 @@ __all__ = ["TelnetTransport", "Wishes", "from_setup"]
 DEFAULT_PORT: Final = 23
 _QUICKACK: Final = getattr(socket, "TCP_QUICKACK", None)
 _COLUMNS: Final = 240
-"""Of the terminal that we say we are: so wide that no shell breaks a robot's line."""
+"""Width of our terminal, large enough that shells do not wrap the lines of a robot."""
 _LONGEST_NAME: Final = 40
 _SMALL_BYTES: Final = 1024
-"""With more at once, the system acknowledges soon enough by itself."""
+"""Limit in bytes below which an immediate acknowledgement pays off."""
 
 
 class Wishes(NamedTuple):
-    """What this end takes part in, and what it asks for by itself."""
+    """The Telnet options that URC requests or allows."""
 
     is_first: bool = False
-    """Our wishes are the first thing we send; else we only answer."""
+    """Whether URC starts the negotiation; otherwise it only replies."""
     echo: bool = False
-    """Whether the robot may repeat what it is sent."""
+    """Whether the robot may echo its input."""
     binary: bool = False
-    """Whether bytes are to pass as they are, both ways."""
+    """Whether bytes are transparent in both directions."""
     terminal: str = "VT100"
-    """What we say when asked which terminal we are."""
+    """Terminal type in replies."""
 
 
 class TelnetTransport(StreamLine):
-    """One Telnet connection, opened as often as it is needed."""
+    """One Telnet connection; it may be opened repeatedly."""
 
     def __init__(self, host: str, port: int, wishes: Wishes, via: Carrier | None = None) -> None:
-        """Prepare a line to `host`, through `via` if there is one. Nothing is opened yet."""
+        """Initialise for `host`, tunnelled through `via` if given, without connecting."""
         super().__init__()
         self._address = Address(host, port)
         self._wishes = wishes
@@ -61,7 +61,7 @@ class TelnetTransport(StreamLine):
 
     @property
     def address(self) -> str:
-        """Where it leads, for people: ``telnet 192.168.1.5:23``."""
+        """Target of the transport as text for people: ``telnet 192.168.1.5:23``."""
         return f"telnet {self._address.text}"
 
     async def open(self, timeout_s: float) -> None:
@@ -81,7 +81,7 @@ class TelnetTransport(StreamLine):
         except (OSError, UnicodeError) as fault:
             raise ConnectFailed(self._address.explain(fault)) from fault
         except PeerClosed as closed:
-            raise ConnectFailed(f"{place} closed the line at once") from closed
+            raise ConnectFailed(f"{place} closed the connection at once") from closed
         finally:
             if inner is not None:
                 await inner.abort()
@@ -92,7 +92,7 @@ class TelnetTransport(StreamLine):
             return await self._via.connect(host, port, timeout_s), None
         line = await self._address.dial(timeout_s)
         try:
-            # A Synch comes as urgent data; kept apart, its last byte would be missing.
+            # A Synch is urgent data; out of band, its last byte would be missing.
             line.setsockopt(socket.SOL_SOCKET, socket.SO_OOBINLINE, 1)
             return await adopt(line), line
         except BaseException:
@@ -101,14 +101,14 @@ class TelnetTransport(StreamLine):
 
 
 class _TelnetStream:
-    """The text of a line that speaks Telnet."""
+    """The text of a Telnet connection."""
 
     def __init__(self, inner: ByteStream, talk: TelnetTalk, line: socket.socket | None) -> None:
-        """Speak Telnet over `inner`; `line` is its socket, where it has one here."""
+        """Use Telnet over `inner`; `line` is its socket, if it has one here."""
         self._inner = inner
         self._talk = talk
         self._line = line
-        self._put = inner.put  # the way of every message: looked up once
+        self._put = inner.put  # the path of every message, looked up once
         self._encode = talk.encode
 
     async def take(self) -> bytes:
@@ -136,21 +136,21 @@ class _TelnetStream:
 
 
 def _acknowledge(line: socket.socket) -> None:
-    """Tell the other side at once that its bytes have come.
+    """Acknowledge the received bytes at once.
 
-    Telnet servers write in small pieces and wait for each to be acknowledged, which costs 40 ms a
-    command where that is put off. The system forgets the wish with every read.
+    Telnet servers send small segments and wait for each acknowledgement. A delayed one costs 40 ms
+    per command. The system resets this option with every read.
     """
     if _QUICKACK is not None:
-        with suppress(OSError):  # the line is going down
+        with suppress(OSError):  # the connection is closing
             line.setsockopt(socket.IPPROTO_TCP, _QUICKACK, 1)
 
 
 def from_setup(setup: Setup) -> TelnetTransport:
-    """Make a transport out of a document's options; docs/transports/telnet.md explains each.
+    """Return a transport for the options of a document; see docs/transports/telnet.md.
 
     Raises:
-        TransportError: an option is missing or not usable.
+        TransportError: an option is missing or invalid.
     """
     options = {"port": DEFAULT_PORT, **setup.options}
     terminal = _options.text("telnet", options, "terminal", "VT100")
@@ -170,7 +170,7 @@ def from_setup(setup: Setup) -> TelnetTransport:
 
 
 def _begin(wishes: Wishes) -> tuple[TelnetTalk, bytes]:
-    """Return a fresh talk, and what to send first."""
+    """Return a new negotiation and its first bytes to send."""
     binary = (BINARY,) if wishes.binary else ()
     echo = (ECHO,) if wishes.echo else ()
     talk = TelnetTalk(

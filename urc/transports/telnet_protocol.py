@@ -1,9 +1,9 @@
-"""Telnet's own talk, apart from any socket: what is text, what is negotiation, what to answer.
+"""The Telnet protocol without a socket: separation of text and negotiation, and replies.
 
-Pure. Options are agreed by the Q method (RFC 1143), which cannot loop: an answer is given only
-where something changes. As neither side here ever takes back what it agreed to by itself, its six
-states are the three of `_Side`. What is not in the tables of allowed options is refused, each time
-that it is asked for: servers negotiate in several rounds and wait for the last answer.
+Pure. Options are negotiated by the Q method (RFC 1143), which cannot loop: a reply is sent only for
+a change. Neither side here withdraws an agreed option, so its six states reduce to the three of
+`_Side`. Options outside the tables are refused at every request: servers negotiate in several
+rounds and wait for the last reply.
 """
 
 import re
@@ -13,29 +13,29 @@ from typing import Final
 __all__ = ["BINARY", "ECHO", "NAWS", "SGA", "TTYPE", "TelnetTalk"]
 
 BINARY: Final = 0
-"""Bytes as they are, NUL and CR too (RFC 856)."""
+"""Transparent bytes, NUL and CR included (RFC 856)."""
 ECHO: Final = 1
-"""The side that says so repeats what it is sent (RFC 857)."""
+"""Echo by the side that offers it (RFC 857)."""
 SGA: Final = 3
-"""No turn-taking (RFC 858)."""
+"""Suppress Go Ahead: full-duplex operation (RFC 858)."""
 TTYPE: Final = 24
-"""Name of the terminal, when asked for it (RFC 1091)."""
+"""Terminal type on request (RFC 1091)."""
 NAWS: Final = 31
-"""Size of the terminal's window (RFC 1073)."""
+"""Window size of the terminal (RFC 1073)."""
 
 _SE, _SB, _WILL, _WONT, _DO, _DONT, _IAC = 240, 250, 251, 252, 253, 254, 255
 _CR: Final = 13
 _SEND, _IS = b"\x01", b"\x00"
 _IAC_BYTE: Final = b"\xff"
 _LONGEST_DETAIL: Final = 256
-"""Bytes of a subnegotiation that are kept; what we answer to is shorter."""
+"""Longest kept subnegotiation in bytes; all supported ones are shorter."""
 _BARE_CR: Final = re.compile(rb"\r(?![\n\0])")
 
 _Step = Callable[[bytes, int], int]
 
 
 class _Side:
-    """The options of one side: ours (asked for by DO) or the other's (offered by WILL)."""
+    """The options of one side: ours (requested by DO) or the other's (offered by WILL)."""
 
     def __init__(self, agree: int, refuse: int, allowed: frozenset[int]) -> None:
         self._agree, self._refuse, self._allowed = agree, refuse, allowed
@@ -43,14 +43,14 @@ class _Side:
         self._asked: set[int] = set()
 
     def ask(self, option: int) -> bytes:
-        """Return our wish that `option` be on."""
+        """Return the request to enable `option`."""
         if option in self.active or option in self._asked:
             return b""
         self._asked.add(option)
         return bytes((_IAC, self._agree, option))
 
     def told_on(self, option: int) -> bytes:
-        """Return the answer to a request or an offer to switch `option` on."""
+        """Return the reply to a request or offer to enable `option`."""
         if option in self.active:
             return b""
         if option in self._asked:
@@ -63,7 +63,7 @@ class _Side:
         return bytes((_IAC, self._refuse, option))
 
     def told_off(self, option: int) -> bytes:
-        """Return the answer to a request or an announcement that `option` is off."""
+        """Return the reply to a request or announcement to disable `option`."""
         self._asked.discard(option)
         if option not in self.active:
             return b""
@@ -72,7 +72,7 @@ class _Side:
 
 
 class TelnetTalk:
-    """One end of a Telnet connection, either end."""
+    """The protocol state of one end of a Telnet connection."""
 
     def __init__(
         self,
@@ -83,14 +83,14 @@ class TelnetTalk:
         columns: int = 80,
         rows: int = 24,
     ) -> None:
-        """Prepare a talk in which nothing has been agreed.
+        """Initialise without any agreed option.
 
         Args:
-            ours: options we take on when asked to.
-            theirs: options the other side may take on.
-            terminal: its name, for who asks.
-            columns: its width in characters, 1..65535.
-            rows: its height.
+            ours: options that we accept on request.
+            theirs: options that the other side may use.
+            terminal: terminal type for replies.
+            columns: width in characters, 1..65535.
+            rows: height in characters.
         """
         self._ours = _Side(_WILL, _WONT, ours)
         self._theirs = _Side(_DO, _DONT, theirs)
@@ -104,24 +104,24 @@ class TelnetTalk:
 
     @property
     def ours(self) -> frozenset[int]:
-        """The options that are on at this end."""
+        """Enabled options of this end."""
         return frozenset(self._ours.active)
 
     @property
     def theirs(self) -> frozenset[int]:
-        """The options that are on at the other end."""
+        """Enabled options of the other end."""
         return frozenset(self._theirs.active)
 
     def ask(self, *, ours: tuple[int, ...] = (), theirs: tuple[int, ...] = ()) -> bytes:
-        """Return the bytes that say which options should be on."""
+        """Return the bytes that request these options."""
         wishes = [self._ours.ask(option) for option in ours]
         return b"".join(wishes + [self._theirs.ask(option) for option in theirs])
 
     def receive(self, data: bytes) -> tuple[bytes, bytes]:
-        """Return the text in `data`, and the bytes that must be sent in answer to the rest.
+        """Return the text in `data`, and the bytes of the replies to the rest.
 
-        A sequence may be cut anywhere between two calls. Commands (interrupt, Synch …) mean
-        nothing to a robot's driver and are dropped.
+        A sequence may be split anywhere between two calls. Commands (interrupt, Synch …) are
+        irrelevant to drivers and dropped.
         """
         if self._step == self._text and _IAC not in data:
             return self._as_meant(data), b""
@@ -134,17 +134,17 @@ class TelnetTalk:
         return found, answers
 
     def encode(self, data: bytes) -> bytes:
-        """Return `data` as it goes over the line: a CR alone is CR NUL, and 255 is doubled."""
-        # A number is looked for ten times as fast as a byte string.
+        """Return `data` in its wire form: a single CR becomes CR NUL, and 255 is doubled."""
+        # Searching for a number is ten times as fast as for a byte string.
         if _CR in data and BINARY not in self._ours.active:
             data = _BARE_CR.sub(b"\r\0", data)
         return data.replace(_IAC_BYTE, b"\xff\xff") if _IAC in data else data
 
     def _as_meant(self, text: bytes) -> bytes:
-        """Return text without NUL, which is nothing but the second half of a CR, or padding."""
+        """Return text without NUL, which only follows a CR or serves as padding."""
         return text if BINARY in self._theirs.active else text.translate(None, b"\0")
 
-    # -- where in the stream we are; each takes bytes from `at` and returns the next place
+    # -- states of the parser; each consumes bytes from `at` and returns the next offset
 
     def _text(self, data: bytes, at: int) -> int:
         end = data.find(_IAC_BYTE, at)
@@ -198,7 +198,7 @@ class TelnetTalk:
         if data[at] == _SE:
             self._answers.append(self._answer_to(bytes(self._detail)))
             return at + 1
-        return self._command(data, at)  # its end is missing: the new command counts
+        return self._command(data, at)  # the end is missing: the new command takes precedence
 
     def _answer_to(self, detail: bytes) -> bytes:
         asks_terminal = detail == bytes((TTYPE,)) + _SEND

@@ -1,7 +1,7 @@
-"""A connected socket for a library that brings its own protocol, and what went wrong in one line.
+"""Connected sockets for libraries with their own protocol, and one-line error texts.
 
-The libraries' own ways of connecting look names up in threads that a program waits for at its end;
-this one does as the TCP transport does, and says the same when it fails.
+The libraries would look up names in threads that delay the end of the program. This module connects
+like the TCP transport, with the same error texts.
 """
 
 import socket
@@ -14,25 +14,25 @@ __all__ = ["Address", "reason"]
 
 
 class Address:
-    """Host and port of a line, and how people write them."""
+    """The host and port of a connection, with their usual notation."""
 
     def __init__(self, host: str, port: int) -> None:
-        """Prepare; nothing is looked up yet."""
+        """Initialise without a lookup."""
         self.host = host
         self.port = port
         self.text = place_of(host, port)
         self._lookup = Lookup(host, port, socket.SOCK_STREAM)
 
     async def dial(self, timeout_s: float) -> socket.socket:
-        """Return a connected socket that does not block; each address gets a fair share of time.
+        """Return a connected non-blocking socket; each address gets an equal share of the time.
 
         Raises:
-            OSError, UnicodeError: what `explain` puts into words.
+            OSError, UnicodeError: an error for `explain`.
         """
         return await self._lookup.first(connected, timeout_s)
 
     def explain(self, fault: Exception) -> str:
-        """Return one line for people about why `dial` could not connect."""
+        """Return one line for people with the reason of a failed `dial`."""
         if isinstance(fault, OSError | UnicodeError):
             return explain(self.host, self.text, fault)
         return f"cannot connect to {self.text} ({reason(fault)})"

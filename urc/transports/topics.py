@@ -1,8 +1,8 @@
-"""What has arrived on a line of topics and has not been taken yet.
+"""The bounded queue of received topic messages.
 
-A robot that publishes faster than its messages are taken must neither be held up (one stalled
-reader freezes a topic for everybody) nor fill our memory. So each topic keeps its newest messages,
-and of the others the oldest go; answers are kept apart, since nobody repeats them.
+A fast publisher must neither be blocked nor fill our memory: one stalled reader would freeze a
+topic for all clients. So each topic keeps its newest messages. Responses are kept separately, since
+they are not repeated.
 """
 
 import asyncio
@@ -14,41 +14,41 @@ from urc.transports.base import PeerClosed
 __all__ = ["Inbox"]
 
 TOPIC_MESSAGES = 256
-"""Messages of one topic that wait at most."""
+"""Limit of queued messages per topic."""
 TOPIC_BYTES = 524_288
-"""Size of all of them; a single larger one (an image) waits alone."""
+"""Limit of queued bytes per topic; a single larger message (an image) is queued alone."""
 MESSAGES = 4096
-"""Messages of all topics together: behind a wildcard there may be any number."""
+"""Limit of queued messages of all topics; a wildcard may match any number of them."""
 ALL_BYTES = 33_554_432
-"""Size of all of them."""
+"""Limit of queued bytes of all topics."""
 A_TURN = 32
-"""Envelopes after which a reader lets the others have their turn on the loop."""
+"""Envelopes per turn of the event loop."""
 ANSWERS = 1024
-"""Responses and pieces of feedback that wait at most; their size is bounded by `ALL_BYTES`, too."""
+"""Limit of queued responses and feedback; `ALL_BYTES` bounds their size, too."""
 
 
 class Inbox:
-    """A bounded queue of envelopes in the order of their arrival; newest wins topic by topic."""
+    """A bounded queue of envelopes in the order of arrival; each topic keeps its newest ones."""
 
     def __init__(self) -> None:
         self._waiting: dict[int, Envelope] = {}
-        """By number, in the order of arrival."""
+        """Number → envelope, in the order of arrival."""
         self._topics: dict[str, deque[tuple[int, int]]] = {}
         """Topic → number and size of each of its messages."""
         self._sizes: dict[str, int] = {}
         self._bytes = 0
         self._messages = 0
         self._answers: dict[int, int] = {}
-        """Number → size of each answer that waits."""
+        """Number → size of each queued response."""
         self._answers_bytes = 0
         self._number = 0
         self._arrived = asyncio.Event()
         self._ended: str | None = None
         self.dropped = 0
-        """Envelopes that were given up for newer ones."""
+        """Number of dropped envelopes."""
 
     def message(self, topic: str, envelope: Envelope, size_bytes: int) -> None:
-        """Add a message of `topic`, and give up as many old ones as it needs."""
+        """Add a message of `topic`, dropping old ones as necessary."""
         queue = self._topics.get(topic)
         if queue is None:
             queue = self._topics[topic] = deque()
@@ -67,7 +67,7 @@ class Inbox:
             self._drop_oldest()
 
     def answer(self, envelope: Envelope, size_bytes: int = 0) -> None:
-        """Add a response or a piece of feedback; one too many is given up."""
+        """Add a response or feedback; it is dropped if the queue is full."""
         is_full = self._answers and self._answers_bytes + size_bytes > ALL_BYTES
         if len(self._answers) >= ANSWERS or is_full:
             self.dropped += 1
@@ -76,23 +76,23 @@ class Inbox:
         self._answers_bytes += size_bytes
 
     def end(self, reason: str) -> None:
-        """No more will come; what waits can still be taken."""
+        """End the queue; queued envelopes can still be read."""
         if self._ended is None:
             self._ended = reason
         self._arrived.set()
 
     @property
     def ended(self) -> str | None:
-        """Why no more will come; None while the line is up."""
+        """Reason of the end; None while the connection is open."""
         return self._ended
 
     @property
     def is_filling(self) -> bool:
-        """Whether so much waits that whoever takes it should have a turn now."""
+        """Whether the reader should yield to the consumer."""
         return len(self._waiting) >= A_TURN
 
     async def take(self) -> Envelope:
-        """Return the next envelope; raise `PeerClosed` when no more will come."""
+        """Return the next envelope; raise `PeerClosed` at the end."""
         while not self._waiting:
             if self._ended is not None:
                 raise PeerClosed(self._ended)
@@ -113,7 +113,7 @@ class Inbox:
         return self._number
 
     def _drop(self, topic: str, number: int) -> None:
-        """Give up the oldest message of `topic`, which has that number."""
+        """Drop the oldest message of `topic`, which has that number."""
         del self._waiting[number]
         self._forget(topic)
         self.dropped += 1
@@ -125,12 +125,12 @@ class Inbox:
                 return
 
     def _forget(self, topic: str) -> None:
-        """Strike the oldest message of `topic`, which is not waiting any more."""
+        """Remove the bookkeeping of the oldest message of `topic`."""
         queue = self._topics[topic]
         _, size = queue.popleft()
         self._bytes -= size
         self._messages -= 1
         if queue:
             self._sizes[topic] -= size
-        else:  # topics behind a wildcard are without end
+        else:  # the number of topics behind a wildcard is unlimited
             del self._topics[topic], self._sizes[topic]

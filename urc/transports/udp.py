@@ -1,11 +1,10 @@
-"""UDP to a robot: a payload is a datagram, and a datagram is a frame.
+"""UDP to a robot: one payload is one datagram, and one datagram is one frame.
 
-There is no connection, so there is little that can be known: opening asks nobody, and a robot that
-is gone is only silent. What can be told is told: a machine that answers that nobody listens there,
-and a network that has no way. Where the robot's address is not given, it is the one of whoever
-talks first, and opening waits for that.
+UDP has no connections, so opening sends nothing, and a lost robot is only silent. Detectable errors
+are reported: a closed port of the robot, and a missing route. Without a declared address, the first
+sender becomes the robot, and opening waits for it.
 
-Datagrams that nobody takes push the oldest out; `dropped` counts them.
+When the receive queue is full, the oldest datagrams are dropped and counted in `dropped`.
 """
 
 import asyncio
@@ -26,23 +25,23 @@ from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport, Tra
 __all__ = ["UdpTransport", "from_setup"]
 
 READ_AHEAD = 512
-"""Most datagrams that are read before somebody takes them."""
+"""Limit of queued datagrams."""
 READ_AHEAD_BYTES = 1_048_576
-"""The same in bytes."""
+"""Limit of queued bytes."""
 _AT_ONCE = 64
-"""Datagrams that are read before others have their turn on the loop."""
+"""Datagrams per turn of the event loop."""
 _LONGEST = 65_536
 _RECVERR = {socket.AF_INET: (socket.IPPROTO_IP, 11), socket.AF_INET6: (socket.IPPROTO_IPV6, 25)}
-"""IP_RECVERR of Linux, which Python does not name: refusals reach unconnected sockets, too."""
+"""IP_RECVERR of Linux, missing in Python: it reports refusals on unconnected sockets, too."""
 _LOST_HERE = (errno.ENOBUFS, errno.EAGAIN, errno.ENOMEM)
-"""The datagram found no place on this machine: that is how datagrams get lost."""
+"""Errors that mean a datagram lost on this machine, as UDP permits."""
 _NO_WAY = (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENETDOWN, errno.EADDRNOTAVAIL)
 
 _Address = tuple[str | int, ...]
 
 
 class UdpTransport:
-    """One socket that talks to one robot, or to all that hear a broadcast."""
+    """One socket for one robot, or for all receivers of a broadcast."""
 
     def __init__(
         self,
@@ -54,15 +53,15 @@ class UdpTransport:
         accepts_any: bool = False,
         is_broadcast: bool = False,
     ) -> None:
-        """Prepare the line. Nothing is opened yet.
+        """Initialise without opening the socket.
 
         Args:
-            host: the robot's name or address; "": whoever talks first.
-            port: where it listens, 1..65535; 0: it answers where it is heard from.
+            host: name or address of the robot; "" for the first sender.
+            port: port of the robot, 1..65535; 0 for the source port of its datagrams.
             listen: own port; 0 lets the system choose.
-            bind: own address; "": all of them.
-            accepts_any: take datagrams from everybody, not from `host` alone.
-            is_broadcast: `host` stands for many.
+            bind: own address; "" for all.
+            accepts_any: whether to accept datagrams from all senders, not only from `host`.
+            is_broadcast: whether `host` is a broadcast address.
         """
         self._host = host
         self._port = port
@@ -73,30 +72,30 @@ class UdpTransport:
         self._lookup = Lookup(host, port, socket.SOCK_DGRAM) if host else None
         self._allowed: frozenset[str] = frozenset()
         self._robot: _Address | None = None
-        """Where datagrams go; None until somebody has talked."""
+        """Destination address; None until a robot has sent a datagram."""
         self._line: socket.socket | None = None
         self._endpoint: asyncio.DatagramTransport | None = None
-        """Reads `_line` where the loop cannot watch sockets."""
+        """Reads `_line` if the event loop cannot watch sockets."""
         self._buffer = memoryview(bytearray(_LONGEST))
         self._arrived: deque[bytes] = deque()
         self._arrived_bytes = 0
         self._ended = CLOSED
         self._changed = asyncio.Event()
         self.dropped = 0
-        """Datagrams that came and were pushed out by newer ones, since the transport was made."""
+        """Number of dropped datagrams since the creation of the transport."""
 
     @property
     def address(self) -> str:
-        """Where it leads, for people: ``udp 192.168.10.1:8889``, ``udp *:14550 (listening)``."""
+        """Target as text for people: ``udp 192.168.10.1:8889``, ``udp *:14550 (listening)``."""
         if self._host and self._port:
             return f"udp {place_of(self._host, self._port)}"
         sender = f" for {self._host}" if self._host else ""
         return f"udp {place_of(self._bind or '*', self._listen)} (listening{sender})"
 
     async def open(self, timeout_s: float) -> None:
-        """Take the own port, at once where the robot's host is known.
+        """Bind the own port, and return at once if the address of the robot is known.
 
-        Otherwise wait until somebody talks, or raise `ConnectFailed` within `timeout_s` seconds.
+        Otherwise wait for the first datagram, or raise `ConnectFailed` within `timeout_s` seconds.
         """
         await self.close()
         try:
@@ -108,14 +107,14 @@ class UdpTransport:
         except TimeoutError as fault:
             is_known = self._line is not None
             await self.close()
-            what = "nobody has talked to" if is_known else "no answer about the host of"
+            what = "no datagram has reached" if is_known else "no answer about the host of"
             raise ConnectFailed(f"{what} {self.address} within {timeout_s:g} s") from fault
         except BaseException:
             await self.close()
             raise
 
     async def receive(self) -> bytes:
-        """Return the next datagram; raise `PeerClosed` when the line is closed or refused."""
+        """Return the next datagram; raise `PeerClosed` when the socket is closed or refused."""
         while not self._arrived:
             if self._ended:
                 raise PeerClosed(self._ended)
@@ -126,7 +125,7 @@ class UdpTransport:
         return data
 
     async def send(self, data: Payload) -> None:
-        """Send `data` as one datagram; raise `TransportError` if that cannot be."""
+        """Send `data` as one datagram; raise `TransportError` on an error."""
         payload = as_bytes(data)
         if self._line is None or self._ended or self._robot is None:
             raise PeerClosed(self._ended or CLOSED)
@@ -137,13 +136,16 @@ class UdpTransport:
                 self._take_fault(fault, len(payload))
 
     def offer(self, data: bytes) -> bool:
-        """Send `data` without a turn of the loop; return whether it went well. Never waits."""
+        """Send `data` without a turn of the event loop; return whether it succeeded.
+
+        Never waits.
+        """
         if self._line is None or self._ended or self._robot is None:
             return False
         try:
             self._line.sendto(data, self._robot)
         except OSError:
-            return False  # `send` finds out what is to be said about it
+            return False  # `send` then handles the error
         return True
 
     async def close(self) -> None:
@@ -152,7 +154,7 @@ class UdpTransport:
         endpoint, self._endpoint = self._endpoint, None
         if endpoint is not None:
             endpoint.abort()
-            await asyncio.sleep(0)  # the loop closes the socket in its next turn
+            await asyncio.sleep(0)  # the event loop closes the socket in its next turn
         elif line is not None:
             with suppress(NotImplementedError):
                 asyncio.get_running_loop().remove_reader(line)
@@ -169,7 +171,7 @@ class UdpTransport:
                 rows = await self._lookup.addresses()
             except (OSError, UnicodeError) as fault:
                 raise ConnectFailed(explain(self._host, self._host, fault)) from fault
-            # Nobody tells which address of a name works, and robots have the old kind.
+            # The working address of a name is unknown, and robots use IPv4.
             family, address = min(rows, key=lambda row: row[0] != socket.AF_INET)
             self._allowed = frozenset(str(one[0]).partition("%")[0] for _, one in rows)
             self._robot = tuple(address) if self._port else None  # type: ignore[arg-type]
@@ -178,7 +180,7 @@ class UdpTransport:
         loop = asyncio.get_running_loop()
         try:
             loop.add_reader(line, self._read)
-        except NotImplementedError:  # the usual loop of Windows
+        except NotImplementedError:  # the default event loop of Windows
             self._endpoint, _ = await loop.create_datagram_endpoint(
                 lambda: _Endpoint(self._heard, self._note), sock=line
             )
@@ -200,7 +202,7 @@ class UdpTransport:
         return line
 
     def _read(self) -> None:
-        """Take what has arrived; called by the loop."""
+        """Read the received datagrams; called by the event loop."""
         line = self._line
         for index in range(_AT_ONCE):
             if line is None:
@@ -209,7 +211,7 @@ class UdpTransport:
                 count, sender = line.recvfrom_into(self._buffer)
             except BlockingIOError:
                 if not index:
-                    _forget_faults(line)  # what keeps the loop awake is no datagram
+                    _forget_faults(line)  # an error, not a datagram, keeps the event loop busy
                 return
             except OSError as fault:
                 _forget_faults(line)
@@ -218,7 +220,7 @@ class UdpTransport:
             self._heard(bytes(self._buffer[:count]), sender)
 
     def _heard(self, datagram: bytes, sender: _Address) -> None:
-        """Keep a datagram of the robot."""
+        """Queue a datagram of the robot."""
         host = str(sender[0]).partition("%")[0]
         if not datagram or not (self._accepts_any or host in self._allowed):
             return
@@ -236,7 +238,7 @@ class UdpTransport:
             self._take_fault(fault, 0)
 
     def _take_fault(self, fault: OSError, length: int) -> None:
-        """End the line for what is wrong with it, and raise that.
+        """End the connection because of an error, and raise it.
 
         Raises:
             TransportError: always.
@@ -259,7 +261,7 @@ class UdpTransport:
 
 
 class _Endpoint(asyncio.DatagramProtocol):
-    """Passes on what the loop reads by itself."""
+    """Passes on the datagrams that the event loop reads."""
 
     def __init__(
         self, heard: Callable[[bytes, _Address], None], note: Callable[[OSError], None]
@@ -276,10 +278,10 @@ class _Endpoint(asyncio.DatagramProtocol):
 
 
 def from_setup(setup: Setup) -> Transport:
-    """Make a transport out of a document's options.
+    """Return a transport for the options of a document.
 
     Raises:
-        TransportError: an option is missing or not usable.
+        TransportError: an option is missing or invalid.
     """
     options = setup.options
     if setup.via is not None:
@@ -305,7 +307,7 @@ def from_setup(setup: Setup) -> Transport:
 
 
 def _forget_faults(line: socket.socket) -> None:
-    """Empty the queue in which Linux keeps why earlier datagrams did not arrive."""
+    """Empty the Linux error queue of earlier datagrams."""
     if sys.platform == "linux":
         with suppress(OSError):
             while True:

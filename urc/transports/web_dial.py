@@ -1,7 +1,7 @@
-"""Connections to the one place that a web transport leads to: directly, with TLS, through another.
+"""Connections to the server of a web transport: direct or tunnelled, with or without TLS.
 
-`Reach` gives streams of our own; a library that brings its own protocol wants a socket, and gets
-either the connection's own or, where that is no plain one, an end of a pair that is pumped.
+`Reach` returns our own streams. A library with its own protocol needs a socket. It gets the socket
+of a plain connection, or one end of a socket pair with a relay.
 """
 
 import asyncio
@@ -30,20 +30,20 @@ _PIECE_BYTES = 65536
 
 
 class Dialer:
-    """Connects to one place, as often as it is asked."""
+    """Connects to one server, repeatedly."""
 
     def __init__(self, place: WebPlace, *, tls: Tls | None, via: Carrier | None) -> None:
-        """Lead to `place`, made secret by `tls`, through `via` if there is one."""
+        """Initialise for `place`, with `tls` and through `via` if given."""
         self._reach = Reach(place.host, place.port, via=via, tls=tls)
         is_plain = tls is None and via is None
         self._address = Address(place.host, place.port) if is_plain else None
         self._bridges: set[asyncio.Task[None]] = set()
         self._carried: ByteStream | None = None
-        """What the newest bridge leads to."""
+        """Stream of the newest relay."""
 
     @property
     def place(self) -> str:
-        """Where it leads, for people."""
+        """Target as text for people."""
         return self._reach.place
 
     async def stream(self, timeout_s: float) -> ByteStream:
@@ -63,18 +63,18 @@ class Dialer:
             raise ConnectFailed(self._address.explain(fault)) from fault
 
     def unsent(self, line: socket.socket) -> int:
-        """Return the bytes that were written to `line`, of `plug`, and have not left for good."""
+        """Return the number of unacknowledged bytes of `line`, a result of `plug`."""
         return unsent_in(line) + (unsent_of(self._carried) if self._bridges else 0)
 
     async def reset(self, line: socket.socket) -> None:
-        """Close `line` and what it leads to; what is unsent is never sent."""
+        """Close `line` and its stream; discard unsent data."""
         forget_unsent(line)
         carried = self._carried if self._bridges else None
         if carried is not None and isinstance(carried, SupportsReset):
             await carried.reset()
 
     async def close(self) -> None:
-        """End what is pumped."""
+        """End all relays."""
         bridges = list(self._bridges)
         for bridge in bridges:
             bridge.cancel()
@@ -92,7 +92,7 @@ class Dialer:
 
 
 async def _pump(stream: ByteStream, end: socket.socket) -> None:
-    """Move bytes both ways until either side has ended, then end the other."""
+    """Copy bytes in both directions until either side ends, then end the other."""
     loop = asyncio.get_running_loop()
 
     async def out() -> None:
@@ -118,4 +118,4 @@ async def _until_closed(way: Coroutine[Any, Any, None]) -> None:
     try:
         await way
     except (PeerClosed, OSError):
-        return  # either side has ended: the other is told by ending it, too
+        return  # either side has ended; closing tells the other one

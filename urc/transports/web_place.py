@@ -1,6 +1,6 @@
-"""What `http` and `websocket` share: the place a URL names, its TLS, its credentials, its headers.
+"""Shared options of `http` and `websocket`: URL, TLS, credentials, headers.
 
-The place is fixed when the transport is made: nothing that a robot answers can lead elsewhere.
+The server is fixed when the transport is made: no response of a robot can lead elsewhere.
 """
 
 import re
@@ -17,34 +17,34 @@ from urc.transports.base import TransportError
 __all__ = ["Credentials", "Options", "WebPlace"]
 
 MAX_HEADERS = 32
-"""Headers that a document may add to each request."""
+"""Limit of headers that a document may add to each request."""
 
 
 class WebPlace(NamedTuple):
-    """Where a URL leads."""
+    """The target of a URL."""
 
     is_secure: bool
     host: str
     port: int
     path: str
-    """With the leading slash, and the query if there is one."""
+    """Path with the leading slash, and the query if there is one."""
 
     @property
     def authority(self) -> str:
-        """Host and port as people write them, and as the header Host has them."""
+        """Host and port in their usual notation, as in the header Host."""
         return place_of(self.host, self.port)
 
 
 class Options:
-    """The options of one transport, read with one line for whatever is not usable."""
+    """A reader of the options of one transport, with one-line errors for invalid ones."""
 
     def __init__(self, kind: str, options: Mapping[str, object]) -> None:
-        """Read `options` of a transport of type `kind`."""
+        """Initialise for the `options` of a transport of type `kind`."""
         self.kind = kind
         self._options = options
 
     def part(self, name: str) -> "Options":
-        """Return the options inside the option `name`; none when it is left out."""
+        """Return the options inside the option `name`; empty when it is missing."""
         found = self._options.get(name)
         if found is None:
             return Options(self.kind, {})
@@ -57,7 +57,7 @@ class Options:
         return self._options.items()
 
     def tokens(self, name: str) -> list[str]:
-        """Return a list of names as HTTP knows them."""
+        """Return a list of HTTP tokens."""
         found = self._options.get(name) or []
         if not isinstance(found, list | tuple) or not all(
             isinstance(one, str) and _TOKEN.fullmatch(one) for one in found
@@ -66,7 +66,7 @@ class Options:
         return list(found)
 
     def text(self, name: str, default: str = "") -> str:
-        """Return a text without the spaces around it."""
+        """Return a text without surrounding spaces."""
         found = self._options.get(name, default)
         if found is None:
             return default
@@ -83,7 +83,7 @@ class Options:
         return found
 
     def flag(self, name: str, default: bool) -> bool:
-        """Return true or false."""
+        """Return a boolean."""
         found = self._options.get(name, default)
         if not isinstance(found, bool):
             raise TransportError(f"{self.kind} needs true or false as {name}, not {found!r}")
@@ -112,7 +112,7 @@ class Options:
         return seconds
 
     def place(self, plain: str) -> WebPlace:
-        """Return what the option `url` names, of scheme `plain` or, with TLS, `plain` + ``s``."""
+        """Return the target of the option `url`, with the scheme `plain` or `plain` + ``s``."""
         url = self.text("url")
         wanted = f"{self.kind} needs a url such as {plain}://192.168.4.1/, not {url!r}"
         try:
@@ -136,7 +136,7 @@ class Options:
         found: dict[str, str] = {}
         for name, value in self.part("headers").entries():
             text = str(value).strip()
-            # What follows the name may be a secret: it is not shown.
+            # The value may be a secret: it is not shown.
             if not _TOKEN.fullmatch(name) or not text.isprintable() or not text.isascii():
                 raise TransportError(f"{self.kind} cannot send the header {name[:40]!r} as it is")
             if is_reserved(name) or name.lower() in _OURS:
@@ -147,10 +147,10 @@ class Options:
         return found
 
     def credentials(self, kinds: tuple[str, ...]) -> "Credentials | None":
-        """Return the option `auth`, of one of `kinds`; None when it is left out.
+        """Return the option `auth`, of one of `kinds`; None when it is missing.
 
         Raises:
-            TransportError: what the kind needs is missing.
+            TransportError: a required value is missing.
         """
         if self._options.get("auth") is None:
             return None
@@ -165,7 +165,7 @@ class Options:
         return Credentials(kind, user, auth.text("password"))
 
     def tls(self, place: WebPlace) -> Tls | None:
-        """Return how the way to `place` is made secret, which its scheme decides."""
+        """Return the TLS settings for `place`, whose scheme decides."""
         option = self._options.get("tls")
         if place.is_secure:
             return Tls.of(self.kind, option or True)
@@ -175,7 +175,7 @@ class Options:
 
 
 class Credentials(NamedTuple):
-    """Who we are."""
+    """The credentials of URC for a server."""
 
     kind: str
     user: str
@@ -184,7 +184,7 @@ class Credentials(NamedTuple):
 
     @property
     def header(self) -> str:
-        """The value of Authorization for ``basic`` or ``bearer``."""
+        """Value of the header Authorization for ``basic`` or ``bearer``."""
         if self.kind == "bearer":
             return f"Bearer {self.secret}"
         return "Basic " + b64encode(f"{self.user}:{self.secret}".encode()).decode()

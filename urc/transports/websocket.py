@@ -1,8 +1,8 @@
-"""WebSocket to a robot (RFC 6455), on the library `websockets`.
+"""WebSocket to a robot (RFC 6455), with the library `websockets`.
 
-Each message is one payload. What arrives is read ahead a little and then left in the kernel's
-queue, so a robot that floods waits; `send` returns once the kernel has every byte. Pings tell a
-robot that is gone without a word: it answers none. Nothing is kept while there is no connection.
+Each message is one payload. A few messages are read ahead, all others stay in the queue of the
+kernel, so a flooding robot must wait. `send` returns once the kernel has every byte. Missing
+replies to pings reveal a lost robot. No data is kept without a connection.
 """
 
 import asyncio
@@ -29,23 +29,23 @@ from urc.transports.web_place import Options
 __all__ = ["WebSocketTransport", "from_setup"]
 
 READ_AHEAD_MESSAGES = 4
-"""Messages that are read before somebody takes them."""
+"""Limit of messages that are read ahead."""
 MAX_MESSAGE_BYTES = 1_048_576
 UNTAKEN_BYTES = 1_048_576
-"""Answers to pings that the robot may leave untaken."""
+"""Limit of unsent ping replies, in bytes."""
 _NORMAL = CloseCode.NORMAL_CLOSURE
 _CLOSE_S = 0.2
-"""How long a close in good order may take; then the connection is cut."""
+"""Timeout for an orderly close, in seconds; then the connection is reset."""
 
 
 class WebSocketTransport:
-    """One WebSocket, opened as often as it is needed."""
+    """One WebSocket; it may be opened repeatedly."""
 
     def __init__(self, setup: Setup) -> None:
-        """Read the options of `setup`; nothing is opened yet.
+        """Read the options of `setup`, without connecting.
 
         Raises:
-            TransportError: an option is missing or not usable.
+            TransportError: an option is missing or invalid.
         """
         options = Options("websocket", setup.options)
         self._place = options.place("ws")
@@ -64,12 +64,12 @@ class WebSocketTransport:
 
     @property
     def address(self) -> str:
-        """Where it leads, for people: ``websocket ws://192.168.4.1:80/control``."""
+        """Target of the transport as text for people: ``websocket ws://192.168.4.1:80/control``."""
         place = self._place
         return f"websocket ws{'s' * place.is_secure}://{place.authority}{place.path}"
 
     async def open(self, timeout_s: float) -> None:
-        """Connect and shake hands, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Connect and do the handshake, or raise `ConnectFailed` within `timeout_s` seconds."""
         await self.close()
         where = self._place.authority
         try:
@@ -84,7 +84,7 @@ class WebSocketTransport:
                 await self._dialer.close()
 
     async def receive(self) -> bytes:
-        """Return the next message that is not empty; raise `PeerClosed` when no more will come."""
+        """Return the next non-empty message; raise `PeerClosed` at the end of the connection."""
         if self._socket is None:
             raise PeerClosed(CLOSED)
         try:
@@ -96,11 +96,11 @@ class WebSocketTransport:
             raise PeerClosed(_end(ended)) from ended
 
     async def send(self, data: Payload) -> None:
-        """Hand one message to the kernel, waiting while it is full.
+        """Pass one message to the kernel, waiting for buffer space.
 
         Raises:
-            PeerClosed: the line broke.
-            TransportError: `data` is no text, and text is what is sent here.
+            PeerClosed: the connection broke.
+            TransportError: `data` is not text, on a connection that sends text.
         """
         message = as_bytes(data)
         if self._socket is None:
@@ -117,7 +117,7 @@ class WebSocketTransport:
             raise PeerClosed(_end(ended)) from ended
 
     async def close(self) -> None:
-        """Say good-bye and close, within a moment. Never raises, may be called twice."""
+        """Send a close message and close, after a short wait. Never raises, may be called twice."""
         connection, self._socket = self._socket, None
         try:
             if connection is not None:
@@ -126,7 +126,7 @@ class WebSocketTransport:
             await self._dialer.close()
 
     async def probe(self) -> None:
-        """Ask for a sign of life, and return when anything has come since."""
+        """Send a ping, and return when any data has arrived since."""
         connection = self._socket
         if not isinstance(connection, _Connection):
             raise PeerClosed(CLOSED)
@@ -138,7 +138,7 @@ class WebSocketTransport:
             raise PeerClosed(_end(ended)) from ended
 
     def unsent(self) -> int:
-        """Return the bytes handed over that have not left this machine for good."""
+        """Return the number of bytes that have not been acknowledged."""
         if self._socket is None:
             return 0
         transport = self._socket.transport
@@ -146,7 +146,7 @@ class WebSocketTransport:
         return transport.get_write_buffer_size() + self._dialer.unsent(line)
 
     async def abort(self) -> None:
-        """Close at once; what the robot has not got by now it never gets. Never raises."""
+        """Close at once and discard unsent data. Never raises."""
         connection, self._socket = self._socket, None
         try:
             if connection is not None:
@@ -162,9 +162,9 @@ class WebSocketTransport:
         place = self._place
         line = await self._dialer.plug(timeout_s)
         try:
-            # Our own bound holds over connecting and the handshake; the library needs none.
+            # Our own timeout covers connecting and the handshake.
             return await _Connect(
-                f"ws://{place.authority}{place.path}",  # TLS is underneath, if there is any
+                f"ws://{place.authority}{place.path}",  # any TLS is below
                 sock=line,
                 create_connection=_Connection,
                 subprotocols=self._subprotocols or None,
@@ -185,22 +185,22 @@ class WebSocketTransport:
 
 
 class _Connection(ClientConnection):
-    """Does not heap up answers to pings that the other side does not take.
+    """Limits the ping replies that the other side does not accept.
 
-    The library writes them without asking whether there is room.
+    The library writes them without checking for buffer space.
     """
 
     _untaken = 0
     _sign: asyncio.Future[None] | None = None
 
     def next_sign(self) -> asyncio.Future[None]:
-        """Return what is done when anything has come, also a part of a message, or the end."""
+        """Return a future that is done after any further data, or at the end."""
         if self._sign is None or self._sign.done():
             self._sign = asyncio.get_running_loop().create_future()
         return self._sign
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Let nobody wait for a sign that cannot come."""
+        """Wake the tasks that wait for further data."""
         self._give_sign()
         super().connection_lost(exc)
 
@@ -209,7 +209,7 @@ class _Connection(ClientConnection):
             self._sign.set_result(None)
 
     def data_received(self, data: bytes) -> None:
-        """Take what came, and end the line when it makes us answer without end."""
+        """Process received data; too many unsent replies close the connection."""
         self._give_sign()
         before = self.transport.get_write_buffer_size()
         super().data_received(data)
@@ -221,32 +221,32 @@ class _Connection(ClientConnection):
 
 
 class _Connect(connect):
-    """Follows no redirect: a robot must not lead us elsewhere."""
+    """Follows no redirect: a robot must not lead elsewhere."""
 
     def process_redirect(self, exc: Exception) -> Exception | str:
         return exc
 
 
 def from_setup(setup: Setup) -> Transport:
-    """Make a transport out of a document's options; raise `TransportError` for an unusable one."""
+    """Return a transport for the options of a document, or raise `TransportError`."""
     return WebSocketTransport(setup)
 
 
 async def _hang_up(connection: ClientConnection) -> None:
-    """Close in good order; if that takes too long, or nobody waits for it any more, cut."""
+    """Close in order; reset the connection after a timeout or a cancellation."""
     try:
         with suppress(TimeoutError):
             async with asyncio.timeout(2 * _CLOSE_S):
                 await connection.close()
     finally:
         connection.transport.abort()
-        with suppress(TimeoutError):  # one turn of the loop: then the socket is closed, too
+        with suppress(TimeoutError):  # one more turn, and the socket is closed
             async with asyncio.timeout(_CLOSE_S):
                 await connection.wait_closed()
 
 
 def _refusal(fault: Exception, where: str) -> str:
-    """Return one line for people about why there is no WebSocket."""
+    """Return one line for people with the reason of a failed handshake."""
     if isinstance(fault, InvalidStatus):
         response = fault.response
         target = response.headers.get("Location")
@@ -255,14 +255,14 @@ def _refusal(fault: Exception, where: str) -> str:
         status = one_line(f"{response.status_code} {response.reason_phrase}")
         return f"{where} answered {status} instead of a WebSocket"
     if isinstance(fault, NegotiationError):
-        return f"{where} wants what was not offered ({one_line(str(fault))})"
+        return f"{where} requires a feature that was not offered ({one_line(str(fault))})"
     if isinstance(fault, InvalidMessage | EOFError | ConnectionError):
-        return f"what listens on {where} does not speak HTTP, or closed the line"
+        return f"what listens on {where} does not speak HTTP, or closed the connection"
     return f"what listens on {where} is no WebSocket ({one_line(str(fault))})"
 
 
 def _end(ended: ConnectionClosed) -> str:
-    """Return one line for people about why a connection is over."""
+    """Return one line for people with the reason of the end."""
     theirs, ours, cause = ended.rcvd, ended.sent, ended.__cause__
     if theirs is not None and ended.rcvd_then_sent is not False:
         said = f" ({theirs.code} {one_line(theirs.reason)})" if theirs.code != _NORMAL else ""

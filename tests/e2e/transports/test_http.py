@@ -164,7 +164,7 @@ async def test_a_url_that_leads_elsewhere_is_not_asked_for(web: Server, url: str
         assert answer.attributes["ok"] is False
         assert "status" not in answer.attributes
         reason = str(answer.attributes["reason"])
-        assert "nobody else is asked" in reason or "is no URL" in reason
+        assert "only the robot is asked" in reason or "is no URL" in reason
 
 
 @WEB

@@ -267,7 +267,7 @@ async def test_server_that_vanishes_is_told(tmp_path: Path) -> None:
             assert transport.unsent() > 0
             with pytest.raises(PeerClosed) as told:
                 await asyncio.wait_for(transport.receive(), 2 * WAIT_S)
-            assert str(told.value) == "the line broke (connection timed out)"
+            assert str(told.value) == "the connection broke (connection timed out)"
         finally:
             await loss.end()
 

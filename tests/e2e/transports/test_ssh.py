@@ -115,9 +115,9 @@ async def test_killed_server_is_told_and_reached_again_when_it_is_back(sshd: Ssh
         assert (await through.take()).startswith(b"SSH-2.0")
         sshd.kill()
         assert await end_of(line) in (
-            "the robot closed the line",
-            "the line broke (connection reset by peer)",
-            "the line broke (broken pipe)",  # Linux calls a reset so that comes behind the end
+            "the robot closed the connection",
+            "the connection broke (connection reset by peer)",
+            "the connection broke (broken pipe)",  # Linux reports a late reset so
         )
         with pytest.raises(PeerClosed):
             await through.take()
@@ -143,7 +143,7 @@ async def test_frozen_server_is_noticed(sshd: Sshd, mode: str) -> None:
         await line.open(OPEN_S)
         sshd.stop()
         said = await end_of(line, GONE_WITHIN_S)
-        assert said == "the line broke (the robot does not answer any more)"
+        assert said == "the connection broke (the robot does not answer any more)"
         await line.close()
         with pytest.raises(ConnectFailed) as told:
             await line.open(0.5)
@@ -201,7 +201,7 @@ async def test_what_the_server_cannot_reach_is_told(sshd: Sshd) -> None:
         f"cannot connect to 127.0.0.1:1 through ssh 127.0.0.1:{sshd.port} (connection refused)"
     )
     await (await line.connect("127.0.0.1", sshd.port, OPEN_S)).abort()
-    with pytest.raises(PeerClosed, match="only carries others"):
+    with pytest.raises(PeerClosed, match="only tunnels others"):
         await line.send(b"?")
     await line.close()
 

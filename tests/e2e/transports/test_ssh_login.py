@@ -150,8 +150,8 @@ async def test_trusted_host_key_opens_the_line_until_it_changes(sshd: Sshd) -> N
     said = await refusal(line)
     assert said == (
         f"the host key of 127.0.0.1:{sshd.port} is another one: expected {before}, it shows "
-        f"{sshd.fingerprint} (ssh-ed25519); somebody may be listening in. If the robot was set up "
-        "anew, 'urc trust PROFILE gauge' trusts the new one"
+        f"{sshd.fingerprint} (ssh-ed25519); the connection may be intercepted. If the robot was "
+        "reinstalled, 'urc trust PROFILE gauge' trusts the new one"
     )
     assert sshd.said.count("Accepted") == logins
     assert file.read_text("ascii").count("\n") == 1

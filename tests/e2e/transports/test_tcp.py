@@ -322,7 +322,7 @@ async def test_quiet_line_that_is_cut_is_told() -> None:
             await loss.begin()
             with pytest.raises(PeerClosed) as told:
                 await asyncio.wait_for(transport.receive(), 2 * WAIT_S)
-            assert str(told.value) == "the line broke (connection timed out)"
+            assert str(told.value) == "the connection broke (connection timed out)"
         finally:
             await loss.end()
             await transport.close()

@@ -94,7 +94,7 @@ async def test_whoever_talks_first_is_the_robot() -> None:
     async with nothing_left():
         with pytest.raises(ConnectFailed) as told:
             await transport.open(0.2)
-        expected = f"nobody has talked to udp *:{port} (listening) within 0.2 s"
+        expected = f"no datagram has reached udp *:{port} (listening) within 0.2 s"
         assert str(told.value) == expected
         with robot() as vehicle:
             opening = asyncio.ensure_future(transport.open(WAIT_S))

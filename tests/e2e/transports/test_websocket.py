@@ -92,9 +92,9 @@ async def test_robot_that_ends_closes_the_line() -> None:
     async with robot("sh", "-c", "echo one; echo two") as port, line(port) as transport:
         assert await received(transport) == b"one"
         assert await received(transport) == b"two"
-        with pytest.raises(PeerClosed, match="the robot closed the line"):
+        with pytest.raises(PeerClosed, match="the robot closed the connection"):
             await received(transport)
-        with pytest.raises(PeerClosed, match="the robot closed the line"):
+        with pytest.raises(PeerClosed, match="the robot closed the connection"):
             await transport.send(b"three")
 
 

@@ -66,7 +66,7 @@ class Wire:
     async def close(self) -> None:
         self.is_open = False
 
-    def cut(self, reason: str = "the line broke") -> None:
+    def cut(self, reason: str = "the connection broke") -> None:
         self.arriving.put_nowait(PeerClosed(reason))
 
 

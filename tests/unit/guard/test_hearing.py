@@ -33,7 +33,7 @@ class ProbedWire(CountedWire):
     async def probe(self) -> None:
         self.probes += 1
         if self.is_broken:
-            raise PeerClosed("the line broke")
+            raise PeerClosed("the connection broke")
         if self.bug is not None:
             raise self.bug
         await self.lives.wait()

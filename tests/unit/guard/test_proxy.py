@@ -85,11 +85,11 @@ async def test_what_came_before_the_end_is_still_given() -> None:
     guard = Guard()
     await guard.line.open(1.0)
     guard.tell(wire.Received("wire", 1, b"last words"), 10)
-    guard.tell(wire.Lost("wire", 1, "the robot closed the line"))
+    guard.tell(wire.Lost("wire", 1, "the robot closed the connection"))
     assert await guard.line.receive() == b"last words"
-    with pytest.raises(PeerClosed, match="the robot closed the line"):
+    with pytest.raises(PeerClosed, match="the robot closed the connection"):
         await guard.line.receive()
-    with pytest.raises(PeerClosed, match="the robot closed the line"):
+    with pytest.raises(PeerClosed, match="the robot closed the connection"):
         await guard.line.send(b"x")
 
 
@@ -193,7 +193,7 @@ async def test_line_is_closed_before_and_after() -> None:
         assert not guard.line.is_open
         assert not guard.line.offer(b"x")
         for use in (guard.line.send(b"x"), guard.line.receive()):
-            with pytest.raises(PeerClosed, match="the line is closed"):
+            with pytest.raises(PeerClosed, match="the connection is closed"):
                 await use
     assert guard.said == [wire.Open("wire", 1, 1.0), wire.Close("wire", 1)]
 
@@ -372,7 +372,7 @@ async def test_frame_with_a_counter_is_taken_while_there_is_room() -> None:
 async def test_sender_of_a_frame_with_a_counter_is_told_what_has_left() -> None:
     guard = Guard()
     gone: list[Payload] = []
-    with pytest.raises(PeerClosed, match="the line is closed"):
+    with pytest.raises(PeerClosed, match="the connection is closed"):
         await guard.line.send_counted(counted(1), gone.append)
     await guard.line.open(1.0)
     sending = asyncio.ensure_future(guard.line.send_counted(counted(1), gone.append))
@@ -407,7 +407,7 @@ async def test_line_is_closed_once() -> None:
     await guard.line.close()
     await guard.line.close()
     assert guard.said == [wire.Close("wire", 1)]
-    with pytest.raises(PeerClosed, match="the line is closed"):
+    with pytest.raises(PeerClosed, match="the connection is closed"):
         await sending
 
 

@@ -41,7 +41,7 @@ FROM_GUARD: list[wire.FromGuard] = [
     wire.Received("wire", 3, IMAGE),
     wire.Sent("wire", 3, 8),
     wire.Refused("wire", 3, 8, "too many bytes", False),
-    wire.Lost("wire", 3, "the robot closed the line"),
+    wire.Lost("wire", 3, "the robot closed the connection"),
     wire.Closed("wire", 3),
     wire.Stopped("drive", "expired", 9),
     wire.Beat(0.001),

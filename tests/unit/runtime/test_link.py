@@ -119,7 +119,7 @@ async def test_robot_that_closes_at_once_is_not_hammered(is_per_request: bool) -
     async with opened(line, clock, line_profile(is_per_request=is_per_request)) as session:
         await clock.advance(60)
         assert 10 <= line.opens <= 18
-        assert state_of(session) == ("lost", "the robot closed the line")
+        assert state_of(session) == ("lost", "the robot closed the connection")
         assert session.hub.links["wire"].attempts == line.opens
         assert len(session.hub.notes) < 10
 

@@ -94,7 +94,7 @@ RESET = ConnectionResetError(104, "Connection reset by peer")
 
 @pytest.mark.parametrize("fault", [None, RESET])
 async def test_server_without_a_common_algorithm_is_told_so(fault: OSError | None) -> None:
-    """Though it has closed the line before we have read what it offers."""
+    """Though it has closed the connection before we have read what it offers."""
     said = await refusal(Curt(VERSION + offer(OLD), fault))
     assert "speaks no algorithm that URC takes; 'legacy: true' allows old ones" in said
     assert "received aes128-cbc" in said
@@ -109,4 +109,4 @@ async def test_good_bye_behind_an_offer_is_not_lost() -> None:
 async def test_server_that_says_nothing_more_has_closed_the_line() -> None:
     """Then there is no other reason."""
     said = await refusal(Curt(VERSION))
-    assert said == "10.0.0.7:22 closed the line before the login was done"
+    assert said == "10.0.0.7:22 closed the connection before the login was done"

@@ -80,4 +80,4 @@ async def test_what_breaks_after_the_end_is_not_the_reason() -> None:
     assert wire.fault == "", "what came before is read first"
     async with asyncio.timeout(10):
         await wire.gone()
-    assert wire.fault == "the robot closed the line"
+    assert wire.fault == "the robot closed the connection"
