@@ -44,12 +44,12 @@ class Lookup:
     async def first(
         self, connect: Callable[[int, object], Awaitable[_Connected]], timeout_s: float
     ) -> _Connected:
-        """Return what `connect` makes of the first address that accepts a connection.
+        """Return the result of `connect` for the first address that accepts a connection.
 
-        The addresses are tried in turn, each with a fair share of the time that is left.
+        The addresses are tried in turn, each with an equal share of the remaining time.
 
         Raises:
-            OSError, UnicodeError: the name leads to no address, or none accepts a connection.
+            OSError, UnicodeError: the lookup failed, or no address accepts a connection.
         """
         loop = asyncio.get_running_loop()
         deadline = loop.time() + timeout_s
