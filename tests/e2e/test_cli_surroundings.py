@@ -63,7 +63,7 @@ def test_dashboard_that_others_reach_says_so(urc_process: Start) -> None:
     dashboard.wait_for("^dashboard ")
     assert dashboard.end(signal.SIGTERM) == 0
     assert dashboard.errors == [
-        "urc serve: 0.0.0.0 can be reached by others, and there is no sign-in yet:"
+        "urc serve: 0.0.0.0 is reachable from other machines, and there is no sign-in:"
         " anyone on that network can drive these robots"
     ]
 

@@ -122,7 +122,7 @@ def test_what_one_publishes_another_installs_updates_and_undoes(
         "drivers/puppet 1.0.0 → 1.1.0  with widgets/dial 1.0.0 → 1.1.0\n"
     )
     assert "nobody can be asked here" in ben.does("update", code=2)
-    assert "it may do more than before" in ben.does("update", "--yes", code=1)
+    assert "it gains permissions" in ben.does("update", "--yes", code=1)
     assert ben.does("list") == "drivers/puppet 1.0.0  with widgets/dial 1.0.0\n"
     told = ben.does("update", "puppet", "--yes", "--allow-more")
     for line in (
@@ -130,13 +130,13 @@ def test_what_one_publishes_another_installs_updates_and_undoes(
         "  may from now on: connects by tcp (wire)",
         "  may no longer: connects by tcp (wire)",
         '    - commands.beep.send: "beep"\n    + commands.beep.send: "BEEP"',
-        "updated drivers/puppet to 1.1.0; 'urc update --back drivers/puppet' goes back",
+        "updated drivers/puppet to 1.1.0; 'urc update --back drivers/puppet' reverts it",
     ):
         assert line in told
     _is_withdrawn(lab, anna, ben, people("dora"))
     lab.end()  # the way back needs nobody
     told = ben.does("update", "--back", "puppet")
-    assert told == "drivers/puppet is 1.0.0 again, as before the update to 1.1.0\n"
+    assert told == "drivers/puppet is reverted to 1.0.0, the version before 1.1.0\n"
     assert ben.does("list") == "drivers/puppet 1.0.0  with widgets/dial 1.0.0\n"
     bundle = str(lab.token.parent / "puppet.urcof")
     ben.does("bundle", "puppet", "--to", bundle)

@@ -145,7 +145,7 @@ def test_a_robot_that_is_not_there_is_told(tmp_path: Path) -> None:
         ((PUPPET,), f"urc replay: {PUPPET} is not an MCAP file"),
         (
             ("x.mcap", "--speed", "0"),
-            "urc replay: argument --speed: a speed from 0.1 to 100 is expected, not '0'; try"
+            "urc replay: argument --speed: expected a speed from 0.1 to 100, found '0'; try"
             " 'urc replay --help'",
         ),
     ],

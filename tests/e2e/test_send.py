@@ -274,7 +274,7 @@ async def test_a_server_that_hangs_lets_nothing_move_but_every_stop(
         note.write_text(json.dumps({"address": address, "key": "k" * 40, "pid": os.getpid()}))
         done = await send(profile, "go", "--data-dir", str(data))
         assert (done.returncode, done.stdout) == (1, "")
-        assert f"the server at {address} does not say who drives the robot" in done.stderr
+        assert f"the server at {address} does not report the operator of the robot" in done.stderr
         assert (await send(profile, "halt", "--data-dir", str(data))).returncode == 0
     assert cart.heard == ["halt"]
 
@@ -342,17 +342,17 @@ async def test_how_long_it_is_held_must_be_said(profile: str) -> None:
     done = await send(profile, "drive", "speed=1")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
-        "urc send: drive moves the robot for as long as it is held: say how long, as --hold 1s\n"
+        "urc send: drive moves the robot while it is held: give a time, such as --hold 1s\n"
     )
     done = await send(profile, "beep", "--hold", "1s")
     assert (done.returncode, done.stderr) == (
         2,
-        "urc send: beep is given once, and not held: leave --hold out\n",
+        "urc send: beep is not a held command: remove --hold\n",
     )
     done = await send(profile, "drive", "speed=1", "--hold", "2m")
     assert (done.returncode, done.stderr) == (
         2,
-        "urc send: --hold is at most 60s; drive longer on a dashboard\n",
+        "urc send: --hold is 60s at most; drive longer on a dashboard\n",
     )
     done = await send(profile, "drive", "speed=7", "--hold", "1s")
     assert (done.returncode, done.stderr) == (

@@ -1,6 +1,6 @@
 """Command-line words → values, for all verbs alike.
 
-Floor 6. A verb is a module with `EXAMPLE`, `add_arguments(parser)` and `run(arguments) -> int`.
+Layer 6. A verb is a module with `EXAMPLE`, `add_arguments(parser)` and `run(arguments) -> int`.
 """
 
 import argparse
@@ -38,25 +38,25 @@ _SECONDS = {"ms": 0.001, "s": 1.0, "m": 60.0, "h": 3600.0, None: 1.0}
 
 
 class _Exit(Exception):
-    """The command line is answered already: help was printed, or a complaint."""
+    """Raised after help or an error was printed."""
 
 
 class _Parser(argparse.ArgumentParser):
-    """argparse with complaints of one line, as everything in URC complains."""
+    """argparse with errors in one line."""
 
     def error(self, message: str) -> NoReturn:
         complain(f"{self.prog}: {message}; try '{self.prog} --help'")
         raise _Exit(2)
 
     def print_help(self, file: object = None) -> None:
-        print(self.format_help(), end="")  # argparse's own way hides that it could not be written
+        print(self.format_help(), end="")  # argparse's own way hides a failure to write
 
     def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
         raise _Exit(status)
 
 
 def parse(verb: str, summary: str, module: Any, words: list[str]) -> argparse.Namespace | int:
-    """Return the arguments of a verb, or the exit code when there is nothing left to do."""
+    """Return the arguments of a verb, or the exit code when help or an error was printed."""
     parser = _Parser(
         prog=f"urc {verb}",
         description=summary[0].upper() + summary[1:] + ".",
@@ -66,14 +66,14 @@ def parse(verb: str, summary: str, module: Any, words: list[str]) -> argparse.Na
     )
     module.add_arguments(parser)
     try:
-        # Intermixed: `urc watch PROFILE --for 5s SIGNAL` means what it says.
+        # Options may stand between words, as in `urc watch PROFILE --for 5s SIGNAL`.
         return parser.parse_intermixed_args(words)
     except _Exit as ended:
         return int(ended.args[0])
 
 
 def add_profile(parser: argparse.ArgumentParser) -> None:
-    """Add PROFILE and the ways to fill in its settings."""
+    """Add PROFILE and the options for its settings."""
     parser.add_argument("profile", metavar="PROFILE", help="a robot file, or the name of a robot")
     add_settings(parser)
 
@@ -115,7 +115,7 @@ def add_dev(parser: argparse.ArgumentParser) -> None:
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether only this machine reaches what listens on `host`."""
+    """Return whether `host` is reachable from this machine only."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -123,23 +123,23 @@ def is_loopback(host: str) -> bool:
 
 
 def add_port(parser: argparse.ArgumentParser) -> None:
-    """Add `--port`, the dashboard's."""
+    """Add `--port`, the port of the dashboard."""
     parser.add_argument(
         "--port", type=port, default=8080, help="port; 0 takes a free one (default: 8080)"
     )
 
 
 def load(word: str) -> "Profile":
-    """Return the profile that `word` names; raise `UrcError` with its problems."""
+    """Return the profile with the name or path `word`; raise `UrcError` with its problems."""
     from urc.runtime.opened import open_document
 
     return open_document(profile_path(word))
 
 
 def profile_path(word: str) -> str:
-    """Return the file that `word` means: a path, a robot that ships with URC, or one installed.
+    """Return the file for a word: a path, a shipped robot, or an installed robot.
 
-    A file goes before the name of a robot that ships, and that before an installed package.
+    A file takes precedence over a shipped robot, and a shipped robot over an installed package.
     """
     path = Path(word)
     if path.suffix in (".yaml", ".yml") or os.path.isfile(word):
@@ -154,12 +154,12 @@ def profile_path(word: str) -> str:
     if path.suffix or len(path.parts) > 1:
         return word
     if os.path.exists(word):
-        return word  # a folder: reading it says so
+        return word  # a folder fails when it is read
     for suffix in (".yaml", ".yml"):
         if os.path.isfile(word + suffix):
             raise UrcError(f"there is no file {word!r}; did you mean {word + suffix!r}?")
     known = ", ".join(sorted(file.stem for file in shipped("robots").glob("*.yaml")))
-    raise UrcError(f"there is no file and no robot {word!r}; the robots here are: {known}")
+    raise UrcError(f"there is no file and no robot {word!r}; known robots: {known}")
 
 
 def what_it_has(word: str, known: Iterable[str]) -> str:
@@ -177,7 +177,7 @@ def duration(text: str) -> float:
     seconds = float(found[1]) * _SECONDS[found[2]] if found else 0.0
     if not seconds:
         raise argparse.ArgumentTypeError(
-            f"a duration like 500ms, 5s or 2m is expected, not {text!r}"
+            f"expected a duration like 500ms, 5s or 2m, found {text!r}"
         )
     return seconds
 
@@ -185,19 +185,19 @@ def duration(text: str) -> float:
 def port(text: str) -> int:
     """Return a port to listen on, 0 to 65535."""
     if not re.fullmatch(r"[0-9]{1,5}", text) or int(text) > 65535:
-        raise argparse.ArgumentTypeError(f"a port from 0 to 65535 is expected, not {text!r}")
+        raise argparse.ArgumentTypeError(f"expected a port from 0 to 65535, found {text!r}")
     return int(text)
 
 
 def _address(text: str) -> str:
-    # An empty one would mean every network that this machine is in.
+    # An empty address would mean all networks of this machine.
     if not text.strip():
-        raise argparse.ArgumentTypeError("an address is expected, like 127.0.0.1 or 0.0.0.0")
+        raise argparse.ArgumentTypeError("expected an address like 127.0.0.1 or 0.0.0.0")
     return text.strip()
 
 
 def _assignment(text: str) -> tuple[str, str]:
     name, equals, value = text.partition("=")
     if not equals or not name:
-        raise argparse.ArgumentTypeError(f"NAME=VALUE is expected, found {text!r}")
+        raise argparse.ArgumentTypeError(f"expected NAME=VALUE, found {text!r}")
     return name, value

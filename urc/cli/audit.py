@@ -13,11 +13,11 @@ MOST = 1_000_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add how much, of which robot, and where it is kept."""
+    """Add the number of entries, the robot, and the data folder."""
     parser.add_argument(
         "--last", type=_count, default=USUAL, metavar="N", help="newest entries, 200 by default"
     )
-    parser.add_argument("--robot", default="", metavar="NAME", help="of this robot only")
+    parser.add_argument("--robot", default="", metavar="NAME", help="entries of this robot only")
     parser.add_argument(
         "--data-dir",
         dest="data",
@@ -28,22 +28,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the entries, oldest first; 1 when the file was tampered with."""
+    """Print the entries, oldest first; return 1 when the file was tampered with."""
     from urc._folders import data_folder
     from urc.runtime.audit import check, read
 
     file = (arguments.data or data_folder()) / "audit.sqlite"
     if not file.is_file():
-        raise UrcError(f"there is no {file}: 'urc serve' makes it, --data-dir names its folder")
+        raise UrcError(f"there is no {file}: 'urc serve' creates it, --data-dir names its folder")
     for entry in read(file, robot=arguments.robot, last=arguments.last):
         print(json_text(entry._asdict()))
     broken = check(file)
     if broken:
-        complain(f"urc audit: {file} was changed by somebody: {broken}")
+        complain(f"urc audit: {file} was tampered with: {broken}")
     return 1 if broken else 0
 
 
 def _count(text: str) -> int:
     if not text.isascii() or not text.isdigit() or not 1 <= int(text[:9]) <= MOST or len(text) > 7:
-        raise argparse.ArgumentTypeError(f"a number from 1 to {MOST} is expected, not {text!r}")
+        raise argparse.ArgumentTypeError(f"expected a number from 1 to {MOST}, found {text!r}")
     return int(text)

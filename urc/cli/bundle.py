@@ -1,4 +1,4 @@
-"""`urc bundle`: a package and all that it needs as one file, to carry where no network is."""
+"""`urc bundle`: a package with its dependencies in one file, for machines without a network."""
 
 import argparse
 from pathlib import Path
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     lock = plan.lock
     file: Path = arguments.to or Path(f"{lock.key.name}-{lock.version}.urcof")
     if file.suffix != ".urcof":
-        raise Misuse(f"{file}: the name of a bundle ends in .urcof")
+        raise Misuse(f"{file}: the name of a bundle must end with .urcof")
     archives = {
         pin.sha256: plan.archives.get(pin.sha256) or store.blob(pin.sha256)
         for pin in lock.packages.values()
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _planned(word: str, store: "Store") -> "Plan":
-    """Return the packages; installed versions come first, because they were tried."""
+    """Return the packages; installed versions come first, because they are tested."""
     from urc.cli.packages import is_path, planned
     from urc.packages.names import parse_wish
     from urc.packages.plan import Plan
@@ -68,7 +68,7 @@ def _planned(word: str, store: "Store") -> "Plan":
 
 
 def _signatures(plan: "Plan", arguments: argparse.Namespace) -> "dict[str, Signature]":
-    """Return the signatures; packages from a folder get the user's own."""
+    """Return the signatures; packages from a folder get the user's own signature."""
     from urc.cli.packages import signer
     from urc.packages.names import parse_key
 

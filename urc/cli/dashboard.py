@@ -31,10 +31,9 @@ from urc.web.fleet.robots import Glimpse
 __all__ = ["Place", "SettingsOf", "run_dashboard", "workshop_of"]
 
 SettingsOf = Callable[[Profile], Mapping[str, Value]]
-"""The settings of a profile that were given at the start; raises `UrcError` for those that no
-longer fit."""
+"""Return the settings of a profile from the command line; raise `UrcError` for invalid ones."""
 _LOOK = (320, 240)
-"""Columns and rows of the picture on a card."""
+"""Columns and rows of the preview on a card."""
 
 
 def _nothing(_: Profile) -> Mapping[str, Value]:
@@ -44,25 +43,25 @@ def _nothing(_: Profile) -> Mapping[str, Value]:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where the dashboard is."""
+    """Address and folders of the dashboard."""
 
     host: str
     port: int
     allowed_hosts: Sequence[str] = ()
     data: Path | None = None
-    """Folder of URC's own data; None: that of this user."""
+    """Folder of URC's own data; None means the folder of this user."""
     has_guard: bool = True
-    """Whether a guard process stops motion when this one cannot."""
+    """Whether a guard process stops motion when this process cannot."""
     tiles: Path | None = None
-    """Folder of map pictures; None: maps are grids."""
+    """Folder of map tiles; None means maps with a grid only."""
     token: str = ""
-    """Of those who manage from other machines; "": none may."""
+    """Token for management from other machines; "" allows none."""
     shows_installed: bool = False
-    """Whether the robots and drivers that are installed are on the menu."""
+    """Whether installed robots and drivers are on the menu."""
     trusted: Sequence[str] = ()
-    """Widgets that do not ship with URC, and share the page all the same."""
+    """Third-party widgets that share the page without a sandbox."""
     recordings: Path | None = None
-    """Folder in which each session is kept; None: none is."""
+    """Folder for a recording of each session; None records no session."""
 
 
 def run_dashboard(
@@ -75,19 +74,19 @@ def run_dashboard(
     is_dev: bool = False,
     faults: Sequence[str] = (),
 ) -> int:
-    """Serve the dashboard until a signal ends it, which is fine: return 0.
+    """Serve the dashboard until a signal ends it; return 0 then.
 
     Args:
-        profiles: the robots that are there from the start.
-        place: address, port, the names it answers to, and what is kept where.
+        profiles: the robots at the start.
+        place: address, port, host names, and folders.
         is_simulated: each robot is emulated, over a real socket, instead of the real one.
-        on_ready: called once with the way in.
-        given: the settings of a profile that were given at the start.
-        is_dev: whether there are dev pages, and documents are read again when they are saved.
-        faults: what goes wrong with emulated robots, as ``loss=5%`` or ``tello:loss=5%``.
+        on_ready: called once with the entrance.
+        given: the settings of a profile from the command line.
+        is_dev: whether there are developer pages, and saved documents are read again.
+        faults: of emulated robots, as ``loss=5%`` or ``tello:loss=5%``.
 
     Raises:
-        UrcError: a port that cannot be had, two robots of one name, a fault that none can have.
+        UrcError: a port that is not available, two robots of one name, an impossible fault.
     """
     names = [profile.name for profile in profiles]
     for name in names:
@@ -121,7 +120,7 @@ async def _serve(
         for profile in profiles:
             robot = _first(garage, profile)
             if faulty is not None:
-                # Emulated from the start, whether somebody looks at it or not.
+                # Emulated from the start, even without a viewer.
                 twin = Twin(robot.profile, robot.settings)
                 stack.enter_context(faulty.watch(profile.name, twin))
                 redirected = await stack.enter_async_context(
@@ -145,14 +144,14 @@ async def _serve(
             trusted=place.trusted,
         )
         gc.collect()
-        gc.freeze()  # what is loaded by now stays: looking through it again would hold us up
+        gc.freeze()  # keep loaded objects out of later garbage collections, which would delay us
         await serve(app, host=place.host, port=place.port, on_ready=ready)
     return 0
 
 
 @asynccontextmanager
 async def _listening(faulty: Faulty) -> AsyncIterator[None]:
-    """Execute typed fault commands for as long as the context lasts."""
+    """Execute typed fault commands during the context."""
     task = asyncio.create_task(faulty.listen())
     try:
         yield
@@ -164,7 +163,7 @@ async def _listening(faulty: Faulty) -> AsyncIterator[None]:
 def workshop_of(
     place: Place, given: SettingsOf = _nothing, faulty: Faulty | None = None
 ) -> Workshop:
-    """Return what makes the robots of a dashboard while it runs; `faulty`: they are emulated."""
+    """Return the robot factory of a dashboard; with `faulty`, its robots are emulated."""
     return Workshop(
         own_folder(place.data),
         make=partial(_robot, place, faulty),
@@ -179,11 +178,11 @@ def _motion(place: Place) -> Motion:
 
 
 def _first(garage: Garage, profile: Profile) -> Robot:
-    """Return a robot that exists from the start, with or without stored settings."""
+    """Return a robot that exists from the start, with its stored settings if they are valid."""
     try:
         return garage.robot(profile.name, profile)
     except UrcError as error:
-        complain(f"urc: {error}; what was filled in for {profile.name} is left out")
+        complain(f"urc: {error}; the stored settings of {profile.name} are ignored")
         return garage.robot(profile.name, profile, Kept())
 
 
@@ -197,7 +196,7 @@ def _robot(
 
 
 def _seen(twin: Twin) -> Glimpse:
-    """Return what an emulated robot looks like: through its camera, from above, or in figures."""
+    """Return the preview of an emulated robot: its camera, a view from above, or readings."""
     now_s = time.time()
     return twin.camera(now_s) or twin.top_view(*_LOOK, now_s) or twin.readings(now_s)
 
@@ -210,7 +209,7 @@ async def _session(
     profile: Profile,
     values: Mapping[str, Value],
 ) -> AsyncIterator[Session]:
-    """Open a session with a robot, or with its twin, which lives as long as the session."""
+    """Open a session with a robot, or with its emulation, which ends with the session."""
     transports = built_in_catalog().transports
     async with AsyncExitStack() as stack:
         settings = values
@@ -221,14 +220,14 @@ async def _session(
             profile = await stack.enter_async_context(stand_in(profile, settings, twin))
         session = Session(profile, settings, transports, motion=motion)
         if recordings is not None:
-            # First in, last out: what is said at both ends of the session is recorded, too.
+            # Opened first and closed last, so that both ends of the session are recorded.
             await stack.enter_async_context(_kept(session, recordings))
         yield await stack.enter_async_context(session)
 
 
 @asynccontextmanager
 async def _kept(session: Session, folder: Path) -> AsyncIterator[None]:
-    """Record a session; where that cannot be, it is said, and the robot is driven all the same."""
+    """Record a session; report a failed recording, and continue without it."""
     from urc.runtime.recording.recorder import recorded  # most record nothing
 
     profile = session.profile
@@ -244,5 +243,5 @@ async def _kept(session: Session, folder: Path) -> AsyncIterator[None]:
 
 
 def _complete(profile: Profile, values: Mapping[str, Value]) -> dict[str, Value]:
-    """Return settings with defaults for values that only a real robot needs."""
+    """Return settings with samples for values that only a real robot needs."""
     return sample_settings(profile.settings) | dict(values)

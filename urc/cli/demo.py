@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.runtime.catalog import built_in_catalog
 
     if arguments.dev and not is_loopback(arguments.host):
-        raise Misuse(f"--dev shows all traffic and is for this machine alone, not {arguments.host}")
+        raise Misuse(f"--dev shows all traffic and is for this machine only, not {arguments.host}")
     catalog = built_in_catalog()
     files = sorted(shipped("robots").glob("*.yaml"))
     profiles = [load_profile(file, catalog) for file in files]
@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
         first, *others = entrance.lines()
         print("\n".join((f"{first}   (Ctrl-C ends it)", *others)), flush=True)
         if not arguments.no_browser and has_screen(sys.platform, os.environ):
-            # Everyone on this machine can read the command line of a browser.
+            # Every user of this machine can read the command line of a browser.
             url = entrance.address_once
             threading.Thread(target=_open_browser, args=(url,), daemon=True).start()
 
@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _port(arguments: argparse.Namespace) -> int:
-    """Return the port that was asked for, else the usual one, else any: a demo always begins."""
+    """Return the given port, else the usual port, else any free port."""
     if arguments.port is not None:
         return int(arguments.port)
     family = socket.AF_INET6 if ":" in arguments.host else socket.AF_INET
@@ -75,13 +75,13 @@ def _port(arguments: argparse.Namespace) -> int:
 
 
 def has_screen(platform: str, environment: Mapping[str, str]) -> bool:
-    """Return whether a window can open: in a bare terminal a text browser would take it over."""
+    """Return whether a window can open; else a text browser would take over the terminal."""
     if platform in ("win32", "darwin"):
         return True
     return any(environment.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
 
 
 def _open_browser(url: str) -> None:
-    """Open the page; in a thread of its own, because some browsers return when they are closed."""
+    """Open the page in a thread, because some browsers return only when they are closed."""
     with suppress(webbrowser.Error, OSError):
         webbrowser.open(url)

@@ -21,7 +21,7 @@ Row = Mapping[str, object]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the profile, how long, and the form of the output."""
+    """Add the profile, the duration, and the format of the output."""
     parser.add_argument(
         "profile",
         metavar="PROFILE",
@@ -33,11 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--for", dest="seconds", type=duration, default=DEFAULT_S, metavar="TIME",
         help="how long to listen for announcements, 3s by default",
     )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="a JSON line for each thing found")
+    parser.add_argument("--json", action="store_true", help="one JSON line for each result")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Look around; 1 when nothing was found."""
+    """Search; return 1 without a result."""
     from urc.cli.running import run_loop
     from urc.cli.settings import complete_settings, settings_given
 
@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _known_robots() -> list["Profile"]:
-    """Return the robots that ship with URC; one that does not load is another verb's matter."""
+    """Return the robots that ship with URC, without those that fail to load."""
     from urc.shipped import shipped
 
     found = []
@@ -88,7 +88,7 @@ async def _look_around(
     elif rows:
         print(_table(rows))
         if hint:
-            print("\nIn the profile, for what is known of them:\n")
+            print("\nFor the profile:\n")
             print("\n".join(map(printable, hint.split("\n"))))
     if not rows:
         complain("urc discover: nothing was found")
@@ -133,9 +133,9 @@ async def _mdns(profiles: Sequence["Profile"], seconds: float) -> list[Row]:
 async def _nearby(
     profiles: Sequence["Profile"], settings: Sequence[Mapping[str, "Value"]], typed: set[str]
 ) -> tuple[list[Row], str]:
-    """Return what listens where shipped robots are by default on this machine, or at typed hosts.
+    """Return the open ports of shipped robots, at their defaults on this machine or at given hosts.
 
-    A rosbridge among it is asked for its topics.
+    A rosbridge among them also gives its topics.
     """
     from urc.transports.discover_local import listening
 
@@ -152,7 +152,7 @@ async def _nearby(
     for place in await listening(robots):
         names = ", ".join(dict.fromkeys(robots[place]))
         rows.append(
-            {"found": "port", "place": f"{place[0]}:{place[1]}", "what": f"where {names} may be",
+            {"found": "port", "place": f"{place[0]}:{place[1]}", "what": f"possibly {names}",
              "host": place[0], "port": place[1]}
         )  # fmt: skip
         if place in bridges:
@@ -165,7 +165,7 @@ async def _nearby(
 def _places(
     profile: "Profile", settings: Mapping[str, "Value"]
 ) -> Iterator[tuple[str, tuple[str, int]]]:
-    """Yield kind, host and port of the lines of a robot whose settings say all of it."""
+    """Yield type, host and port of the transports of a robot with complete settings."""
     from urc.runtime.settings import options_of
     from urc.transports.rosbridge import DEFAULT_PORT
 
@@ -175,7 +175,7 @@ def _places(
         try:
             options = options_of(spec, settings)
         except UrcError:
-            continue  # a setting without a value: nobody knows where that robot is
+            continue  # a setting without a value: the address is unknown
         default = DEFAULT_PORT if spec.type == "rosbridge" else None
         host, port = options.get("host"), options.get("port", default)
         if isinstance(host, str) and host and isinstance(port, int):
@@ -189,7 +189,7 @@ async def _topics(profile: "Profile", settings: Mapping[str, "Value"]) -> tuple[
 
     rows: list[Row] = []
     parts: list[str] = []
-    # What it subscribes to itself, a bridge of ROS 1 would count among the topics.
+    # Without subscriptions, because a ROS 1 bridge would list them as topics.
     driver = profile.driver._replace(messages={})
     made = make_transports(driver, settings, built_in_catalog().transports)
     for name, spec in profile.driver.transports.items():

@@ -17,9 +17,9 @@ EXAMPLE = "urc doctor"
 
 REQUIRED = {
     "PyYAML": "reads documents",
-    "jsonschema": "explains what is wrong in them",
+    "jsonschema": "explains their problems",
     "Jinja2": "templates and pages",
-    "jmespath": "picks values out of JSON",
+    "jmespath": "selects values in JSON",
     "starlette": "the dashboard's pages",
     "uvicorn": "the dashboard's server",
     "websockets": "the dashboard's live values",
@@ -29,11 +29,11 @@ REQUIRED = {
 }
 OPTIONAL = {
     "paho-mqtt": "robots behind an MQTT broker (pip install 'urc[mqtt]')",
-    "cbor2": "images from rosbridge without detours (pip install 'urc[cbor]')",
-    "zeroconf": "robots that announce themselves, for urc discover (pip install 'urc[mdns]')",
+    "cbor2": "images from rosbridge in CBOR (pip install 'urc[cbor]')",
+    "zeroconf": "robots that announce themselves, for 'urc discover' (pip install 'urc[mdns]')",
     "mcap": "recordings of sessions (pip install 'urc[record]')",
     "google-re2": "patterns that are not provably fast; without it they are refused",
-    "uvloop": "a faster event loop; without it, ticks take a little longer to the robot",
+    "uvloop": "a faster event loop; without it, held commands have a little more delay",
 }
 FOLDERS: tuple[Literal["schemas", "robots", "widgets", "templates"], ...] = (
     "schemas",
@@ -41,7 +41,7 @@ FOLDERS: tuple[Literal["schemas", "robots", "widgets", "templates"], ...] = (
     "widgets",
     "templates",
 )
-_VENDOR_REMEDY = "install the wheel, or run ./dev once: without it there are no plots"
+_VENDOR_REMEDY = "install the wheel, or run ./dev once; without them there are no plots"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,12 +53,12 @@ class _Finding:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the port that is tried."""
+    """Add the port to check."""
     add_port(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print a line per check; 1 when something is missing that URC needs."""
+    """Print a line per check; return 1 when a requirement is missing."""
     findings = list(_findings(arguments.port))
     width = max(len(finding.name) for finding in findings)
     for finding in findings:
@@ -98,7 +98,7 @@ def _package(name: str, purpose: str, *, is_required: bool) -> _Finding:
 def _attempt(name: str, check: Callable[[], str], *, is_required: bool = True) -> _Finding:
     try:
         return _Finding(name, True, check(), is_required)
-    except (UrcError, ImportError) as fault:  # what is not installed cannot be imported either
+    except (UrcError, ImportError) as fault:  # not installed means not importable
         return _Finding(name, False, str(fault), is_required)
 
 
@@ -106,9 +106,9 @@ def _precedence() -> _Finding:
     from urc.guard.precedence import why_not
 
     refusal = why_not()
-    text = "the guard runs before ordinary programs"
+    text = "the guard has a higher priority than ordinary programs"
     if refusal:
-        text = f"the guard is a program like others ({refusal}); see docs/motion.md"
+        text = f"the guard has ordinary priority ({refusal}); see docs/motion.md"
     return _Finding("real time", not refusal, text, is_required=False)
 
 

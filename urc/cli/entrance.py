@@ -1,4 +1,4 @@
-"""The way into a dashboard: the addresses that are printed, and the keys in them."""
+"""The entrance of a dashboard: the printed addresses, and the keys in them."""
 
 import os
 import secrets
@@ -24,7 +24,7 @@ _LONGEST = 200
 
 
 class Entrance(NamedTuple):
-    """A dashboard that is ready."""
+    """The addresses of a dashboard that is ready."""
 
     url: str
     """Without a key."""
@@ -32,19 +32,19 @@ class Entrance(NamedTuple):
 
     @property
     def address(self) -> str:
-        """The address for who started it."""
+        """The address with all rights, for the user who started the dashboard."""
         return self.access.address(self.url)
 
     @property
     def address_once(self) -> str:
-        """The address for the browser that is started: it works once."""
+        """The address for the browser that URC starts: it works once."""
         return self.access.address_once(self.url)
 
     def lines(self) -> Iterator[str]:
         """Yield the lines to print: first the address with all rights."""
         yield f"dashboard {self.address}"
         if self.access.is_open:
-            yield f"for others {self.url}   (without a key they watch and drive)"
+            yield f"for others {self.url}   (without a key: watch and drive)"
         if managers := self.access.address_of_managers(self.url):
             yield f"for managers {managers}"
 
@@ -62,10 +62,10 @@ def access_for(host: str, token: str = "") -> "Access":
 
 
 def token_in(file: Path) -> str:
-    """Return the token that a file holds; one is made where there is no file.
+    """Return the token in a file; create the file if it is missing.
 
     Raises:
-        UrcError: it cannot be read or written, or holds no token.
+        UrcError: the file cannot be read or written, or has no token.
     """
     from urc.private_files import put_private
 
@@ -78,8 +78,8 @@ def token_in(file: Path) -> str:
         raise UrcError(f"--token: cannot use {file}: {reason}") from error
     if not _SHORTEST <= len(token) <= _LONGEST or not token.isprintable() or " " in token:
         raise Misuse(
-            f"--token: {file} must hold {_SHORTEST} to {_LONGEST} characters without spaces;"
-            " remove the file, and URC makes a good one"
+            f"--token: {file} must have {_SHORTEST} to {_LONGEST} characters without spaces;"
+            " remove the file, and URC creates one"
         )
     return token
 

@@ -30,7 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
     page = every.get(arguments.code)
     if page is None:
         close = get_close_matches(arguments.code, every, n=1)
-        hint = f"did you mean '{close[0]}'?" if close else "'urc explain' lists them"
+        hint = f"did you mean '{close[0]}'?" if close else "'urc explain' lists all codes"
         raise Misuse(f"there is no code {arguments.code!r}; {hint}")
     print(page)
     return 0

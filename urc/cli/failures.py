@@ -11,7 +11,7 @@ class Misuse(UrcError):
 
 
 def explain(error: Exception, program: str) -> int:
-    """Print a failure of `program`, ``urc watch`` for example; return the exit code."""
+    """Print a failure of `program`, such as ``urc watch``; return the exit code."""
     match error:
         case ProblemsError():
             for problem in error.problems:
@@ -20,7 +20,9 @@ def explain(error: Exception, program: str) -> int:
         case UrcError():
             complain(f"{program}: {error}")
         case ModuleNotFoundError() if not str(error.name).startswith("urc."):
-            complain(f"{program}: {error.name} is not installed; 'urc doctor' tells what is")
+            complain(
+                f"{program}: {error.name} is not installed; 'urc doctor' lists missing packages"
+            )
         case OSError():
             where = f"{error.filename}: " if error.filename else ""
             complain(f"{program}: {where}{error.strerror or error}")
@@ -30,7 +32,7 @@ def explain(error: Exception, program: str) -> int:
 
 
 def _mistake(bug: Exception) -> str:
-    """Return what a maintainer needs to find a mistake of our own, on one line."""
+    """Return one line about a mistake of URC, for its developers."""
     from traceback import extract_tb  # slow to load, and only now needed
 
     frames = extract_tb(bug.__traceback__)

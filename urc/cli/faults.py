@@ -24,18 +24,18 @@ __all__ = ["Faulty", "add_faults"]
 
 
 _LONGEST: Final = 4096
-"""Bytes of a line; longer lines are dropped."""
+"""Maximum bytes of a line; longer lines are dropped."""
 _MOST_WAITING: Final = 64
-"""Unread lines; beyond this number the newest are dropped."""
+"""Maximum unread lines; beyond this number the newest are dropped."""
 
 
 async def typed_lines(stream: TextIO | None) -> AsyncIterator[str]:
-    """Yield the lines of a stream until it ends; at once nothing where it cannot be read.
+    """Yield the lines of a stream until it ends; none if it cannot be read.
 
-    In the background of a terminal nothing is read: the terminal would stop the process.
+    A process in the background of a terminal reads nothing: the terminal would stop the process.
 
     Args:
-        stream: a pipe or terminal, None where there is none.
+        stream: a pipe or terminal, or None.
     """
     try:
         handle = -1 if stream is None else stream.fileno()
@@ -70,7 +70,7 @@ async def typed_lines(stream: TextIO | None) -> AsyncIterator[str]:
     try:
         loop.add_reader(handle, read)
     except (NotImplementedError, OSError, ValueError):
-        return  # a system whose loop watches sockets only
+        return  # the event loop of this system only supports sockets
     try:
         while (line := await lines.get()) is not None:
             yield line
@@ -79,7 +79,7 @@ async def typed_lines(stream: TextIO | None) -> AsyncIterator[str]:
 
 
 def _is_ours(handle: int) -> bool:
-    """Return whether reading is allowed: a terminal belongs to the process in its foreground."""
+    """Return whether reading is allowed: a terminal belongs to its foreground process."""
     try:
         return not os.isatty(handle) or os.tcgetpgrp(handle) == os.getpgrp()
     except (AttributeError, OSError):
@@ -87,7 +87,7 @@ def _is_ours(handle: int) -> bool:
 
 
 def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
-    """Add the faults from the start; `has_names` where there may be several robots."""
+    """Add the option for faults from the start; `has_names` if there may be several robots."""
     which = " with emulated robots: FAULT with all, ROBOT:FAULT with one," if has_names else ","
     name = "tello:" if has_names else ""
     parser.add_argument(
@@ -105,12 +105,11 @@ def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
 class Faulty:
     """The emulated robots of one process, and their injected faults.
 
-    A robot may be emulated again while the process runs, as when its settings change: what is wrong
-    with it stays.
+    A robot keeps its faults when it is emulated again, for example after a change of its settings.
     """
 
     def __init__(self, now: Callable[[], float] = time.time) -> None:
-        """Begin with no robot.
+        """Start without a robot.
 
         Args:
             now: seconds since the epoch.
@@ -118,14 +117,14 @@ class Faulty:
         self._now = now
         self._twins: dict[str, list[Twin]] = {}
         self._wrong: dict[str, dict[str, str]] = {}
-        """Robot → faults as they were written, for the next time that it is emulated."""
+        """Robot → its faults as written, for its next emulation."""
 
     @contextmanager
     def watch(self, name: str, twin: "Twin") -> Iterator[None]:
-        """Let a robot have its faults for as long as the context lasts."""
+        """Inject the faults of a robot during the context."""
         twins = self._twins.setdefault(name, [])
         for text in self._wrong.get(name, {}).values():
-            with suppress(UrcError):  # another version of it need not have that signal
+            with suppress(UrcError):  # another version may lack that signal
                 twin.inject(text, self._now())
         twins.append(twin)
         try:
@@ -134,7 +133,7 @@ class Faulty:
             twins.remove(twin)
 
     def begin(self, texts: Sequence[str]) -> None:
-        """Inject the faults of the command line; raise `Misuse` for an impossible one."""
+        """Inject the faults of the command line; raise `Misuse` for an impossible fault."""
         for text in texts:
             try:
                 self.inject(text)
@@ -142,12 +141,12 @@ class Faulty:
                 raise Misuse(f"--fault: {error}") from None
 
     def inject(self, text: str) -> None:
-        """Let something go wrong from now on: ``loss=5%``, or ``tello:loss=5%``.
+        """Inject a fault: ``loss=5%``, or ``tello:loss=5%``.
 
-        Without a name it is for every robot that can have it.
+        Without a name, it applies to every robot that can have it.
 
         Raises:
-            UrcError: there is no such robot or fault, or no robot here can have it; one line.
+            UrcError: an unknown robot or fault, or a fault that no robot here can have; one line.
         """
         from urc.simulator.faults import parse_fault
 
@@ -167,10 +166,10 @@ class Faulty:
             raise refusals[0]
 
     def mend(self, robot: str = "") -> None:
-        """Let nothing be wrong any more, with one robot or with all.
+        """Remove all faults, of one robot or of all robots.
 
         Raises:
-            UrcError: there is no such robot; one line.
+            UrcError: an unknown robot; one line.
         """
         for name in self._named(robot) if robot else [*self._twins]:
             self._wrong.pop(name, None)
@@ -202,7 +201,7 @@ class Faulty:
                 self.mend(rest.strip())
             elif line.strip() not in ("", "faults"):
                 raise UrcError(
-                    f"{line.strip()[:60]!r} means nothing; write fault …, mend or faults"
+                    f"{line.strip()[:60]!r} is not a command; write fault …, mend or faults"
                 )
         except UrcError as error:
             complain(str(error))
@@ -211,6 +210,6 @@ class Faulty:
             print(self, flush=True)
 
     async def listen(self) -> None:
-        """Obey all lines on standard input, until it ends."""
+        """Execute all lines of standard input, until it ends."""
         async for line in typed_lines(sys.stdin):
             self.obey(line)

@@ -1,4 +1,4 @@
-"""`urc install`: a package with all that it needs, from a repository, a bundle or a folder."""
+"""`urc install`: a package with its dependencies, from a repository, a bundle or a folder."""
 
 import argparse
 from pathlib import Path
@@ -20,7 +20,7 @@ EXAMPLE = "urc install drivers/puppet@^1.0"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what to install, and whether to ask."""
+    """Add the package and the options of consent."""
     parser.add_argument(
         "package",
         metavar="PACKAGE",
@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Show what it may do, ask, install."""
+    """Show the permissions, ask, install."""
     from urc.cli.packages import is_agreed_to, is_path, keep_in_use, open_store, planned, used_lock
     from urc.packages.disk import put_file
     from urc.packages.install import origin_lines
@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
     lock_file: Path | None = arguments.lock
     pinned = _pinned(lock_file)
     if pinned is not None and is_path(arguments.package):
-        raise Misuse("a lock chooses among the versions of repositories; name a package")
+        raise Misuse("a lock file selects versions of repositories; give the name of a package")
     plan = planned(arguments.package, pinned, takes_withdrawn=arguments.withdrawn)
     store = open_store()
     with store.changing() as change:
@@ -84,18 +84,18 @@ def run(arguments: argparse.Namespace) -> int:
         put_file(lock_file, plan.lock.to_bytes(), lock_file.resolve().parent)
     print(f"installed {plan.lock}")
     if used is not None and (used.key, used.version) != (plan.lock.key, plan.lock.version):
-        print(f"{used} stays in use; the settings of the robot choose the version")
+        print(f"{used} stays in use; the settings of the robot select the version")
     return 0
 
 
 def _check_signer(plan: "Plan", fingerprint: str) -> None:
-    """Raise `PackageError` unless a certain key signed the package."""
+    """Raise `PackageError` unless the key with this fingerprint signed the package."""
     from urc.packages.names import PackageError
 
     signature = plan.signatures.get(plan.lock.packages[plan.lock.root].sha256)
     if signature is None or signature.fingerprint != fingerprint.rstrip("="):
         found = f"signed by {signature}" if signature else "not signed"
-        raise PackageError(f"{plan.lock} is {found}, and not by {fingerprint}")
+        raise PackageError(f"{plan.lock} is {found}, expected a signature by {fingerprint}")
 
 
 def _pinned(file: Path | None) -> "Lock | None":
@@ -115,7 +115,7 @@ def _compare(
     look: "Looks",
     risks: list[str],
 ) -> "Difference | None":
-    """Print what another version changes, and return it; None where nothing is compared."""
+    """Print and return the changes in another version; None without a version to compare."""
     from urc.packages.update import Difference, staged_difference
     from urc.problems import UrcError, printable
 
@@ -125,8 +125,8 @@ def _compare(
         found = staged_difference(used, plan, store, folder, look)
     except UrcError as error:
         line = str(error).strip().partition("\n")[0]
-        complain(f"urc install: what changes is not known: {used} cannot be read: {line}")
-        # It may do more, then: nobody can say that it does not.
+        complain(f"urc install: the changes are unknown: {used} cannot be read: {line}")
+        # Unknown changes count as new permissions.
         return Difference([], ["whatever stands above"], [], risks, [])
     print(f"{used} is in use; this changes:")
     for line in difference_lines(found):
@@ -135,7 +135,7 @@ def _compare(
 
 
 def _show(plan: "Plan", folder: Path, origins: list[str], look: "Looks") -> list[str]:
-    """Print what a package may do; return what of this machine it uses by itself."""
+    """Print the permissions of a package; return the resources of this machine that it names."""
     from urc.packages.store import kinds_in
     from urc.problems import printable
 
@@ -145,7 +145,7 @@ def _show(plan: "Plan", folder: Path, origins: list[str], look: "Looks") -> list
     seen = look(document, folder, widgets)
     for line in origins:
         print(printable(line))
-    print(f"{lock} may do this:")
+    print(f"{lock} has these permissions:")
     for line in seen.permissions:
         print(printable(f"  {line}"))
     return seen.risks

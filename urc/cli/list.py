@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _updates(*, is_json: bool) -> int:
-    """Print the updates; 0 also without any, which is no failure."""
+    """Print the updates; return 0 also without any."""
     from urc.cli.output import complain, json_text
     from urc.cli.packages import known_repositories, open_store
     from urc.packages.update import headline, newer

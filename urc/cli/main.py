@@ -1,6 +1,6 @@
 """The `urc` command: finds the verb, imports it alone, and turns every failure into one line.
 
-Floor 6. Nothing heavy may be imported here, not even `typing`: `urc --version` and each verb pay
+Layer 6. Nothing heavy may be imported here, not even `typing`: `urc --version` and each verb pay
 only for what they use.
 """
 
@@ -39,7 +39,7 @@ VERBS: dict[str, str] = {
 }
 
 _INTERRUPTED = 130
-"""128 + SIGINT, as a shell reports it."""
+"""The exit code of a shell after SIGINT: 128 + 2."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -49,11 +49,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         code = _answer(words)
     except KeyboardInterrupt:
-        _discard_output()  # writing the rest could block, and nobody wants it any more
+        _discard_output()  # the rest could block
         return _INTERRUPTED
     except BrokenPipeError:
-        code = 0  # the reader has all it wants: `urc watch … | head`
-    except Exception as error:  # supervisor: the last one there is
+        code = 0  # the reader has enough, as in `urc watch … | head`
+    except Exception as error:  # supervisor: the last resort
         from urc.cli.failures import explain
 
         code = explain(error, f"urc {words[0]}" if words and words[0] in VERBS else "urc")
@@ -101,7 +101,7 @@ def _usage() -> str:
             "",
             *lines,
             "",
-            "'urc VERB --help' tells more, with an example. 'urc --version' prints the version.",
+            "'urc VERB --help' explains a verb. 'urc --version' prints the version.",
         )
     )
 
@@ -112,16 +112,16 @@ def _unknown(verb: str) -> int:
     from urc.cli.output import complain
 
     close = get_close_matches(verb, VERBS, n=1)
-    hint = f"did you mean '{close[0]}'?" if close else "'urc --help' lists them"
+    hint = f"did you mean '{close[0]}'?" if close else "'urc --help' lists all verbs"
     complain(f"urc: there is no verb {verb!r}; {hint}")
     return 2
 
 
 def _mend_streams() -> None:
-    """See to it that there are standard streams, and that they take any text.
+    """Open missing standard streams, and let all of them take any text.
 
-    WARNING: a closed one must be filled first of all. The next file or socket would get its number,
-    and what is printed would go to a robot.
+    WARNING: missing streams come first. Else the next file or socket would get the number of a
+    standard stream, and printed text would go to a robot.
     """
     for number in range(3):
         try:
@@ -130,14 +130,14 @@ def _mend_streams() -> None:
             os.open(os.devnull, os.O_RDWR)
     sys.stdout = sys.stdout or os.fdopen(1, "w", encoding="utf-8", closefd=False)
     sys.stderr = sys.stderr or os.fdopen(2, "w", encoding="utf-8", closefd=False)
-    # File names and robots may hold what the terminal's encoding does not.
+    # Names of files and robots may have characters that the terminal's encoding lacks.
     reconfigure = getattr(sys.stdout, "reconfigure", None)
     if reconfigure:
         reconfigure(errors="backslashreplace")
 
 
 def _flush(code: int) -> int:
-    """Flush the output, so that its failure is reported as all others are."""
+    """Flush the output, so that its failure is reported like any other."""
     try:
         sys.stdout.flush()
     except BrokenPipeError:

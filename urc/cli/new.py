@@ -1,4 +1,4 @@
-"""`urc new`: the files of something new, complete and sound, to be changed."""
+"""`urc new`: the files of a new widget, complete and valid, as a starting point."""
 
 import argparse
 import os
@@ -28,14 +28,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Make the folder; nothing that is there already is changed."""
+    """Create the folder; never change an existing one."""
     from urc.problems import UrcError
 
     name: str = arguments.name
     if not _NAME.fullmatch(name):
-        raise UrcError(f"a widget cannot be called {name!r}: write small letters, digits and '-'")
+        raise UrcError(
+            f"a widget cannot have the name {name!r}: use lower-case letters, digits and '-'"
+        )
     if (shipped("widgets") / name).is_dir():
-        raise UrcError(f"a widget called {name!r} ships with URC, and goes before any other")
+        raise UrcError(f"a widget with the name {name!r} ships with URC, and takes precedence")
     home: Path = arguments.into or Path("widgets")
     folder = home / name
     try:
@@ -45,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
             text = source.read_text(encoding="utf-8")
             (folder / source.name).write_text(_filled(text, name, folder), encoding="utf-8")
     except FileExistsError as error:
-        raise UrcError(f"{folder} is there already") from error
+        raise UrcError(f"{folder} already exists") from error
     except OSError as error:
         raise UrcError(f"{folder} cannot be created: {error.strerror or error}") from error
     print(folder)
@@ -61,7 +63,7 @@ def _filled(text: str, name: str, folder: Path) -> str:
 
 
 def _path_to(target: Path, folder: Path) -> str:
-    """Return how a file in a folder names one of URC's: from there, within one checkout."""
+    """Return the path of a URC file from a folder: relative within one checkout, else absolute."""
     home = shipped("schemas").parent.resolve()
     if folder.resolve().is_relative_to(home):
         return Path(os.path.relpath(target.resolve(), folder.resolve())).as_posix()

@@ -18,7 +18,7 @@ def complain(line: str) -> None:
 
 
 def json_text(value: Mapping[str, object], indent: int | None = None) -> str:
-    """Return `value` as JSON that standard output's encoding can carry, and no terminal obeys."""
+    """Return `value` as JSON in standard output's encoding, without control sequences."""
     import json
 
     takes_all = sys.stdout.encoding.lower().replace("-", "") == "utf8"
@@ -27,7 +27,7 @@ def json_text(value: Mapping[str, object], indent: int | None = None) -> str:
 
 
 def _plain(value: object) -> object:
-    """Return what JSON has for a reading that it does not know: bytes are written in base64."""
+    """Return a reading without a JSON type as one: bytes become base64."""
     if isinstance(value, bytes):
         from base64 import b64encode
 

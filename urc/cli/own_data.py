@@ -1,4 +1,4 @@
-"""The folder of URC's own data, as the verbs use it: for this user alone."""
+"""The folder of URC's own data, private to this user."""
 
 import os
 from contextlib import suppress
@@ -13,14 +13,14 @@ _OWN = 0o700
 
 
 def own_folder(named: Path | None = None) -> Path:
-    """Return the folder of URC's own data, made where it is missing.
+    """Return the folder of URC's own data; create it if it is missing.
 
-    The usual one is closed to others, also where an older version left it open; one that was chosen
-    and is there may serve others as well, and is left as it is. Where it cannot be made, whoever
-    writes there says so.
+    The default folder becomes private, even if an older version left it open. A chosen folder that
+    exists may serve other users, and stays as it is. If the folder cannot be created, the first
+    write to it fails with a message.
 
     Args:
-        named: as `--data-dir` says; None: the usual one, or that of ``URC_DATA_DIR``.
+        named: from `--data-dir`; None means ``URC_DATA_DIR`` or the default folder.
     """
     folder = named or data_folder()
     with suppress(OSError):

@@ -57,7 +57,7 @@ def known_repositories() -> "list[Repository]":
     """Return the repositories that this user added.
 
     Raises:
-        Misuse: there are none.
+        Misuse: no repository is added.
     """
     known = repositories().all()
     if not known:
@@ -66,9 +66,9 @@ def known_repositories() -> "list[Repository]":
 
 
 def installed_document(word: str) -> Path | None:
-    """Return the document of the installed robot or driver that a word names, or None.
+    """Return the document of an installed robot or driver by name, or None.
 
-    Without a version that is the one in use; see `urc.runtime.kept.in_use`.
+    Without a version, it is the version in use; see `urc.runtime.kept.in_use`.
     """
     if not (data_folder() / "packages" / "state.json").is_file():
         return None
@@ -98,7 +98,7 @@ def is_path(word: str) -> bool:
 
 
 def planned(word: str, pinned: "Lock | None" = None, *, takes_withdrawn: bool = False) -> "Plan":
-    """Return what a package's name, file or folder comes to, with all archives fetched."""
+    """Return the install plan of a package's name, file or folder, with all archives fetched."""
     from urc.packages.install import plan_file, plan_wish
     from urc.packages.names import parse_wish
     from urc.packages.sources import open_source
@@ -129,7 +129,7 @@ RISKS_FLAG: Final = "--let-it-use-my-keys-files-and-fixed-hosts"
 
 
 def add_risks(parser: argparse.ArgumentParser) -> None:
-    """Add the flag for packages that name files, keys, programs or hosts by themselves."""
+    """Add the flag for packages that name files, keys, programs or hosts themselves."""
     parser.add_argument(
         RISKS_FLAG,
         dest="takes_risks",
@@ -141,7 +141,7 @@ def add_risks(parser: argparse.ArgumentParser) -> None:
 def is_agreed(question: str) -> bool:
     """Ask the user; raise `Misuse` without a terminal."""
     if not sys.stdin.isatty():
-        raise Misuse("nobody can be asked here; --yes agrees beforehand")
+        raise Misuse("there is no terminal to ask; --yes agrees in advance")
     try:
         return input(f"{question} Type yes: ").strip().lower() == "yes"
     except EOFError:
@@ -154,24 +154,24 @@ def is_agreed_to(
     arguments: argparse.Namespace,
     question: str,
 ) -> bool:
-    """Ask a person, or take `--yes`, which is not enough where a version may do more.
+    """Ask the user, or take `--yes`, which is not enough for new permissions.
 
     Args:
-        difference: to what is installed; None where nothing is.
-        risks: what the package uses of this machine by itself.
+        difference: to the installed version; None if none is installed.
+        risks: resources of this machine that the package itself names.
         arguments: with ``yes``, ``allow_more`` and ``takes_risks``.
-        question: as ``Update it?``.
+        question: such as ``Update it?``.
     """
     gains = difference is not None and bool(difference.gained)
     if risks:
-        _warn("WARNING: by itself, without your filling it in:")
+        _warn("WARNING: the package itself names these resources of your machine:")
         for line in risks:
             _warn(f"  {line}")
     if arguments.yes:
         return _is_yes_enough(gains, bool(risks), arguments)
-    if risks and not arguments.takes_risks and not is_agreed("Let it do that?"):
+    if risks and not arguments.takes_risks and not is_agreed("Allow this?"):
         return False
-    return is_agreed(f"It may do more than before. {question}" if gains else question)
+    return is_agreed(f"It gains permissions. {question}" if gains else question)
 
 
 def _is_yes_enough(gains: bool, has_risks: bool, arguments: argparse.Namespace) -> bool:
@@ -180,16 +180,16 @@ def _is_yes_enough(gains: bool, has_risks: bool, arguments: argparse.Namespace) 
         *([RISKS_FLAG] if has_risks and not arguments.takes_risks else []),
     ]
     if lacks:
-        what = "it may do more than before" if gains else "it uses what nobody fills in"
+        what = "it gains permissions" if gains else "it names resources of this machine"
         complain(
-            f"urc: {what}, which --yes alone does not agree to;"
-            f" add {' '.join(lacks)}, or leave --yes out and be asked"
+            f"urc: {what}, and --yes alone does not accept that;"
+            f" add {' '.join(lacks)}, or remove --yes to be asked"
         )
     return not lacks
 
 
 def used_lock(store: "Store", key: "Key") -> "Lock | None":
-    """Return what is in use of a package: of what is driven, whatever has its name."""
+    """Return the version of a package in use; a robot or driver in use may have another key."""
     from urc.runtime.kept import DRIVEN, in_use
 
     installed = store.installed()
@@ -208,7 +208,7 @@ def keep_in_use(lock: "Lock") -> None:
 
 
 def _warn(line: str) -> None:
-    """Print one line to standard error, in red where that is a terminal."""
+    """Print one line to standard error, in red on a terminal."""
     from urc.problems import printable
 
     is_plain = not sys.stderr.isatty() or bool(os.environ.get("NO_COLOR"))
@@ -217,21 +217,21 @@ def _warn(line: str) -> None:
 
 
 def signer(file: Path | None = None) -> "Signer | None":
-    """Return the key in a file that was named, or this user's own if there is one.
+    """Return the key in the given file, or this user's own key if any.
 
     Raises:
-        Misuse: there is no file of that name.
+        Misuse: the given file does not exist.
     """
     from urc.packages.signature import PUBLISHER, read_signer
 
     found = read_signer(file or data_folder() / PUBLISHER)
     if found is None and file is not None:
-        raise Misuse(f"{file}: there is no such file; 'urc repo key new NAME' makes a key")
+        raise Misuse(f"{file}: this file does not exist; 'urc repo key new NAME' creates a key")
     return found
 
 
 def search_repositories(words: Sequence[str], kind: str = "", *, is_json: bool = False) -> int:
-    """Print the newest version of each package with all words; 1 without any."""
+    """Print the newest version of each package with all words; return 1 without a result."""
     from urc.cli.output import json_text
     from urc.packages.index import search
     from urc.packages.sources import merged

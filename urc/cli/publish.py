@@ -1,4 +1,4 @@
-"""`urc publish`: a package to a repository that takes packages."""
+"""`urc publish`: uploads a package to a repository that accepts packages."""
 
 import argparse
 from pathlib import Path
@@ -14,7 +14,7 @@ EXAMPLE = "urc publish lab/drivers/puppet --to https://robots.example/ --token-f
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what to publish, and where."""
+    """Add the packages and the repository."""
     parser.add_argument(
         "packages",
         metavar="DIR|PACKAGE",
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Send each package; what the repository refuses ends it with its reason."""
+    """Upload each package; stop at the first refusal, with its reason."""
     from urc.cli.failures import Misuse
     from urc.cli.packages import signer
     from urc.packages.publish import is_overheard, publish
@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     url = repository_url(arguments.to)
     if is_overheard(url) and not arguments.insecure:
         raise Misuse(
-            f"{url} is not encrypted: anybody on the way can read the token; use https,"
+            f"{url} is not encrypted: an attacker on the way can read the token; use https,"
             " or --insecure in a network that you trust"
         )
     token, made = read_token(arguments.token_file), _provenance(arguments)
@@ -70,12 +70,12 @@ def run(arguments: argparse.Namespace) -> int:
             signature = key.sign(said.key, said.version, package.digest)
         done = publish(url, package, signature, token, made)
         who = f"signed by {signature}" if signature else "not signed"
-        print(f"{'published' if done.is_new else 'there already:'} {done.listed}, {who}")
+        print(f"{'published' if done.is_new else 'already there:'} {done.listed}, {who}")
     return 0
 
 
 def _provenance(arguments: argparse.Namespace) -> "Provenance | None":
-    """Return where the packages were made, if that is told."""
+    """Return the source of the packages, if given."""
     import msgspec
 
     from urc import __version__
@@ -85,7 +85,7 @@ def _provenance(arguments: argparse.Namespace) -> "Provenance | None":
 
     if not arguments.source:
         if arguments.commit:
-            raise Misuse("--commit names a commit of --source; name that, too")
+            raise Misuse("--commit needs --source, the repository of the commit")
         return None
     said = {"source": arguments.source, "commit": arguments.commit, "tool": f"urc {__version__}"}
     try:
@@ -97,7 +97,7 @@ def _provenance(arguments: argparse.Namespace) -> "Provenance | None":
 
 
 def _look(source: "FileSource", document: Path, arguments: argparse.Namespace) -> None:
-    """Refuse a package of a folder with findings; what is packed already the repository looks at.
+    """Refuse a package folder with problems; the repository checks packed archives.
 
     Raises:
         PackageError: the errors, and the warnings unless they are allowed.
@@ -116,7 +116,7 @@ def _look(source: "FileSource", document: Path, arguments: argparse.Namespace) -
     if found:
         told = "; ".join(problem.headline for problem in found[:_TOLD_MOST])
         only = all(one.severity == "warning" for one in found)
-        hint = "; --allow-warnings publishes it all the same" if only else ""
+        hint = "; --allow-warnings publishes it despite warnings" if only else ""
         raise PackageError(f"{told}{hint}")
 
 

@@ -1,4 +1,4 @@
-"""`urc record`: connect, and keep all that happens in a file that `urc replay` plays."""
+"""`urc record`: connects, and records the session in a file for `urc replay`."""
 
 import argparse
 import asyncio
@@ -21,7 +21,7 @@ _SOON_S, _LOOK_S = 0.02, 0.5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the profile, how long, and where to."""
+    """Add the profile, the duration, and the file."""
     add_profile(parser)
     parser.add_argument(
         "-o",
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Record until the time is over or a signal comes; 1 when nothing was received."""
+    """Record until the time is over or a signal arrives; return 1 when nothing was received."""
     from urc.cli.running import run_loop
     from urc.cli.settings import complete_settings
 
@@ -55,9 +55,9 @@ async def _record(
     session = Session(profile, settings, built_in_catalog().transports)
     check_installed()
     file = arguments.output or named(Path(), profile.name)
-    # It begins before the session and ends after it: what is said at both ends is in it.
+    # The recording starts before the session and ends after it, so both ends are recorded.
     async with recorded(session.hub, file, profile) as recorder:
-        while not (recorder.is_begun or recorder.fault):  # noqa: ASYNC110 - a thread says so
+        while not (recorder.is_begun or recorder.fault):  # noqa: ASYNC110 - a thread sets them
             await asyncio.sleep(_SOON_S)
         if recorder.fault:
             raise UrcError(recorder.fault)
@@ -69,15 +69,16 @@ async def _record(
 
 
 async def _until_over(recorder: "Recorder", seconds: float | None) -> None:
-    """Return when the time is over, when nothing can be recorded any more, or at Ctrl-C."""
+    """Return when the time is over, when recording failed, or at Ctrl-C."""
     try:
         async with asyncio.timeout(seconds):
-            while not recorder.fault:  # noqa: ASYNC110 - a thread says so
+            while not recorder.fault:  # noqa: ASYNC110 - a thread sets it
                 await asyncio.sleep(_LOOK_S)
     except TimeoutError:
         pass
     except asyncio.CancelledError:
-        # That is how a recording without a time ends: the file is made whole, and told of.
+        # Ctrl-C is the normal end without a time: the file is completed, and its contents are
+        # printed.
         task = asyncio.current_task()
         if task is not None:
             task.uncancel()

@@ -1,4 +1,4 @@
-"""`urc remove`: an installed package, and what only it needed."""
+"""`urc remove`: removes an installed package, and dependencies that nothing else needs."""
 
 import argparse
 
@@ -6,7 +6,7 @@ EXAMPLE = "urc remove drivers/puppet"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what to remove."""
+    """Add the package to remove."""
     parser.add_argument(
         "package", metavar="PACKAGE", help="NAME or drivers/NAME; @VERSION for one version only"
     )
@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Remove it; what another package needs stays."""
+    """Remove it; keep what another package needs."""
     from urc._folders import data_folder
     from urc.cli.packages import open_store
     from urc.packages.names import parse_wish
@@ -34,8 +34,8 @@ def run(arguments: argparse.Namespace) -> int:
     for name in names_kept(folder, removed, store.installed()):
         file = KeptFile(folder, name)
         if arguments.keep_settings:
-            print(f"kept what was filled in for {name}: {file.file}")
+            print(f"kept the settings of {name}: {file.file}")
         else:
             file.forget()
-            print(f"forgot what was filled in for {name}, its secrets too")
+            print(f"deleted the settings of {name}, including its secrets")
     return 0

@@ -1,4 +1,4 @@
-"""`urc replay`: the dashboard on a recording, as if the robot told it now."""
+"""`urc replay`: the dashboard on a recording, with its values as if they were live."""
 
 import argparse
 from pathlib import Path
@@ -20,7 +20,7 @@ EXAMPLE = "urc replay puppet.mcap --speed 2"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the recording, how it is played, and where to listen."""
+    """Add the recording, the playback options, and the address."""
     parser.add_argument("recording", metavar="FILE", type=Path, help="a recording of URC")
     parser.add_argument(
         "--profile",
@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
         lost = f"its last {recording.unread_bytes} bytes cannot be read"
         complain(f"urc replay: {recording.file} is damaged, or was cut off: {lost}")
     elif recording.unread_bytes:
-        complain(f"urc replay: {recording.file} has no end; the last second may be missing")
+        complain(f"urc replay: {recording.file} is incomplete; the last second may be missing")
     profile = load(arguments.profile) if arguments.profile else _profile_in(recording)
     player = Player(
         recording,
@@ -90,7 +90,7 @@ async def _serve(player: "Player", host: str, port: int) -> int:
 
 
 def _profile_in(recording: "Recording") -> "Profile":
-    """Return the profile that is kept in a recording."""
+    """Return the profile in a recording."""
     with TemporaryDirectory(prefix="urc-replay-") as folder:
         file = Path(folder, "profile.yaml")
         file.write_text(recording.document, encoding="utf-8")
@@ -98,7 +98,7 @@ def _profile_in(recording: "Recording") -> "Profile":
             return load(str(file))
         except ProblemsError as error:
             line = str(error).partition("\n")[0].replace(str(file), recording.file.name)
-            raise UrcError(f"{line}; --profile names another profile to show it with") from None
+            raise UrcError(f"{line}; --profile names another profile for it") from None
 
 
 def _speed(text: str) -> float:
@@ -107,5 +107,5 @@ def _speed(text: str) -> float:
     except ValueError:
         speed = 0.0
     if not 0.1 <= speed <= 100:
-        raise argparse.ArgumentTypeError(f"a speed from 0.1 to 100 is expected, not {text!r}")
+        raise argparse.ArgumentTypeError(f"expected a speed from 0.1 to 100, found {text!r}")
     return speed

@@ -1,4 +1,4 @@
-"""`urc repo`: repositories of packages, those of others and one's own."""
+"""`urc repo`: repositories of packages, known ones and one's own."""
 
 import argparse
 import asyncio
@@ -21,18 +21,16 @@ def token(arguments: argparse.Namespace) -> int:
     from urc.problems import printable
 
     if arguments.tokens is None:
-        raise Misuse(
-            "'urc repo token' needs --tokens FILE, the file that 'urc repo serve' is given"
-        )
+        raise Misuse("'urc repo token' needs --tokens FILE, the same file as for 'urc repo serve'")
     tokens = Tokens(arguments.tokens)
     match arguments.words:
         case ["add", name]:
             if not arguments.may:
-                raise Misuse("'urc repo token add' needs --may: what the token may publish")
+                raise Misuse("'urc repo token add' needs --may: the packages that it may publish")
             print(tokens.add(name, tuple(arguments.may)))
         case ["remove", name]:
             tokens.remove(name)
-            print(f"removed {name}: it may publish nothing any more")
+            print(f"removed {name}: this token can no longer publish")
         case ["list"]:
             for one in tokens.all():
                 print(printable(f"{one.name}  {', '.join(one.may)}"))
@@ -42,7 +40,7 @@ def token(arguments: argparse.Namespace) -> int:
 
 
 def key(arguments: argparse.Namespace) -> int:
-    """Make or show one's own key, list those of others, or forget one."""
+    """Create or show one's own key, list the pinned keys, or forget one."""
     from urc._folders import data_folder
     from urc.cli.packages import open_store
     from urc.packages.names import parse_key
@@ -52,11 +50,11 @@ def key(arguments: argparse.Namespace) -> int:
     match arguments.words:
         case ["new", name]:
             made = new_signer(name, file)
-            print(f"{made}, in {file}: keep a copy where nobody else can read it")
+            print(f"{made}, in {file}: keep a copy in a private place")
         case ["show"]:
             own = read_signer(file)
             if own is None:
-                raise Misuse(f"{file}: there is no key; 'urc repo key new NAME' makes one")
+                raise Misuse(f"{file}: there is no key; 'urc repo key new NAME' creates one")
             print(own)
         case ["list"]:
             for name, kept in sorted(open_store().state().keys.items()):
@@ -64,7 +62,7 @@ def key(arguments: argparse.Namespace) -> int:
         case ["forget", name]:
             with open_store().changing() as change:
                 change.forget_key(parse_key(name))
-            print(f"forgot the key of {name}; the next one that signs it is kept")
+            print(f"forgot the key of {name}; the next key that signs it is pinned")
         case _:
             raise Misuse("'urc repo key' takes new NAME, show, list or forget PACKAGE")
     return 0
@@ -74,13 +72,13 @@ EXAMPLE = "urc repo add http://192.168.1.5:8090/"
 
 _PORT = 8090
 _ARCHIVE_S = 60.0
-"""Time limit for the upload of an archive."""
+"""Time limit for the upload of an archive, in seconds."""
 _RENEW_S = 3600.0
-"""How often a server checks whether its index must be signed again."""
+"""Period between two checks of the expiry of a served index, in seconds."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what to do, and with what."""
+    """Add the action and its options."""
     parser.add_argument(
         "action",
         metavar="ACTION",
@@ -134,10 +132,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _days(text: str) -> int:
-    """Return a number of days; raise what argparse tells in one line."""
+    """Return a number of days; raise an error in one line for argparse."""
     if text.isdecimal() and len(text) < 4 and 1 <= int(text) <= 365:
         return int(text)
-    raise argparse.ArgumentTypeError(f"1 to 365 days are expected, found {text[:20]!r}")
+    raise argparse.ArgumentTypeError(f"expected 1 to 365 days, found {text[:20]!r}")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -161,14 +159,14 @@ def _add(arguments: argparse.Namespace) -> int:
     keeper = next((one.keeper for one in known.all() if one.name == url), "")
     print(printable(f"its index is signed by {keeper}" if keeper else "its index is not signed"))
     if url.startswith("http:"):
-        complain(f"urc repo: {url} is not encrypted: who is in between can change what is listed")
+        complain(f"urc repo: {url} is not encrypted: an attacker on the way can change the index")
     return 0
 
 
 def _remove(arguments: argparse.Namespace) -> int:
     from urc.cli.packages import repositories
 
-    print(f"removed {repositories().remove(_one(arguments, 'URL'))}; what is installed stays")
+    print(f"removed {repositories().remove(_one(arguments, 'URL'))}; installed packages stay")
     return 0
 
 
@@ -177,7 +175,7 @@ def _list(arguments: argparse.Namespace) -> int:
     from urc.problems import printable
 
     if arguments.words:
-        raise Misuse("'urc repo list' takes no more words")
+        raise Misuse("'urc repo list' takes no arguments")
     for repository in repositories().all():
         keeper = repository.keeper
         print(printable(f"{repository.name}  signed by {keeper}" if keeper else repository.name))
@@ -191,7 +189,7 @@ def _search(arguments: argparse.Namespace) -> int:
 
 
 def _index(arguments: argparse.Namespace) -> int:
-    """Write the index of a folder, for any static web server; 1 when a package is left out."""
+    """Write the index of a folder, for any static web server; return 1 for a skipped package."""
     from urc.packages.keeper import make_index
     from urc.runtime.examine import examine
 
@@ -201,13 +199,13 @@ def _index(arguments: argparse.Namespace) -> int:
         complain(f"not listed: {fault}")
     print(f"{folder / 'index.json'}  {len(listing.listed.packages)} versions of packages")
     if seal is not None:
-        print(f"signed by {seal.signer}; sign it anew ('urc repo index', or a running"
+        print(f"signed by {seal.signer}; sign it again ('urc repo index', or a running"
               f" 'urc repo serve') within {arguments.valid / 2:g} days")  # fmt: skip
     return 1 if listing.faults else 0
 
 
 def _seal(arguments: argparse.Namespace) -> "Seal | None":
-    """Return what the index is signed with; None: there is no key."""
+    """Return the signature settings of the index; None without a key."""
     from urc.cli.packages import signer
     from urc.packages.head import Seal
 
@@ -216,14 +214,14 @@ def _seal(arguments: argparse.Namespace) -> "Seal | None":
 
 
 def _withdraw(arguments: argparse.Namespace) -> int:
-    """Offer a version no more, and say why."""
+    """Withdraw a version, with a reason."""
     if not (arguments.why or "").strip():
-        raise Misuse("'urc repo withdraw' needs --why: it is told who has it installed")
+        raise Misuse("'urc repo withdraw' needs --why: the reason for its users")
     return _note(arguments, arguments.why.strip())
 
 
 def _restore(arguments: argparse.Namespace) -> int:
-    """Offer a version again."""
+    """Offer a withdrawn version again."""
     return _note(arguments, "")
 
 
@@ -271,7 +269,7 @@ def _serve(arguments: argparse.Namespace) -> int:
 
 
 async def _renewing(folder: Path, seal: "Seal | None") -> None:
-    """Sign the index again before it expires, for as long as it is served."""
+    """Sign the index again before it expires, as long as it is served."""
     from urc.packages.keeper import renew
     from urc.packages.names import PackageError
 
@@ -280,7 +278,7 @@ async def _renewing(folder: Path, seal: "Seal | None") -> None:
         try:
             await asyncio.to_thread(renew, folder, seal)
         except (PackageError, OSError) as error:
-            complain(f"urc repo: the index is not signed anew: {error}")
+            complain(f"urc repo: the signature of the index is not renewed: {error}")
 
 
 def _tokens(arguments: argparse.Namespace, folder: Path) -> "Tokens | None":
@@ -291,10 +289,8 @@ def _tokens(arguments: argparse.Namespace, folder: Path) -> "Tokens | None":
     if file is None:
         return None
     if file.resolve().is_relative_to(folder.resolve()):
-        raise Misuse(
-            f"{file}: it stands in the repository, which any web server gives out; move it"
-        )
-    Tokens(file).all()  # what is wrong with it is told now, not to the first who publishes
+        raise Misuse(f"{file}: it is inside the repository, which web servers publish; move it")
+    Tokens(file).all()  # report mistakes now, not at the first upload
     return Tokens(file)
 
 
@@ -305,7 +301,7 @@ def _print_url(url: str) -> None:
 def _name(arguments: argparse.Namespace, folder: Path) -> str:
     name = str(arguments.name or folder.resolve().name or "repository")
     if len(name) > 200 or not name.isprintable():
-        raise Misuse("--name is one line of at most 200 characters")
+        raise Misuse("--name must be one line of at most 200 characters")
     return name
 
 

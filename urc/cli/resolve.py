@@ -1,4 +1,4 @@
-"""`urc resolve`: a profile as one document, each key with the place that it comes from."""
+"""`urc resolve`: a profile as one document, with the origin of each key."""
 
 import argparse
 

@@ -1,4 +1,4 @@
-"""An event loop under a verb: signals end it, and a slow reader does not hold it up."""
+"""An event loop for a verb: signals end it, and a slow reader does not block it."""
 
 import asyncio
 import logging
@@ -24,9 +24,9 @@ def run_loop(
     A second signal ends the process at once.
 
     Args:
-        work: returns an exit code; what it cleans up when cancelled must take bounded time.
-        code_when_ended: for a signal; 128 + its number when left out, as a shell reports it.
-        is_fast: on the fastest loop that is installed, which takes a moment to load.
+        work: returns an exit code; its cleanup after cancellation must take bounded time.
+        code_when_ended: exit code for a signal; 128 + its number by default, as in a shell.
+        is_fast: use the fastest installed loop, which takes a moment to load.
     """
     handler = logging.StreamHandler()
     handler.setFormatter(_OneLine())
@@ -46,7 +46,7 @@ async def _until_signal(work: Coroutine[Any, Any, int], code_when_ended: int | N
         task.cancel()
 
     for number in (signal.SIGINT, signal.SIGTERM):
-        # Windows has no such handlers; there Ctrl-C arrives as KeyboardInterrupt.
+        # Windows has no such handlers: Ctrl-C arrives as KeyboardInterrupt.
         with suppress(NotImplementedError):
             loop.add_signal_handler(number, end, number)
     try:
@@ -58,7 +58,7 @@ async def _until_signal(work: Coroutine[Any, Any, int], code_when_ended: int | N
 
 
 class _OneLine(logging.Formatter):
-    """Log lines for people: an exception is named, its traceback is not shown."""
+    """Log lines for people, with the name of an exception and without its traceback."""
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line."""
@@ -75,10 +75,10 @@ class _Job(NamedTuple):
 
 
 class LineWriter:
-    """Writes to the standard streams without blocking the loop on a slow reader.
+    """A writer for the standard streams that a slow reader cannot block.
 
-    The work is done by a daemon thread, straight on the descriptor: Python waits at its exit for
-    other threads, and for the buffer of a `print` that may never end.
+    A daemon thread writes straight to the descriptor. At its exit, Python waits for other threads,
+    and for the buffer of a `print` that may never end.
     """
 
     def __init__(self) -> None:
@@ -86,10 +86,10 @@ class LineWriter:
         threading.Thread(target=self._work, name="writer", daemon=True).start()
 
     async def write(self, stream: TextIO, text: str) -> None:
-        """Return when all of `text` was taken.
+        """Return when all of `text` is written.
 
         Raises:
-            OSError: it cannot be written; `BrokenPipeError` when the reader has gone.
+            OSError: it cannot be written; `BrokenPipeError` when the reader is gone.
         """
         loop = asyncio.get_running_loop()
         data = text.encode(stream.encoding, "backslashreplace")
@@ -105,7 +105,7 @@ class LineWriter:
                 _write_all(job.descriptor, job.data)
             except OSError as error:
                 fault = error
-            with suppress(RuntimeError):  # the loop has ended meanwhile
+            with suppress(RuntimeError):  # the loop has already ended
                 job.loop.call_soon_threadsafe(_settle, job.done, fault)
 
 

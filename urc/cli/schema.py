@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _bundled(folder: Path, name: str) -> Any:
-    """Return the schema `name` with every other one that it refers to under its ``$defs``."""
+    """Return the schema `name` with all schemas that it refers to under its ``$defs``."""
     pending, texts = [name], {name: (folder / name).read_text("utf-8")}
     while pending:
         for other in _OTHER.findall(texts[pending.pop()]):
@@ -57,7 +57,7 @@ def _bundled(folder: Path, name: str) -> Any:
 
 
 def _relinked(node: Any, here: str, root: str) -> Any:
-    """Return a schema whose references lead to where its parts stand in the bundle of `root`."""
+    """Return a schema with references to the parts in the bundle of `root`."""
     if isinstance(node, list):
         return [_relinked(item, here, root) for item in node]
     if not isinstance(node, dict):

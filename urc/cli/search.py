@@ -1,4 +1,4 @@
-"""`urc search`: packages in the repositories that were added."""
+"""`urc search`: packages in the known repositories."""
 
 import argparse
 
@@ -6,7 +6,7 @@ EXAMPLE = "urc search battery --kind widget"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the words, and the form of the answer."""
+    """Add the words and the format of the output."""
     parser.add_argument(
         "words", metavar="WORD", nargs="*", help="words that a package must contain"
     )
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the newest version of each package with all words; 1 without any."""
+    """Print the newest version of each package with all words; return 1 without a result."""
     from urc.cli.packages import search_repositories
 
     return search_repositories(arguments.words, arguments.kind, is_json=arguments.json)

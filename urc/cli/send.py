@@ -1,7 +1,7 @@
 """`urc send`: one command, its reply as JSON.
 
-Motion starts neither against a latched STOP nor against a driving operator, and ends when either
-comes. The engine learns about a STOP that is latched by another process.
+Motion does not start while STOP is latched or an operator drives, and ends when either happens. The
+engine is informed of a STOP that another process latched.
 """
 
 import argparse
@@ -34,17 +34,17 @@ from urc.runtime.latch import LatchFile
 from urc.runtime.servers import Server, headers, servers
 
 _ANSWER_S = 2.0
-"""A server that has not answered by then hangs; what it knows is not known."""
+"""Timeout of a server's reply in seconds; after it, the state of the server is unknown."""
 _LOOK_S = 0.1
 _ASK_S = 0.5
 _MOST_BYTES = 4096
 
 
 class Hindrance:
-    """Looks at the kept latch, and asks the servers that run on the same data folder."""
+    """Interlocks of a robot: the stored latch, and the servers on the same data folder."""
 
     def __init__(self, data: Path, robot: str, clock: Callable[[], float]) -> None:
-        """Prepare for one robot; nothing is read yet.
+        """Prepare for one robot, without reading anything.
 
         Args:
             data: folder of URC's own data.
@@ -61,14 +61,14 @@ class Hindrance:
         self._ask_s = float("-inf")
         self._driven = ""
         self.why = ""
-        """Why nothing may be moved, as of the last `look`; "": it may."""
+        """Reason why motion is refused, as of the last `look`; "" if it is allowed."""
 
     async def look(self) -> str:
-        """Look now; return `why`."""
+        """Read the state now; return `why`."""
         return await asyncio.to_thread(self._look)
 
     async def follow(self, on_change: Callable[[str], None]) -> None:
-        """Look again and again, until cancelled; tell every other `why`."""
+        """Read the state repeatedly until cancelled; report every change of `why`."""
         while True:
             before = self.why
             if await self.look() != before:
@@ -84,7 +84,7 @@ class Hindrance:
         return self.why
 
     def _read_latch(self) -> None:
-        """Read the kept latch, unless it is the one that was read before."""
+        """Read the stored latch if it has changed."""
         try:
             found = os.stat(self._file)
             seen = (found.st_mtime_ns, found.st_ino)
@@ -96,7 +96,7 @@ class Hindrance:
             self._latched = f"STOP is latched, pressed by {by}: reset it first" if by else ""
 
     def _asked(self) -> str:
-        """Return what the first server says that has something against it."""
+        """Return the first objection of a server, or ""."""
         for file, server in servers(self._data).items():
             why = self._answer(file, server)
             if why:
@@ -112,7 +112,7 @@ class Hindrance:
             line.request("GET", path, headers=headers(server))
             answer = line.getresponse()
             text = answer.read(_MOST_BYTES)
-            if answer.status == HTTPStatus.NOT_FOUND:  # it does not serve this robot
+            if answer.status == HTTPStatus.NOT_FOUND:  # this server does not have the robot
                 return ""
             found = json.loads(text)
             by, holder = str(found["latched"]), str(found["holder"])
@@ -120,10 +120,10 @@ class Hindrance:
                 return ""
         except ConnectionRefusedError:
             with suppress(OSError):
-                file.unlink()  # of a server that was killed
+                file.unlink()  # its server was killed
             return ""
         except (OSError, HTTPException, ValueError, KeyError, TypeError, RecursionError):
-            return f"the server at {url} does not say who drives the robot"
+            return f"the server at {url} does not report the operator of the robot"
         finally:
             line.close()
         if by:
@@ -135,9 +135,9 @@ EXAMPLE = "urc send my-robot.yaml set_speed speed=3 --set host=192.168.1.20"
 
 _WHOLE = re.compile(r"[+-]?[0-9]{1,300}")
 KNOWN_S = 3.0
-"""How long what a command requires may take to be read."""
+"""Time limit in seconds for reading the signals that a command requires."""
 _WRONG_USE = ("bad-argument", "unknown-command")
-"""Codes of failures that are caused by the arguments."""
+"""Codes of failures that wrong arguments cause."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -155,7 +155,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--despite-stop",
         action="store_true",
-        help="move the robot even while STOP is latched or a person drives it",
+        help="move the robot even while STOP is latched or an operator drives it",
     )
     parser.add_argument(
         "--data-dir",
@@ -167,7 +167,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the command and print its reply; 1 when it failed."""
+    """Run the command and print its reply; return 1 when it failed."""
     from urc.cli.running import run_loop
     from urc.cli.settings import complete_settings
 
@@ -184,16 +184,16 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _check_hold(command: "Command", hold_s: float | None) -> None:
     if command.hold is None and hold_s is not None:
-        raise Misuse(f"{command.name} is given once, and not held: leave --hold out")
+        raise Misuse(f"{command.name} is not a held command: remove --hold")
     if command.hold is not None and hold_s is None:
         raise Misuse(
-            f"{command.name} moves the robot for as long as it is held: say how long, as --hold 1s"
+            f"{command.name} moves the robot while it is held: give a time, such as --hold 1s"
         )
     if hold_s is not None:
         from urc.runtime.holding import LONGEST_HOLD_S
 
         if hold_s > LONGEST_HOLD_S:
-            raise Misuse(f"--hold is at most {LONGEST_HOLD_S:g}s; drive longer on a dashboard")
+            raise Misuse(f"--hold is {LONGEST_HOLD_S:g}s at most; drive longer on a dashboard")
 
 
 def _arguments(command: "Command", words: list[str]) -> dict[str, "Reading"]:
@@ -202,7 +202,7 @@ def _arguments(command: "Command", words: list[str]) -> dict[str, "Reading"]:
         name, equals, text = word.partition("=")
         if not equals:
             example = f"{next(iter(command.arguments), 'ARG')}={word}"
-            raise Misuse(f"an argument is written ARG=VALUE, as {example!r}; found {word!r}")
+            raise Misuse(f"expected ARG=VALUE, such as {example!r}; found {word!r}")
         argument = command.arguments.get(name)
         if argument is None:
             hint = what_it_has(name, command.arguments)
@@ -217,31 +217,31 @@ def _arguments(command: "Command", words: list[str]) -> dict[str, "Reading"]:
 
 
 def _elements(argument: "Argument", text: str) -> tuple["Value", ...]:
-    """Return the elements of an array: ``1,2,3``, or ``["a, b", "c"]`` as JSON has it."""
+    """Return the elements of an array: ``1,2,3``, or ``["a, b", "c"]`` in JSON."""
     if text.startswith("["):
         import json
 
         try:
             return tuple(json.loads(text))
         except (ValueError, RecursionError):
-            raise Misuse(f"{argument.name}: {text!r} is no list in JSON") from None
+            raise Misuse(f"{argument.name}: {text!r} is not a JSON list") from None
     single = argument._replace(type=argument.of)
     return tuple(_value(single, word.strip()) for word in text.split(",")) if text else ()
 
 
 def _value(argument: "Argument", text: str) -> "Value":
-    """Return the typed value; range and choices are the engine's to check."""
+    """Return the typed value; the engine checks range and choices."""
     try:
         if argument.type == "integer":
             return int(text, 0)
         if argument.type == "number":
-            # "20" stays a whole number, as it would in a document: templates print it as written.
+            # "20" stays a whole number, as in a document, because templates print it.
             return int(text) if _WHOLE.fullmatch(text) else float(text)
     except ValueError:
-        raise Misuse(f"{argument.name}: {argument.type} expected, found {text!r}") from None
+        raise Misuse(f"{argument.name}: expected {argument.type}, found {text!r}") from None
     if argument.type == "boolean":
         if text not in ("true", "false"):
-            raise Misuse(f"{argument.name}: true or false expected, found {text!r}")
+            raise Misuse(f"{argument.name}: expected true or false, found {text!r}")
         return text == "true"
     return text
 
@@ -300,7 +300,7 @@ async def _given(
 async def _heeding(
     session: "Session", command: "Command", arguments: argparse.Namespace
 ) -> AsyncIterator["Hindrance | None"]:
-    """Heed STOP and driving operators while the context lasts, unless told not to."""
+    """Obey STOP and operators during the context, unless the arguments say otherwise."""
     may_move = command.moves or command.hold is not None
     if arguments.despite_stop or not may_move:
         yield None
@@ -312,7 +312,7 @@ async def _heeding(
     hindrance = Hindrance(data, session.profile.name, clock)
 
     def tell(why: str) -> None:
-        session.latch(f"{why}; --despite-stop moves it all the same" if why else "")
+        session.latch(f"{why}; --despite-stop overrides this" if why else "")
 
     if await hindrance.look():
         tell(hindrance.why)
@@ -324,7 +324,7 @@ async def _heeding(
 
 
 async def _known(session: "Session", command: "Command") -> None:
-    """Wait for the first reading of what the command requires, for as long as may take."""
+    """Wait for the first reading of the signals that the command requires, up to the time limit."""
     wanted = {name for one in command.requires for name in one.condition.names}
     wanted &= session.profile.driver.signals.keys()
 
@@ -333,7 +333,10 @@ async def _known(session: "Session", command: "Command") -> None:
 
     if is_known():
         return
-    with session.hub.tap() as tap, suppress(TimeoutError):  # then the engine says what is not known
+    with (
+        session.hub.tap() as tap,
+        suppress(TimeoutError),
+    ):  # then the engine reports it
         async with asyncio.timeout(KNOWN_S):
             while not is_known():
                 await tap.filled()
@@ -341,7 +344,7 @@ async def _known(session: "Session", command: "Command") -> None:
 
 
 def _why(session: "Session", command: "Command", failed: "CommandFailed") -> str:
-    """Return the reason, with what the links know when the robot is not there."""
+    """Return the reason, with the state of the links when the robot is not connected."""
     from urc.protocol.bounds import lines_of
 
     if failed.code != "disconnected":

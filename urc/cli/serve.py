@@ -19,7 +19,7 @@ EXAMPLE = "urc serve puppet --set host=192.168.1.20"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the profiles, their settings, and where to listen."""
+    """Add the profiles, their settings, and the address."""
     parser.add_argument(
         "profiles",
         metavar="PROFILE",
@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--no-guard",
         dest="has_guard",
         action="store_false",
-        help="for debugging: write motion from this process; if it hangs, nothing stops a robot",
+        help="for debugging: send motion from this process; if it hangs, nothing stops a robot",
     )
     for flag, text in (
         ("--data-dir", "data folder: latched stops, audit log, settings"),
@@ -87,10 +87,10 @@ def run(arguments: argparse.Namespace) -> int:
     _check(arguments)
     profiles = [load(word) for word in arguments.profiles]
     if not profiles and (arguments.settings or arguments.settings_file):
-        raise Misuse("--set and --settings are for the profiles that are named; name one")
-    settings_given(profiles, arguments)  # what is wrong with them is said before anything starts
+        raise Misuse("--set and --settings need a profile on the command line")
+    settings_given(profiles, arguments)  # report invalid settings before the server starts
     for folder in dict.fromkeys(each for one in profiles for each in hidden_beside(one.file)):
-        complain(f"urc serve: {folder} is not used: a widget of that name ships with URC")
+        complain(f"urc serve: {folder} is not used: a widget of this name ships with URC")
     if not is_loopback(arguments.host):
         _warn(arguments)
 
@@ -103,12 +103,12 @@ def run(arguments: argparse.Namespace) -> int:
         )
         named = [one.name for one in profiles]
         if profile.name not in named:
-            return resolve_settings(bare, {}, os.environ)[0]  # an installed one
+            return resolve_settings(bare, {}, os.environ)[0]  # an installed profile
         others = [one for one in profiles if one.name != profile.name]
         return settings_given([bare, *others], arguments)[0][0]
 
     if not arguments.has_guard:
-        complain("urc serve: no guard: a robot that moves is not stopped when this process hangs")
+        complain("urc serve: no guard: a moving robot is not stopped when this process hangs")
     return run_dashboard(
         profiles,
         Place(
@@ -135,29 +135,29 @@ def _check(arguments: argparse.Namespace) -> None:
     """Refuse arguments that exclude each other.
 
     Raises:
-        Misuse: two of them do, or a folder does not exist.
+        Misuse: for such arguments, or a folder that does not exist.
     """
     if arguments.dev and not is_loopback(arguments.host):
-        raise Misuse(f"--dev shows all traffic and is for this machine alone, not {arguments.host}")
+        raise Misuse(f"--dev shows all traffic and is for this machine only, not {arguments.host}")
     if arguments.manage and not arguments.token_file and not is_loopback(arguments.host):
         raise Misuse(
             f"--manage lets others at {arguments.host} install packages and change settings:"
-            " add --token FILE, and only those with the token in that file may"
+            " add --token FILE to require the token in that file"
         )
     if arguments.token_file and not arguments.manage:
-        raise Misuse("--token is for those who manage from other machines: add --manage")
+        raise Misuse("--token is for management from other machines: add --manage")
     if arguments.faults and not arguments.simulate:
         raise Misuse("--fault is for emulated robots: add --simulate")
     if arguments.tiles and not arguments.tiles.is_dir():
-        raise Misuse(f"--tiles names a folder of map pictures; {arguments.tiles} is none")
+        raise Misuse(f"--tiles needs a folder of map tiles; {arguments.tiles} is not a folder")
     if arguments.record:
         from urc.runtime.recording.recorder import check_installed
 
-        check_installed()  # said now, not when somebody drives
+        check_installed()  # reported now, not when an operator drives
 
 
 def _warn(arguments: argparse.Namespace) -> None:
     complain(
-        f"urc serve: {arguments.host} can be reached by others, and there is no sign-in yet:"
+        f"urc serve: {arguments.host} is reachable from other machines, and there is no sign-in:"
         " anyone on that network can drive these robots"
     )

@@ -18,23 +18,24 @@ __all__ = ["complete_settings", "settings_given"]
 def settings_given(
     profiles: Sequence[Profile], arguments: argparse.Namespace, *, allows_any_port: bool = False
 ) -> list[tuple[dict[str, Value], tuple[str, ...]]]:
-    """Return, for each profile, the settings' values and the names of those that have none.
+    """Return, for each profile, the values of its settings and the names of those without a value.
 
-    `--set` wins over the environment, the environment over the settings file, and that over the
-    profile's default. With several profiles, a setting goes to each that has one of that name.
+    `--set` takes precedence over the environment, the environment over the settings file, and the
+    file over the profile's default. With several profiles, a setting goes to each profile that has
+    it.
 
     Args:
         profiles: at least one.
-        arguments: as `add_settings` made them.
-        allows_any_port: port 0 lets the system choose.
+        arguments: with the options of `add_settings`.
+        allows_any_port: whether port 0 lets the system choose.
 
     Raises:
-        Misuse: a name that no profile has, or a text that is no value of its type.
+        Misuse: a name that no profile has, or a text that is not a value of its type.
         ProblemsError: the same, in the settings file.
     """
     given: dict[str, str] = dict(arguments.settings)
     _warn_of_secrets(profiles, arguments)
-    # A single profile knows best what it has, and what was meant.
+    # A single profile gives the better hint for an unknown name.
     if len(profiles) > 1:
         for name in given:
             if not any(name in profile.settings for profile in profiles):
@@ -59,21 +60,21 @@ def settings_given(
 
 
 def _warn_of_secrets(profiles: Sequence[Profile], arguments: argparse.Namespace) -> None:
-    """Say once of each secret that was typed who reads it, and how else it is given."""
+    """Warn once of each secret on the command line, and name the alternatives."""
     told: set[str] = arguments.__dict__.setdefault("told_secrets", set())
     for name, _ in arguments.settings:
         settings = [one.settings[name] for one in profiles if name in one.settings]
         if name not in told and any(one.is_secret for one in settings):
             told.add(name)
             complain(
-                f"warning: --set {name}=… can be read by everybody on this machine, in the list of"
+                f"warning: --set {name}=… is visible to every user of this machine, in the list of"
                 f" processes: use {environment_name(name)} in the environment, or a file with"
                 " --settings"
             )
 
 
 def complete_settings(profile: Profile, arguments: argparse.Namespace) -> dict[str, Value]:
-    """Return the value of every setting; raise `Misuse` naming those that have none."""
+    """Return the value of every setting; raise `Misuse` with the names of settings without one."""
     ((values, missing),) = settings_given([profile], arguments)
     if missing:
         words = " ".join(f"--set {name}=…" for name in missing)
@@ -90,7 +91,7 @@ def _settings_in(
     document = read_document(file)
     if not isinstance(document.data, dict):
         raise ProblemsError(
-            [document.problem((), "wrong-type", "a settings file is a list of name: value")]
+            [document.problem((), "wrong-type", "a settings file must be a mapping of name: value")]
         )
     problems: list[Problem] = []
     texts: dict[str, str] = {}
@@ -113,10 +114,10 @@ def _faults_of(
     settings = [one.settings[name] for one in profiles if name in one.settings]
     if not settings:
         known = ", ".join(dict.fromkeys(key for one in profiles for key in one.settings)) or "none"
-        text = f"there is no setting {name!r}; there are: {known}"
+        text = f"there is no setting {name!r}; known settings: {known}"
         yield document.problem((name,), "unknown-setting", text, key=True)
     elif isinstance(value, (dict, list)):
-        yield document.problem((name,), "wrong-type", "text, a number, true or false is expected")
+        yield document.problem((name,), "wrong-type", "expected text, a number, true or false")
     elif value is not None:
         for setting in settings:
             try:

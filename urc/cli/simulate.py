@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 EXAMPLE = "urc simulate puppet --set port=6789"
 
 _SOURCE: Final = "urc.simulator.twin"
-"""Log of the frames that an emulated robot cannot answer."""
+"""Name of the logger for frames that an emulated robot cannot answer."""
 _AGAIN_S: Final = 10.0
-"""The same is told again after this time, with how often it happened."""
+"""Time in seconds after which the same warning appears again, with a count."""
 _LINES_A_SECOND: Final = 5
 _LAST_LINES: Final = 10
-"""Different complaints told at the end."""
+"""Maximum different warnings in the final summary."""
 _KINDS_MOST: Final = 200
-"""Different complaints that are kept apart; beyond them the oldest is forgotten."""
+"""Maximum different warnings with a count of their own; beyond it the oldest goes."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     profile = load(arguments.profile)
     ((values, missing),) = settings_given([profile], arguments, allows_any_port=True)
-    # What only a real robot needs to be told, nobody must fill in for its twin.
+    # Samples replace the values that only a real robot needs.
     settings = sample_settings(profile.settings) | values
     settings |= {name: 0 for name in missing if profile.settings[name].type == "port"}
     twin, faulty = Twin(profile, settings), Faulty()
@@ -79,7 +79,7 @@ async def _simulate(
 
 
 class Complaints(logging.Handler):
-    """Reports frames that an emulated robot could not answer: one line each, repeats counted.
+    """A reporter of frames that an emulated robot could not answer: one line each, with a count.
 
     Args:
         tell: prints one line.
@@ -93,16 +93,16 @@ class Complaints(logging.Handler):
         self._tell = tell
         self._clock = clock
         self._counts: dict[str, int] = {}
-        """Complaint → how often it came since it was told."""
+        """Warning → its count since its last line."""
         self._told_at: dict[str, float] = {}
         self._forgotten = 0
-        """How many were neither told nor are still counted by themselves."""
+        """Count of warnings without a line and without a count of their own."""
         self._second = float("-inf")
         self._lines = 0
-        """Lines told in the second that began at `_second`."""
+        """Number of lines in the second that began at `_second`."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Count a complaint, and tell it unless it was told a moment ago."""
+        """Count a warning, and print it unless it was printed a moment ago."""
         text = record.getMessage()
         if text not in self._counts and len(self._counts) >= _KINDS_MOST:
             oldest = next(iter(self._counts))
@@ -117,7 +117,7 @@ class Complaints(logging.Handler):
             self._told_at[text] = now
 
     def finish(self) -> None:
-        """Report the counted repeats, the most frequent ones first."""
+        """Report the counted warnings, the most frequent ones first."""
         left = sorted(self._counts.items(), key=lambda item: -item[1])
         for text, count in left[:_LAST_LINES]:
             if count:

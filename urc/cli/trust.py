@@ -1,4 +1,4 @@
-"""`urc trust`: the host key of an SSH server, shown to a person and kept when that is right."""
+"""`urc trust`: shows the host key of an SSH server to the user, and stores it on consent."""
 
 import argparse
 import sys
@@ -30,14 +30,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Show the key and keep it when a person says so; 1 when it is not kept."""
+    """Show the key and store it on consent; return 1 when it is not stored."""
     from urc.cli.running import run_loop
 
     profile = load(arguments.profile)
     name = _transport(profile, arguments.transport)
     line = _line(profile, name, _settings(profile, name, arguments))
     if line.target.keys.is_pinned:
-        raise Misuse(f"transports.{name}: host_key in the document says which key is right")
+        raise Misuse(f"transports.{name}: the document already gives the key as host_key")
     offers: list[Offer] = []
 
     async def look() -> int:
@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _transport(profile: "Profile", named: str | None) -> str:
-    """Return the transport that is meant."""
+    """Return the ssh transport with this name, or the only one."""
     choices = [name for name, spec in profile.driver.transports.items() if spec.type == "ssh"]
     if not choices:
         raise Misuse(f"{profile.name} has no ssh transport: nothing to trust")
@@ -63,7 +63,7 @@ def _transport(profile: "Profile", named: str | None) -> str:
 
 
 def _settings(profile: "Profile", name: str, arguments: argparse.Namespace) -> dict[str, "Value"]:
-    """Return the settings; without a login on the way, secrets may be left out."""
+    """Return the settings; secrets are optional if no tunnel needs a login."""
     from urc.cli.settings import settings_given
 
     ((values, missing),) = settings_given([profile], arguments)
@@ -83,7 +83,7 @@ def _line(profile: "Profile", name: str, settings: dict[str, "Value"]) -> "SshTr
 
     line = make_transports(profile.driver, settings, built_in_catalog().transports)[name]
     if not isinstance(line, SshTransport):
-        raise UrcError(f"transports.{name}: another package's ssh has no keys that URC can keep")
+        raise UrcError(f"transports.{name}: this ssh transport has no keys that URC can store")
     return line
 
 
@@ -91,28 +91,30 @@ def _decide(line: "SshTransport", offer: "Offer", yes: str | None) -> int:
     from urc.transports.known_hosts import remember
 
     address = line.target.address
-    print(f"{address.text} shows the host key {offer.fingerprint} ({offer.algorithm})")
+    print(f"{address.text} has the host key {offer.fingerprint} ({offer.algorithm})")
     if not offer.expected:
-        print("it is trusted already")
+        print("this key is already trusted")
         return 0
     if offer.expected == "revoked":
         raise UrcError("this key is revoked in the known-hosts file, and cannot be trusted")
     if offer.expected != "unknown":
-        print(f"it was {offer.expected} before: the robot was set up anew, or somebody listens in")
+        print(
+            f"the key was {offer.expected} before: a reinstalled robot, or an attacker in between"
+        )
     if yes is None and not _is_confirmed():
         print("nothing is kept")
         return 1
     if yes is not None and yes.rstrip("=") != offer.fingerprint:
-        raise UrcError(f"that is not the key that was to be trusted ({yes}); nothing is kept")
+        raise UrcError(f"this is not the key to trust ({yes}); nothing is stored")
     file = remember(address.host, address.port, offer.key)
-    print(f"trusted from now on, by {file}")
+    print(f"trusted from now on, in {file}")
     return 0
 
 
 def _is_confirmed() -> bool:
     if not sys.stdin.isatty():
-        raise Misuse("nobody can be asked here; --yes SHA256:… trusts that fingerprint")
+        raise Misuse("there is no terminal to ask; --yes SHA256:… trusts that fingerprint")
     try:
-        return input("Is that the robot's own key? Type yes: ").strip().lower() == "yes"
+        return input("Is this the robot's own key? Type yes: ").strip().lower() == "yes"
     except EOFError:
         return False

@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Update, or go back; 1 when something could not be."""
+    """Update, or revert; return 1 after a failure."""
     if arguments.back:
         return _back(arguments)
     from urc.cli.packages import known_repositories, open_store
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
                 print(f"{lock} is up to date")
             elif not _update(lock, plan, store, arguments):
                 code = 1
-        except PackageError as error:  # the others can still be updated
+        except PackageError as error:  # other packages can still be updated
             complain(f"urc update: {error}")
             code = 1
     return code
@@ -71,15 +71,15 @@ def _installed(store: "Store", word: str) -> "tuple[Lock, str]":
 
 
 def _all(store: "Store") -> "list[tuple[Lock, str]]":
-    """Return the newest version of everything that is installed."""
-    newest = {lock.root: lock for lock in store.installed()}  # they come by version
+    """Return the newest version of every installed package."""
+    newest = {lock.root: lock for lock in store.installed()}  # in the order of versions
     if not newest:
         print("nothing is installed")
     return [(lock, "*") for lock in newest.values()]
 
 
 def _update(old: "Lock", plan: "Plan", store: "Store", arguments: argparse.Namespace) -> bool:
-    """Show what changes, ask, and do it; return whether it was done."""
+    """Show the changes, ask, and update; return whether it was done."""
     from urc.cli.packages import is_agreed_to
     from urc.packages.install import origin_lines
     from urc.packages.update import staged_difference
@@ -95,12 +95,12 @@ def _update(old: "Lock", plan: "Plan", store: "Store", arguments: argparse.Names
             print(f"{old} stays")
             return False
         change.replace(old, plan)
-    print(f"updated {old.root} to {plan.lock.version}; 'urc update --back {old.root}' goes back")
+    print(f"updated {old.root} to {plan.lock.version}; 'urc update --back {old.root}' reverts it")
     return True
 
 
 def _told(old: "Lock", plan: "Plan", difference: "Difference", origins: list[str]) -> list[str]:
-    """Return what changes, for people."""
+    """Return the changes, for people."""
     from urc.packages.update import headline
 
     lines = [headline(old, plan.lock)]
@@ -110,11 +110,11 @@ def _told(old: "Lock", plan: "Plan", difference: "Difference", origins: list[str
 
 
 def difference_lines(difference: "Difference") -> list[str]:
-    """Return what another version may do and send that the one before does not, for people."""
+    """Return the differences in permissions and sent bytes between two versions, for people."""
     lines = [f"  may from now on: {line}" for line in difference.gained]
     lines += [f"  may no longer: {line}" for line in difference.lost]
     if not difference.gained:
-        lines.append("  it may do no more than before")
+        lines.append("  no new permissions")
     if difference.wire:
         lines += ["  on the wire:", *(f"    {line}" for line in difference.wire)]
     return lines
@@ -129,5 +129,5 @@ def _back(arguments: argparse.Namespace) -> int:
     lock, _ = _installed(store, arguments.packages[0])
     with store.changing() as change:
         old = change.back(lock)
-    print(f"{lock.root} is {old.version} again, as before the update to {lock.version}")
+    print(f"{lock.root} is reverted to {old.version}, the version before {lock.version}")
     return 0

@@ -1,6 +1,6 @@
 """`urc validate`: the problems of documents, and their own tests. Needs no robot, no network.
 
-Imports as little as it can: people run it on every save.
+It imports little, because people run it on every save.
 """
 
 import argparse
@@ -32,13 +32,13 @@ class _Report:
         self.failed = 0
         """Tests that failed."""
         self.is_cut_short = False
-        """Whether errors have kept later checks from being made."""
+        """Whether errors prevented later checks."""
         self.problems: list[Problem] = []
-        """In the order of the command line; each once, though several documents may share it."""
+        """Problems in the order of the command line, without duplicates from shared documents."""
         self.coverage: list[Coverage] = []
-        """Of each profile whose tests were run."""
+        """Test coverage of each profile whose tests were run."""
         self.looked_at: dict[str, None] = {}
-        """Every file that the problems depend on, existing or not."""
+        """Every file that affects the result, existing or not."""
 
     def add(self, problems: list[Problem]) -> None:
         self.problems = list(dict.fromkeys([*self.problems, *problems]))
@@ -66,12 +66,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Check all documents, print the report; 1 when there is an error in any of them."""
+    """Check all documents, print the report; return 1 after an error."""
     paths = list(dict.fromkeys(map(_document_in, arguments.paths)))
     if arguments.watch:
         return _watch(paths, arguments)
     report = _examine(paths, with_tests=not arguments.no_tests)
-    with suppress(BrokenPipeError):  # `urc validate … | head` has findings all the same
+    with suppress(BrokenPipeError):  # keeps the exit code, as in `… | head`
         _print(report, arguments, indent=2)
     return _exit_code(report, arguments)
 
@@ -87,7 +87,7 @@ def _watch(paths: list[str], arguments: argparse.Namespace) -> int:
     code = 0
     try:
         while True:
-            watched = Watched(paths)  # before they are read: no change may fall in between
+            watched = Watched(paths)  # created before reading, so that no change is missed
             report = _examine(paths, with_tests=not arguments.no_tests)
             watched.add(report.looked_at)
             code = _exit_code(report, arguments)
@@ -131,7 +131,7 @@ def _examine(paths: list[str], *, with_tests: bool) -> _Report:
 def _examine_folder(
     path: str, widget: "Widget | None", report: _Report, *, with_demo: bool = True
 ) -> None:
-    """Add the problems of the files next to a widget's manifest, once that is valid."""
+    """Add the problems of the files next to a widget's manifest, if the manifest is valid."""
     from urc.web.show.widget_check import FILES, check_widget
 
     home = os.path.dirname(path)
@@ -151,9 +151,9 @@ def _examine_own_widgets(profile: "Profile", report: _Report) -> None:
 
 
 def _document_in(path: str) -> str:
-    """Return the document that a path, or the name of a robot, means.
+    """Return the document for a path, or for the name of a robot.
 
-    A widget's folder stands for its manifest. What nothing has is a finding like others.
+    A widget's folder means its manifest. A missing file is reported like other problems.
     """
     manifest = os.path.join(path, "widget.yaml")
     if os.path.isfile(manifest):
@@ -213,7 +213,7 @@ def _summary(report: _Report) -> str:
         passed = report.tests - report.failed
         words.append(f"{passed} of {_count(report.tests, 'test')} passed")
     words += filter(None, [summary(report.coverage)])
-    more = "; more may follow once the errors are mended" if report.is_cut_short else ""
+    more = "; later checks wait for the correction of errors" if report.is_cut_short else ""
     return f"{_count(report.files, 'document')}: {', '.join(words)}{more}"
 
 

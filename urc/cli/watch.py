@@ -1,4 +1,4 @@
-"""`urc watch`: connect and print a JSON line per update, for people, pipes and logs."""
+"""`urc watch`: connects and prints a JSON line per update, for people, pipes and logs."""
 
 import argparse
 import asyncio
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 EXAMPLE = "urc watch puppet battery --for 5s"
 
 _LAST_WORDS_S = 5.0
-"""How long the reader may take for the last lines, when the time is over."""
+"""Time limit in seconds for the last lines, after the time is over."""
 
 _LOSSES_S = 5.0
-"""Between two lines about losses."""
+"""Minimum interval between two lines about losses, in seconds."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the profile, the signals, how long, and the raw traffic."""
+    """Add the profile, the signals, the duration, and the raw traffic."""
     add_profile(parser)
     parser.add_argument(
         "signals", metavar="SIGNAL", nargs="*", default=[], help="only these signals"
@@ -39,12 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--for", dest="seconds", type=duration, metavar="TIME", help="stop after 500ms, 5s, 2m …"
     )
     parser.add_argument(
-        "--wire", action="store_true", help="print the raw traffic, too, in hex and text"
+        "--wire", action="store_true", help="also print the raw traffic, in hex and text"
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Watch until the time is over or a signal comes; 1 when nothing was received."""
+    """Watch until the time is over or a signal arrives; return 1 when nothing was received."""
     from urc.cli.running import run_loop
     from urc.cli.settings import complete_settings
 
@@ -78,7 +78,7 @@ async def _watch(
 
 
 async def _follow(tap: "Tap", printer: "_Printer", seconds: float | None) -> None:
-    """Print what the tap gives until the time is over."""
+    """Print the events of the tap until the time is over."""
     now = asyncio.get_running_loop().time
     ends = math.inf if seconds is None else now() + seconds
     is_over = False
@@ -86,33 +86,33 @@ async def _follow(tap: "Tap", printer: "_Printer", seconds: float | None) -> Non
         with suppress(TimeoutError):
             async with asyncio.timeout_at(ends):
                 await tap.filled()
-        is_over = now() >= ends  # a tap that is never empty is never waited for
+        is_over = now() >= ends  # a tap that is never empty never waits
         try:
-            # Not cut off in the middle of a line by the end of the time, yet not without end.
+            # The end of the time does not cut a line, but a blocked reader has a time limit.
             async with asyncio.timeout_at(ends + _LAST_WORDS_S):
                 await printer.tell(tap.take())
                 await printer.tell_losses(tap.dropped, is_last=is_over)
         except TimeoutError:
-            raise UrcError("nobody takes the output; the last lines are lost") from None
+            raise UrcError("the output is blocked; the last lines are lost") from None
 
 
 def _reasons(hub: "Hub") -> str:
-    """Return what the links know about it."""
+    """Return the state of the links as a reason."""
     details = dict.fromkeys(link.detail for link in hub.links.values() if link.detail)
     return f": {'; '.join(details)}" if details else ""
 
 
 class _Printer:
-    """Prints events as lines: JSON on standard output, notes on standard error."""
+    """A printer of events as lines: JSON on standard output, log entries on standard error."""
 
     def __init__(self, writer: "LineWriter", signals: Iterable[str]) -> None:
         self.received = 0
-        """Lines about what the robot said."""
+        """Lines with data of the robot."""
         self._writer = writer
         self._signals = frozenset(signals)
         self._dropped = 0
         self._losses_told_s = 0.0
-        # Monotonic times are shown as what the clock on the wall said then.
+        # Offset from monotonic time to wall time.
         self._offset_s = time.time() - time.monotonic()
 
     async def tell(self, events: "Iterable[Tapped]") -> None:
@@ -137,12 +137,12 @@ class _Printer:
                 await self._writer.write(stream, "".join(f"{line}\n" for line in lines))
 
     async def tell_losses(self, dropped: int, *, is_last: bool) -> None:
-        """Print how many updates were too many, now and then and at the end."""
+        """Print the number of lost updates, from time to time and at the end."""
         now_s = time.monotonic()
         if dropped == self._dropped or not (is_last or now_s >= self._losses_told_s + _LOSSES_S):
             return
         lost, self._dropped, self._losses_told_s = dropped - self._dropped, dropped, now_s
-        text = f"warning: {lost} updates were lost, the output is not taken fast enough\n"
+        text = f"warning: {lost} updates were lost, because the reader of the output is too slow\n"
         await self._writer.write(sys.stderr, text)
 
     def _time(self, time_s: float) -> float:

@@ -94,7 +94,7 @@ async def test_key_is_kept_when_a_person_says_yes(desk: Desk) -> None:
 
     code, said = await desk.trusts()
     assert code == 0
-    assert "it is trusted already" in said
+    assert "this key is already trusted" in said
     assert "Accepted" not in desk.sshd.said
     assert "Failed password" not in desk.sshd.said
 
@@ -103,11 +103,11 @@ async def test_script_must_name_the_fingerprint(desk: Desk, tmp_path: Path) -> N
     """Whatever the server shows is not good enough."""
     code, said = await desk.trusts()
     assert code == 2
-    assert "nobody can be asked here; --yes SHA256:… trusts that fingerprint" in said
+    assert "there is no terminal to ask; --yes SHA256:… trusts that fingerprint" in said
     other = fingerprint_of(new_key(tmp_path / "other"))
     code, said = await desk.trusts("--yes", other)
     assert code == 1
-    assert f"that is not the key that was to be trusted ({other}); nothing is kept" in said
+    assert f"this is not the key to trust ({other}); nothing is stored" in said
     assert desk.kept == ""
     code, said = await desk.trusts("--yes", desk.sshd.fingerprint)
     assert code == 0, said

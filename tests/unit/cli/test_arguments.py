@@ -37,7 +37,7 @@ def test_what_is_no_duration_is_told(text: str) -> None:
     """No time at all, or time backwards, is none either."""
     with pytest.raises(argparse.ArgumentTypeError) as told:
         duration(text)
-    assert str(told.value) == f"a duration like 500ms, 5s or 2m is expected, not {text!r}"
+    assert str(told.value) == f"expected a duration like 500ms, 5s or 2m, found {text!r}"
 
 
 @pytest.mark.parametrize("text", ["-1", "65536", "", "80 ", "http", "٣", "9" * 5000])
@@ -45,7 +45,7 @@ def test_what_is_no_port_is_told(text: str) -> None:
     """The system would take some of them for another port."""
     with pytest.raises(argparse.ArgumentTypeError) as told:
         port(text)
-    assert str(told.value) == f"a port from 0 to 65535 is expected, not {text!r}"
+    assert str(told.value) == f"expected a port from 0 to 65535, found {text!r}"
     assert (port("0"), port("65535")) == (0, 65535)
 
 
@@ -64,19 +64,19 @@ WRONG = [
     (("watch", "p", "--nope"), "unrecognized arguments: --nope"),
     (("watch", "p", "--wir"), "unrecognized arguments: --wir"),
     (("doctor", "a\nb\x1b"), r"unrecognized arguments: a\x0ab\x1b"),
-    (("watch", "p", "--set", "a"), "argument --set: NAME=VALUE is expected, found 'a'"),
-    (("watch", "p", "--set", "=a"), "argument --set: NAME=VALUE is expected, found '=a'"),
+    (("watch", "p", "--set", "a"), "argument --set: expected NAME=VALUE, found 'a'"),
+    (("watch", "p", "--set", "=a"), "argument --set: expected NAME=VALUE, found '=a'"),
     (
         ("serve", "p", "--host", " "),
-        "argument --host: an address is expected, like 127.0.0.1 or 0.0.0.0",
+        "argument --host: expected an address like 127.0.0.1 or 0.0.0.0",
     ),
     (
         ("simulate", "p", "--host", ""),
-        "argument --host: an address is expected, like 127.0.0.1 or 0.0.0.0",
+        "argument --host: expected an address like 127.0.0.1 or 0.0.0.0",
     ),
     (
         ("demo", "--port", "99999"),
-        "argument --port: a port from 0 to 65535 is expected, not '99999'",
+        "argument --port: expected a port from 0 to 65535, found '99999'",
     ),
 ]
 
@@ -115,5 +115,5 @@ def test_profile_is_a_path_or_the_name_of_a_robot(
     for word in ("nobody", "x" * 5000):
         with pytest.raises(UrcError) as told:
             path(word)
-        expected = f"there is no file and no robot {word!r}; the robots here are: puppet"
+        expected = f"there is no file and no robot {word!r}; known robots: puppet"
         assert str(told.value) == expected

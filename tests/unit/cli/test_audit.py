@@ -54,7 +54,7 @@ def test_a_changed_entry_is_told_with_its_number(
     output, errors = capsys.readouterr()
     assert len(output.splitlines()) == 6
     assert errors == (
-        f"urc audit: {file} was changed by somebody: entry 4 does not follow from entry 3\n"
+        f"urc audit: {file} was tampered with: entry 4 does not follow from entry 3\n"
     )
 
 
@@ -63,7 +63,7 @@ def test_senseless_number_of_entries_is_wrong_use(
     text: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["audit", "--data-dir", str(folder), f"--last={text}"]) == 2
-    assert "a number from 1 to 1000000 is expected" in capsys.readouterr().err
+    assert "expected a number from 1 to 1000000" in capsys.readouterr().err
 
 
 def test_folder_without_an_audit_is_told(
@@ -74,5 +74,5 @@ def test_folder_without_an_audit_is_told(
     assert output == ""
     assert errors == (
         f"urc audit: there is no {tmp_path / 'audit.sqlite'}:"
-        " 'urc serve' makes it, --data-dir names its folder\n"
+        " 'urc serve' creates it, --data-dir names its folder\n"
     )

@@ -80,5 +80,5 @@ def test_typed_lines_are_obeyed_and_answered(capsys: pytest.CaptureFixture[str])
     assert said.out == "faults: tello: loss=20%\nfaults: tello: loss=20%\nfaults: none\n"
     assert said.err.splitlines() == [
         "no robot 'pupet' is emulated here; did you mean 'puppet'?",
-        "'break it' means nothing; write fault …, mend or faults",
+        "'break it' is not a command; write fault …, mend or faults",
     ]

@@ -50,7 +50,7 @@ def test_help_of_a_verb_can_be_asked_for_in_two_ways(verb: str, capsys: Output) 
 
 @pytest.mark.parametrize(
     ("word", "hint"),
-    [("wach", "did you mean 'watch'?"), ("x", "'urc --help' lists them")],
+    [("wach", "did you mean 'watch'?"), ("x", "'urc --help' lists all verbs")],
 )
 def test_unknown_verb_is_told_with_a_suggestion(word: str, hint: str, capsys: Output) -> None:
     """Exit code 2: wrong use."""
@@ -69,7 +69,7 @@ CASES: list[tuple[BaseException, int, str]] = [
     (
         ModuleNotFoundError("No module named 'yaml'", name="yaml"),
         1,
-        "urc watch: yaml is not installed; 'urc doctor' tells what is",
+        "urc watch: yaml is not installed; 'urc doctor' lists missing packages",
     ),
     (PermissionError(errno.EACCES, "Permission denied", "x"), 1, "urc watch: x: Permission denied"),
     (OSError("odd"), 1, "urc watch: odd"),
@@ -144,7 +144,7 @@ def test_schema_of_nothing_is_wrong_use(capsys: Output) -> None:
         (
             ("watch", "nobody"),
             1,
-            "urc watch: there is no file and no robot 'nobody'; the robots here are: ",
+            "urc watch: there is no file and no robot 'nobody'; known robots: ",
         ),
         (("watch", "gone.yaml"), 1, "gone.yaml:1:1: error no-such-file: there is no such file"),
         (
@@ -200,12 +200,12 @@ def test_arguments_of_a_command_are_typed() -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["12"], "an argument is written ARG=VALUE, as 'n=12'; found '12'"),
+        (["12"], "expected ARG=VALUE, such as 'n=12'; found '12'"),
         (["m=1"], "move has no argument 'm'; it has: n, x, b, s"),
         (["n=1", "n=2"], "n is given twice"),
-        (["n=1.5"], "n: integer expected, found '1.5'"),
-        (["x=fast"], "x: number expected, found 'fast'"),
-        (["b=yes"], "b: true or false expected, found 'yes'"),
+        (["n=1.5"], "n: expected integer, found '1.5'"),
+        (["x=fast"], "x: expected number, found 'fast'"),
+        (["b=yes"], "b: expected true or false, found 'yes'"),
     ],
 )
 def test_wrong_arguments_of_a_command_are_wrong_use(words: list[str], message: str) -> None:

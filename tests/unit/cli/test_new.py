@@ -33,7 +33,7 @@ def test_what_is_there_is_not_touched(tmp_path: Path, capsys: pytest.CaptureFixt
     (tmp_path / "lamp").mkdir()
     assert main(["new", "widget", "lamp", "--into", str(tmp_path)]) == 1
     told = capsys.readouterr().err
-    assert "is there already" in told
+    assert "already exists" in told
     assert len(told.splitlines()) == 1
     assert not list((tmp_path / "lamp").iterdir())
 
@@ -44,7 +44,7 @@ def test_a_name_that_no_folder_may_have_is_refused(
 ) -> None:
     """Nothing is made."""
     assert main(["new", "widget", name, "--into", str(tmp_path)]) == 1
-    assert "cannot be called" in capsys.readouterr().err
+    assert "cannot have the name" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 

@@ -23,13 +23,13 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_what_was_filled_in_goes_along(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["remove", "drivers/rover"]) == 0
-    assert "forgot what was filled in for rover, its secrets too" in capsys.readouterr().out
+    assert "deleted the settings of rover, including its secrets" in capsys.readouterr().out
     assert not KeptFile(data / "robots", "rover").file.exists()
 
 
 def test_what_was_filled_in_may_stay(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["remove", "rover", "--keep-settings"]) == 0
-    assert "kept what was filled in for rover: " in capsys.readouterr().out
+    assert "kept the settings of rover: " in capsys.readouterr().out
     assert KeptFile(data / "robots", "rover").load().settings == SECRET
 
 

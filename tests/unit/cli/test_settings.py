@@ -118,10 +118,10 @@ def test_any_port_is_for_those_who_listen(filed: Filed) -> None:
         (
             "prot: 1\nport: [1]\nhost: a b\nkey: hunter2\n",
             """\
-mine.yaml:1:1: error unknown-setting prot: there is no setting 'prot'; there are: host, port, key
+mine.yaml:1:1: error unknown-setting prot: there is no setting 'prot'; known settings: host, port, key
     1 | prot: 1
       | ^^^^
-mine.yaml:2:1: error wrong-type port: text, a number, true or false is expected
+mine.yaml:2:1: error wrong-type port: expected text, a number, true or false
     2 | port: [1]
       | ^^^^
 mine.yaml:3:7: error wrong-value host: 'a b' is not a host name or an address
@@ -132,7 +132,7 @@ mine.yaml:4:6: error wrong-value key: that is not a whole number""",
         (
             "- a\n",
             """\
-mine.yaml:1:1: error wrong-type: a settings file is a list of name: value
+mine.yaml:1:1: error wrong-type: a settings file must be a mapping of name: value
     1 | - a
       | ^""",
         ),
@@ -162,7 +162,7 @@ def test_a_secret_that_is_typed_is_warned_of_once(capsys: pytest.CaptureFixture[
         settings_given([robot()], typed)
     said = capsys.readouterr().err
     assert said == (
-        "warning: --set key=… can be read by everybody on this machine, in the list of processes:"
+        "warning: --set key=… is visible to every user of this machine, in the list of processes:"
         " use URC_SET_KEY in the environment, or a file with --settings\n"
     )
 
