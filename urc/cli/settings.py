@@ -114,7 +114,7 @@ def _faults_of(
     settings = [one.settings[name] for one in profiles if name in one.settings]
     if not settings:
         known = ", ".join(dict.fromkeys(key for one in profiles for key in one.settings)) or "none"
-        text = f"there is no setting {name!r}; known settings: {known}"
+        text = f"there is no setting {name!r}; there are: {known}"
         yield document.problem((name,), "unknown-setting", text, key=True)
     elif isinstance(value, (dict, list)):
         yield document.problem((name,), "wrong-type", "expected text, a number, true or false")

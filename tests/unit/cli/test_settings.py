@@ -118,7 +118,7 @@ def test_any_port_is_for_those_who_listen(filed: Filed) -> None:
         (
             "prot: 1\nport: [1]\nhost: a b\nkey: hunter2\n",
             """\
-mine.yaml:1:1: error unknown-setting prot: there is no setting 'prot'; known settings: host, port, key
+mine.yaml:1:1: error unknown-setting prot: there is no setting 'prot'; there are: host, port, key
     1 | prot: 1
       | ^^^^
 mine.yaml:2:1: error wrong-type port: expected text, a number, true or false
