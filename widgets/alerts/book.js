@@ -2,13 +2,13 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Alert} Alert */
 
 /**
- * What people have done about alerts. An alert that is over is forgotten, so that the next one of
- * the same value is new; one that gets worse is new, too. No DOM, no clock.
+ * Acknowledged and shelved alerts. An ended alert is forgotten, so that the next one of the same value
+ * is new; an alert that gets worse is new, too. It knows no DOM and no clock.
  *
  * @typedef {{alarm: string, isSeen: boolean, untilMs: number}} Entry
  */
 export class Book {
-  /** @param {unknown} kept as `kept()` returned it */
+  /** @param {unknown} kept earlier result of `kept()` */
   constructor(kept) {
     /** @type {Map<string, Entry>} */
     this.entries = new Map();
@@ -23,9 +23,9 @@ export class Book {
   }
 
   /**
-   * @param {readonly Alert[]} alerts all there are now
-   * @param {number} nowMs of the day
-   * @returns {Alert[]} those that are new
+   * @param {readonly Alert[]} alerts all present alerts
+   * @param {number} nowMs time of day
+   * @returns {Alert[]} the new ones
    */
   take(alerts, nowMs) {
     const there = new Set(alerts.map(({ signal }) => signal));
@@ -36,7 +36,7 @@ export class Book {
       const known = this.entries.get(signal);
       if (known && known.alarm === alarm) {
         if (known.untilMs === 0 || known.untilMs > nowMs) return false;
-        known.untilMs = 0; // it was put off, and its time is over
+        known.untilMs = 0; // shelved, and the time is over
         known.isSeen = false;
         return true;
       }
@@ -58,7 +58,7 @@ export class Book {
 
   /**
    * @param {string} signal
-   * @param {number} untilMs of the day
+   * @param {number} untilMs time of day
    */
   shelve(signal, untilMs) {
     const entry = this.entries.get(signal);

@@ -1,12 +1,12 @@
 // @ts-check
-/** A tone and a voice. Both are extras: what is shown never depends on them. */
+/** A tone and a voice. The display never depends on them. */
 
 const TONE_S = 0.25;
 
 /** @type {AudioContext | null} */
 let audio = null;
 
-/** @param {boolean} isCritical two tones instead of one, and higher */
+/** @param {boolean} isCritical whether to play two higher tones instead of one */
 export function tone(isCritical) {
   try {
     audio ??= new AudioContext();
@@ -29,7 +29,7 @@ export function tone(isCritical) {
 /** @param {string} text */
 export function say(text) {
   if (!("speechSynthesis" in globalThis)) return;
-  speechSynthesis.cancel(); // the newest counts
+  speechSynthesis.cancel(); // the newest text wins
   const said = new SpeechSynthesisUtterance(text);
   said.lang = document.documentElement.lang;
   speechSynthesis.speak(said);

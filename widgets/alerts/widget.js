@@ -24,12 +24,12 @@ export default {
     const book = new Book(memory.read());
     /** @type {readonly Alert[]} */
     let alerts = [];
-    let watched = { limited: 1, known: 0 }; // until it is told
+    let watched = { limited: 1, known: 0 }; // until the page reports it
     let isUp = false;
     let isMuted = false;
 
     function look() {
-      // Before any value has come nobody knows what is over: what was acknowledged stays so.
+      // Before the first value no alert can end: acknowledgements stay.
       if (alerts.length === 0 && watched.limited > 0 && watched.known === 0) return show();
       const fresh = book.take(alerts, Date.now());
       if (fresh.length > 0) tell(fresh);
@@ -74,14 +74,14 @@ export default {
       write(note, alerts.length === 0 ? `— ${words}` : words);
     }
 
-    /** That nothing is past its limit: all is well only where everything that has one is known. */
+    /** Text for no alert: all is well only if every limited signal has a value. */
     function calm() {
       const { limited, known } = watched;
       if (isUp && known === limited) return t("✓ no alert");
       return isUp && known > 0 ? t("no alert") : "";
     }
 
-    /** Of what nobody can say now whether it is past its limit. */
+    /** Number of limited signals without a value. */
     function unknown() {
       const count = watched.limited - watched.known;
       if (!isUp) return t("no connection to URC");
@@ -161,7 +161,7 @@ export default {
       isDim = !isDim && !isStill();
       attribute(root, "data-flash", isDim ? "true" : "");
     }, FLASH_EVERY_MS);
-    const timer = setInterval(look, LOOK_EVERY_MS); // what was put off comes back
+    const timer = setInterval(look, LOOK_EVERY_MS); // shelved alerts come back
     return {
       destroy() {
         clearInterval(timer);

@@ -1,22 +1,22 @@
 // @ts-check
 /**
- * A tape that runs past a mark. Pure.
+ * A tape that moves past a mark. Pure.
  *
- * Its rungs are drawn for three times what is seen, and then it is only moved; it is drawn anew when
- * the mark comes near an end.
+ * Its rungs are drawn for three times the visible range, and then only moved; it is redrawn when the
+ * mark comes near an end.
  */
 import { wholes } from "urc/scale";
 
-/** How high the picture of the tape is, in its own units. */
+/** Height of the drawing, in its own units. */
 export const HIGH = 200;
 
 /**
  * Return the rungs around a value.
  *
  * @param {number} value
- * @param {number} span how much is seen
+ * @param {number} span visible range
  * @returns {{base: number, step: number, rungs: {value: number, y: number, isMain: boolean}[]}}
- *   `base` is the value at y 0; y grows downwards
+ *   `base` is the value at y = 0; y grows downwards
  */
 export function tape(value, span) {
   const step = stepOf(span);
@@ -30,7 +30,7 @@ export function tape(value, span) {
 }
 
 /**
- * Return whether a tape that was drawn around `base` still covers what is seen.
+ * Return whether a tape drawn around `base` still covers the visible range.
  *
  * @param {number} value
  * @param {number} base
@@ -41,7 +41,7 @@ export function covers(value, base, span) {
 }
 
 /**
- * Return how far the tape has to be moved so that a value stands at the mark.
+ * Return the offset of the tape that puts a value at the mark.
  *
  * @param {number} value
  * @param {number} base

@@ -6,7 +6,7 @@ import { attribute, clamp, drawing, format, noteOf, number, part, style, svg, wr
 import { digitsOf } from "urc/scale";
 import { covers, offset, tape } from "./tape.js";
 
-/** A climb below this share of a unit is level flight. */
+/** Climb below which the flight is level, as a share of a unit. */
 const LEVEL = 0.05;
 
 export default {

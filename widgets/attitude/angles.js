@@ -1,13 +1,13 @@
 // @ts-check
 /**
- * Where a vehicle leans, out of whichever angles its robot sends. Pure.
+ * The attitude of a vehicle, from the angles of its robot. Pure.
  *
  * Axes as in REP 103: FLU is x forward, y left, z up; FRD is x forward, y right, z down. Roll has the
- * same sign in both, pitch and yaw have not: a positive pitch is nose down in FLU, nose up in FRD.
+ * same sign in both, pitch and yaw do not: a positive pitch is nose down in FLU, nose up in FRD.
  *
- * @typedef {{roll: number | null, pitch: number | null, yaw: number | null}} Angles in radians, in
- *   the axes of the robot; null where one is not known.
- * @typedef {{bank: number | null, nose: number | null, turn: number | null}} Lean in degrees: right
+ * @typedef {{roll: number | null, pitch: number | null, yaw: number | null}} Angles Angles in radians, in
+ *   the axes of the robot; null if unknown.
+ * @typedef {{bank: number | null, nose: number | null, turn: number | null}} Lean Angles in degrees: right
  *   side down, nose up, and turned to the right are positive.
  * @typedef {[number, number, number]} Point
  * @typedef {{depth: number, name: string, points: [number, number][]}} Face
@@ -16,11 +16,11 @@
 export const DEGREES = 180 / Math.PI;
 
 /**
- * Return roll, pitch and yaw (turned in the order yaw, pitch, roll) of an orientation.
+ * Return roll, pitch and yaw of an orientation (applied in the order yaw, pitch, roll).
  *
- * @param {readonly (number | null)[]} parts of a quaternion
+ * @param {readonly (number | null)[]} parts components of a quaternion
  * @param {string} order "xyzw" as in ROS, or "wxyz"
- * @returns {Angles | null} null when it is no orientation
+ * @returns {Angles | null} null for an invalid orientation
  */
 export function ofQuaternion(parts, order) {
   const given = parts.slice(0, 4);
@@ -41,7 +41,7 @@ export function ofQuaternion(parts, order) {
  */
 function ofUnit(x, y, z, w) {
   const sine = Math.min(1, Math.max(-1, 2 * (w * y - z * x)));
-  // Straight up or down, roll and yaw turn about the same axis: all of it is given to yaw.
+  // At nose straight up or down, roll and yaw have the same axis: yaw gets the whole angle.
   if (Math.abs(sine) > 1 - 1e-9) {
     const yaw = -2 * Math.sign(sine) * Math.atan2(x, w);
     return { roll: 0, pitch: (Math.sign(sine) * Math.PI) / 2, yaw };
@@ -55,7 +55,7 @@ function ofUnit(x, y, z, w) {
 
 /**
  * @param {Angles} angles
- * @param {string} axes "FLU" or "FRD"; ENU and NED are the same seen from the ground
+ * @param {string} axes "FLU" or "FRD"; ENU and NED have the same signs, respectively
  * @returns {Lean}
  */
 export function leanOf({ roll, pitch, yaw }, axes) {
@@ -66,7 +66,7 @@ export function leanOf({ roll, pitch, yaw }, axes) {
 }
 
 /**
- * Return the same direction between -180 and 180.
+ * Return the angle between -180 and 180.
  *
  * @param {number} degrees
  */
@@ -75,7 +75,7 @@ export function wrapped(degrees) {
   return turned === -180 && degrees > 0 ? 180 : turned;
 }
 
-/** Corners of a vehicle 2 long, 1.3 wide and 0.6 high, as forward, right, down; its nose is lower. The origin is inside. */
+/** Corners of a vehicle around the origin, as forward, right, down: 2 by 1.3 by 0.6, with a lower nose. */
 const CORNERS = /** @type {Point[]} */ ([
   [-1, -0.65, 0.3],
   [-1, 0.65, 0.3],
@@ -86,7 +86,7 @@ const CORNERS = /** @type {Point[]} */ ([
   [0.7, 0.5, -0.1],
   [0.7, -0.5, -0.1],
 ]);
-/** Each by its corners, in turn. @type {[string, number[]][]} */
+/** Each face by its corners, in order. @type {[string, number[]][]} */
 const FACES = [
   ["back", [1, 0, 4, 5]],
   ["left", [0, 3, 7, 4]],
@@ -95,11 +95,11 @@ const FACES = [
   ["top", [4, 7, 6, 5]],
   ["bottom", [0, 1, 2, 3]],
 ];
-/** The watcher stands behind the vehicle, to its left, and above: degrees. */
+/** Viewpoint behind the vehicle, to its left, and above, in degrees. */
 const LOOK = { aside: 25, down: 22 };
 
 /**
- * Return the faces of a solid vehicle as a watcher behind it sees them, the furthest first.
+ * Return the faces of a solid vehicle, seen from behind, the farthest first.
  *
  * @param {Lean} lean
  * @returns {Face[]} points from about -1.3 to 1.3, right and down positive
@@ -118,8 +118,8 @@ export function solid({ bank, nose, turn }) {
 }
 
 /**
- * Return how much a face of a convex body around the origin looks away: 1 is right away, -1 is at the
- * watcher. Those that look away are hidden by those that do not, so they are drawn first.
+ * Return how far a face of a convex body around the origin points away from the viewer, from -1 to 1.
+ * Faces that point away are hidden by the others, so they are drawn first.
  *
  * @param {Point[]} places
  */

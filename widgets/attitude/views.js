@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The pictures of an attitude. Each has `show(lean)`, which moves things and makes none.
+ * The views of an attitude. Each has `show(lean)`, which moves elements and creates none.
  *
  * @typedef {import("./angles.js").Lean} Lean
  * @typedef {{show: (lean: Lean) => void}} View
@@ -8,10 +8,10 @@
 import { attribute, clamp, drawing, format, part, style, svg, write } from "urc/kit";
 import { solid } from "./angles.js";
 
-/** Units a degree, so that 84 degrees from top to bottom are seen. */
+/** Units for each degree: 84 degrees are visible from top to bottom. */
 const PER_DEGREE = 2;
 const BANKS = [-60, -45, -30, -20, -10, 0, 10, 20, 30, 45, 60];
-/** Ends of the bars of single axes, in degrees. */
+/** Ends of the bars of the axes, in degrees. */
 const ENDS = { bank: 90, nose: 90, turn: 180 };
 
 /**
@@ -32,11 +32,11 @@ export function viewOf(el, options) {
   }
 }
 
-/** The world as seen from inside, or the vehicle as seen from behind. */
+/** The artificial horizon: the world seen from inside, or the vehicle seen from behind. */
 class Horizon {
   /**
    * @param {HTMLElement} el
-   * @param {boolean} isVehicle whether the vehicle leans, and not the world
+   * @param {boolean} isVehicle whether the vehicle leans instead of the world
    */
   constructor(el, isVehicle) {
     this.isVehicle = isVehicle;
@@ -77,7 +77,7 @@ class Horizon {
   }
 }
 
-/** From behind and from the side, with what it may lean. */
+/** The vehicle from behind and from the side, with its limits. */
 class Outline {
   /**
    * @param {HTMLElement} el
@@ -99,7 +99,7 @@ class Outline {
 }
 
 /**
- * Return lines at which it would lean too far, to both sides.
+ * Return lines at the limit, on both sides.
  *
  * @param {number} degrees
  */
@@ -130,7 +130,7 @@ class Solid {
   }
 }
 
-/** One bar an axis. */
+/** One bar for each axis. */
 class Axes {
   /** @param {HTMLElement} el */
   constructor(el) {

@@ -8,9 +8,9 @@ import { attribute, mark, noteOf, number, numbers, part, worst, write } from "ur
 import { DEGREES, leanOf, ofQuaternion } from "./angles.js";
 import { viewOf } from "./views.js";
 
-/** From this share of a limit on it is a caution. */
+/** Share of a limit from which on it is a caution. */
 const NEAR = 0.8;
-/** What each part of a lean is called. */
+/** Names of the angles. */
 const NAMES = { bank: mark("roll"), nose: mark("pitch"), turn: mark("yaw") };
 
 export default {
@@ -54,7 +54,7 @@ export default {
 };
 
 /**
- * Return which parts of a lean a view draws.
+ * Return the angles that a view draws.
  *
  * @param {unknown} view
  * @returns {readonly (keyof Lean)[]}
@@ -64,7 +64,7 @@ function partsOf(view) {
 }
 
 /**
- * Return how that stands which is shown; where nothing is known, how all stands that is bound.
+ * Return the state of the shown readings; without any, the state of all bound ones.
  *
  * @param {readonly (Reading | undefined)[]} known
  * @param {readonly (Reading | undefined)[]} all
@@ -76,7 +76,7 @@ function readingOf(known, all) {
 }
 
 /**
- * Return why a part is not known.
+ * Return why an angle is unknown.
  *
  * @param {Reading | undefined} reading
  * @param {Context["t"]} t
@@ -109,8 +109,8 @@ function passed({ bank, nose }, options) {
 }
 
 /**
- * Say how it leans so that no convention has to be known. With a part that is missing nobody knows
- * that it is level.
+ * Describe the attitude in words that need no convention. With an unknown angle it is never called
+ * level.
  *
  * @param {Lean} lean
  * @param {readonly (keyof Lean)[]} missing

@@ -7,7 +7,7 @@ import { bounded, snapped } from "urc/curve";
 import { clamp, part, style, write } from "urc/kit";
 import { DIRECTIONS, Motion, pointed, pulled, signed, speak } from "urc/motion";
 
-/** Half of the thumb's size, which the track leaves at either end, in CSS pixels. */
+/** Half of the thumb's size, which is the margin of the track at either end, in CSS pixels. */
 const MARGIN = 24;
 
 export default {
@@ -17,7 +17,7 @@ export default {
    */
   mount(ctx) {
     const { el, options } = ctx;
-    if (!el.querySelector(".axis-lever")) return {}; // no command is bound: there is nothing to do
+    if (!el.querySelector(".axis-lever")) return {}; // no command is bound
     const lever = new Lever(ctx);
     const motion = new Motion(ctx, "axis", "moved");
     motion.hold({
@@ -103,7 +103,7 @@ class Lever {
     speak(this.el, value, this.isUpright ? t("up") : t("to the right"), this.isUpright ? t("down") : t("to the left"));
   }
 
-  /** What the robot says, where it can be placed. @param {Reading | undefined} reading */
+  /** Draw the robot's own position, if it is within the scale. @param {Reading | undefined} reading */
   echo(reading) {
     const { min, max } = reading?.signal ?? {};
     const value = reading?.value;

@@ -32,7 +32,7 @@ export default {
         if (!value) return;
         const known = meter.show(value);
         const place = known === null ? origin : share(known, ...meter.scale);
-        // On the part that shows it: a property of the root would be handed down to all parts.
+        // On the part that shows it: all parts would inherit a property of the root.
         style(fill, "--bar-from", Math.min(origin, place).toFixed(4));
         style(fill, "--bar-long", Math.abs(place - origin).toFixed(4));
         if (known !== null) extremes?.add(place);
@@ -49,7 +49,7 @@ export default {
  * @param {HTMLElement} el
  * @param {Signal} signal
  * @param {[number, number]} scale
- * @param {(value: number) => number} factor to the unit that is shown
+ * @param {(value: number) => number} factor conversion to the displayed unit
  */
 function drawScale(el, signal, scale, factor) {
   const parts = bands(signal.limits, ...scale).map(({ from, to, alarm }) => {
@@ -81,7 +81,7 @@ function box(name, place) {
   return made;
 }
 
-/** Marks of the lowest and the highest so far. */
+/** Marks of the lowest and highest value so far. */
 class Extremes {
   /** @param {HTMLElement} root */
   constructor(root) {

@@ -1,25 +1,25 @@
 // @ts-check
 /**
- * What a battery's numbers mean. Pure.
+ * Computations on the values of a battery. Pure.
  */
 
 /**
- * Return how long the charge lasts.
+ * Return the remaining time of the charge.
  *
  * @param {number | null} level percent
- * @param {number | null} current amperes; negative while it is discharged, as in ROS
+ * @param {number | null} current amperes; negative while discharging, as in ROS
  * @param {unknown} capacity ampere hours
- * @returns {number | null} seconds; null when nobody can say, as while it is charged
+ * @returns {number | null} seconds; null if unknown, for example while charging
  */
 export function timeLeft(level, current, capacity) {
   if (level === null || current === null || typeof capacity !== "number") return null;
-  // Next to nothing: the rest of the time would be longer than anybody believes.
+  // With almost no current the result would be absurdly long.
   if (current > -capacity / 1000) return null;
   return (3600 * capacity * Math.max(0, level)) / 100 / -current;
 }
 
 /**
- * Return a time as people read it: "2 h 05 min", "7 min", "under 1 min".
+ * Return hours and minutes for texts such as "2 h 05 min", "7 min", "under 1 min".
  *
  * @param {number} seconds
  * @returns {{hours: number, minutes: number}}
@@ -30,7 +30,7 @@ export function clock(seconds) {
 }
 
 /**
- * Return how much the cells differ: the highest less the lowest; null when fewer than two are known.
+ * Return the highest minus the lowest cell; null if fewer than two are known.
  *
  * @param {readonly (number | null)[]} cells
  */
@@ -40,14 +40,14 @@ export function spread(cells) {
 }
 
 /**
- * Return between what a cell is empty and full.
+ * Return the values of an empty and a full cell.
  *
  * @param {{unit?: string | undefined, min?: number | undefined, max?: number | undefined}} signal
  * @param {{cell_min?: unknown, cell_max?: unknown}} options
  * @returns {[number, number]}
  */
 export function cellScale({ unit, min, max }, options) {
-  // A lithium cell is the usual one; whoever has another says so.
+  // Default: a lithium cell; the options override it.
   const [empty, full] = unit === "V" ? [3, 4.2] : [0, 100];
   const least = typeof options.cell_min === "number" ? options.cell_min : (min ?? empty);
   const most = typeof options.cell_max === "number" ? options.cell_max : (max ?? full);
@@ -55,7 +55,7 @@ export function cellScale({ unit, min, max }, options) {
 }
 
 /**
- * A mean over about so many seconds, so that the time left does not jump with each start of a motor.
+ * A running mean over some seconds, so that the remaining time does not jump with each motor start.
  */
 export class Mean {
   /** @param {number} seconds */
@@ -67,7 +67,7 @@ export class Mean {
   }
 
   /**
-   * @param {number | null} value null: begin anew with the next
+   * @param {number | null} value null starts again with the next value
    * @param {number} time in seconds
    */
   add(value, time) {

@@ -5,19 +5,19 @@
  * @typedef {{x: number, y: number, w: number, h: number}} Box A rectangle in the units of a drawing.
  */
 
-/** The inside of each drawing's shell, as in the template. @type {Record<string, Box>} */
+/** Inside of each drawing's shell, as in the template. @type {Record<string, Box>} */
 export const INSIDE = {
   lying: { x: 12, y: 12, w: 168, h: 88 },
   standing: { x: 12, y: 28, w: 88, h: 168 },
 };
 
-/** How far from the inside the tip of a limit's mark is, its height, and half its width. */
+/** Distance of a limit mark's tip from the inside, its height, and half its width. */
 const TIP = 12;
 const HIGH = 8;
 const HALF = 5;
 
 /**
- * Two triangles that point at the shell from outside, where a limit is.
+ * Return two triangles that point at the shell from outside, at a limit.
  *
  * @param {Box} inside
  * @param {number} place 0..1

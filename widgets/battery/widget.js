@@ -8,7 +8,7 @@ import { share } from "urc/scale";
 import { Mean, cellScale, clock, spread, timeLeft } from "./charge.js";
 import { INSIDE, mark } from "./drawing.js";
 
-/** Of a unit's character against a digit's. */
+/** Width of a unit's character, relative to a digit. */
 const UNIT_WIDTH = 0.86;
 const MEAN_S = 30;
 
@@ -53,7 +53,7 @@ export default {
   },
 };
 
-/** The drawing that is more or less full. */
+/** The drawing of the battery with its level. */
 class Shell {
   /** @param {Context} ctx */
   constructor({ el, t }) {
@@ -68,7 +68,7 @@ class Shell {
       isLying: name === "lying",
       limits: drawing(el, `.battery-${name} .battery-limits`),
     }));
-    /** Whose limits are drawn. @type {Reading["signal"] | null} */
+    /** Signal of the drawn limits. @type {Reading["signal"] | null} */
     this.drawn = null;
   }
 
@@ -115,7 +115,7 @@ class Shell {
   }
 }
 
-/** One bar a cell or module, the lowest and the highest marked. */
+/** One bar for each cell or module; the lowest and the highest are marked. */
 class Cells {
   /** @param {Context} ctx */
   constructor({ el, options, t }) {
@@ -128,7 +128,7 @@ class Cells {
 
   /**
    * @param {Readings} readings
-   * @returns {string} what is wrong; "" when nothing is
+   * @returns {string} the problem, or ""
    */
   update({ cells, modules }) {
     const each = many(modules);

@@ -1,18 +1,17 @@
 // @ts-check
 /**
- * What a hand does on a button: two taps, a finger that rests, one that stays. A click without a
- * finger, as a screen reader and a key make it, counts as the whole gesture where it cannot be told
- * from it by time.
+ * Gestures on a button: double tap, long press, repeat. A click without a pointer, from a screen reader
+ * or a key, counts as the whole gesture if the gesture cannot be told by time.
  */
 
 import { isDown } from "urc/giving";
 
-/** So long a finger rests before it counts. */
+/** Time of a long press. */
 export const HOLD_MS = 800;
-/** Two taps that are further apart are two. */
+/** Longest time between the taps of a double tap. */
 export const DOUBLE_MS = 500;
 const EVERY_MS = 40;
-/** A finger that scrolls the page has gone on by then; one that is still there presses. */
+/** Time after which a touch is a press, and not the start of a scroll. */
 const SETTLE_MS = 100;
 
 /**
@@ -22,16 +21,16 @@ const SETTLE_MS = 100;
  * @param {number} spec.repeatMs
  * @param {() => boolean} spec.isReady
  * @param {() => void} spec.done
- * @param {(share: number) => void} spec.progress how far the hold has got, 0 to 1
+ * @param {(share: number) => void} spec.progress reports the progress of a long press, 0 to 1
  * @param {AbortSignal} spec.signal
- * @returns {() => void} ends what a finger has begun
+ * @returns {() => void} cancels the present gesture
  */
 export function listen(el, { gesture, repeatMs, isReady, done, progress, signal }) {
   let firstMs = -Infinity;
   let downMs = -1;
   /** @type {number | undefined} */
   let timer;
-  /** A finger that may yet scroll the page. @type {number | undefined} */
+  /** Timer of a touch that may become a scroll. @type {number | undefined} */
   let settling;
   if (gesture === "tap" || gesture === "double") {
     el.addEventListener("click", () => {
@@ -41,7 +40,7 @@ export function listen(el, { gesture, repeatMs, isReady, done, progress, signal 
       if (gesture === "tap" || isSecond) done();
     }, { signal });
     el.addEventListener("keydown", (event) => {
-      // A key that is held down repeats its clicks: that is one tap.
+      // A held key repeats its clicks: they count as one tap.
       if (event.repeat && event.key === "Enter") event.preventDefault();
     }, { signal });
     return () => (firstMs = -Infinity);
@@ -76,13 +75,13 @@ export function listen(el, { gesture, repeatMs, isReady, done, progress, signal 
   el.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
     el.setPointerCapture(event.pointerId);
-    // A hold counts late anyway, and is broken off by the scrolling.
+    // A long press acts late anyway, and a scroll cancels it.
     if (gesture === "hold" || event.pointerType !== "touch") begin();
     else if (downMs < 0) settling ??= window.setTimeout(begin, SETTLE_MS);
   }, { signal });
   el.addEventListener("pointerup", () => settling !== undefined && begin(), { signal }); // a tap
   el.addEventListener("touchmove", (event) => {
-    if (gesture === "repeat" && downMs >= 0) event.preventDefault(); // it presses, and scrolls nothing
+    if (gesture === "repeat" && downMs >= 0) event.preventDefault(); // a press: no scroll
   }, { signal, passive: false });
   for (const name of ["pointerup", "pointercancel", "lostpointercapture", "blur", "keyup"]) {
     el.addEventListener(name, end, { signal });
@@ -95,7 +94,7 @@ export function listen(el, { gesture, repeatMs, isReady, done, progress, signal 
   }, { signal });
   el.addEventListener("keydown", (event) => {
     if (event.key !== "Enter" && event.key !== " ") return;
-    event.preventDefault(); // no click besides
+    event.preventDefault(); // no additional click
     if (!event.repeat) begin();
   }, { signal });
   el.addEventListener("contextmenu", (event) => event.preventDefault(), { signal });

@@ -6,9 +6,9 @@ import { Giver, slide } from "urc/giving";
 import { attribute, noteOf, part, style, write } from "urc/kit";
 import { listen } from "./gesture.js";
 
-/** How long a question stands. */
+/** Time limit of a question. */
 const ASK_MS = 5000;
-/** A second tap of the same finger is no answer to a question that it has not seen. */
+/** Taps within this time of the first one do not count: the operator has not read the question yet. */
 const READ_MS = 400;
 
 export default {
@@ -17,7 +17,7 @@ export default {
    * @returns {Instance}
    */
   mount(ctx) {
-    if (!ctx.el.querySelector(".button-main")) return {}; // no command is bound: nothing to do
+    if (!ctx.el.querySelector(".button-main")) return {}; // no command is bound
     const button = new Button(ctx);
     return {
       update({ state }, { press }) {
@@ -31,7 +31,7 @@ export default {
   },
 };
 
-/** One command: asked for, under way, done or failed. Nothing is ever given twice. */
+/** One command with its confirmation and state. A command is never sent twice. */
 class Button {
   /** @param {Context} ctx */
   constructor(ctx) {
@@ -46,7 +46,7 @@ class Button {
     this.cooldownMs = 1000 * Number(options["cooldown"] ?? 0);
     this.isAsking = false;
     this.coldMs = -Infinity;
-    /** What is known of the state: its age, or the limit it has passed. */
+    /** Note about the state: its age, or the exceeded limit. */
     this.stateNote = "";
     /** @type {number | undefined} */
     this.asking = undefined;
@@ -65,7 +65,7 @@ class Button {
       const end = listen(this.main, {
         gesture,
         repeatMs: Number(options["repeat_ms"] ?? 250),
-        // One that is under way, or cold, is left out; without the robot the gesture is over.
+        // A repeat skips a pending or cooling command; without the robot the gesture ends.
         isReady: gesture === "repeat" ? () => this.giver.isReady : isReady,
         done: () => this.press(),
         progress: (share) => style(fill, "--button-share", share.toFixed(2)),
@@ -79,7 +79,7 @@ class Button {
     el.querySelector(".button-no")?.addEventListener("click", () => this.answer(false), { signal });
     el.addEventListener("keydown", (event) => {
       if (event.key !== "Escape" || !this.isAsking) return;
-      event.preventDefault(); // it means no, and not STOP
+      event.preventDefault(); // Escape means no here, and not STOP
       this.answer(false);
     }, { signal });
   }

@@ -1,19 +1,19 @@
 // @ts-check
 /**
- * How a picture lies in its box. Pure: no DOM.
+ * The placement of an image in its box. Pure: no DOM.
  *
  * @typedef {"contain" | "cover" | "fill"} Fit
  * @typedef {object} Size
  * @property {number} width
  * @property {number} height
  *
- * @typedef {object} Placement What a canvas does before it draws the picture around 0, 0.
- * @property {number} x where the middle is
+ * @typedef {object} Placement Transform of a canvas before it draws the image around 0, 0.
+ * @property {number} x position of the middle
  * @property {number} y
  * @property {number} angle radians, clockwise
- * @property {number} width of the picture as it is drawn, before it is turned
+ * @property {number} width width of the drawn image before its rotation
  * @property {number} height
- * @property {number} flip -1 when it is mirrored
+ * @property {number} flip -1 if it is mirrored
  */
 
 /**
@@ -43,8 +43,8 @@ export function place(picture, box, { fit, rotate, mirror }) {
 }
 
 /**
- * Return how far a finger has dragged the view, as pan and tilt from -1 to 1: the picture follows the
- * finger, so the camera turns the other way. Pan is positive to the left (REP 103), tilt upwards.
+ * Return the drag of the view as pan and tilt from -1 to 1: the image follows the finger, so the camera
+ * turns the other way. Pan is positive to the left (REP 103), tilt upwards.
  *
  * @param {{x: number, y: number, startX: number, startY: number}} hand
  * @param {Size} box
@@ -56,7 +56,7 @@ export function lookOf(hand, box) {
 }
 
 /**
- * Return the age of a picture for people: tenths while they matter.
+ * Return the age of an image as text, with tenths while they matter.
  *
  * @param {number} seconds
  */
@@ -67,7 +67,7 @@ export function ageText(seconds) {
 }
 
 /**
- * Return the name of a snapshot's file: only letters that every disk takes.
+ * Return the file name of a snapshot, with characters that every file system accepts.
  *
  * @param {string} title
  * @param {Date} when
@@ -78,7 +78,7 @@ export function fileName(title, when) {
   return `${plain || "camera"}-${stamp}.png`;
 }
 
-/** Pictures in a second, over the last so many. */
+/** Images per second, over the last few. */
 export class Rate {
   constructor() {
     /** @type {number[]} */

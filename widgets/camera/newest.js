@@ -1,13 +1,13 @@
 // @ts-check
 /**
- * Pictures of whichever camera is looked at, decoded one at a time: the newest wins, none queues.
+ * Decoder for the images of the chosen camera, one at a time: the newest wins, none is queued.
  *
  * @typedef {import("../../urc/web/static/core/types.js").Picture} Picture
  */
 
 export class Newest {
   /**
-   * @param {(bitmap: ImageBitmap) => void} show the bitmap stays open until the next one is shown
+   * @param {(bitmap: ImageBitmap) => void} show shows an image; the bitmap stays open until the next one
    * @param {(error: unknown) => void} failed
    */
   constructor(show, failed) {
@@ -18,7 +18,7 @@ export class Newest {
     this.serial = -1;
     this.isBusy = false;
     this.isOver = false;
-    /** Changes with the camera: what was asked of another one is not shown. */
+    /** Number of the camera: images of an earlier one are not shown. */
     this.source = 0;
     /** @type {ImageBitmap | null} */
     this.shown = null;
@@ -56,7 +56,7 @@ export class Newest {
     this.show(bitmap);
   }
 
-  /** Forget the camera that was looked at. */
+  /** Forget the present camera. */
   leave() {
     this.source += 1;
     this.serial = -1;

@@ -54,13 +54,13 @@ class Camera {
     this.rate = options["rate"] === true ? new Rate() : null;
     /** @type {Reading[]} */
     this.sources = [];
-    /** How many of them the input `images` has. */
+    /** Number of images in the input `images`. */
     this.listed = 0;
     this.chosen = 0;
     /** @type {HTMLButtonElement[] | undefined} */
     this.switches = undefined;
     this.fault = "";
-    /** What a hand that turns the camera is told. */
+    /** Note for the hand that turns the camera. */
     this.hand = "";
     this.pictures = new Newest(
       () => {
@@ -77,7 +77,7 @@ class Camera {
     if (options["snapshot"] !== false) this.addSnapshot();
     this.addFullColour();
     if (this.face.tabIndex === 0) this.addHold(ctx);
-    // The age grows also when nothing comes: that is when it matters.
+    // A timer, because the age also grows without new images.
     this.timer = setInterval(() => this.tellAge(), LOOK_AGAIN_MS);
   }
 
@@ -97,7 +97,7 @@ class Camera {
     this.shutter.disabled = true;
   }
 
-  /** At night pictures are dimmed; this shows them as they are, for a moment. */
+  /** Add the button that shows dimmed images in full colour for a moment. */
   addFullColour() {
     /** @type {number | undefined} */
     let ending;
@@ -151,7 +151,7 @@ class Camera {
     this.tell();
   }
 
-  /** A button for each camera. Titles come with the signals, which may be later than the first reading. */
+  /** Show a button for each camera. Titles come with the signals, maybe after the first reading. */
   showSwitches() {
     const isFirst = !this.switches;
     this.switches ??= this.sources.map((_, index) => {
@@ -166,7 +166,7 @@ class Camera {
     if (isFirst) this.lookAtChosen();
   }
 
-  /** The server sends the pictures of the chosen camera only. */
+  /** Request the images of the chosen camera only. */
   lookAtChosen() {
     const singles = this.sources.length - this.listed;
     this.ctx.look("image", this.chosen < singles ? [0] : []);
@@ -246,7 +246,7 @@ class Camera {
     link.href = url;
     link.download = fileName(this.title, new Date());
     link.click();
-    // The browser reads it after the click.
+    // The browser reads the URL after the click.
     setTimeout(() => URL.revokeObjectURL(url), 10_000);
   }
 

@@ -17,7 +17,7 @@ export default {
     const hasCommand = command("complete") !== null;
     const giver = new Giver({ give: () => send("complete"), show, t, signal });
     if (!hasCommand) giver.reason = "";
-    /** What was ticked is kept by its words: a list that was changed is not ticked by its places. */
+    /** Ticked items, stored by their text, so that a changed list is not ticked by position. */
     const kept = memory.read();
     const known = new Set(Array.isArray(kept) ? kept.map(String) : []);
     const boxes = [...el.querySelectorAll(".checklist-item")].map((item) => {

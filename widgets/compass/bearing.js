@@ -6,7 +6,7 @@
 const POINTS = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];
 
 /**
- * Return the same direction from 0 to below 360.
+ * Return the bearing from 0 to below 360.
  *
  * @param {number} degrees
  */
@@ -16,7 +16,7 @@ export function bearing(degrees) {
 }
 
 /**
- * Return the bearing that a robot's angle means.
+ * Return the bearing for a robot's angle.
  *
  * @param {number} value
  * @param {string} unit "rad" or degrees
@@ -28,7 +28,7 @@ export function bearingOf(value, unit, convention) {
 }
 
 /**
- * Return the angle that a robot means by a bearing: the way back of `bearingOf`.
+ * Return the robot's angle for a bearing: the inverse of `bearingOf`.
  *
  * @param {number} degrees
  * @param {string} unit
@@ -40,7 +40,7 @@ export function angleOf(degrees, unit, convention) {
 }
 
 /**
- * Return the shorter way from one bearing to another: -180 to 180, to the right is positive.
+ * Return the shorter turn from one bearing to another: -180 to 180, positive to the right.
  *
  * @param {number} from
  * @param {number} to
@@ -51,7 +51,7 @@ export function turn(from, to) {
 }
 
 /**
- * Return the point of the compass that is nearest.
+ * Return the nearest point of the compass.
  *
  * @param {number} degrees
  */
@@ -60,7 +60,7 @@ export function point(degrees) {
 }
 
 /**
- * Return a bearing as it is spoken: three digits, 360 never.
+ * Return a bearing in three digits, never 360.
  *
  * @param {number | null} degrees
  */
@@ -70,11 +70,11 @@ export function figures(degrees) {
 }
 
 /**
- * Return the bearing at which a point of the rose lies.
+ * Return the bearing of a point of the rose.
  *
- * @param {number} right from the middle
- * @param {number} down from the middle
- * @param {number} up bearing that is at the top of the rose
+ * @param {number} right distance from the middle
+ * @param {number} down distance from the middle
+ * @param {number} up bearing at the top of the rose
  */
 export function bearingAt(right, down, up) {
   return bearing((Math.atan2(right, -down) * 180) / Math.PI + up);

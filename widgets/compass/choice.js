@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * Choosing a heading: by a tap on the rose or with the arrow keys, and then a button that sends it.
- * Nothing is sent by choosing.
+ * Choice of a heading: by a tap on the rose or by arrow keys, then a button that sends it. A choice alone
+ * sends nothing.
  */
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet */
@@ -20,7 +20,7 @@ const KEYS = /** @type {Record<string, number>} */ ({
 export class Choice {
   /**
    * @param {Context} ctx
-   * @param {(degrees: number) => number} angle what the robot is told for a bearing
+   * @param {(degrees: number) => number} angle returns the robot's angle for a bearing
    */
   constructor(ctx, angle) {
     this.ctx = ctx;
@@ -31,7 +31,7 @@ export class Choice {
     this.answer = part(ctx.el, ".compass-answer");
     /** @type {number | null} */
     this.chosen = null;
-    /** What is at the top of the rose. */
+    /** Bearing at the top of the rose. */
     this.up = 0;
     this.heading = 0;
     this.isReady = false;
@@ -71,7 +71,7 @@ export class Choice {
   click(event) {
     const { left, top, width, height } = this.rose.getBoundingClientRect();
     const [right, down] = [event.clientX - left - width / 2, event.clientY - top - height / 2];
-    // In the middle a finger's width decides over everything.
+    // In the middle, the width of a finger would decide about the direction.
     if (Math.hypot(right, down) < Math.min(width, height) / 12) return;
     this.choose(Math.round(bearingAt(right, down, this.up)));
   }
@@ -88,7 +88,7 @@ export class Choice {
 
   /** @param {number | null} degrees */
   choose(degrees) {
-    // A small cell has no room for the button: there, nothing can be sent, so nothing is chosen.
+    // A small cell has no room for the button, so nothing can be sent or chosen.
     if (!this.button.checkVisibility()) return;
     this.chosen = degrees === null ? null : bearing(degrees);
     write(this.answer, "");

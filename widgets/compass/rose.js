@@ -1,19 +1,19 @@
 // @ts-check
 /**
- * What the compass draws that never changes: the rose, and a tape that goes round one and a half times.
+ * The fixed drawings of the compass: the rose, and a tape of one and a half turns.
  */
 import { svg } from "urc/kit";
 import { bearing } from "./bearing.js";
 
 const LETTERS = ["N", "E", "S", "W"];
-/** Of the tape: units a degree, so that 120 degrees are seen. */
+/** Units of the tape for each degree: 120 degrees are visible. */
 export const PER_DEGREE = 200 / 120;
 
 /** The needle that points straight up. */
 const NEEDLE = /** @type {const} */ ([[0, -52], [24, 36], [0, 22], [-24, 36]]);
 
 /**
- * Return the points of the needle, as they are written into a polygon.
+ * Return the points of the needle for an SVG polygon.
  *
  * @param {number} degrees clockwise from straight up
  */
@@ -26,7 +26,7 @@ export function needle(degrees) {
 /**
  * @param {SVGElement} ticks
  * @param {SVGElement} letters
- * @returns {SVGTextElement[]} what has to stay upright while the rose turns
+ * @returns {SVGTextElement[]} labels that stay upright while the rose turns
  */
 export function drawRose(ticks, letters) {
   let path = "";
@@ -50,7 +50,7 @@ export function drawRose(ticks, letters) {
 
 /**
  * @param {SVGElement} strip
- * @returns {{degrees: number, text: SVGTextElement}[]} its labels
+ * @returns {{degrees: number, text: SVGTextElement}[]} labels of the tape
  */
 export function drawStrip(strip) {
   let path = "";

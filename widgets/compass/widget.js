@@ -7,11 +7,11 @@ import { angleOf, bearing, bearingOf, figures, point, turn } from "./bearing.js"
 import { Choice } from "./choice.js";
 import { PER_DEGREE, drawRose, drawStrip, needle } from "./rose.js";
 
-/** What an angle means in axes: clockwise from north, or counter-clockwise from east. */
+/** Angle convention of each axis convention: clockwise from north, or counter-clockwise from east. */
 const CONVENTIONS = { bearing: "bearing", NED: "bearing", FRD: "bearing", ENU: "yaw", FLU: "yaw" };
-/** On a tape, what lies outside is shown at its end. */
+/** Position of marks outside of the tape, at its end. */
 const EDGE = 96;
-/** A label further away than so many degrees would be cut. */
+/** Distance of a label from the middle beyond which it would be cut, in degrees. */
 const SEEN = 53;
 
 export default {
@@ -60,7 +60,7 @@ export default {
 };
 
 /**
- * @param {number | null} way degrees to the right
+ * @param {number | null} way turn in degrees, positive to the right
  * @param {Context["t"]} t
  */
 function wayText(way, t) {

@@ -27,7 +27,7 @@ export default {
     /** @type {Readonly<Record<string, Outlet>>} */
     let bound = Object.create(null);
 
-    /** Tell the robot, where a command is bound. @param {"arm" | "disarm"} output */
+    /** Send a command to the robot if it is bound. @param {"arm" | "disarm"} output */
     async function tell(output) {
       if (!bound[output]) return;
       try {

@@ -1,21 +1,21 @@
 // @ts-check
 /**
- * A depth image as metres: from bytes, from numbers, from a PNG. Pure: no DOM.
+ * A depth image in metres, from bytes, numbers or a PNG. Pure: no DOM.
  *
- * @typedef {{width: number, height: number, metres: Float32Array}} Field NaN where nothing is known.
+ * @typedef {{width: number, height: number, metres: Float32Array}} Field Distances; NaN if unknown.
  * @typedef {"16UC1" | "32FC1" | "8UC1"} Encoding
  * @typedef {{encoding: Encoding, width: number, height: number, bigEndian: boolean, scale: number}} Form
- *   `scale`: metres of one unit of the image.
+ *   `scale`: metres for each unit of the image.
  */
 import { MOST_PIXELS, isPng, readPng } from "./png.js";
 
 const BYTES = { "8UC1": 1, "16UC1": 2, "32FC1": 4 };
 
 /**
- * Return the field that a file or raw bytes hold.
+ * Return the depths in a file or in raw bytes.
  *
- * A PNG may stand behind the 12 bytes that ROS puts before a compressed depth image: its format, and
- * two numbers by which an image of floating point was made whole.
+ * A PNG may follow the 12 bytes that ROS puts before a compressed depth image: its format, and two
+ * numbers for the conversion of floating point depths to integers.
  *
  * @param {Uint8Array} bytes
  * @param {Form} form
@@ -36,7 +36,7 @@ export async function readField(bytes, form) {
 }
 
 /**
- * @param {Uint8Array} bytes rows from the top, without gaps
+ * @param {Uint8Array} bytes rows from the top, without padding
  * @param {Form} form
  * @returns {Field}
  */
@@ -100,7 +100,7 @@ function pixels(width, height) {
 
 /**
  * Return the field as pixels: near is bright, far is dark, and what is not known is `unknown`.
- *
+ * Write the field as pixels: near is bright, far is dark, and unknown pixels are `unknown`.
  * @param {Field} field
  * @param {{near: number, far: number}} clip metres
  * @param {Uint32Array} palette 256 pixels
@@ -120,8 +120,8 @@ export function paint({ metres }, { near, far }, palette, unknown, into) {
 }
 
 /**
- * Return the distance at a place, given in shares of the picture: the middle value of the nine pixels
- * around it that are known; NaN when none is.
+ * Return the distance at a point, given in shares of the image: the median of the known pixels among the
+ * nine around it; NaN without any.
  *
  * @param {Field} field
  * @param {number} x 0 to 1

@@ -1,17 +1,17 @@
 // @ts-check
 /**
- * A PNG of one grey channel, with all of its 16 bits: a browser's own decoder gives only 8. Pure but
- * for DecompressionStream, which browsers and Node have.
+ * A decoder for grey PNGs with all 16 bits: the browser's decoder gives only 8. Pure except for
+ * DecompressionStream, which browsers and Node have.
  *
  * @typedef {{width: number, height: number, bits: number, values: Uint16Array}} Grey
  */
 
 const MARK = [137, 80, 78, 71, 13, 10, 26, 10];
-/** More than a camera of depth has; it keeps a hostile file from eating the page's memory. */
+/** Size limit above any depth camera's: a hostile file must not fill the memory of the page. */
 export const MOST_PIXELS = 4_194_304;
 
 /**
- * Return whether a PNG begins at that place.
+ * Return whether a PNG begins at `from`.
  *
  * @param {Uint8Array} bytes
  * @param {number} [from]
@@ -84,7 +84,7 @@ async function inflate(parts, size) {
 }
 
 /**
- * @param {Uint8Array} raw rows, each with the kind of its filter first
+ * @param {Uint8Array} raw rows, each with its filter type first
  * @param {{width: number, height: number, bits: number}} head
  * @param {number} rowBytes
  */
@@ -107,9 +107,9 @@ function unfilter(raw, { width, height, bits }, rowBytes) {
 
 /**
  * @param {number} kind
- * @param {Uint8Array} line changed in place
+ * @param {Uint8Array} line row, changed in place
  * @param {Uint8Array} above
- * @param {number} step bytes of a pixel
+ * @param {number} step bytes for each pixel
  */
 function undo(kind, line, above, step) {
   if (kind > 4) throw new Error(`the PNG has an unknown filter ${kind}`);

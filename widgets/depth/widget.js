@@ -45,13 +45,13 @@ class Depth {
     this.sheet = new Sheet(data);
     this.clip = { near: Number(options["near"] ?? 0.3), far: Number(options["far"] ?? 5) };
     this.palette = palette(options["palette"] === "grey" ? "grey" : "cividis");
-    /** Where it is measured, in shares of the picture. */
+    /** Point of the measurement, in shares of the image. */
     this.point = { x: 0.5, y: 0.5 };
     /** @type {Field | null} */
     this.field = null;
     /** @type {Reading | null} */
     this.reading = null;
-    /** Came while another one was being read: the newest wins. @type {Reading | null} */
+    /** Newest reading that arrived during decoding. @type {Reading | null} */
     this.next = null;
     this.isBusy = false;
     this.isOver = false;
@@ -104,7 +104,7 @@ class Depth {
     this.move(this.point.x + STEP * way[0], this.point.y + STEP * way[1]);
   }
 
-  /** Where the picture lies in the page: its own shape, within or beyond the box of the canvas. */
+  /** Return the place of the image in the page: its own shape, within or beyond the canvas. */
   box() {
     const { left, top, width, height } = this.face.getBoundingClientRect();
     const { width: columns, height: rows } = this.sheet.canvas;
@@ -201,7 +201,7 @@ class Depth {
       const isNew = canvas.width !== field.width || canvas.height !== field.height;
       sheet.resize(field.width, field.height);
       const image = new ImageData(field.width, field.height);
-      // What is not known looks like the box behind it, and is no colour of the scale.
+      // Unknown pixels have the colour of the background, which is not part of the scale.
       const { surface } = colours(this.root, ["surface"]);
       paint(field, this.clip, this.palette, pixel(surface), new Uint32Array(image.data.buffer));
       sheet.pen.putImageData(image, 0, 0);

@@ -6,7 +6,7 @@ import { arrow } from "urc/curve";
 import { attribute, part } from "urc/kit";
 import { along, DIRECTIONS, Motion, pointed } from "urc/motion";
 
-/** The middle of three fields is none. */
+/** Share around the middle without direction: the middle of three fields. */
 const REST = 1 / 3;
 
 export default {
@@ -16,7 +16,7 @@ export default {
    */
   mount(ctx) {
     const { el, options } = ctx;
-    if (!el.querySelector(".dpad-pad")) return {}; // no command is bound: there is nothing to do
+    if (!el.querySelector(".dpad-pad")) return {}; // no command is bound
     const pad = part(el, ".dpad-pad");
     const buttons = [...el.querySelectorAll("[data-at]")];
     const level = Number(options["level"] ?? 1);
@@ -56,7 +56,7 @@ export default {
 };
 
 /**
- * Where the arrow that has the focus points.
+ * Return the direction of the focused arrow.
  *
  * @param {Element[]} buttons
  */

@@ -1,15 +1,15 @@
 // @ts-check
 /**
- * Where the sticks and buttons of a gamepad are: shown, and learnt by moving them.
+ * The mapping of a gamepad's sticks and buttons: shown, and learnt by moving them.
  *
  * @typedef {import("../../urc/web/static/core/types.js").Context} Context
  * @typedef {import("../../urc/web/static/core/types.js").PadView} PadView
  * @typedef {import("../../urc/web/static/widgets/padmap.js").PadMap} PadMap
  *
- * @typedef {object} Part One thing that can be learnt.
+ * @typedef {object} Part One part of the mapping.
  * @property {string} text
- * @property {string} how What a person has to do.
- * @property {number} axis Which of the four axes; -1 for a button.
+ * @property {string} how Instruction for the operator.
+ * @property {number} axis Index of the axis, 0 to 3; -1 for a button.
  * @property {"left" | "right" | "slower" | "faster"} [button]
  */
 import { STANDARD, movedAxis, withAxis, withButton } from "urc/padmap";
@@ -38,9 +38,9 @@ export class Mapping {
     this.places = [];
     /** @type {HTMLButtonElement[]} */
     this.buttons = [];
-    /** Which part is being learnt; null while none is. @type {Part | null} */
+    /** Part that is being learnt, or null. @type {Part | null} */
     this.learnt = null;
-    /** How the gamepad was when that began. @type {PadView | null} */
+    /** State of the gamepad at the start of learning. @type {PadView | null} */
     this.before = null;
     /** @type {PadView | null} */
     this.view = null;
@@ -73,7 +73,7 @@ export class Mapping {
 
   /** @param {PadView | null} view */
   draw(view) {
-    if (this.view?.id !== view?.id) this.learnt = null; // another gamepad teaches nothing about this one
+    if (this.view?.id !== view?.id) this.learnt = null; // another gamepad was connected
     this.view = view;
     if (this.root.hidden !== !view) this.root.hidden = !view;
     if (!view) return;

@@ -49,7 +49,7 @@ function driving(ctx) {
     el: part(el, ".gamepad-grip"),
     keys: [],
     pad: side,
-    isFree: () => false, // a finger on the picture holds nothing
+    isFree: () => false, // touching the picture holds nothing
     push({ sticks = [0, 0, 0, 0], buttons = [] }) {
       const [across, along, turned] = sticks;
       const fastest = motion.speeds[motion.speeds.length - 1] ?? 1;
@@ -65,7 +65,7 @@ function driving(ctx) {
   return motion.instance();
 }
 
-/** Every axis and button of a gamepad, as it is now. */
+/** The present state of every axis and button of a gamepad. */
 class TestView {
   /** @param {Context} ctx */
   constructor({ el, t }) {

@@ -3,12 +3,12 @@
  * The geometry of a round scale: 270 degrees, open below. Pure.
  */
 
-/** Degrees clockwise from straight up. */
+/** Angle of the start of the scale, clockwise from straight up, in degrees. */
 export const START = -135;
 export const SWEEP = 270;
 
 /**
- * Return where a share of the scale points to, in degrees clockwise from straight up.
+ * Return the angle of a share of the scale, in degrees clockwise from straight up.
  *
  * @param {number} share 0 to 1
  */
@@ -17,7 +17,7 @@ export function angle(share) {
 }
 
 /**
- * Return the point of a circle around the origin, as it is written into a path.
+ * Return a point of a circle around the origin, for an SVG path.
  *
  * @param {number} degrees clockwise from straight up
  * @param {number} radius
@@ -32,7 +32,7 @@ export function place(degrees, radius) {
 const NEEDLE = /** @type {const} */ ([[-4, 0], [-1.5, -74], [1.5, -74], [4, 0]]);
 
 /**
- * Return the points of the needle, as they are written into a polygon.
+ * Return the points of the needle for an SVG polygon.
  *
  * @param {number} degrees clockwise from straight up
  */
@@ -55,7 +55,7 @@ export function arc(from, to, radius) {
 }
 
 /**
- * Return the path of short lines across the rim.
+ * Return the path of tick marks across the rim.
  *
  * @param {readonly number[]} shares
  * @param {number} inner

@@ -41,7 +41,7 @@ export default {
  * @param {HTMLElement} el
  * @param {Signal} signal
  * @param {[number, number]} scale
- * @param {(value: number) => number} factor to the unit that is shown
+ * @param {(value: number) => number} factor conversion to the displayed unit
  */
 function drawScale(el, signal, scale, factor) {
   const parts = bands(signal.limits, ...scale).map(({ from, to, alarm }) => {
@@ -64,7 +64,7 @@ function drawScale(el, signal, scale, factor) {
   drawing(el, ".gauge-figures").replaceChildren(...figures);
 }
 
-/** Marks of the lowest and the highest so far. */
+/** Marks of the lowest and highest value so far. */
 class Extremes {
   /** @param {SVGElement} root */
   constructor(root) {

@@ -12,7 +12,7 @@ export default {
    * @returns {Instance}
    */
   mount({ el, options, hold }) {
-    if (!el.querySelector(".hold-button-main")) return {}; // no command is bound: there is nothing to do
+    if (!el.querySelector(".hold-button-main")) return {}; // no command is bound
     const root = part(el, ".hold-button");
     const main = part(el, ".hold-button-main");
     const word = part(el, ".hold-button-word");

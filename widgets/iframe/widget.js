@@ -13,7 +13,7 @@ export default {
    */
   mount(ctx) {
     const address = String(ctx.options["url"] ?? "");
-    // URC gives its own address of a page; without a robot, as in the gallery, there is none.
+    // The server replaces the URL of a page by its own; without a robot, as in the gallery, it does not.
     if (!address.startsWith("/robots/")) return { update() {} };
     const shown = new Shown(ctx, address);
     return { update() {}, destroy: () => shown.end() };
@@ -36,7 +36,7 @@ class Shown {
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.late = undefined;
     this.addButton(part(el, ".iframe-top"), signal);
-    // A page of somebody else tells of no key; only that the focus has gone there can be seen.
+    // A third-party page reports no keys; only its focus is visible.
     for (const kind of ["blur", "focus"]) addEventListener(kind, () => this.tell(), { signal });
     const every = Number(options["refresh"] ?? 0);
     if (every > 0) this.timer = setInterval(() => this.refresh(), Math.max(every, SHORTEST_S) * 1000);
@@ -59,7 +59,7 @@ class Shown {
     if (!document.hidden && !this.isInside()) this.load();
   }
 
-  /** A frame of its own each time: an address that changes in the same one would fill the history. */
+  /** Load the page in a new frame, because a new URL in the same frame would add to the history. */
   load() {
     for (const old of this.place.querySelectorAll("[data-coming]")) old.remove();
     const frame = document.createElement("iframe");
@@ -83,7 +83,7 @@ class Shown {
     clearTimeout(this.late);
     for (const old of this.place.querySelectorAll("iframe")) if (old !== frame) old.remove();
     delete frame.dataset["coming"];
-    // The document around the page is ours. There is none when the server has not given it.
+    // The document around the page is ours; it is missing if the server refused it.
     const ours = frame.contentDocument;
     const refused = ours?.body.dataset["fault"] ?? "";
     const isThere = ours?.querySelector("iframe") !== null && ours !== null;

@@ -31,7 +31,7 @@ export default {
     }
 
     ctx.picture("picture", (bitmap) => {
-      // The style sheet fits it into the cell, so it keeps its own size.
+      // The canvas keeps the size of the image; the style sheet fits it into the cell.
       sheet.resize(bitmap.width, bitmap.height);
       sheet.pen.drawImage(bitmap, 0, 0);
       sheet.show();
@@ -44,7 +44,7 @@ export default {
         attribute(root, "data-state", picture.state);
         const isNone = picture.state === "none";
         tell(isNone ? t("no picture yet") : noteOf(picture, t));
-        // What is as old as that must not be taken for now.
+        // An old image must not be taken for the present.
         canvas.hidden = picture.state === "gone";
         attribute(root, "data-gone", canvas.hidden ? "yes" : null);
       },
@@ -53,7 +53,7 @@ export default {
 };
 
 /**
- * Show the picture of the profile.
+ * Show the image of the profile.
  *
  * @param {Context} ctx
  * @param {HTMLElement} root

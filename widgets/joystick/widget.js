@@ -8,7 +8,7 @@ import { gate, settingsOf } from "urc/curve";
 import { attribute, drawing, part, write } from "urc/kit";
 import { along, DIRECTIONS, Motion, pointed, pulled, signed, speak } from "urc/motion";
 
-/** How far the knob goes, and the whole face, in units of the drawing. */
+/** Travel of the knob, and size of the face, in units of the drawing. */
 const TRAVEL = 56;
 const FACE = 200;
 
@@ -19,7 +19,7 @@ export default {
    */
   mount(ctx) {
     const { el, options } = ctx;
-    if (!el.querySelector(".joystick-pad")) return {}; // no command is bound: there is nothing to do
+    if (!el.querySelector(".joystick-pad")) return {}; // no command is bound
     const stick = new Stick(ctx);
     const motion = new Motion(ctx, "joystick", "moved");
     motion.hold({
@@ -51,10 +51,10 @@ class Stick {
     this.shape = settingsOf(options).gate;
     this.stays = { x: options["spring_x"] === false, y: options["spring_y"] === false };
     this.keyLevel = Number(options["keys"] ?? 0.5);
-    /** CSS pixels of a full push, and where the face's middle is: looked at once a gesture. */
+    /** CSS pixels at full deflection, and middle of the face: measured once for each gesture. */
     this.reach = 1;
     this.shift = { x: 0, y: 0 };
-    /** Where it stayed, from which the next pull begins. */
+    /** Kept position, at which the next drag begins. */
     this.base = { x: 0, y: 0 };
     this.at = { x: 0, y: 0 };
     this.kind = "";
@@ -84,7 +84,7 @@ class Stick {
     return { push: along(this.axes, this.at), isFine: hand.kind !== "keys" };
   }
 
-  /** Where it stays when the pointer lets go: sprung axes return. */
+  /** Return the position after a release: sprung axes return to zero. */
   stayed() {
     return { x: this.stays.x ? this.at.x : 0, y: this.stays.y ? this.at.y : 0 };
   }

@@ -5,7 +5,7 @@
 import { attribute, part, write } from "urc/kit";
 import { DIRECTIONS, Motion, pointed, signed } from "urc/motion";
 
-/** Cap that is drawn → keys that mean the same, by place. @type {Record<string, readonly string[]>} */
+/** Drawn key → keys with the same meaning, by position. @type {Record<string, readonly string[]>} */
 const CAPS = {
   KeyW: DIRECTIONS.ahead,
   KeyS: DIRECTIONS.back,
@@ -22,7 +22,7 @@ export default {
    */
   mount(ctx) {
     const { el, options, signal } = ctx;
-    if (!el.querySelector(".keyboard-keys")) return {}; // no command is bound: there is nothing to do
+    if (!el.querySelector(".keyboard-keys")) return {}; // no command is bound
     const field = part(el, ".keyboard-keys");
     const everywhere = part(el, ".keyboard-on");
     const [x, y, turn] = ["x", "y", "turn"].map((name) => part(el, `.keyboard-${name}`));
@@ -37,7 +37,7 @@ export default {
       el: field,
       keys: Object.values(CAPS).flat(),
       page: () => (isEverywhere ? "free" : "none"),
-      isFree: () => false, // a finger on a picture of keys holds nothing
+      isFree: () => false, // touching the picture holds nothing
       push({ keys }) {
         down = keys;
         const { x: ahead, y: left } = pointed(keys);

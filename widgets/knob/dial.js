@@ -1,9 +1,9 @@
 // @ts-check
-/** The geometry of a dial that goes three quarters round, from lower left over the top. No DOM. */
+/** The geometry of a dial of 270 degrees, from lower left over the top. It knows no DOM. */
 
-/** Degrees from the top, clockwise, at which it begins and ends. */
+/** Angle of its ends from the top, in degrees. */
 export const SWEEP = 135;
-/** A finger nearer to the middle than this share of the radius points nowhere. */
+/** Share of the radius below which a pointer has no direction. */
 const BLIND = 0.25;
 
 /**
@@ -15,7 +15,7 @@ export function angleOf(share) {
 }
 
 /**
- * Where a finger points; null in the middle, and in the gap below the ends' halves.
+ * Return the share at a pointer; null in the middle, and in the gap between the ends.
  *
  * @param {number} x to the right of the middle, in radii
  * @param {number} y below the middle, in radii
@@ -26,19 +26,19 @@ export function shareAt(x, y) {
   return shareOf(degrees(x, y));
 }
 
-/** A finger that pulls the hand of a dial. */
+/** A drag of the dial's hand. */
 export class Pull {
-  /** @param {number} share where the hand is, 0 to 1 */
+  /** @param {number} share position of the hand, 0 to 1 */
   constructor(share) {
-    /** Of the finger: beyond an end it is in the gap, or has come through it. */
+    /** Angle of the pointer; beyond an end it is in the gap, or has crossed it. */
     this.angle = angleOf(share);
-    /** Whether the finger is in the middle, or has been since it last pointed somewhere. */
+    /** Whether the pointer has been in the middle since its last direction. */
     this.isAstray = false;
   }
 
   /**
-   * Follow the finger, but not over the gap from one end to the other: out of the middle it points
-   * anew, as a finger that is put down.
+   * Follow the pointer, but never across the gap from one end to the other. After a visit to the middle it
+   * counts as a new press.
    *
    * @param {number} x to the right of the middle, in radii
    * @param {number} y below the middle, in radii
@@ -55,7 +55,7 @@ export class Pull {
     return shareOf(this.angle);
   }
 
-  /** Go the shorter way. @param {number} way in degrees */
+  /** Turn the shorter way. @param {number} way in degrees */
   turn(way) {
     const shorter = Math.abs(way) > 180 ? way - 360 * Math.sign(way) : way;
     this.angle = Math.min(180, Math.max(-180, this.angle + shorter));

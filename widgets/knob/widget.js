@@ -5,7 +5,7 @@ import { Setpoint, SetpointFace } from "urc/giving";
 import { attribute, drawing } from "urc/kit";
 import { Pull, arc, ray, shareAt } from "./dial.js";
 
-/** The middle of the drawing in its box of 100 by 90, and the radius of the rail. */
+/** Middle of the drawing in its box of 100 by 90, and radius of the rail. */
 const MIDDLE = { x: 0.5, y: 50 / 90 };
 const RADIUS = 42;
 
@@ -34,11 +34,11 @@ export default {
 
     /**
      * @param {PointerEvent} event
-     * @returns {[number, number]} in radii from the middle
+     * @returns {[number, number]} distance from the middle, in radii
      */
     function placeOf({ clientX, clientY }) {
       const box = drawing(el, ".knob-drawing").getBoundingClientRect();
-      // The drawing keeps its shape in a box of any other.
+      // The drawing keeps its aspect ratio in any box.
       const scale = Math.min(box.width / 100, box.height / 90);
       const [left, top] = [box.left + (box.width - 100 * scale) / 2, box.top + (box.height - 90 * scale) / 2];
       const x = clientX - left - 100 * scale * MIDDLE.x;

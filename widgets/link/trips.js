@@ -1,5 +1,5 @@
 // @ts-check
-/** Round trips of the last minutes: middle, 95 %, and how good that is. No DOM, no clock. */
+/** Round-trip times of the last minutes: median, 95th percentile, and quality. It knows no DOM and no clock. */
 
 const MOST = 120;
 export const CAUTION_MS = 100;
@@ -18,8 +18,8 @@ export class Trips {
   }
 
   /**
-   * @param {number} share 0.5 for the middle
-   * @returns {number | null} milliseconds; null while there are none
+   * @param {number} share 0.5 for the median
+   * @returns {number | null} milliseconds; null without data
    */
   share(share) {
     if (this.all.length === 0) return null;
@@ -27,7 +27,7 @@ export class Trips {
     return sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))] ?? null;
   }
 
-  /** Share of them, 0 to 1, that were too late to drive by; null while there are none. */
+  /** Return the share of trips that are too slow for driving, 0 to 1; null without data. */
   late() {
     if (this.all.length === 0) return null;
     return this.all.filter((ms) => ms > POOR_MS).length / this.all.length;

@@ -65,14 +65,14 @@ export default {
       attribute(root, "data-state", sign);
       if (isReplay && worst === "live") {
         attribute(root, "data-state", "");
-        write(now, t("Replay")); // nothing of it is live, and the way to URC says nothing of it
+        write(now, t("Replay")); // a playback has no live link
         if (facts) draw(facts);
         return;
       }
       const words = !isUp
         ? t("No connection to URC")
         : { lost: t("Robot lost"), silent: t("Robot silent"), live: t("Live") }[worst ?? ""] ?? t("Connecting");
-      // The way to URC: beside a robot that is lost, it would be taken for the way to the robot.
+      // Hidden for a lost robot: it is the trip to URC, and would be taken for the trip to the robot.
       const trip = tripMs === null || worst !== "live" ? "" : ` · ${figure(tripMs)} ms`;
       write(now, `${SIGNS[sign]} ${words}${trip}`);
       if (facts) draw(facts);

@@ -4,10 +4,10 @@
 const RANKS = { info: 0, warning: 1, error: 2 };
 
 /**
- * Return the lines that are wanted, oldest first. No DOM.
+ * Return the selected lines, oldest first. It knows no DOM.
  *
  * @param {readonly LogLine[]} lines
- * @param {{level: string, words: string, most: number}} wanted all words must be in the line
+ * @param {{level: string, words: string, most: number}} wanted a line must have all words
  * @returns {LogLine[]}
  */
 export function chosen(lines, { level, words, most }) {
@@ -22,7 +22,7 @@ export function chosen(lines, { level, words, most }) {
 }
 
 /**
- * Return a file of the lines: time (UTC), level, source and text, one line each.
+ * Return the lines as a file: time (UTC), level, source and text, one line each.
  *
  * @param {readonly LogLine[]} lines
  */

@@ -6,7 +6,7 @@ import { attribute, clock, part, save, write } from "urc/kit";
 import { chosen, fileOf } from "./lines.js";
 
 const SIGNS = { info: "", warning: "◆", error: "▲" };
-/** Nearer to the end than this, it follows. */
+/** Distance from the end within which the log follows new lines. */
 const NEAR_PX = 24;
 
 export default {
@@ -24,7 +24,7 @@ export default {
     /** @type {readonly LogLine[]} */
     let lines = [];
     let missing = 0;
-    /** Lines that stand still. @type {readonly LogLine[] | null} */
+    /** Lines of a paused log. @type {readonly LogLine[] | null} */
     let held = null;
     let shown = "";
 
@@ -64,7 +64,7 @@ export default {
     level.addEventListener("change", show, { signal });
     filter.addEventListener("input", show, { signal });
     filter.addEventListener("keydown", (event) => {
-      if (event.key === "Escape" && filter.value) event.preventDefault(); // it empties the field
+      if (event.key === "Escape" && filter.value) event.preventDefault(); // Escape clears the field
     }, { signal });
     pause.addEventListener("click", () => {
       held = held ? null : lines;

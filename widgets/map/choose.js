@@ -1,7 +1,6 @@
 // @ts-check
 /**
- * Choosing a place or a way: asked before it is sent. Knows no Leaflet; what was chosen is drawn by
- * whoever listens.
+ * Choice of a place or a route, with a confirmation. It knows no Leaflet; a listener draws the choice.
  *
  * @typedef {import("../../urc/web/static/core/types.js").Context} Context
  * @typedef {import("./geo.js").Place} Place
@@ -10,7 +9,7 @@
 import { attribute, button, write } from "urc/kit";
 import { distance, distanceText, isInside, lengthOf, placeText } from "./geo.js";
 
-/** A way of more places is no way that a finger has drawn. */
+/** Most places of a route; more are no route that a person draws. */
 const MOST = 200;
 
 export class Choice {
@@ -89,7 +88,7 @@ export class Choice {
     this.changed();
   }
 
-  /** Begin to draw a way, or end it. */
+  /** Start drawing a route, or end it. */
   toggleWay() {
     const isWay = this.mode === "way" || this.mode === "sure";
     this.clear();
@@ -112,7 +111,7 @@ export class Choice {
     this.changed();
   }
 
-  /** Why it cannot be sent; "" when it can. */
+  /** Return why it cannot be sent, or "". */
   hindrance() {
     const outlet = this.mode === "place" ? this.goto : this.waypoints;
     if (this.places.some((place) => !isInside(place, this.fence))) return this.t("outside the fence");
@@ -155,7 +154,7 @@ export class Choice {
   async go() {
     if (this.yes.disabled) return;
     if (this.mode === "way") {
-      this.mode = "sure"; // asked once more: a way is more than a tap
+      this.mode = "sure"; // a route needs a second confirmation
       this.show();
       return;
     }
@@ -180,7 +179,7 @@ export class Choice {
     return this.isLocal ? { x: second, y: first } : { latitude: first, longitude: second };
   }
 
-  /** @returns {any} lists, which a command takes as arrays */
+  /** @returns {any} lists, for commands with array arguments */
   all() {
     const places = this.places.map((place) => rounded(place, this.isLocal));
     const [firsts, seconds] = [places.map(([first]) => first), places.map(([, second]) => second)];
@@ -189,7 +188,7 @@ export class Choice {
 }
 
 /**
- * To a millimetre, or a centimetre on the earth.
+ * Round to a millimetre, or to a centimetre on the earth.
  *
  * @param {Place} place
  * @param {boolean} isLocal

@@ -1,16 +1,16 @@
 // @ts-check
 /**
- * Places on the earth, and on a floor. Pure: no DOM, no Leaflet.
+ * Places on the earth, or on a robot's own map. Pure: no DOM, no Leaflet.
  *
- * A place is `[first, second]`: latitude and longitude in degrees, or y and x in metres of the
- * robot's own map, as Leaflet wants it: up comes first.
+ * A place is `[first, second]`: latitude and longitude in degrees, or y and x in metres on the robot's
+ * own map. Leaflet has the upward coordinate first.
  *
  * @typedef {[number, number]} Place
  */
 
 const EARTH_M = 6_371_008.8;
 const RAD = Math.PI / 180;
-/** No robot's own map goes as far as round the earth: such numbers are noise. */
+/** Largest coordinate on a robot's own map, the circumference of the earth: larger numbers are noise. */
 const FARTHEST_M = 4e7;
 
 /**
@@ -31,7 +31,7 @@ export function distance(one, other, isLocal) {
 }
 
 /**
- * Return the length of a way in metres.
+ * Return the length of a route in metres.
  *
  * @param {readonly Place[]} way
  * @param {boolean} isLocal
@@ -44,7 +44,7 @@ export function lengthOf(way, isLocal) {
 }
 
 /**
- * Return how many degrees of latitude and longitude a metre is; 1 and 1 on a floor.
+ * Return the degrees of latitude and longitude of a metre; 1 and 1 on a robot's own map.
  *
  * @param {Place} origin
  * @param {boolean} isLocal
@@ -57,7 +57,7 @@ export function perMetre(origin, isLocal) {
 }
 
 /**
- * Return whether a place lies within the fence. No fence holds nothing back.
+ * Return whether a place lies within the fence. Without a fence all places do.
  *
  * @param {Place} place
  * @param {readonly Place[]} fence
@@ -75,10 +75,10 @@ export function isInside(place, fence) {
 }
 
 /**
- * Return a fence or way from an option: pairs of numbers; whatever is no pair is left out.
+ * Return the fence or route in an option: pairs of numbers; invalid pairs are left out.
  *
  * @param {unknown} value
- * @param {boolean} isLocal pairs are x, y there, and latitude, longitude on the earth
+ * @param {boolean} isLocal whether pairs are x, y; else latitude, longitude
  * @returns {Place[]}
  */
 export function placesOf(value, isLocal) {
@@ -91,7 +91,7 @@ export function placesOf(value, isLocal) {
 }
 
 /**
- * Return whether two numbers can be a place.
+ * Return two numbers as a place, or null if they are invalid.
  *
  * @param {number | null} first
  * @param {number | null} second
@@ -106,10 +106,10 @@ export function placeOf(first, second, isLocal) {
 }
 
 /**
- * Return an angle in degrees, minutes and seconds with its side, as `46°31′10.9″ N`.
+ * Return an angle in degrees, minutes and seconds with its hemisphere, such as `46°31′10.9″ N`.
  *
  * @param {number} degrees
- * @param {"NS" | "EW"} sides positive first
+ * @param {"NS" | "EW"} sides letters, the positive one first
  */
 export function sexagesimal(degrees, sides) {
   // Rounded as a whole, so that 59.96 seconds never become 60.0.
@@ -121,7 +121,7 @@ export function sexagesimal(degrees, sides) {
 }
 
 /**
- * Return a place for people.
+ * Return a place as text.
  *
  * @param {Place} place
  * @param {"decimal" | "dms"} form
@@ -136,7 +136,7 @@ export function placeText([first, second], form, isLocal) {
 }
 
 /**
- * Return a distance for people.
+ * Return a distance as text.
  *
  * @param {number} metres
  */
@@ -146,8 +146,8 @@ export function distanceText(metres) {
 }
 
 /**
- * Return the bearing in degrees, clockwise from up, of a yaw that grows counter-clockwise from the
- * x axis, in radians (REP 103).
+ * Return the bearing in degrees, clockwise from up, of a yaw in radians, counter-clockwise from the x
+ * axis (REP 103).
  *
  * @param {number} yaw
  */
@@ -156,7 +156,7 @@ export function bearingOf(yaw) {
 }
 
 /**
- * Return a round spacing for a grid: 1, 2 or 5 times a power of ten metres, at least `pixels` apart.
+ * Return a round grid spacing in metres: 1, 2 or 5 times a power of ten, at least `pixels` apart.
  *
  * @param {number} metresPerPixel
  * @param {number} [pixels]
@@ -169,7 +169,7 @@ export function gridStep(metresPerPixel, pixels = 64) {
 }
 
 /**
- * Return what a message of a receiver says: latitude, longitude and accuracy, as in NavSatFix.
+ * Return latitude, longitude and accuracy in a message such as NavSatFix.
  *
  * @param {unknown} fix
  * @returns {{place: Place | null, accuracy: number | null}}
@@ -186,15 +186,15 @@ export function readFix(fix) {
       : null;
   const list = Array.isArray(covariance) ? covariance : [];
   const spread = Number(list[0]) + Number(list[4]);
-  // One number for both ways: the root of their mean variance.
+  // One number for both directions: the root of their mean variance.
   return { place, accuracy: spread > 0 && Number.isFinite(spread) ? Math.sqrt(spread / 2) : null };
 }
 
-/** Where it has been: at most so many places, none of them close to the one before. */
+/** The trail of past places: a limited number, with a minimum distance. */
 export class Trail {
   /**
-   * @param {number} most
-   * @param {number} apart metres
+   * @param {number} most largest number of places
+   * @param {number} apart minimum distance in metres
    * @param {boolean} isLocal
    */
   constructor(most, apart, isLocal) {

@@ -1,18 +1,18 @@
 // @ts-check
-/** A grid in metres under the map: where there are no tiles, it tells what moves and how far. */
+/** A grid in metres under the map: without tiles, it shows motion and distances. */
 /** @typedef {import("leaflet").Map} LeafletMap */
 /** @typedef {import("./geo.js").Place} Place */
 import { board, colours, write } from "urc/kit";
 import { wholes } from "urc/scale";
 import { distance, distanceText, gridStep, perMetre } from "./geo.js";
 
-/** More lines than fit on any screen at their least spacing. */
+/** Limit of the number of lines, above that of any screen. */
 const MOST_LINES = 200;
 
 export class Grid {
   /**
    * @param {LeafletMap} map
-   * @param {HTMLElement} scale takes what a square is
+   * @param {HTMLElement} scale shows the size of a square
    * @param {boolean} isLocal
    */
   constructor(map, scale, isLocal) {
@@ -42,7 +42,7 @@ export class Grid {
     this.ask();
   }
 
-  /** Once a frame, however often the map says that it moved. */
+  /** Redraw once in the next frame, however often the map has moved. */
   ask() {
     if (this.isAsked) return;
     this.isAsked = true;

@@ -43,7 +43,7 @@ class Chart {
     this.note = part(el, ".map-note");
     /** @type {"decimal" | "dms"} */
     this.form = options["format"] === "dms" ? "dms" : "decimal";
-    /** Known with the first update: which inputs are bound. @type {boolean | null} */
+    /** Whether it is the robot's own map; known with the first update. @type {boolean | null} */
     this.isLocal = null;
     this.signal = signal;
     this.ctx = ctx;
@@ -67,7 +67,7 @@ class Chart {
       zoom: Number(options["zoom"] ?? (isLocal ? 5 : 18)),
       minZoom: isLocal ? -3 : 1,
       maxZoom: isLocal ? 10 : 22,
-      // Its controls set markup from text, which the page's policy forbids.
+      // Leaflet's own controls make markup from text, which the page policy forbids.
       zoomControl: false,
       attributionControl: false,
       zoomAnimation: !isStill(),
@@ -80,7 +80,7 @@ class Chart {
   }
 
   /**
-   * Begin with what is bound: the earth, or the robot's own map.
+   * Start the map of the bound inputs: the earth, or the robot's own map.
    *
    * @param {Readonly<Record<string, Reading>>} readings
    * @param {Readonly<Record<string, Outlet>>} outputs
@@ -119,7 +119,7 @@ class Chart {
         this.choice?.tap([lat, lng]);
       }
       if (event.key === "Escape" && this.choice && this.choice.mode !== "look") {
-        event.preventDefault(); // it means no, and not STOP
+        event.preventDefault(); // Escape means no here, and not STOP
         this.choice.clear();
       }
     };
@@ -265,7 +265,7 @@ class Chart {
 const RANK = ["live", "stale", "gone", "none"];
 
 /**
- * Of two readings that make one place, the one that is worse.
+ * Return the worse of two readings of one place.
  *
  * @param {Reading | undefined} one
  * @param {Reading | undefined} other

@@ -1,7 +1,7 @@
 // @ts-check
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 
-/** The server has rendered all of it: nothing changes here. */
+/** The server has rendered all content; it never changes. */
 export default {
   /** @returns {Instance} */
   mount() {

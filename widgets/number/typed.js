@@ -1,15 +1,15 @@
 // @ts-check
-/** What somebody typed as a number, and why it is none. No DOM. */
+/** Parser for typed numbers, with the reason of a failure. It knows no DOM. */
 
 const PLAIN = /^[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d{1,3})?$/i;
-/** Thousands are parted, twice or with a decimal sign behind them: nothing else can be meant. */
+/** Thousands separators: at least two, or one before a decimal separator. The meaning is certain. */
 const PARTED = /^([+-]?\d{1,3})((?:,\d{3})+)(\.\d*)?$|^([+-]?\d{1,3})((?:\.\d{3})+)(,\d*)?$/;
-/** A thousand here, and one with three decimals there. */
+/** Ambiguous: a thousand in English, three decimals in other languages. */
 const EITHER = /^[+-]?[1-9]\d{0,2},\d{3}(e[+-]?\d{1,3})?$/i;
 
 /**
- * @param {string} text as typed: blanks and the unit behind it are nothing, a comma is a point unless
- *   it parts thousands; a point alone is always one, since that is how numbers are shown
+ * @param {string} text typed text: blanks and a unit at its end are ignored. A comma is a decimal
+ *   separator unless it separates thousands; a single point always is, because the page shows it so
  * @param {{min: number, max: number, unit: string, isWhole: boolean}} bounds
  * @returns {{value: number} | {fault: "empty" | "none" | "whole" | "low" | "high"}
  *   | {fault: "comma", either: [number, number]}}
@@ -32,7 +32,7 @@ export function numberOf(text, { min, max, unit, isWhole }) {
 }
 
 /**
- * Return a number with a point for its decimals and nothing between its thousands.
+ * Return the number with a decimal point and without thousands separators.
  *
  * @param {string} typed
  */

@@ -18,8 +18,8 @@ export default {
     const field = el.querySelector(".number-field");
     const argument = Object.values(ctx.command("change")?.arguments ?? {})[0];
     const setpoint = new Setpoint(ctx, show);
-    setpoint.isLive = true; // a step is given at once
-    // What nobody has bounded may be any number.
+    setpoint.isLive = true; // a step is sent at once
+    // Without bounds any number is allowed.
     const bounds = {
       ...setpoint.bounds,
       min: bound(ctx.options["min"], argument?.min, -Infinity, Math.max),
@@ -28,7 +28,7 @@ export default {
     };
     setpoint.bounds = { ...bounds };
     let fault = "";
-    /** Whether something was typed that is not set yet. */
+    /** Whether the field has unsent text. */
     let isDraft = false;
 
     function show() {
@@ -60,7 +60,7 @@ export default {
     }
 
     if (field instanceof HTMLInputElement) {
-      /** Steps go on from what was typed. @param {string} key @param {boolean} [isTyping] */
+      /** Step from the typed number. @param {string} key @param {boolean} [isTyping] */
       const step = (key, isTyping = false) => {
         const typed = isDraft ? numberOf(field.value, bounds) : { value: setpoint.from };
         fault = "fault" in typed ? words(typed) : "";

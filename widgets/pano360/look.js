@@ -1,19 +1,19 @@
 // @ts-check
 /**
- * Where somebody looks in a picture of all directions, and what its file says of them. Pure: no DOM.
+ * The viewing direction in a panorama, and the pose in its file. Pure: no DOM.
  *
- * Yaw is degrees to the left of the picture's middle (REP 103), pitch degrees upwards.
+ * Yaw is in degrees to the left of the image's middle (REP 103), pitch in degrees upwards.
  *
  * @typedef {object} View
  * @property {number} yaw -180 to 180
  * @property {number} pitch -90 to 90
  * @property {number} fov degrees from top to bottom
  *
- * @typedef {object} Pose What the file says (Photo Sphere XMP).
- * @property {number} heading degrees clockwise from north of the picture's middle; NaN: not told
- * @property {number} pitch of the camera, degrees up
- * @property {number} roll of the camera, degrees
- * @property {number} startHeading where to look first, in the picture; NaN: not told
+ * @typedef {object} Pose Metadata of the file (Photo Sphere XMP).
+ * @property {number} heading heading of the image's middle, degrees clockwise from north; NaN if unknown
+ * @property {number} pitch pitch of the camera, degrees upwards
+ * @property {number} roll roll of the camera, degrees
+ * @property {number} startHeading first viewing direction in the image; NaN if unknown
  * @property {number} startPitch
  */
 
@@ -41,7 +41,7 @@ export function turned(view, { yaw = 0, pitch = 0, zoom = 1 }) {
 }
 
 /**
- * Return the point one looks at, 1 away: x right, y up, z back, as three has it.
+ * Return the point in the viewing direction at distance 1: x right, y up, z back, as in three.js.
  *
  * @param {View} view
  * @returns {[number, number, number]}
@@ -52,7 +52,7 @@ export function target({ yaw, pitch }) {
 }
 
 /**
- * Return which part of the flat picture is seen, in shares of it; left may be below 0 or above 1.
+ * Return the visible part of the flat image, in shares of it; left may be below 0 or above 1.
  *
  * @param {View} view
  * @param {number} aspect width by height of the box
@@ -66,9 +66,9 @@ export function crop({ yaw, pitch, fov }, aspect) {
 }
 
 /**
- * Return where a device that is tilted looks, against where it was when that began.
+ * Return the change of the viewing direction by a tilted device.
  *
- * @param {{alpha: number, beta: number}} now degrees, as the device says them
+ * @param {{alpha: number, beta: number}} now degrees, from the device
  * @param {{alpha: number, beta: number}} start
  */
 export function tilted(now, start) {
@@ -76,7 +76,7 @@ export function tilted(now, start) {
 }
 
 /**
- * Return what the file says about its pose; null when it says nothing.
+ * Return the pose in the file's metadata, or null.
  *
  * @param {Uint8Array} bytes the beginning of a JPEG
  * @returns {Pose | null}
@@ -99,7 +99,7 @@ export function poseOf(bytes) {
 }
 
 /**
- * Return the view with which a picture begins: what the file says, else what the options do.
+ * Return the first view of an image: from its file, else from the options.
  *
  * @param {Pose | null} pose
  * @param {View} otherwise
@@ -107,7 +107,7 @@ export function poseOf(bytes) {
  */
 export function firstView(pose, otherwise) {
   if (!pose || Number.isNaN(pose.startHeading)) return otherwise;
-  // The file counts clockwise from north, and the picture's middle is at its own heading.
+  // The file counts clockwise from north, and the image's middle has a heading of its own.
   const middle = Number.isNaN(pose.heading) ? 0 : pose.heading;
   return turned(
     { ...otherwise, yaw: 0, pitch: 0 },
@@ -116,7 +116,7 @@ export function firstView(pose, otherwise) {
 }
 
 /**
- * Return where one looks as a compass says it; NaN when the file does not tell.
+ * Return the viewing direction as a bearing; NaN without a heading in the file.
  *
  * @param {Pose | null} pose
  * @param {View} view

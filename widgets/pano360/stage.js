@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * What draws the panorama: a sphere seen from within, or, without WebGL, a part of the flat picture.
+ * The renderer of the panorama: a sphere seen from inside, or, without WebGL, a part of the flat image.
  *
  * @typedef {import("./look.js").Pose} Pose
  * @typedef {import("./look.js").View} View
@@ -15,19 +15,19 @@
 import { board } from "urc/kit";
 import { crop, target } from "./look.js";
 
-/** More than this is not seen on a screen, and fills the memory of a phone. */
+/** Highest pixel density: more is not visible, and fills the memory of a phone. */
 const MOST_DENSITY = 1.5;
 
 /**
  * @param {typeof import("three")} three
- * @returns {Stage} throws where there is no WebGL
+ * @returns {Stage} throws without WebGL
  */
 export function sphere(three) {
   const renderer = new three.WebGLRenderer({ antialias: false, powerPreference: "low-power" });
   renderer.setPixelRatio(Math.min(MOST_DENSITY, globalThis.devicePixelRatio || 1));
   const scene = new three.Scene();
   const camera = new three.PerspectiveCamera(75, 1, 0.1, 10);
-  // Seen from within: mirrored, so that left stays left, and turned, so that its middle is ahead.
+  // Mirrored, because it is seen from inside, and rotated, so that its middle is ahead.
   const geometry = new three.SphereGeometry(1, 48, 32).scale(-1, 1, 1).rotateY(-Math.PI / 2);
   const material = new three.MeshBasicMaterial();
   const ball = new three.Mesh(geometry, material);
@@ -38,7 +38,7 @@ export function sphere(three) {
   return {
     canvas: renderer.domElement,
     show(bitmap, pose) {
-      // A new one where the size differs: a texture's storage keeps its size.
+      // A new texture for another size: a texture cannot be resized.
       const old = /** @type {ImageBitmap | undefined} */ (texture?.image);
       if (!texture || old?.width !== bitmap.width || old.height !== bitmap.height) {
         texture?.dispose();
@@ -46,7 +46,7 @@ export function sphere(three) {
         texture.colorSpace = three.SRGBColorSpace;
         texture.generateMipmaps = false;
         texture.minFilter = three.LinearFilter;
-        // A bitmap's first row is its top, and WebGL does not turn bitmaps over.
+        // The first row of a bitmap is its top, and WebGL does not flip bitmaps.
         texture.flipY = false;
         texture.repeat.y = -1;
         texture.offset.y = 1;
@@ -74,7 +74,7 @@ export function sphere(three) {
       geometry.dispose();
       material.dispose();
       renderer.dispose();
-      renderer.forceContextLoss(); // a page may hold only some sixteen of them
+      renderer.forceContextLoss(); // browsers allow only about sixteen contexts
     },
   };
 }
@@ -95,7 +95,7 @@ export function flat() {
       const pen = board(canvas, size);
       const part = crop(view, size.width / Math.max(1, size.height));
       const scale = size.width / part.width;
-      // It goes on at its other side: left of the left edge is the right one.
+      // The image wraps around: left of its left edge is its right edge.
       const first = Math.floor(part.left);
       for (let copy = first; copy < part.left + part.width; copy += 1) {
         const x = (copy - part.left) * scale;

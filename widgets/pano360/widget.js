@@ -11,7 +11,7 @@ import { MOST_XMP, bearing, firstView, poseOf, tilted, turned } from "./look.js"
 import { flat, sphere } from "./stage.js";
 
 const STEP = 5;
-/** The pose of a stream of pictures is read anew no more often. */
+/** Shortest interval of reading the pose from a stream of images, in seconds. */
 const POSE_EVERY_S = 1;
 const SIDES = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];
 
@@ -114,7 +114,8 @@ class Panorama {
     this.pose = poseOf(bytes);
     this.home = firstView(this.pose, this.home);
     if (!this.hasMoved) this.view = this.home;
-    if (bitmap.width > 0) this.stage.show(bitmap, this.pose); // 0: it is closed, the next one is there
+    // 0: closed already, because a newer one arrived.
+    if (bitmap.width > 0) this.stage.show(bitmap, this.pose);
     this.ask();
   }
 
@@ -181,7 +182,7 @@ class Panorama {
     this.ask();
   }
 
-  /** Drawn once a frame, and only when something has changed. */
+  /** Draw once in the next frame, after a change only. */
   ask() {
     if (this.isAsked) return;
     this.isAsked = true;
@@ -211,7 +212,7 @@ class Panorama {
     return made;
   }
 
-  /** Browsers tell how they are tilted on safe pages only, and some want to be asked by a tap. */
+  /** Add the button for tilting. Browsers give the sensors to secure contexts only, some after a tap. */
   offerTilt() {
     const Tilt = /** @type {any} */ (globalThis).DeviceOrientationEvent;
     if (!globalThis.isSecureContext || !Tilt || !matchMedia("(pointer: coarse)").matches) return;

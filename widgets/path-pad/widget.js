@@ -8,12 +8,12 @@ import { attribute, clamp, drawing, format, number, part, svg, write } from "urc
 import { DIRECTIONS, pointed } from "urc/motion";
 import { fitted, lengthOf } from "urc/stroke";
 
-/** From the middle to the edge in units of the drawing, of which the whole has 200. */
+/** Distance from the middle to the edge, in units of the drawing, which is 200 wide. */
 const EDGE = 96;
 const FACE = 200;
-/** Most points of one stroke before it is simplified: a hand that never stops fills no memory. */
+/** Most raw points of a stroke: an endless stroke must not fill the memory. */
 const MOST_RAW = 2000;
-/** How far an arrow key moves the cursor, as a share of the length. */
+/** Step of an arrow key, as a share of the length. */
 const STEP = 0.05;
 const ARROWS = Object.values(DIRECTIONS).flat();
 
@@ -61,11 +61,11 @@ class PathPad {
     this.most = Number(options["points"] ?? 100);
     this.reason = ctx.t("not ready yet");
     this.isAnswered = false;
-    /** What was drawn, stroke by stroke, in shares of the length. @type {Point[][]} */
+    /** Drawn strokes, in shares of the length. @type {Point[][]} */
     this.strokes = [];
     /** The stroke under the pointer. @type {Point[]} */
     this.stroke = [];
-    /** What is sent, once it was confirmed. @type {Point[]} */
+    /** Points of the confirmed path. @type {Point[]} */
     this.points = [];
     /** @type {[number, number] | null} */
     this.cursor = null;
@@ -108,7 +108,7 @@ class PathPad {
     return true;
   }
 
-  /** Also what lay between two frames, where the browser keeps it. @param {PointerEvent} event */
+  /** Add the moves between two frames, too, if the browser has them. @param {PointerEvent} event */
   move(event) {
     const all = event.getCoalescedEvents?.() ?? [];
     for (const one of all.length > 0 ? all : [event]) {
@@ -123,7 +123,7 @@ class PathPad {
     this.keep([...this.strokes, stroke]);
   }
 
-  /** What was taken from the hand was not meant. */
+  /** Drop a stroke that was interrupted. */
   cancel() {
     this.stroke = [];
     this.draw();
@@ -158,7 +158,7 @@ class PathPad {
   }
 
   /**
-   * Only what the command takes is given; a list is an argument as any other.
+   * Return the arguments that the command has; a list is an argument, too.
    *
    * @returns {Record<string, any>}
    */
@@ -192,7 +192,7 @@ class PathPad {
   }
 
   /**
-   * Where the robot is: in the middle, unless it says.
+   * Set the place of the robot; the middle by default.
    *
    * @param {Reading | undefined} x
    * @param {Reading | undefined} y

@@ -1,14 +1,14 @@
 // @ts-check
 /**
- * What has been, standing still: uPlot with zoom and a cursor, loaded when somebody looks back.
+ * The paused history: uPlot with zoom and a cursor, loaded on demand.
  *
  * @typedef {{title: string, unit: string, colour: string, dash: number[], isShown: boolean}} Line
- * @typedef {{times: number[], columns: (number | null | undefined)[][]}} Rows in the signals' units
+ * @typedef {{times: number[], columns: (number | null | undefined)[][]}} Rows values in the signals' units
  * @typedef {{colour: string, grid: string, epoch: number, moved: (at: number | null) => void,
- *   factor: (value: number) => number}} Look `factor` leads to the unit that is shown now.
+ *   factor: (value: number) => number}} Look `factor` converts to the displayed unit.
  */
 
-/** uPlot has no types that this page could use. @typedef {any} Plot */
+/** uPlot's own types do not fit this page. @typedef {any} Plot */
 
 export class History {
   /**
@@ -39,16 +39,16 @@ export class History {
     this.sizes.observe(place);
   }
 
-  /** What is seen, in seconds. @returns {[number, number]} */
+  /** Visible range, in seconds. @returns {[number, number]} */
   get span() {
     const { min, max } = this.plot.scales.x;
     return [min, max];
   }
 
   /**
-   * Show a shorter or longer time around the cursor, or the middle.
+   * Zoom around the cursor, or around the middle.
    *
-   * @param {number} factor below 1: closer
+   * @param {number} factor below 1 zooms in
    */
   zoom(factor) {
     const times = this.plot.data[0];
@@ -79,7 +79,7 @@ export class History {
     this.plot.setSeries(index + 1, { show: isShown });
   }
 
-  /** Draw the same time anew, in the unit that is shown now. */
+  /** Redraw the same range in the displayed unit. */
   convert() {
     const [min, max] = this.span;
     this.plot.batch(() => {
@@ -88,7 +88,7 @@ export class History {
     });
   }
 
-  /** What the lines have under the cursor, else at the end. */
+  /** Values at the cursor, else at the end. */
   get values() {
     const { idx } = this.plot.cursor;
     const row = typeof idx === "number" ? idx : this.rows.times.length - 1;
@@ -110,7 +110,7 @@ function shownRows({ times, columns }, factor) {
 }
 
 /**
- * Signals rarely come at the same moment: return the value that stood at a row, or null in a gap.
+ * Return the value at a row, or null in a gap: signals rarely come at the same moment.
  *
  * @param {readonly (number | null | undefined)[]} column
  * @param {number} row

@@ -1,9 +1,9 @@
 // @ts-check
 /**
- * The live traces: in each frame the picture moves to the left, and what is new is drawn at its right
- * end on a narrow canvas that moves with it. When that is full, all on it is put into the picture.
+ * The live traces: in each frame the picture moves to the left, and new data is drawn at its right end on
+ * a narrow canvas that moves with it. A full narrow canvas is copied into the picture.
  *
- * Drawing everything anew costs more by far: that is done when the scale has changed, the size, or the
+ * A complete redraw costs much more: it happens only after a change of the scale, the size or the
  * colours.
  *
  * @typedef {import("./picture.js").Strip} Strip
@@ -14,20 +14,20 @@
  * @property {string} colour
  * @property {number[]} dash
  * @property {boolean} isShown
- * @property {number} kept How many readings are in the picture, ...
- * @property {number} keptWay ... and how far its dashes come there, in pixels.
- * @property {number} drawn The same with what is on the narrow canvas.
+ * @property {number} kept Number of readings in the picture.
+ * @property {number} keptWay Length of the dash pattern there, in pixels.
+ * @property {number} drawn Number of readings in the picture and on the narrow canvas.
  * @property {number} drawnWay
  */
 import { Picture } from "./picture.js";
 
 const MAX_DENSITY = 2;
-/** New readings within one column of pixels wait for each other, but no longer than this. */
+/** Longest time for which new readings within one column of pixels are collected. */
 const WAIT_S = 0.05;
 
 export class Live {
   /**
-   * @param {HTMLElement} place of the picture
+   * @param {HTMLElement} place element of the picture
    * @param {number} spanS seconds from left to right
    */
   constructor(place, spanS) {
@@ -37,7 +37,7 @@ export class Live {
     this.traces = [];
     /** @type {[number, number]} */
     this.scale = [0, 1];
-    /** At the right end. */
+    /** Column at the right end. */
     this.column = 0;
     this.drawnS = 0;
     this.isStale = true;
@@ -49,7 +49,7 @@ export class Live {
     this.isStale = true;
   }
 
-  /** Draw all of it in the next frame. */
+  /** Redraw everything in the next frame. */
   spoil() {
     this.isStale = true;
   }
@@ -71,7 +71,7 @@ export class Live {
     this.picture.show(column);
   }
 
-  /** Begin the picture anew. @param {number} startS from when on something is to be seen */
+  /** Clear the picture. @param {number} startS start of the visible range */
   begin(startS) {
     this.picture.wipe();
     for (const trace of this.traces) {
@@ -80,7 +80,7 @@ export class Live {
     }
   }
 
-  /** Whether all that is new has its place on the narrow canvas. @param {number} perSecond */
+  /** Return whether all new data fits on the narrow canvas. @param {number} perSecond */
   fits(perSecond) {
     const { from, to } = this.picture.newest;
     if (this.column >= to) return false;
@@ -89,7 +89,7 @@ export class Live {
     });
   }
 
-  /** Draw what is new on the narrow canvas. @param {number} perSecond */
+  /** Draw new data on the narrow canvas. @param {number} perSecond */
   draw(perSecond) {
     for (const trace of this.traces) {
       const { ring, drawn } = trace;
@@ -101,7 +101,7 @@ export class Live {
     }
   }
 
-  /** Put into the picture what is not in it, from the last readings that are. @param {number} perSecond */
+  /** Add new data to the picture, from its last readings on. @param {number} perSecond */
   keep(perSecond) {
     for (const trace of this.traces) {
       const { ring, kept } = trace;
@@ -122,7 +122,7 @@ export class Live {
   }
 
   /**
-   * Return how far the dashes of a line go between two of its readings, in pixels.
+   * Return the length of a line between two of its readings, for its dashes, in pixels.
    *
    * @param {Trace} trace
    * @param {number} from
@@ -145,10 +145,10 @@ export class Live {
   /**
    * @param {Strip} strip
    * @param {Trace} trace
-   * @param {number} first of its readings
+   * @param {number} first first of its readings
    * @param {number} last
    * @param {number} perSecond pixels
-   * @param {number} way how far its dashes are
+   * @param {number} way offset of its dashes
    */
   line(strip, { ring, isShown, colour, dash }, first, last, perSecond, way) {
     if (!isShown) return;
@@ -172,7 +172,7 @@ export class Live {
     pen.strokeStyle = colour;
     pen.lineWidth = 2 * density;
     pen.lineJoin = "round";
-    // Pieces that are drawn one after the other have no joints; round ends are as good.
+    // Separate pieces have no joints; round caps look the same.
     pen.lineCap = dash.length === 0 ? "round" : "butt";
     pen.setLineDash(dash.map((length) => length * density));
     pen.lineDashOffset = way;

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Small elements of the plot, and what it does with the browser.
+ * Small elements of the plot, and its use of browser functions.
  */
 import { format, style, write } from "urc/kit";
 import { digitsOf, ticks } from "urc/scale";
@@ -24,11 +24,11 @@ function placed(name, top, text = "") {
 }
 
 /**
- * The figures of a scale, with a line for each and one for each limit on it.
+ * Make the labels of a scale, with a line for each label and each limit.
  *
  * @param {readonly [number, number]} scale
  * @param {readonly [string, number][]} limits
- * @param {(value: number) => number} factor from both to the unit that is shown
+ * @param {(value: number) => number} factor conversion of both to the displayed unit
  */
 export function ruled(scale, limits, factor) {
   const [least, most] = [factor(scale[0]), factor(scale[1])];
@@ -47,7 +47,7 @@ export function ruled(scale, limits, factor) {
 }
 
 /**
- * One signal of the legend: a button that shows or hides its line.
+ * Make one entry of the legend: a button that shows or hides the line of a signal.
  *
  * @param {string} name
  * @param {string} hint
@@ -78,13 +78,13 @@ function roomFor(value) {
   return room;
 }
 
-/** So many characters of a value have room from the beginning. */
+/** First width of a value, in characters. */
 const CHARACTERS = 6;
-/** Where there is room for more. @type {WeakMap<Element, number>} */
+/** Larger widths, by element. @type {WeakMap<Element, number>} */
 const rooms = new WeakMap();
 
 /**
- * Write a value of the legend; its room grows when it has to.
+ * Write a value of the legend; its width grows on demand.
  *
  * @param {Element} el
  * @param {string} text

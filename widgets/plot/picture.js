@@ -1,23 +1,22 @@
 // @ts-check
 /**
- * The picture of what was drawn: strips side by side, in a frame that moves to the left with the time.
+ * The picture of the traces: strips side by side, in a frame that moves to the left with the time.
  *
- * What is put into it changes the last strip or two, and one that has left the picture begins anew at
- * its other end. What is new goes on a narrow one that lies over them. Columns are pixels of the
- * screen since time 0.
+ * New data changes the last strip or two; a strip that has left the picture is reused at the other end.
+ * The newest data is drawn on a narrow strip above them. Columns are pixels of the screen since time 0.
  *
  * @typedef {object} Strip
  * @property {Sheet} sheet
- * @property {number} number Which one it is, counted from column 0; NaN: none yet.
+ * @property {number} number Number of the strip, counted from column 0; NaN if unused.
  * @property {number} from First column that can be drawn on it.
- * @property {number} to The one after the last.
- * @property {boolean} isDrawn Whether there is something on it that is not shown yet.
+ * @property {number} to Column after the last one.
+ * @property {boolean} isDrawn Whether it has content that is not shown yet.
  */
 import { Sheet } from "urc/sheet";
 
-/** So many strips are as wide as the picture. */
+/** Number of strips in the width of the picture. */
 const STRIPS = 4;
-/** Width of what is new, and how much of that lies before the column in which it begins, in CSS pixels. */
+/** Width of the narrow strip, and of its part before the first column, in CSS pixels. */
 const NEW_PX = 48;
 const BEFORE_PX = 16;
 
@@ -25,7 +24,7 @@ export class Picture {
   /** @param {HTMLElement} place */
   constructor(place) {
     this.place = place;
-    // One more where the first and the last are seen in part, and one that begins at the right end.
+    // Two more: the first and last strip may be visible in part, and one starts at the right end.
     this.strips = Array.from({ length: STRIPS + 2 }, made);
     this.newest = made();
     this.all = [...this.strips, this.newest];
@@ -33,10 +32,10 @@ export class Picture {
     this.width = 1;
     this.height = 1;
     this.density = 1;
-    /** Columns of one strip; it is wider by `rim` at both ends, for lines have a width. */
+    /** Columns of one strip; it is wider by `rim` at both ends, because lines have a width. */
     this.span = 1;
     this.rim = 0;
-    /** Which column was at the right end when all were put in their places. */
+    /** Column at the right end when the strips were last placed. */
     this.base = 0;
     this.shift = NaN;
   }
@@ -44,7 +43,7 @@ export class Picture {
   /**
    * @param {number} width CSS pixels
    * @param {number} height
-   * @param {number} density pixels of the screen in one of them
+   * @param {number} density screen pixels for each CSS pixel
    */
   resize(width, height, density) {
     const pixels = (/** @type {number} */ length) => Math.max(1, Math.round(length * density));
@@ -58,7 +57,7 @@ export class Picture {
     }
   }
 
-  /** Nothing is drawn any more. */
+  /** Clear the picture. */
   wipe() {
     for (const strip of this.all) {
       strip.number = NaN;
@@ -74,12 +73,12 @@ export class Picture {
   }
 
   /**
-   * Return the strips on which something between two columns is drawn, of those that can be seen; the
-   * canvas of one that has left the picture becomes the one that has come.
+   * Return the visible strips between two columns, ready for drawing; a strip that has left the picture is
+   * cleared and reused.
    *
    * @param {number} from
    * @param {number} to
-   * @param {number} column at the right end
+   * @param {number} column column at the right end
    */
   between(from, to, column) {
     const { rim, span, strips } = this;
@@ -96,10 +95,10 @@ export class Picture {
   }
 
   /**
-   * All is in the picture: what is new begins at this column. All are put in their places anew; the
-   * numbers in there stay small in that way.
+   * Start new data at this column, after all is in the picture. The strips are placed again, which keeps
+   * their coordinates small.
    *
-   * @param {number} column at the right end
+   * @param {number} column column at the right end
    */
   follow(column) {
     const { density, newest, rim } = this;
@@ -109,11 +108,11 @@ export class Picture {
     const left = column - this.width + 1;
     for (const { sheet, from } of this.all) sheet.canvas.style.transform = `translateX(${(from - left) / density}px)`;
     this.base = column;
-    this.shift = NaN; // `show` says it anew
+    this.shift = NaN; // forces the next `show`
   }
 
   /**
-   * Show what was drawn, with this column at the right end.
+   * Show the drawing, with this column at the right end.
    *
    * @param {number} column
    */

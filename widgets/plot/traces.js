@@ -1,19 +1,19 @@
 // @ts-check
 /**
- * The last readings of several signals, and what a drawing of them goes from and to. Pure.
+ * The last readings of several signals, and the range of their drawing. Pure.
  */
 
-/** Readings of one signal: the newest `size`, oldest first. A gap is a NaN. */
+/** Readings of one signal: the newest `size`, oldest first. A gap is NaN. */
 export class Ring {
   /** @param {number} size */
   constructor(size) {
     this.times = new Float64Array(size);
     this.values = new Float64Array(size);
-    /** How many there have ever been; the newest is number `count - 1`. */
+    /** Number of readings so far; the newest is number `count - 1`. */
     this.count = 0;
   }
 
-  /** The number of the oldest that is kept. */
+  /** Number of the oldest kept reading. */
   get first() {
     return Math.max(0, this.count - this.times.length);
   }
@@ -30,7 +30,7 @@ export class Ring {
 
   /**
    * @param {number} time in seconds
-   * @param {number} value NaN: from here on nothing is known
+   * @param {number} value NaN starts a gap
    */
   push(time, value) {
     const place = this.count % this.times.length;
@@ -40,11 +40,11 @@ export class Ring {
   }
 
   /**
-   * Take a reading. It makes a gap where the ones between were missed; what is not newer is left out.
+   * Add a reading, after a gap if earlier ones were missed; readings out of order are dropped.
    *
    * @param {number} time in seconds
    * @param {number} value
-   * @param {number} patience seconds after which two readings belong together no more; 0: never
+   * @param {number} patience seconds after which two readings are not connected; 0: never
    */
   add(time, value, patience) {
     if (this.count > 0) {
@@ -55,15 +55,15 @@ export class Ring {
     this.push(time, value);
   }
 
-  /** From the last reading on, nothing is known. */
+  /** Start a gap after the last reading. */
   cut() {
     if (this.count === 0 || Number.isNaN(this.value(this.count - 1))) return;
     this.push(this.time(this.count - 1) + 1e-4, NaN);
   }
 
   /**
-   * Return the number of the first reading that is not older; the one before it is kept, since a line
-   * comes in from there.
+   * Return the number of the first reading at or after a time; the line comes in from the reading before
+   * it.
    *
    * @param {number} time in seconds
    */
@@ -79,7 +79,7 @@ export class Ring {
 }
 
 /**
- * Return the lowest and the highest value since a time; [Infinity, -Infinity] where there is none.
+ * Return the lowest and the highest value since a time; [Infinity, -Infinity] without values.
  *
  * @param {readonly Ring[]} rings
  * @param {number} time in seconds
@@ -98,7 +98,7 @@ export function extent(rings, time) {
 }
 
 /**
- * Return readings as rows of one table, one column a signal; null where a signal has none.
+ * Return readings as rows of one table, one column for each signal; null for a missing value.
  *
  * @param {readonly Ring[]} rings
  * @param {number} from in seconds
@@ -128,7 +128,7 @@ export function table(rings, from, to) {
 /**
  * Return a table as CSV (RFC 4180), its times as ISO 8601.
  *
- * @param {readonly string[]} names of the columns
+ * @param {readonly string[]} names names of the columns
  * @param {{times: number[], columns: (number | null | undefined)[][]}} rows
  * @param {number} epoch milliseconds since 1970 at time 0
  */
@@ -136,7 +136,7 @@ export function csv(names, { times, columns }, epoch) {
   const lines = [["time", ...names].map(quoted).join(",")];
   times.forEach((time, row) => {
     const cells = columns.map((column) => column[row] ?? "");
-    if (cells.every((cell) => cell === "")) return; // only a gap
+    if (cells.every((cell) => cell === "")) return; // a gap
     lines.push([new Date(epoch + time * 1000).toISOString(), ...cells].join(","));
   });
   return `${lines.join("\r\n")}\r\n`;
@@ -144,13 +144,13 @@ export function csv(names, { times, columns }, epoch) {
 
 /** @param {string} text */
 function quoted(text) {
-  // A spreadsheet would take it for a formula.
+  // Neutralises text that a spreadsheet would take for a formula.
   const safe = /^[=+\-@\t]/.test(text) ? `'${text}` : text;
   return /[",\r\n]/.test(safe) ? `"${safe.replaceAll('"', '""')}"` : safe;
 }
 
 /**
- * @param {unknown} text as "60s" or "5min"
+ * @param {unknown} text such as "60s" or "5min"
  * @returns {number} seconds
  */
 export function seconds(text) {

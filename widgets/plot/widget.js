@@ -11,16 +11,16 @@ import { epoch, legendItem, ruled, writeValue } from "./parts.js";
 import { Ring, csv, extent, seconds, table } from "./traces.js";
 
 const COLOURS = /** @type {const} */ (["series-1", "series-2", "series-3", "series-4", "series-5", "series-6"]);
-/** Lines beyond the colours differ by their dashes, and so they do where there is one colour. */
+/** Dashes of lines beyond the colours, and of all lines in a theme with one colour. */
 const DASHES = [[], [8, 4], [2, 3], [10, 3, 2, 3]];
 const HERTZ = 60;
 const MOST_READINGS = 18_000;
-/** Nobody reads figures that change faster, and ten texts are the dearest part of a frame. */
+/** Interval of the legend: faster numbers are unreadable, and text is the costliest part of a frame. */
 const LEGEND_EVERY_MS = 250;
 const FIT_EVERY_MS = 1000;
-/** Values may fill the scale from this share on before it becomes smaller. */
+/** Used share of the scale below which it shrinks. */
 const LOOSE = 0.4;
-/** Room above and below, as a share of the height. */
+/** Margin above and below, as a share of the height. */
 const RIM = 0.05;
 
 class Plot {
@@ -40,15 +40,15 @@ class Plot {
     this.readings = [];
     /** @type {number[]} */
     this.serials = [];
-    /** To the unit that is shown: all that is kept is as it was said. @type {(value: number) => number} */
+    /** Conversion to the displayed unit; stored values are unconverted. @type {(value: number) => number} */
     this.factor = (value) => value;
-    /** What the legend and the scale were made for. @type {Reading["signal"][]} */
+    /** Signals of the present legend and scale. @type {Reading["signal"][]} */
     this.signals = [];
     this.symbol = "";
-    /** Whether all signals are of one unit. Else what is drawn and read back is as declared. */
+    /** Whether all signals have one unit; else values keep their declared units. */
     this.isOneUnit = true;
     this.legendMs = 0;
-    /** Whether the legend says what was read last. */
+    /** Whether the legend is up to date. */
     this.isTold = true;
     this.fitMs = 0;
     /** @type {History | null} */
@@ -81,10 +81,10 @@ class Plot {
       this.soon();
     });
     sight.observe(this.board);
-    // Time goes on when nothing comes. Who wants less motion gets a step a second.
+    // Time advances without readings. With reduced motion it steps once a second.
     const step = () => {
       if (this.isSeen) this.frame(performance.now());
-      else if (!this.isTold) this.tell(); // those who hear the page are nowhere on it
+      else if (!this.isTold) this.tell(); // screen readers need the legend while the plot is hidden
       this.timer = isStill() ? window.setTimeout(step, 1000) : requestAnimationFrame(step);
     };
     step();
@@ -118,7 +118,7 @@ class Plot {
     this.isTold = false;
   }
 
-  /** Make a line for each signal; what was kept of it before goes on. */
+  /** Make a line for each signal; its earlier readings stay. */
   begin() {
     const traces = new Map(this.signals.map(({ name, unit }, place) => [`${name} ${unit}`, this.live.traces[place]]));
     this.signals = this.readings.map(({ signal }) => signal);
@@ -140,7 +140,7 @@ class Plot {
   }
 
   /**
-   * Lines stay where they are in another unit: only what is written about them changes.
+   * Change the displayed unit: the lines stay, and only their labels change.
    *
    * @param {string} symbol
    * @param {(value: number) => number} factor
@@ -154,7 +154,7 @@ class Plot {
     this.read(this.history.values);
   }
 
-  /** Write the legend anew: one button a signal, which hides its line. */
+  /** Rebuild the legend: one button for each signal, which hides its line. */
   list() {
     const { signal: end, t } = this.ctx;
     const items = this.readings.map(({ signal }, place) => {
@@ -177,11 +177,11 @@ class Plot {
     attribute(button, "aria-pressed", String(trace.isShown));
     this.history?.show(place, trace.isShown);
     this.fit(true);
-    this.live.spoil(); // also where the scale stays as it is
+    this.live.spoil(); // even with an unchanged scale
     this.soon();
   }
 
-  /** Take the colours of the theme. */
+  /** Read the colours of the theme. */
   paint() {
     const palette = colours(this.root, COLOURS);
     const swatches = this.legend.querySelectorAll(".plot-swatch");
@@ -196,13 +196,13 @@ class Plot {
     this.soon();
   }
 
-  /** Where the picture only moves once a second, what has to be seen at once does not wait for that. */
+  /** Draw at once, even if the picture moves only once a second. */
   soon() {
     if (isStill()) requestAnimationFrame(() => this.frame(performance.now()));
   }
 
   /**
-   * Let the scale grow at once when a value is past its end.
+   * Extend the scale at once for a value beyond its end.
    *
    * @param {number} value
    */
@@ -219,7 +219,7 @@ class Plot {
     this.live.frame(nowMs / 1000);
   }
 
-  /** @param {boolean} isNeeded else the scale only changes when much of it is empty */
+  /** @param {boolean} isNeeded false: only change the scale if much of it is empty */
   fit(isNeeded) {
     const nowMs = performance.now();
     this.fitMs = nowMs;
@@ -245,14 +245,14 @@ class Plot {
     return all.filter(([name]) => Object.hasOwn(ALARMS, name));
   }
 
-  /** Write the figures of the scale, and the lines of the limits. */
+  /** Write the labels of the scale, and the lines of the limits. */
   rule() {
     const { figures, lines } = ruled(this.live.scale, this.limits(), this.factor);
     part(this.ctx.el, ".plot-scale").replaceChildren(...figures);
     part(this.ctx.el, ".plot-lines").replaceChildren(...lines);
   }
 
-  /** Write the values beside the names, and what is wrong. */
+  /** Write the values of the legend, and the note. */
   tell() {
     this.isTold = true;
     this.legendMs = performance.now();
@@ -328,7 +328,7 @@ class Plot {
   }
 
   /**
-   * The cursor stands elsewhere: write what was there.
+   * Write the values at a new position of the cursor.
    *
    * @param {number | null} time in seconds
    */
@@ -339,7 +339,7 @@ class Plot {
     this.read(values);
   }
 
-  /** @param {readonly (number | null)[]} values what the legend says of each line */
+  /** @param {readonly (number | null)[]} values values of the legend */
   read(values) {
     const places = this.legend.querySelectorAll(".plot-value");
     this.signals.forEach(({ precision, unit = "" }, place) => {
@@ -374,7 +374,7 @@ class Plot {
     return table(this.live.traces.map(({ ring }) => ring), from, to);
   }
 
-  /** Save what is seen as a file, as the robot said it. */
+  /** Save the visible range as a file, in the robot's units. */
   save() {
     const names = this.signals.map(({ name, unit }) => (unit ? `${name} (${unit})` : name));
     save(csv(names, this.rows(this.history?.span ?? [-Infinity, Infinity]), epoch()), "plot.csv", "text/csv");

@@ -1,9 +1,9 @@
 // @ts-check
 /**
- * What a distance means, and where it is drawn. Pure: no DOM.
+ * The meaning and the drawing of a distance. Pure: no DOM.
  *
- * Angles are degrees from straight ahead, counter-clockwise as in REP 103; drawings have x to the
- * right and y down, so that ahead is up.
+ * Angles are degrees from straight ahead, counter-clockwise as in REP 103; drawings have x to the right
+ * and y down, so that ahead is up.
  *
  * @typedef {"in" | "clear" | "close" | "unknown"} Kind
  * @typedef {"" | "near" | "stop"} Zone
@@ -16,8 +16,8 @@
  */
 
 /**
- * REP 117: what is beyond the range is clear (+Inf), below it too close (-Inf), and what is no number
- * is not known. Most lines cannot carry an infinity, so the ends of the range count as beyond them.
+ * Return the kind of a distance by REP 117: beyond the range is clear (+Inf), below it too close (-Inf),
+ * and not a number is unknown. Most formats have no infinity, so the ends of the range count as beyond.
  *
  * @param {unknown} value
  * @param {Bounds} bounds
@@ -44,7 +44,7 @@ export function zoneOf(value, bounds) {
 }
 
 /**
- * Return how far out a distance is drawn, 0 to 1; what is clear at the rim, what is too close at 0.
+ * Return the drawn length of a distance, 0 to 1: 1 if clear, 0 if too close.
  *
  * @param {unknown} value
  * @param {Bounds} bounds
@@ -58,7 +58,7 @@ export function shareOf(value, bounds) {
 }
 
 /**
- * Return the place on a circle around 0, 0.
+ * Return the point of a circle around 0, 0.
  *
  * @param {number} bearing
  * @param {number} radius
@@ -72,7 +72,7 @@ export function at(bearing, radius) {
 /**
  * Return the outline of a sector between two radii as an SVG path.
  *
- * @param {number} bearing its middle
+ * @param {number} bearing direction of its middle
  * @param {number} width its angle, at most 360
  * @param {number} inner
  * @param {number} outer
@@ -89,7 +89,7 @@ export function sector(bearing, width, inner, outer) {
 }
 
 /**
- * Return one direction for each of `count` sensors: those that are given, the rest spread evenly.
+ * Return one direction for each of `count` sensors: the given ones, the others spread evenly.
  *
  * @param {readonly unknown[]} given
  * @param {number} count
@@ -102,7 +102,7 @@ export function bearings(given, count) {
 }
 
 /**
- * Marks a text that is translated where it is said.
+ * Mark a text for the catalogues; it is translated elsewhere.
  *
  * @param {string} text
  */
@@ -119,7 +119,7 @@ const SIDES = [
 ];
 
 /**
- * Return where a direction points to, in words.
+ * Return a direction in words.
  *
  * @param {number} bearing
  */
@@ -129,7 +129,7 @@ export function sideOf(bearing) {
 }
 
 /**
- * Return which of them matters: the nearest that is known.
+ * Return the index of the nearest known distance.
  *
  * @param {readonly unknown[]} values
  * @param {Bounds} bounds
@@ -147,12 +147,12 @@ export function nearestOf(values, bounds) {
 }
 
 /**
- * Return what is to be said of the sensors beside the one that is shown: where nobody looks any more,
- * and which say something old. Nothing when all are as that one.
+ * Return a note about the other sensors: directions without a measurement, and old values. It is empty if
+ * all have the state of the shown one.
  *
- * @param {readonly string[]} sides where each looks, in words
- * @param {readonly string[]} said what is to be said of each; "" for nothing
- * @param {number} shown the index of that one
+ * @param {readonly string[]} sides direction of each sensor, in words
+ * @param {readonly string[]} said note about each, or ""
+ * @param {number} shown index of the shown sensor
  */
 export function besides(sides, said, shown) {
   if (said.every((words) => words === said[shown])) return [];
@@ -165,7 +165,7 @@ export function besides(sides, said, shown) {
   return [...found].map(([words, places]) => `${[...new Set(places)].join(", ")}: ${words}`);
 }
 
-/** The last minutes of one distance, at most so many points. */
+/** The last minutes of one distance, with a limited number of points. */
 export class Track {
   /**
    * @param {number} windowS
@@ -174,7 +174,7 @@ export class Track {
   constructor(windowS, most = 600) {
     this.windowS = windowS;
     this.most = most;
-    /** Time in seconds and how far out it is drawn; null is a gap. @type {[number, number | null][]} */
+    /** Time in seconds and drawn length; null is a gap. @type {[number, number | null][]} */
     this.points = [];
   }
 

@@ -51,10 +51,10 @@ class View {
     this.ink = colours(el, INK);
     this.track = new Track(WINDOW_S);
     this.drawn = "";
-    /** How many distances the first input held last. */
+    /** Number of distances in the last value of the first input. */
     this.count = 1;
     this.state = "none";
-    // The line goes on with the time, also when nothing comes.
+    // The line advances with the time, also without readings.
     this.timer = this.graph ? setInterval(() => this.drawGraph(), 1000) : undefined;
   }
 
@@ -113,7 +113,7 @@ class View {
   }
 
   /**
-   * Return every distance with the reading that it comes from.
+   * Return every distance with its reading.
    *
    * @param {Reading} reading
    * @param {readonly Reading[]} others
@@ -122,7 +122,7 @@ class View {
   sensors(reading, others) {
     const { value } = reading;
     if (Array.isArray(value)) this.count = value.length;
-    // What is gone says no longer how many it held, and the others still look where they did.
+    // A missing value has no count: the sensors keep their number and directions.
     const first = Array.isArray(value) ? value : value === null ? Array(this.count).fill(null) : [value];
     return [
       ...first.map((each) => ({ value: each, reading })),
@@ -131,7 +131,7 @@ class View {
   }
 
   /**
-   * Return why a sensor does not tell how far it is now; "" when it does.
+   * Return why the distance of a sensor is unknown, or "".
    *
    * @param {Sensor} sensor
    * @param {Bounds} bounds
@@ -208,7 +208,7 @@ class View {
         "data-kind": kind,
         "data-zone": zoneOf(value, bounds),
       });
-      // What stands there is a thick edge: seen without any colour.
+      // An obstacle is a thick edge, visible without colour.
       const inner = Math.max(from, reach - 4);
       const wall = svg("path", {
         class: "range-wall",

@@ -1,26 +1,26 @@
 // @ts-check
 /**
- * What was recorded, and how it is written as a table (RFC 4180). Knows no page.
+ * The recorded rows, and their table (RFC 4180). It knows no page.
  *
  * @typedef {import("../../urc/web/static/core/types.js").Reading} Reading
  * @typedef {readonly [number, string, string]} Row Milliseconds since 1970, signal, value.
  */
 
-/** A text that a spreadsheet would take for a formula. */
+/** Text that a spreadsheet would take for a formula. */
 const FORMULA = /^[=+\-@\t\r]/;
 const NUMBER = /^[+-]?[\d.]+(e[+-]?\d+)?$/i;
 
 export class Recording {
   /**
-   * @param {number} most rows
-   * @param {number} begunS when it began, by the page's clock
+   * @param {number} most largest number of rows
+   * @param {number} begunS start of the recording, by the page's clock
    */
   constructor(most, begunS) {
     this.most = most;
     this.begunS = begunS;
     /** @type {Row[]} */
     this.rows = [];
-    /** Readings that never reached the page. */
+    /** Number of readings lost before the page. */
     this.lost = 0;
   }
 
@@ -29,10 +29,10 @@ export class Recording {
   }
 
   /**
-   * Keep a reading, unless it is from before the recording.
+   * Add a reading, unless it is older than the recording.
    *
    * @param {Reading} reading
-   * @param {number} missed how many were lost before it
+   * @param {number} missed number of lost readings before it
    * @param {number} nowS the page's clock, in seconds
    * @param {number} dateMs the same moment, in milliseconds since 1970
    */
@@ -43,7 +43,7 @@ export class Recording {
     this.rows.push([Math.round(dateMs - (nowS - time) * 1000), signal.name, String(value)]);
   }
 
-  /** Return all as a table in the order of time. */
+  /** Return all rows as a table in the order of time. */
   table() {
     const rows = [...this.rows].sort((one, other) => one[0] - other[0]);
     const lines = rows.map(([time, name, value]) => [new Date(time).toISOString(), name, value].map(field).join(","));
@@ -52,7 +52,7 @@ export class Recording {
 }
 
 /**
- * Return a field as it is written: a robot's text never becomes another field, nor a formula.
+ * Return a quoted field: a robot's text becomes neither another field nor a formula.
  *
  * @param {string} text
  */
@@ -62,7 +62,7 @@ export function field(text) {
 }
 
 /**
- * Return a time span for people, as "1:05" or "1:00:05".
+ * Return a time span as text, such as "1:05" or "1:00:05".
  *
  * @param {number} seconds
  */

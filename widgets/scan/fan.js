@@ -1,26 +1,26 @@
 // @ts-check
 /**
- * Where the rays of a scan point: at even steps, or each at an angle of its own. Pure: no DOM.
+ * The directions of the rays of a scan: at even steps, or with an angle each. Pure: no DOM.
  *
  * Angles are radians from straight ahead, counter-clockwise (REP 103).
  *
  * @typedef {object} Fan
- * @property {number} count of the rays
- * @property {(index: number) => number} angleAt radians of a ray; NaN where its angle is not known
- * @property {(angle: number) => number} rayAt the ray that looks into a direction, of any turn, or NO_RAY
- * @property {(share: number) => number} across the ray at a share of the way from the left end to
- *   the right end, or NO_RAY
+ * @property {number} count number of rays
+ * @property {(index: number) => number} angleAt returns the angle of a ray in radians; NaN if unknown
+ * @property {(angle: number) => number} rayAt returns the ray in a direction of any turn, or NO_RAY
+ * @property {(share: number) => number} across returns the ray at a share of the way from the left to the
+ *   right end, or NO_RAY
  *
- * @typedef {object} Fault Why the rays cannot be placed: a text that can be translated, and its names.
+ * @typedef {object} Fault Why the rays have no directions: a translatable text, and its names.
  * @property {string} text
  * @property {Record<string, number>} names
  */
 
 const TURN = 2 * Math.PI;
-/** No ray looks there. */
+/** Stands for no ray. */
 export const NO_RAY = 0xffff;
 
-/** @param {number} angle radians; returns the same direction from 0 up to a full turn */
+/** Return the angle from 0 to below a full turn. @param {number} angle radians */
 const within = (angle) => ((angle % TURN) + TURN) % TURN;
 
 /** Rays at even steps. @implements {Fan} */
@@ -48,35 +48,35 @@ export class Even {
     const along = within((angle - start) * Math.sign(step));
     const index = Math.round(along / Math.abs(step));
     if (index < count) return index;
-    // Just before the first ray is still the first ray.
+    // Just before the first ray still counts as the first ray.
     return TURN - along <= Math.abs(step) / 2 ? 0 : NO_RAY;
   }
 
   /** @param {number} share */
   across(share) {
     if (this.count === 0) return NO_RAY;
-    // Counter-clockwise rays go from right to left.
+    // Counter-clockwise rays run from right to left.
     const along = this.step > 0 ? 1 - share : share;
     return Math.min(this.count - 1, Math.round(along * (this.count - 1)));
   }
 }
 
-/** Directions that uneven rays are looked up by: a tenth of a degree each. */
+/** Number of directions in the look-up table of uneven rays: a tenth of a degree each. */
 const DIRECTIONS = 3600;
-/** Two rays further apart than so many usual gaps have a sector between them that no ray sees. */
+/** Gap between rays, in usual gaps, above which the sector between them is blind. */
 const JOINED = 3;
-/** A ray stands for no more than this on either side: a few sensors do not see all around. */
+/** Widest half sector of a ray: a few sensors do not see all around. */
 const WIDEST = Math.PI / 4;
 
 /** Rays at angles of their own, in any order. @implements {Fan} */
 export class Uneven {
-  /** @param {readonly unknown[]} angles radians of each ray; what is not a number looks nowhere */
+  /** @param {readonly unknown[]} angles radians of each ray; other values give rays without direction */
   constructor(angles) {
     this.count = angles.length;
     this.angles = Float64Array.from(angles, (each) => (isAngle(each) ? each : NaN));
-    /** Which ray looks into each direction. */
+    /** Ray of each direction. */
     this.rays = new Uint16Array(DIRECTIONS).fill(NO_RAY);
-    /** Left end, and how far it is from there to the right end: all around, with ahead in the middle. */
+    /** Left end, and angle from there to the right end: a full turn, with ahead in the middle. */
     this.left = Math.PI;
     this.extent = TURN;
     this.place();
@@ -87,7 +87,7 @@ export class Uneven {
       .filter((index) => isAngle(this.angles[index]))
       .map((index) => ({ index, angle: within(this.angleAt(index)) }))
       .sort((one, other) => one.angle - other.angle);
-    /** From each ray to the next one counter-clockwise; a single one has a full turn to itself. */
+    /** Gap from each ray to the next one counter-clockwise; a single ray has a full turn. */
     const gaps = around.map(({ angle }, at) => (around[at + 1]?.angle ?? (around[0]?.angle ?? 0) + TURN) - angle);
     const ordered = gaps.filter((gap) => gap > 0).sort((one, other) => one - other);
     const usual = ordered[(ordered.length - 1) >> 1] ?? TURN;
@@ -95,7 +95,7 @@ export class Uneven {
     around.forEach(({ index, angle }, at) => {
       this.fill(angle - half(gaps.at(at - 1) ?? TURN), angle + half(gaps[at] ?? TURN), index);
     });
-    // Where rays are closer than directions, each still has the one that it looks into.
+    // Rays may be closer than the table's directions: each still gets its own direction.
     for (const { index, angle } of around) this.rays[directionOf(angle)] = index;
     const widest = Math.max(0, ...gaps);
     const at = gaps.indexOf(widest);
@@ -146,15 +146,15 @@ function isAngle(value) {
 }
 
 /**
- * Marks a text that is translated where it is said.
+ * Mark a text for the catalogues; it is translated elsewhere.
  *
  * @param {string} text
  */
 const mark = (text) => text;
 
 /**
- * Return why these angles cannot be those of these distances, or null when they can. An angle may be
- * missing where the distance is missing too.
+ * Return why these angles do not fit these distances, or null if they do. An angle may be missing where
+ * the distance is missing, too.
  *
  * @param {readonly unknown[]} angles
  * @param {readonly unknown[]} ranges

@@ -1,5 +1,5 @@
 // @ts-check
-/** What does not change with each sweep: rings, the vehicle, zones, the compass. Drawn when it does. */
+/** The layer that is rarely redrawn: rings, vehicle, zones and compass. */
 import { board, format } from "urc/kit";
 import { ARC } from "./paint.js";
 import { ringStep } from "./rays.js";
@@ -13,7 +13,7 @@ import { ringStep } from "./rays.js";
  * @property {number} near
  * @property {number} stop
  * @property {unknown} vehicle length and width
- * @property {number} heading degrees clockwise from north; NaN when it is not known
+ * @property {number} heading degrees clockwise from north; NaN if unknown
  * @property {{symbol: string, factor: (value: number) => number}} unit
  * @property {Record<string, string> | undefined} ink
  */
@@ -79,7 +79,7 @@ function rings(pen, { most, near, stop, unit, ink }, radius) {
 /**
  * @param {CanvasRenderingContext2D} pen
  * @param {Scene} scene
- * @param {number} scale pixels of one unit; 0: it is only a sign
+ * @param {number} scale pixels for each unit; 0 draws a symbol without scale
  * @param {number} radius
  */
 function vehicle(pen, { vehicle: given, ink }, scale, radius) {
@@ -113,7 +113,7 @@ function compass(pen, { heading, ink }, radius) {
     pen.arc(0, 0, radius * share, 0, 2 * Math.PI);
     pen.stroke();
   }
-  // Without a heading the ring tells where the robot's own left and right are.
+  // Without a heading the ring shows the robot's own left and right.
   const isKnown = Number.isFinite(heading);
   const words = isKnown ? ["N", "E", "S", "W"] : ["0", "−90", "180", "90"];
   for (let tick = 0; tick < 36; tick += 1) {

@@ -1,9 +1,9 @@
 // @ts-check
 /**
- * The pictures of a scan as pixels: each function fills a buffer that becomes an ImageData. One pass
- * over rays or pixels, no object made: a slow device has little time for a frame. Pure: no DOM.
+ * The views of a scan as pixels: each function fills the buffer of an ImageData. One pass over rays or
+ * pixels, without new objects, because a slow device has little time for a frame. Pure: no DOM.
  *
- * @typedef {object} Ink Pixels.
+ * @typedef {object} Ink Colours as pixels.
  * @property {number} wall
  * @property {number} near
  * @property {number} stop
@@ -11,7 +11,7 @@
  * @property {number} unknown
  *
  * @typedef {object} Limits Distances in the unit of the scan.
- * @property {number} most what is drawn at the rim
+ * @property {number} most distance at the rim
  * @property {number} near
  * @property {number} stop
  */
@@ -29,7 +29,7 @@ export function inkOf(distance, { near, stop }, ink) {
 }
 
 /**
- * A dot for each ray, around the middle; the nearer ones are larger, so that colour is not alone.
+ * Draw a dot for each ray around the middle; near dots are larger, so that colour is not alone.
  *
  * @param {Uint32Array} into
  * @param {number} size
@@ -58,7 +58,7 @@ export function dots(into, size, distances, ways, limits, ink) {
 }
 
 /**
- * What is free up to the next thing, and the thing as a wall: between two rays the nearest one counts.
+ * Draw free space up to the next obstacle, and the obstacle as a wall; between two rays the nearest counts.
  *
  * @param {Uint32Array} into
  * @param {Uint16Array} rays ray of each pixel
@@ -87,7 +87,7 @@ export function chart(into, rays, reach, size, distances, limits, ink) {
 }
 
 /**
- * What the robot sees: a wall in each direction, higher and brighter the nearer it stands.
+ * Draw the robot's view: a wall in each direction, higher and brighter for shorter distances.
  *
  * @param {Uint32Array} into
  * @param {number} width
@@ -105,12 +105,12 @@ export function view(into, width, height, rays, distances, limits, palette, unkn
   for (let column = 0; column < width; column += 1) {
     const distance = distances[rays[column] ?? 0] ?? NaN;
     const isKnown = distance === distance;
-    const isClear = isKnown && distance >= limits.most; // one sees nothing
+    const isClear = isKnown && distance >= limits.most; // free space has no wall
     const share = isKnown ? wallHeight(distance, close) : 0.02;
     colours[column] = isClear ? 0 : isKnown ? shade(distance, limits.most, palette) : unknown;
     tops[column] = Math.floor((height * (1 - share)) / 2);
   }
-  // Row by row, as the pixels lie; the lower half is the upper one turned over.
+  // Row by row, in the order of the pixels; the lower half mirrors the upper one.
   for (let row = 0; row < height; row += 1) {
     const depth = Math.min(row, height - 1 - row);
     const from = row * width;
@@ -121,7 +121,7 @@ export function view(into, width, height, rays, distances, limits, palette, unkn
 }
 
 /**
- * Return the pixels of the arc: where each is, and how deep in it lies, 0 to 1.
+ * Return the pixels of the arc: their indexes, and their depth within it, 0 to 1.
  *
  * @param {Float32Array} reach distance of each pixel from the middle, in pixels
  * @param {number} size
@@ -137,7 +137,7 @@ export function band(reach, size) {
 }
 
 /**
- * The same on an arc, as a compass has it: the colour of each direction tells how far it is.
+ * Draw the distances on an arc around a compass: the colour of each direction shows the distance.
  *
  * @param {Uint32Array} into
  * @param {ReturnType<typeof band>} band
@@ -149,7 +149,7 @@ export function band(reach, size) {
  */
 export function arc(into, { places, depths }, rays, distances, limits, palette, unknown) {
   into.fill(0);
-  // The nearer, the further the bar reaches in: brightness is not the only sign.
+  // Bars are longer for shorter distances, so that brightness is not alone.
   const lengths = distances.map((each) => (each === each ? Math.max(0.06, 1 - each / limits.most) : 0.06));
   const colours = Uint32Array.from(distances, (each) => (each === each ? shade(each, limits.most, palette) : unknown));
   for (let index = 0; index < places.length; index += 1) {
@@ -159,11 +159,11 @@ export function arc(into, { places, depths }, rays, distances, limits, palette, 
   }
 }
 
-/** Where the arc lies, as shares of half the picture. */
+/** Radii of the arc, as shares of half the picture. */
 export const ARC = Object.freeze({ inner: 0.5, outer: 0.82 });
 
 /**
- * The distances as they come, first ray left; near is below.
+ * Draw the distances in their order, first ray left; near is low.
  *
  * @param {Uint32Array} into
  * @param {number} width

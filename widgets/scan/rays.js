@@ -1,9 +1,9 @@
 // @ts-check
 /**
- * The geometry of a scan: rays to places, the nearest of them, zones. Pure: no DOM.
+ * The geometry of a scan: positions of rays, the nearest obstacle, zones. Pure: no DOM.
  *
- * Angles are radians from straight ahead, counter-clockwise (REP 103). A pixel's x is to the right
- * and its y down, so ahead is up and left is left.
+ * Angles are radians from straight ahead, counter-clockwise (REP 103). A pixel's x is to the right and
+ * its y down, so ahead is up and left is left.
  *
  * @typedef {import("./fan.js").Fan} Fan
  */
@@ -11,13 +11,13 @@
 const TURN = 2 * Math.PI;
 
 /**
- * Return the distances as they are drawn: NaN where nothing is known, `most` where it is clear, and
- * 0 where something is too close (REP 117).
+ * Return the distances for drawing: NaN if unknown, `most` if clear, and 0 if an obstacle is too close
+ * (REP 117).
  *
  * @param {readonly unknown[]} ranges
  * @param {number} least
  * @param {number} most
- * @param {Float32Array} into as long as `ranges`; written anew
+ * @param {Float32Array} into result, as long as `ranges`
  */
 export function measured(ranges, least, most, into) {
   for (let index = 0; index < into.length; index += 1) {
@@ -30,7 +30,7 @@ export function measured(ranges, least, most, into) {
 }
 
 /**
- * Return sine and cosine of each ray, in the sense of the drawing: multiply by a distance in pixels.
+ * Return sine and cosine of each ray in the drawing: multiply them by a distance in pixels.
  *
  * @param {Fan} fan
  */
@@ -45,7 +45,7 @@ export function directions(fan) {
 }
 
 /**
- * Return the direction of each pixel of a square picture around the sensor, in radians.
+ * Return the direction of each pixel of a square image around the sensor, in radians.
  *
  * @param {number} size pixels
  */
@@ -59,7 +59,7 @@ export function bearingOfPixels(size) {
 }
 
 /**
- * Return for each pixel which ray passes through it.
+ * Return the ray through each pixel.
  *
  * @param {Fan} fan
  * @param {Float32Array} bearings direction of each pixel
@@ -71,7 +71,7 @@ export function rayOfPixels(fan, bearings) {
 }
 
 /**
- * Return the distance from the sensor of each pixel of a square picture, in pixels.
+ * Return the distance of each pixel from the sensor in a square image, in pixels.
  *
  * @param {number} size
  */
@@ -85,8 +85,8 @@ export function reachOfPixels(size) {
 }
 
 /**
- * Return the nearest thing and its direction; null when nothing is in reach. What is too close to be
- * measured counts as 0.
+ * Return the nearest obstacle and its direction; null without one in range. An obstacle below the range
+ * counts as 0.
  *
  * @param {Float32Array} distances
  * @param {Fan} fan
@@ -107,7 +107,7 @@ export function nearest(distances, fan, most) {
 }
 
 /**
- * Return how much of the window a wall fills at a distance: all of it at `close`, little far away.
+ * Return the share of the height that a wall fills at a distance: 1 at `close`, little far away.
  *
  * @param {number} distance
  * @param {number} close
@@ -117,7 +117,7 @@ export function wallHeight(distance, close) {
 }
 
 /**
- * Return which ray each column of a picture from the robot's view shows: left is left.
+ * Return the ray of each column in the robot's view: left is left.
  *
  * @param {Fan} fan
  * @param {number} columns
@@ -128,7 +128,7 @@ export function raysOfColumns(fan, columns) {
 }
 
 /**
- * Return a round distance for rings: 1, 2 or 5 times a power of ten, at most `count` to the rim.
+ * Return a round distance for rings: 1, 2 or 5 times a power of ten, with at most `count` rings.
  *
  * @param {number} most
  * @param {number} [count]
@@ -142,7 +142,7 @@ export function ringStep(most, count = 5) {
 }
 
 /**
- * Marks a text that is translated where it is said.
+ * Mark a text for the catalogues; it is translated elsewhere.
  *
  * @param {string} text
  */
@@ -159,7 +159,7 @@ const SIDES = [
 ];
 
 /**
- * Return where a direction points to, in words.
+ * Return a direction in words.
  *
  * @param {number} angle radians
  */

@@ -15,12 +15,12 @@ import {
   bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, sideOf,
 } from "./rays.js";
 
-/** Largest picture in pixels: a slow device fills no more in a frame. */
+/** Largest image in pixels: a slow device fills no more in a frame. */
 const MOST_PIXELS = 420;
 const INK = /** @type {const} */ (["level", "caution", "alarm", "raised", "faint", "muted", "line", "text", "old"]);
 const VIEWS = /** @type {const} */ (["polar", "map", "graph", "depth", "arc"]);
 /**
- * Marks a text that is translated where it is said.
+ * Mark a text for the catalogues; it is translated elsewhere.
  *
  * @param {string} text
  */
@@ -45,7 +45,7 @@ export default {
 };
 
 /**
- * Return where the pixels of a picture are.
+ * Return the directions and distances of the pixels of an image.
  *
  * @param {number} size
  */
@@ -78,13 +78,13 @@ class Scan {
     this.distances = new Float32Array(0);
     /** @type {Fan} */
     this.fan = new Even(0, 0, 0);
-    /** What the fan was made of. */
+    /** Key of the inputs of the present fan. */
     this.made = "";
     /** @type {Fault | null} */
     this.fault = null;
-    /** Where the pixels of a picture of this size are. */
+    /** Directions and distances of the pixels, for the present size. */
     this.places = placesOf(0);
-    /** What was made for this fan and this size. */
+    /** Look-up tables for the present fan and size. */
     this.tables = {
       key: "",
       ways: directions(this.fan),
@@ -92,7 +92,7 @@ class Scan {
     };
     this.image = new ImageData(1, 1);
     this.pixels = new Uint32Array(this.image.data.buffer);
-    /** Of the picture. Asking the page for it would have it laid out at once. */
+    /** Size of the picture, cached: reading it from the page would force a layout. */
     this.room = { width: 0, height: 0 };
     const sizes = new ResizeObserver(([entry]) => {
       if (!entry) return;
@@ -161,10 +161,10 @@ class Scan {
   }
 
   /**
-   * Learn where the rays point. There are none where that cannot be known: a dot in a wrong place
-   * would hide what stands in its way.
+   * Compute the directions of the rays. If they are unknown there are no rays: a dot in a wrong place would
+   * hide a real obstacle.
    *
-   * @param {Reading} reading of the distances
+   * @param {Reading} reading reading of the distances
    * @param {Readonly<Record<string, Reading>>} readings
    */
   setFan(reading, readings) {
@@ -259,8 +259,8 @@ class Scan {
   }
 
   /**
-   * @param {Pick<Reading, "state">} lead what the sweep is as old as
-   * @param {string} aged how old that is, for people
+   * @param {Pick<Reading, "state">} lead reading whose state is that of the sweep
+   * @param {string} aged age of the sweep, as text
    */
   tell(lead, aged) {
     const { count } = this.fan;

@@ -1,16 +1,16 @@
 // @ts-check
 /**
- * The robot's model: from its URDF file, or a box with a nose. Files come only from where the profile
- * says; a shape that is not among them is left out, and told.
+ * The robot's model: from its URDF file, or a box with a nose. Files only come from the profile; a mesh
+ * without a file is left out and reported.
  *
  * @typedef {typeof import("three")} Three
  * @typedef {import("three").Object3D} Object3D
  * @typedef {{object: Object3D, joints: string[], set: (name: string, value: number) => void, missing: string[]}} Model
  */
 
-/** Colour of what has none: seen in every theme. */
+/** Colour of parts without a material: visible in every theme. */
 const BARE = 0x7a858f;
-/** A file that takes longer than this is not there. */
+/** Time limit for loading a file. */
 const WAIT_MS = 20_000;
 
 /**
@@ -24,7 +24,7 @@ export function box(three, [length = 0.6, width = 0.4, height = 0.2]) {
     new three.BoxGeometry(length, width, height),
     new three.MeshLambertMaterial({ color: BARE }),
   );
-  // A nose, and a mark on its top: ahead is seen from everywhere.
+  // A nose and a mark on the top show the direction from all sides.
   const nose = new three.Mesh(
     new three.ConeGeometry(width * 0.3, length * 0.35, 12).rotateZ(-Math.PI / 2),
     new three.MeshLambertMaterial({ color: 0xf0b23e }),
@@ -41,9 +41,9 @@ export function box(three, [length = 0.6, width = 0.4, height = 0.2]) {
 
 /**
  * @param {Three} three
- * @param {string} url of the URDF file
- * @param {readonly string[]} meshes URLs of the shapes
- * @param {() => void} changed called when a shape has come
+ * @param {string} url URL of the URDF file
+ * @param {readonly string[]} meshes URLs of the meshes
+ * @param {() => void} changed called for each loaded mesh
  * @returns {Promise<Model>}
  */
 export async function urdf(three, url, meshes, changed) {
@@ -83,7 +83,7 @@ export async function urdf(three, url, meshes, changed) {
     })();
   };
   const robot = loader.parse(page);
-  // White, as a shape without a material is, is not seen on a light page.
+  // Three.js makes parts without a material white, which is invisible on a light page.
   robot.traverse((/** @type {any} */ { material }) => {
     if (material && !material.name && material.color?.getHex() === 0xffffff) material.color.setHex(BARE);
   });
@@ -97,9 +97,9 @@ export async function urdf(three, url, meshes, changed) {
 }
 
 /**
- * Return the file that is meant: the one with the most of the path's own end.
+ * Return the file for a path of the model: the one that shares most of the path's end.
  *
- * @param {string} path as in the model, perhaps with a package before it
+ * @param {string} path path in the model, maybe with a package
  * @param {readonly string[]} files
  */
 export function fileOf(path, files) {
@@ -116,7 +116,7 @@ export function fileOf(path, files) {
 }
 
 /**
- * The page's policy lets no text become markup; a file that the browser itself reads as XML is none.
+ * Fetch a file that the browser itself parses as XML, because the page policy forbids markup from text.
  *
  * @param {string} url
  * @returns {Promise<Document>}

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * How a model stands in the scene, and where it is looked at from. Pure: no DOM, no three.
+ * The pose of a model in the scene, and the viewpoint. Pure: no DOM, no three.js.
  *
  * The scene is that of REP 103: x ahead, y left, z up, right-handed. Quaternions are [x, y, z, w].
  *
@@ -10,12 +10,12 @@
  */
 
 /**
- * Marks a text that is translated where it is said.
+ * Mark a text for the catalogues; it is translated elsewhere.
  *
  * @param {string} text
  */
 const mark = (text) => text;
-/** What a turn is called, one way and the other. @typedef {[string, string]} Names */
+/** Names of a rotation in both directions. @typedef {[string, string]} Names */
 /** @type {Names} */
 const ROLL = [mark("right side down {n}°"), mark("left side down {n}°")];
 /** @type {Names} */
@@ -26,7 +26,7 @@ const YAW = [mark("turned left {n}°"), mark("turned right {n}°")];
 /**
  * @param {Quaternion} a
  * @param {Quaternion} b
- * @returns {Quaternion} first b, then a
+ * @returns {Quaternion} rotation by b, then by a
  */
 export function times([ax, ay, az, aw], [bx, by, bz, bw]) {
   return [
@@ -38,7 +38,7 @@ export function times([ax, ay, az, aw], [bx, by, bz, bw]) {
 }
 
 /**
- * Return the turn by roll, then pitch, then yaw about fixed axes, radians.
+ * Return the rotation by roll, then pitch, then yaw about fixed axes, in radians.
  *
  * @param {number} roll
  * @param {number} pitch
@@ -56,8 +56,8 @@ export function fromAngles(roll, pitch, yaw, convention) {
 }
 
 /**
- * Return an orientation that a robot sent: an array of x, y, z, w or an object with these names;
- * null when it is none.
+ * Return an orientation from a robot: an array of x, y, z, w or an object with these names; null if
+ * invalid.
  *
  * @param {unknown} value
  * @param {Convention} convention
@@ -77,7 +77,7 @@ export function fromOrientation(value, convention) {
 }
 
 /**
- * Return a vector turned by a quaternion.
+ * Return a vector rotated by a quaternion.
  *
  * @param {Vector} vector
  * @param {Quaternion} turn
@@ -104,10 +104,10 @@ export function angles([x, y, z, w]) {
 }
 
 /**
- * Return what a pose means, in words, with whole degrees: FLU pitch is positive nose down.
+ * Return the meaning of a pose in words, with whole degrees: FLU pitch is positive nose down.
  *
  * @param {Quaternion} turn
- * @returns {{text: string, degrees: number}[]} what is turned by a degree or more
+ * @returns {{text: string, degrees: number}[]} rotations of at least one degree
  */
 export function posture(turn) {
   const { roll, pitch, yaw } = angles(turn);
@@ -124,11 +124,11 @@ export function posture(turn) {
 }
 
 /**
- * Return where the camera stands, around what it looks at.
+ * Return the position of the camera around its target.
  *
  * @param {"follow" | "top" | "orbit"} view
- * @param {number} yaw of the robot, radians
- * @param {number} size of what is looked at, in metres
+ * @param {number} yaw yaw of the robot, radians
+ * @param {number} size size of the target, in metres
  * @returns {Vector}
  */
 export function cameraAt(view, yaw, size) {
@@ -139,8 +139,7 @@ export function cameraAt(view, yaw, size) {
 }
 
 /**
- * Return a flat list of points as three.js takes them, at most `most`, evenly thinned; what is not a
- * number is left out.
+ * Return a flat list of points for three.js, evenly thinned to at most `most`, without invalid ones.
  *
  * @param {readonly unknown[]} values x, y, z of each
  * @param {number} most

@@ -1,7 +1,6 @@
 // @ts-check
 /**
- * The scene: light, ground, the robot, its points, and from where they are seen. Draws only when it is
- * asked to, and never more often than it may.
+ * The scene: light, ground, robot, points and camera. It draws on request only, at a limited rate.
  *
  * @typedef {typeof import("three")} Three
  * @typedef {import("three").Object3D} Object3D
@@ -11,7 +10,7 @@
 import { cameraAt } from "./pose.js";
 
 const MOST_DENSITY = 1.5;
-/** How far the ground goes to each side, in metres. */
+/** Extent of the ground to each side, in metres. */
 const REACH = 10;
 
 export class Stage {
@@ -55,7 +54,7 @@ export class Stage {
 
   /** @param {number} colour */
   makeGround(colour) {
-    // In pieces of a metre: a long line that begins behind the camera is lost in software.
+    // In pieces of a metre: software renderers lose a long line that begins behind the camera.
     const ends = [];
     for (let line = -REACH; line <= REACH; line += 1) {
       for (let piece = -REACH; piece < REACH; piece += 1) {
@@ -93,7 +92,7 @@ export class Stage {
     this.measure();
   }
 
-  /** How large it is decides from how far it is seen. */
+  /** Measure the model: its size determines the distance of the camera. */
   measure() {
     if (!this.model) return;
     const turn = this.robot.quaternion.clone();
@@ -130,7 +129,7 @@ export class Stage {
     const moved = new this.three.Vector3(...place).sub(this.robot.position);
     this.robot.position.set(...place);
     this.robot.quaternion.set(...turn);
-    // The ground goes along in whole squares, so that it never ends.
+    // The ground moves along in whole squares, so that it never ends.
     this.ground.position.set(Math.round(place[0]), Math.round(place[1]), 0);
     if (this.view === "orbit") {
       this.camera.position.add(moved);
@@ -159,7 +158,7 @@ export class Stage {
   }
 
   /**
-   * Look from elsewhere, by keys.
+   * Move the camera by keys.
    *
    * @param {number} across radians
    * @param {number} up radians
@@ -189,7 +188,7 @@ export class Stage {
     this.ask();
   }
 
-  /** Draw in a frame to come, and not sooner than the budget allows. */
+  /** Draw in a later frame, at most at the frame rate. */
   ask() {
     if (this.isAsked || this.isOver) return;
     this.isAsked = true;
@@ -218,6 +217,6 @@ export class Stage {
       for (const each of [material].flat()) each?.dispose?.();
     });
     this.renderer.dispose();
-    this.renderer.forceContextLoss(); // a page may hold only some sixteen of them
+    this.renderer.forceContextLoss(); // browsers allow only about sixteen contexts
   }
 }

@@ -12,7 +12,7 @@ import { Stage } from "./stage.js";
 const STEP = Math.PI / 24;
 const VIEWS = /** @type {const} */ (["follow", "top", "orbit"]);
 /**
- * Marks a text that is translated where it is said.
+ * Mark a text for the catalogues; it is translated elsewhere.
  *
  * @param {string} text
  */
@@ -72,17 +72,17 @@ class Scene {
     /** @type {Readonly<Record<string, Reading>>} */
     this.readings = {};
     this.seen = "";
-    /** How it stood when that was known last. @type {Quaternion} */
+    /** Last known rotation. @type {Quaternion} */
     this.turned = [0, 0, 0, 1];
     /** @type {[number, number, number]} */
     this.at = [0, 0, 0];
-    /** Of those that are drawn; -1 while there are none. */
+    /** Serial number of the drawn points; -1 without points. */
     this.pointsSerial = -1;
     const view = VIEWS.find((each) => each === options["view"]) ?? "orbit";
     try {
       this.stage = new Stage(three, Controls, this.face, { frames: Number(options["frames"] ?? 30), view });
     } catch {
-      // The words below go on telling how it stands.
+      // The words below still describe the pose.
       this.stage = null;
       this.fault = t("this browser draws no WebGL");
       return;
@@ -170,7 +170,7 @@ class Scene {
   update(readings) {
     this.readings = readings;
     const all = Object.values(readings).flatMap((each) => (Array.isArray(each) ? each : [each]));
-    // As old as the oldest of what is bound.
+    // The state is that of the worst bound reading.
     this.worst = all.reduce((/** @type {Reading | undefined} */ found, each) => worse(found, each), undefined);
     attribute(this.root, "data-state", this.worst?.state ?? "none");
     this.place();
@@ -178,7 +178,7 @@ class Scene {
     this.tell();
   }
 
-  /** Stand and bend as the readings say; what is not known stays as it was. */
+  /** Set pose and joints from the readings; unknown values stay as they were. */
   place() {
     const { readings, stage, model } = this;
     if (!stage) return;
@@ -206,7 +206,7 @@ class Scene {
     return [...first, ...singles];
   }
 
-  /** How it is turned; null when a part of that is not known. @returns {Quaternion | null} */
+  /** Rotation of the robot, or null if a part is unknown. @returns {Quaternion | null} */
   turn() {
     const { readings, convention } = this;
     const whole = fromOrientation(readings["orientation"]?.value, convention);
@@ -220,7 +220,7 @@ class Scene {
   setPoints() {
     const reading = this.readings["points"];
     const values = Array.isArray(reading?.value) ? reading.value : [];
-    // Those that have gone are drawn no more, though no newer ones have come.
+    // Points that are gone are removed, even without newer ones.
     const serial = reading && reading.value !== null ? reading.serial : -1;
     if (!this.stage || serial === this.pointsSerial) return;
     this.pointsSerial = serial;

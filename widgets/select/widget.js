@@ -57,7 +57,7 @@ class Select {
     }, { signal });
   }
 
-  /** What the robot is heard to say when it is this. @param {Value} value */
+  /** Return the robot's word for a value. @param {Value} value */
   word(value) {
     return wordOf(this.state?.signal, value);
   }
@@ -78,7 +78,7 @@ class Select {
     this.giver.take(change);
   }
 
-  /** What is chosen while the robot is asked is given next; the newest only. @param {Choice | undefined} choice */
+  /** Send a choice, or queue it during a pending command. @param {Choice | undefined} choice */
   choose(choice) {
     if (choice && this.giver.isReady) {
       this.chosen = choice.value;
@@ -125,7 +125,7 @@ class Select {
     const place = this.choices.findIndex(({ value }) => this.word(value) === shown);
     const list = this.place?.querySelector("select");
     if (list) {
-      // While the robot is asked the hand is where it went: the next arrow key goes on from there.
+      // During a pending command the selection stays at the hand, so that the next arrow key continues there.
       const isAsked = this.giver.isPending || this.giver.next !== null;
       const wished = isAsked ? this.chosen : this.wish.isWaiting ? this.wish.value : null;
       const hand = wished === null ? place : this.choices.findIndex(({ value }) => value === wished);
@@ -169,8 +169,8 @@ class Select {
 }
 
 /**
- * Lock a control, but not under a hand that is on it: the focus would fall to the page, and the next
- * key with it. What is chosen meanwhile is refused.
+ * Disable a control, but not under the focus: the page would take the focus and the next key. Choices
+ * made meanwhile are refused.
  *
  * @param {HTMLSelectElement | HTMLInputElement} control
  * @param {boolean} isLocked
@@ -182,7 +182,7 @@ function lock(control, isLocked) {
 }
 
 /**
- * What can be chosen: what the slot says, else what the command takes, else what the signal knows.
+ * Return the choices: of the slot, else of the command, else of the signal.
  *
  * @param {Context} ctx
  * @param {Reading | undefined} state

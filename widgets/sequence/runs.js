@@ -4,8 +4,8 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet */
 
 /**
- * What both kinds have: a sequence of the driver, which the server runs and goes on with when this
- * page is gone, and a list of commands, which ends with the page.
+ * The common part of both kinds of runs. The server runs a sequence of the driver, which continues
+ * without this page. The page runs a list of commands, which ends with the page.
  *
  * @typedef {"idle" | "running" | "paused"} State
  */
@@ -15,7 +15,7 @@ const STEPS = ["step_1", "step_2", "step_3", "step_4", "step_5", "step_6", "step
 class Run {
   /**
    * @param {Context} ctx
-   * @param {boolean} isEach each step waits for somebody
+   * @param {boolean} isEach whether each step waits for the operator
    * @param {() => void} show
    */
   constructor(ctx, isEach, show) {
@@ -24,7 +24,7 @@ class Run {
     this.show = show;
     /** @type {string[]} */
     this.names = [];
-    /** Steps that were begun. */
+    /** Number of begun steps. */
     this.place = 0;
     /** @type {State} */
     this.state = "idle";
@@ -41,7 +41,7 @@ class Run {
   end() {}
 }
 
-/** The server knows where it stands, whoever has begun it. */
+/** A sequence of the driver; the server reports its state, whichever page started it. */
 export class RobotSequence extends Run {
   /**
    * @param {Context} ctx
@@ -54,7 +54,7 @@ export class RobotSequence extends Run {
     const steps = described?.steps ?? [];
     this.names = steps.map(({ text, what }) => ctx.t(text, { what }));
     const name = described?.command ?? "";
-    // A command that is no sequence has one step: itself.
+    // A command that is no sequence has itself as its only step.
     if (this.names.length === 0) this.names = [described?.title || name];
     this.isSequence = steps.length > 0;
     ctx.follow("sequences", (known) => {
@@ -88,7 +88,7 @@ export class RobotSequence extends Run {
     } catch (error) {
       const isOurs = error instanceof Error && error.name === "Cancelled";
       this.outcome = `${isOurs ? "○" : "▲"} ${error instanceof Error ? error.message : error}`;
-      // What did not even begin is not to begin paused later.
+      // A sequence that did not start must not start paused later.
       if (this.isSequence && this.state === "idle") ctx.steer("run", "resume");
       if (!this.isSequence) this.isFailed = !isOurs;
     }
@@ -113,7 +113,7 @@ export class RobotSequence extends Run {
   }
 }
 
-/** The page gives one command after the other. */
+/** A list of commands; the page sends one after the other. */
 export class OwnList extends Run {
   /**
    * @param {Context} ctx
@@ -125,7 +125,7 @@ export class OwnList extends Run {
     this.outputs = STEPS.filter((name) => ctx.command(name) !== null);
     this.names = this.outputs.map((name) => ctx.command(name)?.title || ctx.command(name)?.command || name);
     this.isHalted = false;
-    /** Why it goes no further; "" while it may. */
+    /** Reason why it cannot continue, or "". */
     this.ended = "";
     /** @type {(() => void) | null} */
     this.goOn = null;

@@ -1,15 +1,15 @@
 // @ts-check
 /**
- * How strong is strong. Pure.
+ * The scale of a radio's signal strength. Pure.
  */
 
-/** From these dBm on there are 1, 2, 3 and 4 bars; the usual steps of Wi-Fi. */
+/** Thresholds of 1, 2, 3 and 4 bars in dBm; usual for Wi-Fi. */
 const STEPS = [-85, -75, -65, -55];
-/** Between what a history is drawn. @type {Record<string, [number, number]>} */
+/** Range of the drawn history. @type {Record<string, [number, number]>} */
 const ENDS = { "%": [0, 100], dBm: [-100, -30] };
 
 /**
- * Return how many of the four bars are lit.
+ * Return the number of lit bars, 0 to 4.
  *
  * @param {number} value
  * @param {string} unit "%" or dBm
@@ -19,7 +19,7 @@ export function bars(value, unit) {
   return STEPS.filter((step) => value >= step).length;
 }
 
-/** What the newest minute was like: one value a second, the oldest first. */
+/** The last minute: one value a second, the oldest first. */
 export class Minute {
   constructor() {
     /** @type {{second: number, value: number}[]} */
@@ -28,8 +28,8 @@ export class Minute {
 
   /**
    * @param {number} time in seconds
-   * @param {number} value the lowest of each second is kept: it is the one that hurts
-   * @returns {boolean} whether the picture has changed
+   * @param {number} value the lowest value of each second is kept, because it matters most
+   * @returns {boolean} whether the drawing has changed
    */
   add(time, value) {
     const second = Math.floor(time);

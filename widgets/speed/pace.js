@@ -1,13 +1,13 @@
 // @ts-check
 /**
- * Speeds in the units that people use. Pure.
+ * Speeds in common units. Pure.
  */
 
-/** From m/s. @type {Record<string, number>} */
+/** Factors from m/s. @type {Record<string, number>} */
 const FACTORS = { "m/s": 1, "km/h": 3.6, kn: 3600 / 1852 };
 
 /**
- * Return how a speed in m/s is shown in a unit, or null when it is none that we know.
+ * Return the conversion of a speed from m/s to a unit, or null for an unknown unit.
  *
  * @param {unknown} unit
  * @returns {{symbol: string, factor: (value: number) => number} | null}
@@ -19,7 +19,7 @@ export function shownIn(unit) {
 }
 
 /**
- * Return the length of a velocity; null when one of its parts is not known.
+ * Return the magnitude of a velocity; null if a component is unknown.
  *
  * @param {readonly (number | null)[] | null} parts
  */

@@ -4,7 +4,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 import { attribute, clamp, keyOf, noteOf, part, style, write } from "urc/kit";
 
-/** The same shapes as everywhere: triangle, diamond and square are alarm, caution and advice. */
+/** Common shapes of all widgets: triangle, diamond and square are alarm, caution and advice. */
 const SHAPES = {
   unknown: "◌",
   plain: "◎",
@@ -35,7 +35,7 @@ export default {
         attribute(root, "data-state", value.state);
         attribute(root, "data-alarm", value.alarm);
         attribute(root, "data-meaning", meaning);
-        // In steps of two characters, so that a change of the word rarely changes the size.
+        // In steps of two characters, so that another word rarely changes the font size.
         style(root, "--state-characters", String(clamp(2 * Math.ceil(word.length / 2), 4, 40)));
         write(shape, SHAPES[meaning]);
         write(text, word);
@@ -72,7 +72,7 @@ function wordOf({ value, text, signal }, words, t) {
 }
 
 /**
- * Return what a table says of a value: by the word that people read, or by what the robot says.
+ * Return the entry of a table for a value, by its displayed word or by the robot's own value.
  *
  * @param {unknown} table
  * @param {unknown} value

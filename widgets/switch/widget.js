@@ -66,7 +66,7 @@ class Switch {
   }
 
   /**
-   * What the robot says; null when it is neither on nor off.
+   * Return the robot's state; null if it is neither on nor off.
    *
    * @param {unknown} said
    * @returns {boolean | null}
@@ -80,7 +80,7 @@ class Switch {
     return typeof said === "number" && this.values[1] === true ? said !== 0 : null;
   }
 
-  /** What the control shows: what was wished for where that is shown meanwhile, else what the robot says. */
+  /** Displayed state: the requested one if the option says so, else the robot's. */
   get shown() {
     if (this.isOptimistic && this.wish.isWaiting) return this.wish.value === true;
     return this.isOn(this.state?.value);
@@ -127,7 +127,7 @@ class Switch {
 }
 
 /**
- * What stands for off and on.
+ * Return the values of off and on.
  *
  * @param {Context} ctx
  * @returns {Value[]}

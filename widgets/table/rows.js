@@ -1,14 +1,14 @@
 // @ts-check
 /**
- * Rows out of values and out of diagnostics, and their order. Pure.
+ * Rows of values and of diagnostics, and their order. Pure.
  *
  * @typedef {"error" | "warn" | "stale" | "unknown" | "ok"} Level
  * @typedef {{name: string, level: Level, message: string}} Row
  */
 
-/** The gravest first. @type {readonly Level[]} */
+/** Levels, the worst first. @type {readonly Level[]} */
 const ORDER = ["error", "warn", "stale", "unknown", "ok"];
-/** As in diagnostic_msgs/DiagnosticStatus. @type {readonly Level[]} */
+/** Levels by number, as in diagnostic_msgs/DiagnosticStatus. @type {readonly Level[]} */
 const NUMBERS = ["ok", "warn", "error", "stale"];
 /** @type {Record<string, Level>} */
 const WORDS = {
@@ -29,7 +29,7 @@ const MOST_ROWS = 500;
 
 /**
  * @param {unknown} given a number as in ROS, or a word
- * @returns {Level} unknown where it says nothing
+ * @returns {Level} unknown for any other value
  */
 export function levelOf(given) {
   if (typeof given === "number") return NUMBERS[given] ?? "unknown";
@@ -89,7 +89,7 @@ function text(value) {
 }
 
 /**
- * Return the rows that are shown, in their order.
+ * Return the visible rows, in order.
  *
  * @template {Row} T
  * @param {readonly T[]} rows

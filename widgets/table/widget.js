@@ -8,7 +8,7 @@
 import { attribute, many, noteOf, part, worst, write } from "urc/kit";
 import { rowsOf, rowsOfLists, shown } from "./rows.js";
 
-/** A table is read, not watched: more often than this nobody can. */
+/** Shortest interval of redraws: a table is read, not watched. */
 const EVERY_MS = 200;
 
 class Table {
@@ -71,7 +71,7 @@ class Table {
     const rows = shown(this.rows, { sort, least, filter: this.filter?.value ?? "" });
     const worse = this.rows.filter(({ level }) => level === "error" || level === "warn").length;
     const { t } = this.ctx;
-    // What is old, or was never read, is not OK, though nothing is known to be wrong with it.
+    // Old and missing values are not OK, even without a known problem.
     const isOld = this.root.dataset["state"] !== "live" || this.rows.some(({ level }) => level === "stale");
     const isOk = this.rows.every(({ level }) => level === "ok");
     const words = worse > 0 ? t("{count} not OK", { count: worse }) : isOld ? t("not known") : isOk ? t("all OK") : "";
@@ -95,7 +95,7 @@ class Table {
 }
 
 /**
- * A sign and a word; a narrow cell shows the sign alone.
+ * Write a symbol and a word; a narrow cell shows the symbol alone.
  *
  * @param {Element} cell
  * @param {string} text

@@ -1,13 +1,13 @@
 // @ts-check
-/** Bytes as people write them, and lines that were typed. No DOM. */
+/** Bytes as text, and the history of typed lines. It knows no DOM. */
 
 const MOST_BYTES = 512;
 const MOST_LINES = 100;
 
 /**
- * Return what was typed as pairs in lower case with a blank between them.
+ * Return the input as pairs of hex digits in lower case, separated by blanks.
  *
- * @param {string} text pairs with blanks, commas or 0x between them, or nothing
+ * @param {string} text pairs, optionally separated by blanks, commas or 0x
  * @returns {{value: string} | {fault: "empty" | "odd" | "letters" | "long"}}
  */
 export function pairsOf(text) {
@@ -25,7 +25,7 @@ export function hexOf(text) {
 }
 
 /**
- * Return a text that does nothing to a terminal: control characters are shown, not obeyed.
+ * Return a text without effect on a terminal: control characters become visible.
  *
  * @param {string} text
  */
@@ -36,9 +36,9 @@ export function plain(text) {
   });
 }
 
-/** Lines that were typed, to be had again with the arrow keys. */
+/** The history of typed lines, for the arrow keys. */
 export class Typed {
-  /** @param {unknown} kept as `lines` was */
+  /** @param {unknown} kept an earlier value of `lines` */
   constructor(kept) {
     this.lines = Array.isArray(kept) ? kept.map(String).slice(-MOST_LINES) : [];
     this.place = this.lines.length;
@@ -55,8 +55,8 @@ export class Typed {
 
   /**
    * @param {-1 | 1} way
-   * @param {string} now what stands in the field
-   * @returns {string} what is to stand there
+   * @param {string} now present text of the field
+   * @returns {string} new text of the field
    */
   go(way, now) {
     if (this.place === this.lines.length) this.draft = now;

@@ -1,5 +1,5 @@
 // @ts-check
-/** Where lines are shown: a terminal where there is one, else a plain list. */
+/** The output: a terminal if it is installed, else a plain list. */
 
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("@xterm/xterm").Terminal} Terminal */
@@ -17,7 +17,7 @@ export class Screen {
     this.ctx = ctx;
     this.place = place;
     this.most = Number(ctx.options["lines"] ?? 1000);
-    /** Lines that came before the terminal did; for it they are the text of the list. */
+    /** Lines before the terminal has loaded; also the text for screen readers. */
     this.list = document.createElement("ol");
     this.list.className = "terminal-list";
     /** @type {Terminal | null} */
@@ -53,12 +53,12 @@ export class Screen {
       box.className = "terminal-box";
       place.append(box);
       withNonce(() => terminal.open(box));
-      // It is only read: Tab leaves it, Escape is STOP, and the screen around it is what has the focus.
+      // Read-only: Tab leaves it, Escape is STOP, and the focus stays on the output around it.
       terminal.attachCustomKeyEventHandler(({ key }) => key.startsWith("Page"));
       for (const part of [terminal.element, terminal.textarea]) if (part) part.tabIndex = -1;
-      terminal.write(HIDE_CURSOR); // nobody types here
+      terminal.write(HIDE_CURSOR); // there is no input here
       for (const line of this.list.children) this.print(terminal, line.textContent ?? "");
-      this.list.classList.add("urc-hidden"); // what a reader and a test find: the text of the lines
+      this.list.classList.add("urc-hidden"); // still readable by screen readers and tests
       this.terminal = terminal;
       this.fit = () => fitting.fit();
       this.fit();
@@ -66,7 +66,7 @@ export class Screen {
       ctx.signal.addEventListener("abort", () => terminal.dispose());
       ctx.follow("theme", () => this.paint());
     } catch (error) {
-      // The list shows the same; the terminal is an extra that some installations don't have.
+      // The list shows the same lines; some installations lack the terminal.
       console.info("terminal: a plain list instead:", error);
     }
   }
@@ -82,7 +82,7 @@ export class Screen {
   }
 
   /**
-   * Each line begins with its break: a terminal of one row would show the empty row after the last.
+   * Print a line with its break first: a terminal of one row would else show an empty row.
    *
    * @param {Terminal} terminal
    * @param {string} line
@@ -105,10 +105,9 @@ export class Screen {
 }
 
 /**
- * Let style elements that are made meanwhile through the page's policy: the terminal makes its own,
- * and has no option for this.
+ * Let new style elements pass the page policy: the terminal makes its own, and has no option for a nonce.
  *
- * @param {() => void} act must not wait
+ * @param {() => void} act must be synchronous
  */
 function withNonce(act) {
   const script = document.querySelector("script[nonce]");
@@ -124,6 +123,6 @@ function withNonce(act) {
   try {
     act();
   } finally {
-    Reflect.deleteProperty(document, "createElement"); // its own again
+    Reflect.deleteProperty(document, "createElement"); // restores the original
   }
 }

@@ -71,7 +71,7 @@ export default {
 
     /**
      * @param {string} text
-     * @returns {string | null} what is sent; null when it cannot be
+     * @returns {string | null} the line to send; null if it is invalid
      */
     function lineOf(text) {
       fault = "";
@@ -92,7 +92,7 @@ export default {
       return fault ? null : text;
     }
 
-    /** The line of the log that was shown last. @type {LogLine | undefined} */
+    /** Last shown line of the log. @type {LogLine | undefined} */
     let last;
     let isBound = false;
     follow("log", ({ lines }) => {

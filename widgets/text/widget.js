@@ -61,7 +61,7 @@ export default {
 
     /**
      * @param {string} value
-     * @param {boolean} isTyping an empty field is no fault yet
+     * @param {boolean} isTyping whether an empty field is valid for now
      */
     function faultOf(value, isTyping = false) {
       if (value === "" && !isTyping) return t("◆ type a text");

@@ -6,10 +6,10 @@ import { gate, settingsOf, tilted } from "urc/curve";
 import { attribute, drawing, part, write } from "urc/kit";
 import { DIRECTIONS, Motion, pointed, pulled, signed } from "urc/motion";
 
-/** How far the bubble goes, and the whole face, in units of the drawing. */
+/** Travel of the bubble, and size of the face, in units of the drawing. */
 const TRAVEL = 74;
 const FACE = 200;
-/** So long a sensor that was asked for may say nothing. */
+/** Time limit for the first event of the sensor. */
 const SENSOR_MS = 2000;
 
 export default {
@@ -19,7 +19,7 @@ export default {
    */
   mount(ctx) {
     const { el } = ctx;
-    if (!el.querySelector(".tilt-pad")) return {}; // no command is bound: there is nothing to do
+    if (!el.querySelector(".tilt-pad")) return {}; // no command is bound
     const sensor = new Sensor(ctx);
     const pad = new Pad(ctx, sensor);
     const motion = new Motion(ctx, "tilt", "moved");
@@ -33,7 +33,7 @@ export default {
   },
 };
 
-/** Which way the device is tilted, where it says so and a person has asked for it. */
+/** The tilt of the device, if it has a sensor and the operator has turned it on. */
 class Sensor {
   /** @param {Context} ctx */
   constructor({ el, t, signal }) {
@@ -54,7 +54,7 @@ class Sensor {
     }
   }
 
-  /** Why there is no sensor; "" when there may be one. */
+  /** Return why there is no sensor, or "". */
   missing() {
     if (!isSecureContext) {
       return this.t("Browsers give the tilt sensor to HTTPS pages only: drag on the pad instead.");
@@ -70,7 +70,7 @@ class Sensor {
       return;
     }
     try {
-      // Only some browsers ask, and only from a tap.
+      // Some browsers need a permission, which they only ask for after a tap.
       const asks = /** @type {{requestPermission?: () => Promise<string>}} */ (
         /** @type {unknown} */ (DeviceOrientationEvent)
       );
@@ -130,7 +130,7 @@ class Pad {
     this.keyLevel = Number(options["keys"] ?? 0.5);
     this.shape = settingsOf(options).gate;
     this.reach = 1;
-    /** How the device was when the pad was taken hold of: that is the middle. */
+    /** Tilt of the device at the start of the hold: it is the middle. */
     this.rest = sensor.now;
     this.isTilted = false;
   }
@@ -144,7 +144,7 @@ class Pad {
       const { width, height } = this.face.getBoundingClientRect();
       this.reach = (Math.min(width, height) * TRAVEL) / FACE;
       this.rest = this.sensor.now;
-      this.isTilted = this.sensor.isUsed; // for the whole gesture: it never changes in the hand
+      this.isTilted = this.sensor.isUsed; // fixed for the whole gesture
     }
     const { x, y } = this.where(hand);
     const [keptX, keptY] = this.isSwapped ? gate(y, x, this.shape) : gate(x, y, this.shape);
@@ -163,7 +163,7 @@ class Pad {
     if (!this.isTilted) return pulled(hand, this.reach);
     const { now } = this.sensor;
     if (!now || !this.rest) {
-      this.rest = now; // the first word of the sensor is the middle
+      this.rest = now; // the first event of the sensor is the middle
       return { x: 0, y: 0 };
     }
     return tilted(now, this.rest, screen.orientation?.angle ?? 0, this.range);

@@ -1,22 +1,22 @@
 // @ts-check
 /**
- * Whether a value rises or falls, told apart from its noise. Pure.
+ * The trend of a value, separated from its noise. Pure.
  */
 
-/** At most so many readings are kept; newer ones in between replace the last. */
+/** Most kept readings; newer ones in between replace the last. */
 const POINTS = 60;
-/** Fewer say nothing. */
+/** Fewest readings for a trend. */
 const LEAST_POINTS = 4;
 
 export class Trend {
-  /** @param {number} spanS over which it is looked at, in seconds */
+  /** @param {number} spanS time span of the trend, in seconds */
   constructor(spanS) {
     this.spanS = spanS;
     /** @type {{time: number, value: number}[]} */
     this.points = [];
   }
 
-  /** Forget everything, as after a gap. */
+  /** Forget all readings, for example after a gap. */
   clear() {
     this.points = [];
   }
@@ -35,12 +35,12 @@ export class Trend {
   }
 
   /**
-   * Return 1 when it rises, -1 when it falls, 0 when it is steady, null when that is not known.
+   * Return 1 if it rises, -1 if it falls, 0 if it is steady, null if unknown.
    *
-   * It rises when the line through the points climbs over the span by more than twice of what they
-   * scatter about it, and by more than `least`.
+   * It rises if the regression line climbs over the span by more than twice the scatter around it, and by
+   * more than `least`.
    *
-   * @param {number} [least] change over the span that means something
+   * @param {number} [least] smallest relevant change over the span
    * @returns {-1 | 0 | 1 | null}
    */
   direction(least = 0) {

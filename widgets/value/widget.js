@@ -10,9 +10,9 @@ const LIMITS = /** @type {const} */ (["lolo", "low", "high", "hihi"]);
 const POINTS = 600;
 const DRAW_EVERY_MS = 100;
 const MOVE_EVERY_MS = 1000;
-/** Over how much time a value has to rise or fall. */
+/** Time span of the trend, in seconds. */
 const TREND_S = 10;
-/** Room above and below, as a share of the height. */
+/** Margin above and below, as a share of the height. */
 const RIM = 0.04;
 
 export default {
@@ -32,7 +32,7 @@ export default {
     const history = place && windowS ? new History(place, windowS) : null;
     const facts = new Facts(ctx);
     signal.addEventListener("abort", () => history?.destroy());
-    /** All but the figure, as it was shown last. */
+    /** Last drawn state of everything but the number. */
     let seen = "";
 
     return {
@@ -43,7 +43,7 @@ export default {
         const symbol = reading.value === null ? "" : reading.unit || known;
         fit(line, "--value-characters", shown.length + symbol.length / 2);
         write(text, shown);
-        // Seldom new; to compare each with what stands there takes longer than to write the figure.
+        // It rarely changes; comparing each part takes longer than writing the number.
         const look = `${reading.state} ${reading.alarm} ${reading.age} ${symbol}`;
         if (look !== seen) {
           seen = look;
@@ -59,7 +59,7 @@ export default {
   },
 };
 
-/** What may stand beside the value: its trend, its limits and its age. */
+/** Optional facts about the value: trend, limits and age. */
 class Facts {
   /** @param {Context} ctx */
   constructor({ el, options, signal, t }) {
@@ -119,10 +119,10 @@ class Facts {
   }
 }
 
-/** The last minutes as a line, drawn by uPlot where the build has brought it. */
+/** The last minutes as a line, drawn by uPlot if it is installed. */
 class History {
   /**
-   * @param {Element} root holds the three parts
+   * @param {Element} root contains the three parts
    * @param {number} windowS
    */
   constructor(root, windowS) {
@@ -134,25 +134,25 @@ class History {
     /** @type {number[]} */
     this.times = [];
     /**
-     * In the signal's unit, for people may change theirs. A gap is a null: what was not measured is
-     * not drawn. @type {(number | null)[]}
+     * Values in the signal's unit, because the displayed unit may change. A gap is null and is not drawn.
+     * @type {(number | null)[]}
      */
     this.values = [];
-    /** Lowest and highest that is drawn. @type {[number, number]} */
+    /** Lowest and highest drawn value. @type {[number, number]} */
     this.scale = [0, 1];
     /** @type {Reading["signal"]} */
     this.signal = { name: "", type: "number" };
-    /** To the unit that is shown. */
+    /** Conversion to the displayed unit. */
     this.factor = (/** @type {number} */ value) => value;
     this.serial = -1;
     this.drawnMs = 0;
     this.limitsShown = "";
-    /** uPlot's instance: its types are not part of this page. @type {any} */
+    /** uPlot's instance; its types are not part of this page. @type {any} */
     this.plot = null;
     this.isOver = false;
-    // The line moves on with the time, also when nothing comes.
+    // The line advances with the time, also without readings.
     this.timer = setInterval(() => this.draw(), MOVE_EVERY_MS);
-    // Not the cell's size: the figures beside the line take of its width.
+    // Not the cell's size: the numbers next to the line take some of its width.
     this.sizes = new ResizeObserver(() => this.plot?.setSize(sizeOf(this.place)));
     void this.load();
   }
@@ -173,13 +173,13 @@ class History {
           x: { time: false, range: () => [end() - this.windowS, end()] },
           y: { range: () => this.scale },
         },
-        // Asked anew for each drawing, so that the line follows the theme.
+        // Read again for each drawing, so that the line follows the theme.
         series: [{}, { stroke: () => getComputedStyle(this.place).color, width: 2, points: { show: false } }],
       };
       this.plot = new Plot(options, [this.times, this.values], this.place);
       this.sizes.observe(this.place);
     } catch (error) {
-      // The number is the widget; the line is an extra that some installations don't have.
+      // The number works without the line; some installations lack uPlot.
       console.info("value: no history is drawn:", error);
       if (this.root instanceof HTMLElement) this.root.hidden = true;
     }
@@ -187,7 +187,7 @@ class History {
 
   /**
    * @param {Reading} reading
-   * @param {(value: number) => number} factor to the unit that is shown
+   * @param {(value: number) => number} factor conversion to the displayed unit
    */
   add(reading, factor) {
     const { state, signal, serial, time } = reading;
@@ -229,7 +229,7 @@ class History {
   draw() {
     this.drawnMs = performance.now();
     const startS = this.drawnMs / 1000 - this.windowS;
-    // The last point before the window stays: from there the line comes in. A gap needs no start.
+    // The last point before the window stays: the line comes in from there. A gap needs no start.
     while ((this.times[1] ?? Infinity) < startS) this.drop();
     if (this.times.length === 1 && (this.times[0] ?? 0) < startS) this.drop();
     const known = this.values.filter((value) => value !== null);
@@ -282,8 +282,8 @@ function sizeOf(place) {
 }
 
 /**
- * @param {unknown} text as "60s" or "5min"
- * @returns {number} seconds; 0 when there is none
+ * @param {unknown} text such as "60s" or "5min"
+ * @returns {number} seconds; 0 if there is none
  */
 function seconds(text) {
   const match = /^(\d+)(s|min)$/.exec(String(text ?? ""));

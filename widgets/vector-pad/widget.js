@@ -7,10 +7,10 @@ import { attribute, drawing, format, part, write } from "urc/kit";
 import { DIRECTIONS, pointed } from "urc/motion";
 import { cutTo, polar } from "urc/stroke";
 
-/** Radius of the rim in units of the drawing, of which the whole has 200. */
+/** Radius of the rim, in units of the drawing, which is 200 wide. */
 const RIM = 90;
 const FACE = 200;
-/** Pixels below which a press is a tap: it sets the end where it was. */
+/** Drag in pixels below which a press is a tap, which sets the end at its place. */
 const TAP = 6;
 const ARROWS = Object.values(DIRECTIONS).flat();
 
@@ -55,11 +55,11 @@ class VectorPad {
     this.isSentByRelease = options["send"] !== "button";
     this.reason = ctx.t("not ready yet");
     this.isAnswered = false;
-    /** What is drawn, in shares of the length; null while nothing is. @type {[number, number] | null} */
+    /** Drawn vector in shares of the length; null without one. @type {[number, number] | null} */
     this.at = null;
     /** @type {[number, number] | null} */
     this.last = null;
-    /** What the pointer has hold of. @type {import("../../urc/web/static/control/grasp.js").Grasp | null} */
+    /** Present pointer capture. @type {import("../../urc/web/static/control/grasp.js").Grasp | null} */
     this.hold = null;
     /** @type {[number, number]} */
     this.start = [0, 0];
@@ -98,7 +98,7 @@ class VectorPad {
     return true;
   }
 
-  /** Drawn from where it was touched: nothing jumps. @param {PointerEvent} event */
+  /** Draw from the start of the touch, so that nothing jumps. @param {PointerEvent} event */
   move(event) {
     const [right, down] = [event.clientX - this.start[0], event.clientY - this.start[1]];
     if (this.isTap && Math.hypot(right, down) < TAP) return;
@@ -141,7 +141,7 @@ class VectorPad {
     this.draw();
   }
 
-  /** Only what the command takes is given. */
+  /** Return the arguments that the command has. */
   given() {
     const [x, y] = this.at ?? [0, 0];
     const { heading, distance } = polar(x, y);
