@@ -12,6 +12,7 @@ import math
 import weakref
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, Protocol
 
 from urc.model.codec import Payload
@@ -390,7 +391,7 @@ class TwinLine:
                 break
             course.has_waited = False
             course.deeds = course.deeds[1:]
-            said += self._made(lambda deed=deed: self._rules.do(deed, course, now_s)) or []  # type: ignore[misc]  # of this turn
+            said += self._made(partial(self._rules.do, deed, course, now_s)) or []
             self.is_over |= deed.what.closes
         return said
 
