@@ -81,9 +81,9 @@ def test_the_emulated_robot_reads_arrays_back() -> None:
     [
         ("text", "joints=1,2.5,-3", {"joints": (1, 2.5, -3)}),
         ("json", "joints=", {"joints": ()}),
-        ("json", "joints=[1, 0x]", "no list in JSON"),
+        ("json", "joints=[1, 0x]", "is not a JSON list"),
         ("json", "joints=[1, 2]", {"joints": (1, 2)}),
-        ("json", "joints=1,a", "integer expected, found 'a'"),
+        ("json", "joints=1,a", "expected integer, found 'a'"),
     ],
 )
 def test_an_array_is_typed_with_commas_or_as_json(name: str, word: str, values: object) -> None:

@@ -171,7 +171,7 @@ commands:
   come: { to: a, send: "{{ _id }}" }
 """
     text = text.replace("type: udp", "type: pigeon")
-    with pytest.raises(AssertionError, match=r"commands\.go\.send: '_id' means nothing here"):
+    with pytest.raises(AssertionError, match=r"commands\.go\.send: '_id' is unknown here"):
         driver_of(text)
 
 

@@ -176,7 +176,7 @@ def test_urc_install_of_what_cannot_be_compared_is_not_agreed_to_beforehand(
     store.blob_file(old.packages["drivers/rover"].sha256).write_bytes(b"rubbish")
     assert main(["install", str(ATTACK), "--yes"]) == 1
     said = capsys.readouterr().err
-    assert "what changes is not known: drivers/rover 1.0.0 cannot be read" in said
+    assert "the changes are unknown: drivers/rover 1.0.0 cannot be read" in said
     assert "--allow-more" in said
     assert main(["install", str(ATTACK), "--yes", "--allow-more"]) == 0
 
