@@ -207,7 +207,7 @@ def test_simulated_robot_tells_what_it_cannot_answer(urc_process: Start) -> None
             client.sendall(b"Give me the batery %\nGive me the battery %\n")
             assert re.fullmatch(rb"\d{1,2}\n", client.recv(100))
     assert robot.interrupt() == 0
-    complaint = "wire: no rule takes 'Give me the batery %', and the driver never sends it"
+    complaint = "wire: no rule matches 'Give me the batery %', and the driver never sends it"
     assert robot.errors == [complaint, f"{complaint} (2 more times)"]
 
 

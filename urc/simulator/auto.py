@@ -227,7 +227,7 @@ class AutoLine:
                 return [answer.framing.encode(piece) for piece in pieces]
             except (NotWritable, FramingError) as error:
                 why = str(error)
-        raise Unanswered(f"no answer can be made by its {answer.spec.form}: {why}")
+        raise Unanswered(f"no reply can be built as {answer.spec.form}: {why}")
 
     def asked(self, frame: Frame, label: str = "") -> Asked | None:
         """Return the request in a frame with its arguments; an exact match goes first.

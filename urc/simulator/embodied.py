@@ -111,7 +111,7 @@ class Embodied:
         found = self._value(value, time_s)
         if isinstance(found, (int, float)) and math.isfinite(found):
             return float(found)
-        self._tell(f"world.drive.{name}: a number is expected, found {found!r}")
+        self._tell(f"world.drive.{name}: expected a number, found {found!r}")
         return 0.0
 
     def _tell(self, text: str) -> None:

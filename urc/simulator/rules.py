@@ -182,7 +182,7 @@ class Rules:
                 if asked is None and course.frame is not None:
                     asked = self._auto.asked(course.frame)
                 if asked is None:
-                    raise Unanswered("the driver never sends this, so it declares no answer")
+                    raise Unanswered("the driver never sends this, so it declares no reply")
                 said += self._auto.answers(asked, now_s)
             if deed.message is not None:
                 said += self._auto.say(deed.message, now_s)
@@ -244,9 +244,9 @@ def not_taken(frame: Frame) -> str:
     """Return the fault text for an unexpected frame, for people."""
     if not isinstance(frame.payload, bytes):
         shown = traffic_of(frame.payload).decode("utf-8", "replace")[:60]
-        return f"no rule takes {shown!r}, and the driver never sends it"
+        return f"no rule matches {shown!r}, and the driver never sends it"
     try:
         shown = repr(frame.text[:60])
     except BadText:
         return f"a frame is not {frame.encoding} text"
-    return f"no rule takes {shown}, and the driver never sends it"
+    return f"no rule matches {shown}, and the driver never sends it"

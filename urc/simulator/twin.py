@@ -397,7 +397,7 @@ class TwinLine:
 
     def _keep(self, course: Course, left_s: float) -> None:
         if len(self._courses) >= MOST_COURSES:
-            self._fault(f"{MOST_COURSES} answers wait for their time already; this one is dropped")
+            self._fault(f"{MOST_COURSES} delayed replies wait already; this one is dropped")
             return
         course.left_s, course.has_waited = left_s, True
         self._courses.append(course)

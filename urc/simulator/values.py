@@ -237,7 +237,7 @@ def _kept(signal: Signal, value: object) -> Reading:
             return word
         if word in words:
             return words[word]
-        raise BadValue(f"{value!r} is none of the states {', '.join(words.values())}")
+        raise BadValue(f"{value!r} is not among the states {', '.join(words.values())}")
     plain = signal._replace(conversion=signal.conversion._replace(polynomial=(), points=(), base=0))
     return build_converter(plain)(value)
 

@@ -167,8 +167,8 @@ def api_document() -> bytes:
         "info": {
             "title": "URC",
             "version": __version__,
-            "description": "Everything that changes something is a POST from the server's own"
-            " origin: the header Origin is expected and compared.",
+            "description": "Each change is a POST from the server's own origin;"
+            " the header Origin is compared.",
         },
         "paths": paths,
         "components": {"schemas": components},

@@ -28,13 +28,13 @@ class Teller:
 def test_a_complaint_is_told_once_and_then_counted() -> None:
     """The first at once; the others with their number, not before ten seconds are over."""
     teller = Teller()
-    assert teller.hear("no rule takes 'x'") == ["wire: no rule takes 'x'"]
-    assert teller.hear("no rule takes 'x'", 41) == []
+    assert teller.hear("no rule matches 'x'") == ["wire: no rule matches 'x'"]
+    assert teller.hear("no rule matches 'x'", 41) == []
     teller.now = 10.0
-    assert teller.hear("no rule takes 'x'") == ["wire: no rule takes 'x' (42 times)"]
-    assert teller.hear("no rule takes 'x'", 2) == []
+    assert teller.hear("no rule matches 'x'") == ["wire: no rule matches 'x' (42 times)"]
+    assert teller.hear("no rule matches 'x'", 2) == []
     teller.complaints.finish()
-    assert teller.said() == ["wire: no rule takes 'x' (2 more times)"]
+    assert teller.said() == ["wire: no rule matches 'x' (2 more times)"]
 
 
 def test_a_flood_of_different_ones_is_told_at_a_measured_pace() -> None:

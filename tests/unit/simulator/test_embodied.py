@@ -160,7 +160,7 @@ def test_an_input_that_is_no_number_moves_nothing_and_is_told(
         robot.body.world.advance(0.4)
     assert robot.body.world.motion.x == 0.0
     told = [one.getMessage() for one in caplog.records]
-    assert told == ["world.drive.forward: a number is expected, found 'fast'"]
+    assert told == ["world.drive.forward: expected a number, found 'fast'"]
 
 
 def test_a_rule_publishes_to_who_listens(tmp_path: Path) -> None:

@@ -97,7 +97,7 @@ async def test_client_that_was_silent_for_longest_makes_room() -> None:
 async def test_port_must_be_one(port: object) -> None:
     with pytest.raises(UrcError) as told:
         option_port(context(port=port))
-    assert str(told.value) == f"transports.wire.port: {port!r} is no port to listen on"
+    assert str(told.value) == f"transports.wire.port: {port!r} is not a port to listen on"
     assert option_port(context(port=7000)) == 7000
     assert option_port(context(port=port)._replace(is_anywhere=True)) == 0
 

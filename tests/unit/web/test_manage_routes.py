@@ -296,7 +296,7 @@ def fleet_of(client: TestClient) -> Any:
     ("name", "text", "line"),
     [
         ("x.yaml", "kind: driver\nname: x\n", "expected an interface"),
-        ("x.yaml", "kind: interface\nname: A B\n", "'name' is expected"),
+        ("x.yaml", "kind: interface\nname: A B\n", "expected 'name'"),
         ("x.yaml", "a: [", "x.yaml:"),
         ("x.zip", "rubbish", "x.zip"),
         ("x.exe", "rubbish", "x.exe"),

@@ -122,7 +122,7 @@ def option_port(context: ServerContext, key: str = "port", default: int | None =
         return 0
     port = context.options.get(key, default)
     if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= 65535:
-        raise UrcError(f"transports.{context.name}.{key}: {port!r} is no port to listen on")
+        raise UrcError(f"transports.{context.name}.{key}: {port!r} is not a port to listen on")
     return port
 
 

@@ -87,7 +87,7 @@ class UrlServer(ListeningServer):
             parts = urlsplit(url)
             port = 80 if parts.port is None else parts.port
         except ValueError as fault:
-            message = f"transports.{context.name}.url: {url!r} is no url to listen on"
+            message = f"transports.{context.name}.url: {url!r} is not a URL to listen on"
             raise UrcError(message) from fault
         self._path = parts.path or "/"
         if context.is_anywhere:

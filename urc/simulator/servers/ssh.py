@@ -175,7 +175,7 @@ class _Server(asyncssh.SSHServer):
         inside = self._context.carried.get((dest_host, dest_port))
         if inside is None:
             raise asyncssh.ChannelOpenError(
-                asyncssh.OPEN_CONNECT_FAILED, "the emulated robot has nothing there"
+                asyncssh.OPEN_CONNECT_FAILED, "the emulated robot has no server there"
             )
         return self._connection.forward_connection(inside.host, inside.port)  # type: ignore[return-value]
 

@@ -103,7 +103,7 @@ class WebSocketServer(UrlServer, MessageServer):
             await converse(self._context, client, take, put)
             await socket.close()
         except ConnectionClosed as ended:
-            raise ConnectionError("it closed the line") from ended
+            raise ConnectionError("the client closed the connection") from ended
 
 
 def _is_text(payload: bytes) -> bool:

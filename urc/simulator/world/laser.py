@@ -1,6 +1,6 @@
 """A laser scanner: rays from the middle of the robot, with noise.
 
-Pure. It imports numpy, so it is imported on first use.
+Pure. The module loads on first use, because it imports numpy.
 """
 
 import math

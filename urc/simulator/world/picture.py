@@ -1,6 +1,6 @@
 """The camera image of the emulated robot, as JPEG: walls, ground and sky, drawn by rays.
 
-Pure. It imports numpy and Pillow, so it is imported on first use. Each column of the image is one
+Pure. The module loads on first use, because it imports numpy and Pillow. Each column of the image is one
 direction on the ground; its obstacles are drawn from the farthest to the nearest.
 """
 

@@ -1,6 +1,6 @@
 """Rays against the edges of a plan, all at once.
 
-Pure. It imports numpy, so it is imported on first use.
+Pure. The module loads on first use, because it imports numpy.
 """
 
 from typing import Final

@@ -1,6 +1,6 @@
 """The world from above, as JPEG, for cards and pages of an emulated robot.
 
-Pure. It imports Pillow, so it is imported on first use.
+Pure. The module loads on first use, because it imports Pillow.
 """
 
 import io

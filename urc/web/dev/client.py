@@ -49,7 +49,7 @@ ROWS_AT_ONCE = 200
 BEHIND_S = 0.05
 """Interval of messages with rows, in seconds. A robot may produce a thousand rows a second."""
 HELD_S = 0.5
-"""Wait after which held-back text that may begin a secret is shown, in seconds."""
+"""Time after which withheld text is shown, although it may begin a secret, in seconds."""
 RETRY_S = 1.0
 
 log = logging.getLogger(__name__)

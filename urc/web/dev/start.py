@@ -1,7 +1,7 @@
 """The developer start page: one robot with fixed values, whose documents are read at each start.
 
 Layer 5. Only with ``--dev``, and only for holders of the start key. The developer page loads a
-saved document at once; this page reads all documents again, whether or not a change was noticed.
+saved document at once. This page reads all documents again, even without a noticed change.
 """
 
 import asyncio

@@ -1,7 +1,7 @@
 """The two-person rule: a second page must approve the command, or it fails.
 
-Layer 5. Until users sign in, a person is a page that may drive, so the asking page can never be the
-second person. The number of questions and their waiting time are bounded.
+Layer 5. Users do not sign in, so each page that may drive counts as a person. The asking page can
+never be the second one. The number of questions and their waiting time are bounded.
 
 A token of the server stands for a confirmation. It counts once, for a few seconds, on that page,
 and only for the same command with the same arguments. A recorded, changed or delayed confirmation
@@ -129,7 +129,7 @@ class Consent:
             async with within(self._clock, WAIT_S):
                 second = await answer
         except TimeoutError:
-            text = f"{confirm.text} : no second person approved within {WAIT_S:g} s"
+            text = f"{confirm.text}: no second person approved within {WAIT_S:g} s"
             raise CommandFailed("not-confirmed", text) from None
         finally:
             del self._questions[one.number]

@@ -216,7 +216,7 @@ class Controls:
         return "one more"
 
     def hear(self, seat: Seat, said: wire.Driving) -> None:
-        """Perform a message from a page."""
+        """Handle a message from a page."""
         match said:
             case wire.Tick():
                 self._thin(seat, said)

@@ -115,8 +115,8 @@ class Garage:
         filled = self.filled(profile, chosen)
         for secret in sorted(filled.withheld):
             log.warning(
-                "%s: the setting %s is not used until it is entered again: it was entered for"
-                " another place or package, or by an earlier version of URC",
+                "%s: the setting %s was entered for another place, package or version of URC:"
+                " enter it again",
                 name,
                 secret,
             )
@@ -232,7 +232,7 @@ class Garage:
         return profile
 
     def reread(self, profile: Profile) -> Profile:
-        """Return the current profile in the document of a robot from the start; raise."""
+        """Return the present profile of a robot from the start; raise `UrcError`."""
         return open_document(profile.file)
 
     def manifest(self, lock: Lock) -> Manifest:

@@ -37,7 +37,7 @@ def given_source(name: str, data: bytes, installed: Sequence[Lock]) -> FileSourc
     Raises:
         PackageError: it is neither a package nor an interface.
     """
-    name = PurePath(name).name or "what was handed over"
+    name = PurePath(name).name or "the upload"
     suffix = PurePath(name).suffix.lower()
     if suffix in _DOCUMENTS:
         return _wrapped(name, data, installed)
@@ -82,7 +82,7 @@ def _wrapped(name: str, data: bytes, installed: Sequence[Lock]) -> FileSource:
         )
     called = document.get("name")
     if not isinstance(called, str) or not NAME.fullmatch(called):
-        raise PackageError(f"{name}: 'name' is expected: small letters, digits and '-'")
+        raise PackageError(f"{name}: expected 'name' with small letters, digits and '-'")
     key = Key("interface", called)
     before = [lock.number for lock in installed if lock.key == key]
     manifest = {

@@ -189,7 +189,7 @@ class Jobs:
             raise Busy("no job waits for approval: start again")
         if planned.risks and not takes_risks:
             raise PackageError(
-                f"{planned.plan.lock} uses something of this machine by itself: agree to that, too"
+                f"{planned.plan.lock} has access of its own to this machine: approve that, too"
             )
         job.state, job.line = "working", _INSTALLING
         try:

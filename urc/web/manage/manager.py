@@ -158,7 +158,7 @@ class Manager:
         return {name: str(lock) for name, lock in self._parked.items()}
 
     def lock_of(self, name: str) -> Lock | None:
-        """Return the installed package of a robot; None for a robot from the start."""
+        """Return the installed package of a robot; None for a robot that was given at the start."""
         return self._parked.get(name)
 
     # Changes

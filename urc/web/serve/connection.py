@@ -1,8 +1,8 @@
 """One HTTP connection: requests have a time limit, and every refusal carries the policy headers.
 
-Layer 5. A thin layer over uvicorn's protocol; only `server` uses it. uvicorn itself
-refuses bytes that are no HTTP, and connections above its limit. Without this layer those responses
-would lack the page policy.
+Layer 5. A thin layer over uvicorn's protocol; only `server` uses it. The library itself refuses
+bytes that are no HTTP, and connections above its limit. Without this layer those responses would
+lack the page policy.
 """
 
 import asyncio
@@ -54,7 +54,8 @@ class Connection(H11Protocol):
 
     WARNING: it depends on asyncio's protocol methods and on parts of the base class. These are the
     arguments of the constructor, `send_400_response`, and the attributes `conn`, `connections`,
-    `loop` and `transport`. tests/e2e/test_dashboard_server.py fails when one of them changes.
+    `loop` and `transport`. The tests in tests/e2e/test_dashboard_server.py fail when one of them
+    changes.
     """
 
     def __init__(

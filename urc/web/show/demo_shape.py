@@ -159,7 +159,7 @@ def _state(
             "age_s": _ages(signals),
             "alarms": _mapping("the signals of this demo", dict.fromkeys(signals, _ALARM)),
             "history": _mapping("the signals of this demo", dict.fromkeys(_single(signals), past)),
-            "follow": _mapping("what a widget follows", _FOLLOW),
+            "follow": _mapping("the topics that a widget follows", _FOLLOW),
             "replies": _mapping("the commands of this demo", dict.fromkeys(answered, True)),
             "shows": {"type": "array"},
         },

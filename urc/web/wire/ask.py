@@ -102,7 +102,7 @@ def encode_ask(
 
 
 def encode_asked(number: int) -> str:
-    """Return the end of a question."""
+    """Return the message that ends a question."""
     return encoded(_Asked(number))
 
 

@@ -156,7 +156,7 @@ def encode_lease(
 
 
 def encode_beat(number: int) -> str:
-    """Return a heartbeat number, which the page echoes."""
+    """Return the message with a heartbeat number, which the page echoes."""
     return encoded(_Beat(number))
 
 

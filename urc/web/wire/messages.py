@@ -24,7 +24,7 @@ Server → page, by ``t``::
     token   the reply to ``prepare``: allows one command, once, within 5 s
     progress the state of the sequences
 
-Images go as binary messages, see `wire_picture`.
+Images go as binary messages, see `urc.web.wire.picture`.
 
 Page → server: ``ping``, ``run``, ``show``, ``agree``, ``prepare``, ``steer``, and for the controls
 ``drive``, ``tick``, ``release`` and ``stop``. The last three also go over a redundant socket, which
@@ -202,7 +202,7 @@ def decoded(decoder: msgspec.json.Decoder[_Message], text: str | bytes) -> _Mess
     """Return the message of a page.
 
     Raises:
-        BadMessage: it is too long, or none that `decoder` knows.
+        BadMessage: it is too long, or of no type of `decoder`.
     """
     if len(text) > INBOUND_BYTES:
         raise BadMessage(f"longer than {INBOUND_BYTES} bytes")
@@ -238,7 +238,7 @@ def encode_hello(profile: Profile, session: str, now_s: float) -> str:
 
 
 class Indexes:
-    """Names to index numbers, with the last look-up cached."""
+    """Index numbers of names, with a cache of the last look-up."""
 
     def __init__(self, index: Mapping[str, int]) -> None:
         self._index = index
