@@ -23,7 +23,7 @@ def inject(fault: Fault, values: Values, now_s: float) -> None:
     """
     body, faults = values.body, values.faults
     if fault.name in ("noise", "low-battery") and body is None:
-        raise UrcError(f"fault {fault.name}: needs a robot with a world, and this one has none")
+        raise UrcError(f"fault {fault.name}: this robot has no world, which this fault needs")
     if fault.name == "dropout":
         faults.dropped |= {*_dropped(fault.signal, values)}
     elif fault.name == "stuck":

@@ -202,7 +202,7 @@ def test_a_robot_without_a_world_has_no_noise(tmp_path: Path) -> None:
     file.write_text(ROVER.partition("simulator:")[0])
     robot = Twin(load_profile(file, built_in_catalog()), {})
     for text in ("noise=2x", "low-battery"):
-        with pytest.raises(UrcError, match="needs a robot with a world"):
+        with pytest.raises(UrcError, match="this robot has no world"):
             robot.inject(text, 0.0)
     assert robot.top_view(32, 32, 0.0) is None
     assert robot.camera(0.0) is None
