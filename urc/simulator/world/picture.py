@@ -1,7 +1,7 @@
 """The camera image of the emulated robot, as JPEG: walls, ground and sky, drawn by rays.
 
-Pure. The module loads on first use, because it imports numpy and Pillow. Each column of the image is one
-direction on the ground; its obstacles are drawn from the farthest to the nearest.
+Pure. The module loads on first use, because it imports numpy and Pillow. Each column of the image
+is one direction on the ground; its obstacles are drawn from the farthest to the nearest.
 """
 
 import io
