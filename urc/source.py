@@ -78,6 +78,11 @@ class Document:
             mark = inner
         return mark
 
+    def line_starts(self) -> list[int]:
+        """Return the 0-based character of `text` at which each line starts."""
+        ends = _LINE_END if self.text.isascii() else re.compile(_LINE_END_UNICODE)
+        return [0, *(end.end() for end in ends.finditer(self.text))]
+
     def source_of(self, path: Path) -> "Document":
         """Return the document whose text contains the value at `path`, or its nearest parent."""
         return self._nearest(path)[0]

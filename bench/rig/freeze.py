@@ -40,7 +40,7 @@ urc: 1
 kind: robot
 name: frozen
 transports:
-  wire: { type: rosbridge, host: 127.0.0.1, port: PORT, ros: 2, reconnect: { initial: 100ms } }
+  wire: { type: ros, host: 127.0.0.1, port: PORT, version: 2, reconnect: { initial: 100ms } }
 commands:
   go:
     send: { publish: { topic: /go, type: std_msgs/Int64, json: { data: "{{ t }}" } } }

@@ -30,7 +30,7 @@ KINDS: Final = (
     "ssh",
     "serial",
     "mqtt",
-    "rosbridge",
+    "ros",
     "http",
 )
 _AT_ONCE: Final = ("tcp", "telnet", "websocket", "http")
@@ -92,17 +92,17 @@ _OPTIONS: Final = {
     ),
     "serial": 'type: serial, port: "socket://HOST:PORT", baud: 115200, ' + _LINES,
     "mqtt": "type: mqtt, host: HOST, port: OTHER",
-    "rosbridge": "type: rosbridge, host: HOST, port: PORT, ros: 2",
+    "ros": "type: ros, host: HOST, port: PORT, version: 2",
     "http": 'type: http, url: "http://HOST:PORT/"',
 }
 _SENDS: Final = {
     "mqtt": '{ publish: { topic: go, text: "M {{ t }}" } }',
-    "rosbridge": '{ publish: { topic: /go, type: std_msgs/Int64, json: { data: "{{ t }}" } } }',
+    "ros": '{ publish: { topic: /go, type: std_msgs/Int64, json: { data: "{{ t }}" } } }',
     "http": '{ request: { path: "/go?t={{ t }}" } }',
 }
 _ASIDE: Final = {
     "mqtt": "{ publish: { topic: aside, text: here } }",
-    "rosbridge": "{ publish: { topic: /aside, type: std_msgs/String, json: { data: here } } }",
+    "ros": "{ publish: { topic: /aside, type: std_msgs/String, json: { data: here } } }",
 }
 """What is no motion, on lines where motion waits for it, too; these robots do not hear it."""
 
@@ -126,7 +126,7 @@ def place_of(kind: str, lane: int) -> str:
         return f"mqtt:127.0.0.1:{FIRST_PORT[kind] + lane}"
     if kind == "ssh":
         return "tcp:127.0.0.1:0"
-    doors = {"udp": "udp", "websocket": "ws", "rosbridge": "bridge", "http": "http"}
+    doors = {"udp": "udp", "websocket": "ws", "ros": "bridge", "http": "http"}
     door = doors.get(kind, "tcp")
     return f"{door}:{SERVER_ADDRESS}:0"
 

@@ -31,7 +31,11 @@ def test_every_key_is_told_and_shown() -> None:
     definitions = read_schema("driver.schema.json")["$defs"]
     forms = ("publishForm", "callForm", "goalForm", "cancelForm", "requestForm", "subscribe")
     keys = {key for name in forms for key in definitions[name]["properties"]}
-    keys |= {verb for one in MESSAGING.values() for verb in one.verbs} | {"subscribe", "raw", "via"}
+    keys |= {verb for one in MESSAGING.values() for verb in one.verbs} | {
+        "subscribe",
+        "raw",
+        "tunnel",
+    }
     shown = "".join(BLOCKS)
     bodies = {"hex", "bytes", "struct"}  # of the page about binary frames
     assert [key for key in sorted(keys) if f"`{key}" not in PAGE and f"{key}:" not in shown] == []

@@ -92,11 +92,11 @@ def test_what_steers_it_is_seen_on_a_phone_that_lies(file: Path) -> None:
     pages = [page for interface in profile.interfaces.values() for page in interface.pages]
     assert pages
     for page in pages:
-        shown = page.grids.get("low", page.grids["wide"])
+        shown = page.layouts.get("phone_landscape", page.layouts["landscape"])
         filled = [slot for slot in shown.slots if slot.name in profile.slots]
         rows = {row for slot in filled for row in range(slot.row, slot.row + slot.row_span)}
         assert len(rows) <= 2
-        wide = {slot.name for slot in page.grids["wide"].slots}
+        wide = {slot.name for slot in page.layouts["landscape"].slots}
         assert steers & wide <= {slot.name for slot in filled}
 
 

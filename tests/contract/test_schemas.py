@@ -316,13 +316,13 @@ def is_shared_reader(asked: tuple[str, tuple[str | int, ...], str]) -> bool:
     if path[-2:-1] == ("transports",):
         kind = value_at(read_document(name).data, path)["type"]
         return kind not in TRANSPORTS or key in (
-            "answers",
+            "replies",
             "connection",
             "duplex",
             "encoding",
             "framing",
             "send_framing",
-            "via",
+            "tunnel",
         )
     if key == "subscribe" and "simulator" in path:
         return True

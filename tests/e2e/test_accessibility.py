@@ -109,7 +109,9 @@ def asking() -> Wire:
     uses = (*USES, WidgetUse("melt", "button", {}, {"press": "melt"}, title="Melt"))
     told = {**commands(CALM_LEASE_S), "melt": melt}
     profile = dashboard_profile(uses=uses, commands=told)
-    pages = {name: Tab(name, name.title(), {"wide": row(name, "melt")}) for name in ("left", "up")}
+    pages = {
+        name: Tab(name, name.title(), {"landscape": row(name, "melt")}) for name in ("left", "up")
+    }
     both = {**profile.interfaces, "tabs": Interface("tabs", "In tabs", tabs=pages)}
     robot.profile = profile._replace(interfaces=both)
     return robot

@@ -126,7 +126,7 @@ async def test_a_question_is_whole_in_the_lowest_cells(new_page: PageMaker) -> N
     profile = dashboard_profile(
         signals={"at": Signal("at")}, uses=[*uses, *values], commands=commands
     )
-    robot = FakeRobot(profile._replace(interfaces={"x": Interface("x", "X", {"wide": grid})}))
+    robot = FakeRobot(profile._replace(interfaces={"x": Interface("x", "X", {"landscape": grid})}))
     async with running_dashboard(robot) as address:
         page = await new_page(size="phone")
         await page.set_viewport_size({"width": 390, "height": 844})

@@ -97,7 +97,11 @@ async def turned(page: Page, size: tuple[int, int]) -> None:
 
 async def test_each_screen_has_its_own_picture(new_page: PageMaker) -> None:
     """Wide, tall, and a phone both ways; what a picture leaves out is not shown there."""
-    grids = {"wide": row("a", "b", "c"), "tall": column("c", "b", "a"), "phone": row("b", "a")}
+    grids = {
+        "landscape": row("a", "b", "c"),
+        "portrait": column("c", "b", "a"),
+        "phone_portrait": row("b", "a"),
+    }
     async with running_dashboard(gauged(Interface("x", "X", grids))) as address:
         page = await new_page()
         await page.goto(f"{address}robots/puppet/")
@@ -133,8 +137,8 @@ async def test_only_a_tab_that_is_not_drawn_for_a_phone_asks_to_turn_it(
     """The hint comes and goes with the tabs."""
     wide = row("a", "b", "c")
     tabs = {
-        "one": Tab("one", "One", {"wide": wide}),
-        "two": Tab("two", "Two", {"wide": wide, "phone": row("a", "b")}),
+        "one": Tab("one", "One", {"landscape": wide}),
+        "two": Tab("two", "Two", {"landscape": wide, "phone_portrait": row("a", "b")}),
     }
     async with running_dashboard(gauged(Interface("x", "X", tabs=tabs))) as address:
         page = await new_page(size="phone")
@@ -149,8 +153,8 @@ async def test_only_a_tab_that_is_not_drawn_for_a_phone_asks_to_turn_it(
 async def test_a_tab_hides_what_it_does_not_show(new_page: PageMaker) -> None:
     """Its cells get nothing; a cell that is in both goes on; the address says which is open."""
     tabs = {
-        "one": Tab("one", "One", {"wide": row("a", "b")}),
-        "two": Tab("two", "Two", {"wide": row("b", "c")}),
+        "one": Tab("one", "One", {"landscape": row("a", "b")}),
+        "two": Tab("two", "Two", {"landscape": row("b", "c")}),
     }
     robot = gauged(Interface("x", "X", tabs=tabs))
     async with running_dashboard(robot) as address:
@@ -184,8 +188,8 @@ async def test_another_tab_lets_go_of_what_is_held(new_page: PageMaker) -> None:
     """The robot stops, and STOP stays where it is."""
     names = [use.slot for use in USES]
     tabs = {
-        "drive": Tab("drive", "Drive", {"wide": row(*names)}),
-        "more": Tab("more", "More", {"wide": row(names[2])}),
+        "drive": Tab("drive", "Drive", {"landscape": row(*names)}),
+        "more": Tab("more", "More", {"landscape": row(names[2])}),
     }
     async with driven(robot=steered(Interface("x", "X", tabs=tabs))) as (robot, address):
         page = await opened(new_page, address)
@@ -201,8 +205,8 @@ async def test_another_tab_lets_go_of_what_is_held(new_page: PageMaker) -> None:
 
 async def test_another_interface_keeps_the_connection(new_page: PageMaker) -> None:
     """What is held is let go; the values are there at once; the way back leads back."""
-    sticks = Interface("sticks", "Sticks", {"wide": row(*(use.slot for use in USES))})
-    lift = Interface("lift", "Lift", {"wide": row("up")})
+    sticks = Interface("sticks", "Sticks", {"landscape": row(*(use.slot for use in USES))})
+    lift = Interface("lift", "Lift", {"landscape": row("up")})
     async with driven(robot=steered(sticks, lift)) as (robot, address):
         page = await opened(new_page, address)
         await push(page)
@@ -233,8 +237,8 @@ async def test_another_interface_keeps_the_connection(new_page: PageMaker) -> No
 
 async def test_a_link_within_the_page_opens_nothing_anew(new_page: PageMaker) -> None:
     """Neither to the content nor back: what widgets have kept stays, and what is held goes on."""
-    sticks = Interface("sticks", "Sticks", {"wide": row(*(use.slot for use in USES))})
-    lift = Interface("lift", "Lift", {"wide": row("up")})
+    sticks = Interface("sticks", "Sticks", {"landscape": row(*(use.slot for use in USES))})
+    lift = Interface("lift", "Lift", {"landscape": row("up")})
     async with driven(robot=steered(sticks, lift)) as (_, address):
         page = await opened(new_page, address)
         asked: list[str] = []
@@ -278,7 +282,7 @@ async def test_the_background_fills_the_stage_and_controls_lie_above_it(
     """On each screen; STOP is never covered."""
     grid = Grid(2, 3, (Slot("a", 0, 0), Slot("b", 1, 2)))
     async with running_dashboard(
-        gauged(Interface("x", "X", {"wide": grid}, background="c"))
+        gauged(Interface("x", "X", {"landscape": grid}, background="c"))
     ) as address:
         page = await new_page()
         await page.goto(f"{address}robots/puppet/")
@@ -304,7 +308,7 @@ async def test_the_cameras_of_the_background_are_chosen_by_mouse_and_touch(
     ]
     grid = Grid(3, 2, tuple(Slot(f"v{place}", *divmod(place, 2)) for place in range(6)))
     profile = dashboard_profile(signals=signals, uses=uses)
-    interface = Interface("x", "X", {"wide": grid}, background="c")
+    interface = Interface("x", "X", {"landscape": grid}, background="c")
     robot = FakeRobot(profile._replace(interfaces={"x": interface}))
     async with running_dashboard(robot) as address:
         for size in (PHONE, PHONE_LYING, TABLET, DESKTOP):

@@ -30,7 +30,7 @@ name: rover
 settings:
   port: { type: port, default: 9090 }
 transports:
-  ros: { type: rosbridge, host: 127.0.0.1, port: "{{ settings.port }}" }
+  ros: { type: ros, host: 127.0.0.1, port: "{{ settings.port }}" }
 commands:
   goal:
     moves: true

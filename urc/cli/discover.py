@@ -75,7 +75,7 @@ async def _look_around(
         rows += _serial()
     rows += await _mdns(profiles, arguments.seconds)
     hint = ""
-    if settings is not None and "rosbridge" in lines:
+    if settings is not None and "ros" in lines:
         topics, hint = await _topics(profiles[0], settings)
         rows += topics
     if nearby:
@@ -145,7 +145,7 @@ async def _nearby(
         for kind, place in _places(profile, values):
             if is_loopback(place[0]) or place[0] in typed:
                 robots.setdefault(place, []).append(profile.name)
-                if kind == "rosbridge":
+                if kind == "ros":
                     bridges.setdefault(place, (profile, values))
     rows: list[Row] = []
     hints: list[str] = []
@@ -170,13 +170,13 @@ def _places(
     from urc.transports.rosbridge import DEFAULT_PORT
 
     for spec in profile.driver.transports.values():
-        if spec.type not in ("tcp", "rosbridge", "mqtt", "telnet", "ssh") or spec.via:
+        if spec.type not in ("tcp", "ros", "mqtt", "telnet", "ssh") or spec.tunnel:
             continue
         try:
             options = options_of(spec, settings)
         except UrcError:
             continue  # a setting without a value: the address is unknown
-        default = DEFAULT_PORT if spec.type == "rosbridge" else None
+        default = DEFAULT_PORT if spec.type == "ros" else None
         host, port = options.get("host"), options.get("port", default)
         if isinstance(host, str) and host and isinstance(port, int):
             yield spec.type, (host, port)
@@ -193,7 +193,7 @@ async def _topics(profile: "Profile", settings: Mapping[str, "Value"]) -> tuple[
     driver = profile.driver._replace(messages={})
     made = make_transports(driver, settings, built_in_catalog().transports)
     for name, spec in profile.driver.transports.items():
-        if spec.type != "rosbridge":
+        if spec.type != "ros":
             continue
         try:
             topics: list[RosTopic] = await ros_topics(made[name], _OPEN_S)

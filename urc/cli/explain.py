@@ -5,6 +5,7 @@ from difflib import get_close_matches
 
 from urc.cli.failures import Misuse
 from urc.config.codes import pages
+from urc.config.renames import CODES
 
 EXAMPLE = "urc explain unknown-key"
 
@@ -27,10 +28,13 @@ def run(arguments: argparse.Namespace) -> int:
         for one in every.values():
             print(f"{one.code:<{width}}  {one.what}")
         return 0
-    page = every.get(arguments.code)
+    new = CODES.get(arguments.code)
+    page = every.get(new or arguments.code)
     if page is None:
         close = get_close_matches(arguments.code, every, n=1)
         hint = f"did you mean '{close[0]}'?" if close else "'urc explain' lists all codes"
         raise Misuse(f"there is no code {arguments.code!r}; {hint}")
+    if new is not None:
+        print(f"{arguments.code} is called {new} now.\n")
     print(page)
     return 0

@@ -16,6 +16,7 @@ VERBS: dict[str, str] = {
     "validate": "check documents and run their tests",
     "explain": "explain the code of a problem, with a correction",
     "resolve": "print a profile as one document, with the place of every key",
+    "migrate": "rename old keys and values in documents; every other byte stays",
     "docs": "write the manual page of a profile, as Markdown",
     "simulate": "emulate the robot of a profile on its real ports",
     "watch": "print a robot's signals as JSON lines",

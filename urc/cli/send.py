@@ -225,7 +225,7 @@ def _elements(argument: "Argument", text: str) -> tuple["Value", ...]:
             return tuple(json.loads(text))
         except (ValueError, RecursionError):
             raise Misuse(f"{argument.name}: {text!r} is not a JSON list") from None
-    single = argument._replace(type=argument.of)
+    single = argument._replace(type=argument.items)
     return tuple(_value(single, word.strip()) for word in text.split(",")) if text else ()
 
 

@@ -67,7 +67,7 @@ def _settings(profile: "Profile", name: str, arguments: argparse.Namespace) -> d
     from urc.cli.settings import settings_given
 
     ((values, missing),) = settings_given([profile], arguments)
-    if not profile.driver.transports[name].via:
+    if not profile.driver.transports[name].tunnel:
         values |= {one: _NOT_ASKED_FOR for one in missing if profile.settings[one].is_secret}
     missing = tuple(one for one in missing if one not in values)
     if missing:

@@ -46,7 +46,7 @@ _GROUPS: Final[tuple[tuple[str, Mapping[str, tuple[str, ...]], frozenset[str]], 
 )
 """Widget, its inputs by the last words of signals' names, and its required inputs."""
 
-_COLUMNS: Final = {"wide": 4, "phone": 2, "low": 7}
+_COLUMNS: Final = {"landscape": 4, "phone_portrait": 2, "phone_landscape": 7}
 """Maximum columns of a default grid, by screen."""
 _LOW_ROWS: Final = 2
 """Visible rows on a phone in landscape."""
@@ -155,7 +155,7 @@ def _one_input(widget: Widget | None, signal: Signal) -> WidgetUse | None:
     fitting = [
         port.name
         for port in sorted(widget.inputs.values(), key=lambda port: not port.is_required)
-        if not port.is_many and not misfit(port, signal)
+        if not port.is_multiple and not misfit(port, signal)
     ]
     needed = {port.name for port in widget.inputs.values() if port.is_required}
     if not fitting or needed - {fitting[0]}:
@@ -165,7 +165,9 @@ def _one_input(widget: Widget | None, signal: Signal) -> WidgetUse | None:
 
 def _table(signals: list[Signal], shelf: Shelf) -> WidgetUse | None:
     widget = shelf.get("table")
-    port = next((one for one in widget.inputs.values() if one.is_many), None) if widget else None
+    port = (
+        next((one for one in widget.inputs.values() if one.is_multiple), None) if widget else None
+    )
     if widget is None or port is None:
         return None
     fitting = tuple(one.name for one in signals if not misfit(port, one))
@@ -282,12 +284,12 @@ def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
     return Interface(
         name="default",
         title=title,
-        grids={screen: _grid(slots, screen) for screen in _COLUMNS},
+        layouts={screen: _grid(slots, screen) for screen in _COLUMNS},
     )
 
 
 def _grid(slots: Mapping[str, WidgetUse], screen: str) -> Grid:
-    is_low = screen == "low"
+    is_low = screen == "phone_landscape"
     sizes = {name: 2 if use.widget in _BIG else 1 for name, use in slots.items()}
     area = sum(size * size for size in sizes.values())
     wanted = math.ceil(area / _LOW_ROWS if is_low else math.sqrt(area))

@@ -18,7 +18,7 @@ class Messaging(NamedTuple):
 
 
 MESSAGING: Final = {
-    "rosbridge": Messaging(
+    "ros": Messaging(
         ("publish", "call", "goal", "cancel"), ("type", "throttle", "queue_length", "compression")
     ),
     "mqtt": Messaging(("publish",), ("qos",)),

@@ -239,8 +239,8 @@ def _output(use: WidgetUse, name: str) -> object:
 
 
 def _interface(interface: Interface) -> dict[str, object]:
-    grids = {screen: _picture(grid) for screen, grid in interface.grids.items()}
-    return {"title": interface.title, "grids": grids}
+    layouts = {screen: _picture(grid) for screen, grid in interface.layouts.items()}
+    return {"title": interface.title, "layouts": layouts}
 
 
 def _picture(grid: Grid) -> str:

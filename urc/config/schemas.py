@@ -55,7 +55,7 @@ _Check = Callable[[Any], bool]
 _ANNOTATIONS: Final = frozenset(
     (
         *("$schema", "$defs", "title", "description", "examples", "default"),
-        *("file", "page", "local", "below", "gives", "then", "else"),
+        *("file", "page", "same_origin", "less_than", "argument_of", "then", "else"),
     )
 )
 

@@ -84,10 +84,10 @@ def fit_argument(value: Any, kind: str, of: str, size: int | None) -> tuple[Valu
 
 
 def element_of(part: Part, kind: str, findings: Findings) -> str:
-    """Return the type of the elements of an argument; of an array, its ``of``."""
+    """Return the type of the elements of an argument; of an array, its ``items``."""
     if kind == "array":
-        return part.text("of", "number")
-    for key in ("of", "size"):
+        return part.text("items", "number")
+    for key in ("items", "size"):
         if key in part.data:
             text = f"'{key}' has no effect for {kind}"
             hint = "write type: array"

@@ -65,11 +65,11 @@ class Host:
         await asyncio.gather(*ends)
 
     def _make(self, said: wire.Make) -> None:
-        via: Any = self._lines[said.via].transport if said.via else None
+        tunnel: Any = self._lines[said.tunnel].transport if said.tunnel else None
         subscriptions = tuple(Subscription(*one) for one in said.subscriptions)
         module, _, path = said.factory.partition(":")
         factory: Callable[[Setup], Transport] = attrgetter(path)(import_module(module))
-        transport = factory(Setup(said.line, said.options, subscriptions, via))
+        transport = factory(Setup(said.line, said.options, subscriptions, tunnel))
         self.add(said, transport)
 
     def add(self, said: wire.Make, transport: Transport) -> None:

@@ -52,7 +52,7 @@ class Make(msgspec.Struct, array_like=True, frozen=True, tag=1):
     """``module:attribute``, as in the table of transports."""
     options: dict[str, Any]
     subscriptions: list[tuple[str, dict[str, Any]]]
-    via: str
+    tunnel: str
     """Line that it goes through, made before; "": none."""
     stalled_s: float
     """Unsent motion of this age means that the line is stalled: it is reset and opened afresh."""

@@ -131,7 +131,7 @@ class Collect(NamedTuple):
     end: Template | None = None
     """Condition that marks the last frame. Without it, the first frame of the next value ends
     it."""
-    most: int = 4096
+    max: int = 4096
     """Largest number of values, or of bytes, in total."""
 
 

@@ -88,12 +88,12 @@ class TransportSpec(NamedTuple):
     """Steps before an orderly close of the connection."""
     stale_after_s: float | None = None
     """Silence after which the connection counts as stale, in seconds; None: never."""
-    via: str = ""
+    tunnel: str = ""
     """Name of the transport that tunnels this one; "" without a tunnel."""
     is_half_duplex: bool = False
     """Whether only one side sends at a time. Until the robot has replied, only a stop may be
     sent."""
-    never_answers: bool = False
+    never_replies: bool = False
     """Whether the robot never sends on this connection, by design; its silence is then no sign of a
     loss."""
     errors: tuple[Pattern, ...] = ()
@@ -166,7 +166,7 @@ class Argument(NamedTuple):
     allows_control: bool = False
     """Whether a string may contain control characters. Otherwise no argument can end a frame."""
     description: str = ""
-    of: ElementType = "number"
+    items: ElementType = "number"
     """Type of the elements of an array; range and choices apply to each of them."""
     size: int | None = None
     """Number of elements of an array; None: any number up to `MOST_ELEMENTS`."""
@@ -256,7 +256,7 @@ class Message(NamedTuple):
     name: str
     transport: str
     read: ReadSpec
-    answer: WriteSpec | None = None
+    acknowledge: WriteSpec | None = None
     """Frame that acknowledges the message at once."""
 
 

@@ -5,7 +5,10 @@ from typing import Final, NamedTuple
 
 from urc.model.values import NOTHING, Value
 
-__all__ = ["DEBUG", "Given", "Grid", "Interface", "Slot", "Tab", "WidgetUse"]
+__all__ = ["DEBUG", "Given", "Grid", "Interface", "SCREENS", "Slot", "Tab", "WidgetUse"]
+
+SCREENS: Final = ("landscape", "portrait", "phone_portrait", "phone_landscape")
+"""Kinds of screen that have a layout of their own."""
 
 DEBUG: Final = "debug"
 """The built-in interface of every robot; documents must not use its name."""
@@ -64,14 +67,14 @@ class Grid(NamedTuple):
 class Tab(NamedTuple):
     """One page of an interface.
 
-    `grids` has one layout per screen: ``wide``, ``tall``, ``phone``, ``low``.
+    `layouts` has the layout of each screen of `SCREENS` that is drawn.
     """
 
     name: str = ""
     """Name of the page; "" for an interface without tabs."""
     title: str = ""
-    grids: Mapping[str, Grid] = NOTHING
-    left: Mapping[str, Grid] = NOTHING
+    layouts: Mapping[str, Grid] = NOTHING
+    left_handed: Mapping[str, Grid] = NOTHING
     """Screen → declared left-handed layout."""
     is_mirrored: bool = True
     """Whether all other layouts are mirrored for left-handed operators."""
@@ -82,7 +85,7 @@ class Interface(NamedTuple):
 
     name: str
     title: str = ""
-    grids: Mapping[str, Grid] = NOTHING
+    layouts: Mapping[str, Grid] = NOTHING
     """Screen → layout; empty when there are tabs."""
     background: str = ""
     """Name of the slot behind all others; "" for no background."""
@@ -92,7 +95,7 @@ class Interface(NamedTuple):
     licence: str = ""
     """SPDX identifier from the document."""
     author: str = ""
-    left: Mapping[str, Grid] = NOTHING
+    left_handed: Mapping[str, Grid] = NOTHING
     """Left-handed layouts, as in a tab."""
     is_mirrored: bool = True
     tabs: Mapping[str, Tab] = NOTHING
@@ -100,7 +103,7 @@ class Interface(NamedTuple):
     @property
     def pages(self) -> tuple[Tab, ...]:
         """All pages of the interface; never empty."""
-        only = Tab("", self.title, self.grids, self.left, self.is_mirrored)
+        only = Tab("", self.title, self.layouts, self.left_handed, self.is_mirrored)
         return tuple(self.tabs.values()) or (only,)
 
     @property
@@ -108,7 +111,7 @@ class Interface(NamedTuple):
         """All visible slots, each once: the background first, then in reading order."""
         names = dict.fromkeys((self.background,) if self.background else ())
         for page in self.pages:
-            for grid in (*page.grids.values(), *page.left.values()):
+            for grid in (*page.layouts.values(), *page.left_handed.values()):
                 ordered = sorted(grid.slots, key=lambda slot: (slot.row, slot.column))
                 names |= dict.fromkeys(slot.name for slot in ordered)
         return tuple(names)

@@ -96,7 +96,7 @@ class Signal(NamedTuple):
     description: str = ""
     conversion: Conversion = PLAIN
     """Conversion from the raw value to `unit`; for an array, of each element."""
-    of: ElementType = "number"
+    items: ElementType = "number"
     """Type of the elements of an array."""
     size: int | None = None
     """Number of elements of an array; most bytes of an image or blob."""

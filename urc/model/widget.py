@@ -27,15 +27,15 @@ class Port(NamedTuple):
     """For an output: whether it is a hold-to-run control. It then takes only motion commands."""
     arguments: tuple[str, ...] = ()
     """For an output: names of its values; those of a held output range from -1 to 1."""
-    of: tuple[str, ...] = ()
+    items: tuple[str, ...] = ()
     """For an array input: accepted element types; () for any."""
     size: int | None = None
     """For an array input: required number of elements; None for any."""
-    is_many: bool = False
+    is_multiple: bool = False
     """For an input: whether it takes a list of signals, each of which must fit."""
-    is_each: bool = False
+    keeps_all: bool = False
     """For an input: whether it receives every sample, not only the newest."""
-    instead_of: tuple[str, ...] = ()
+    replaces: tuple[str, ...] = ()
     """For an input: inputs and options of the same widget that it replaces when bound."""
 
 
@@ -50,13 +50,13 @@ class Widget(NamedTuple):
     outputs: Mapping[str, Port] = NOTHING
     options: Mapping[str, object] = NOTHING
     """JSON Schema ``properties`` of its options."""
-    needs: tuple[str, ...] = ()
+    at_least_one_of: tuple[str, ...] = ()
     """Inputs, outputs and options, at least one of which is required; () for none."""
-    together: tuple[tuple[str, ...], ...] = ()
+    required_together: tuple[tuple[str, ...], ...] = ()
     """Groups of inputs or outputs that work only when all of a group are bound."""
     min_cells: tuple[int, int] = (1, 1)
     """Columns, rows."""
-    is_gate: bool = False
+    is_dead_man: bool = False
     """Whether it is a dead-man control: while it is released, no motion is sent."""
     summary: str = ""
     licence: str = ""

@@ -176,9 +176,9 @@ class CameraSpec(NamedTuple):
 
     width: int = 320
     height: int = 240
-    view: float = 1.2
+    fov: float = 1.2
     """Horizontal field of view."""
-    up: float = 0.25
+    mount_height: float = 0.25
     """Height of the camera above the ground."""
     tilt: float = 0.0
     """Upward tilt of the camera."""
@@ -223,7 +223,7 @@ class WorldSpec(NamedTuple):
     senses: Mapping[str, Template] = NOTHING
     """Signal → its present value."""
     failsafe: Failsafe | None = None
-    plan: PlanSpec | None = None
+    map: PlanSpec | None = None
     """Surroundings; None: the default room."""
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Initial x, y and direction."""

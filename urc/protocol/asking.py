@@ -55,7 +55,7 @@ class Builder:
             messages = [one for one in driver.messages.values() if one.transport == name]
             context = CodecContext(spec.encoding, self._readings.settings, fresh, is_compiled)
             matchers = [self._message(one.read, context) for one in messages]
-            if any(one.answer or one.read.collects for one in messages):
+            if any(one.acknowledge or one.read.collects for one in messages):
                 self._react(spec, messages, matchers, context)
             else:
                 self.lines[name] = Line(spec, matchers)
@@ -76,9 +76,9 @@ class Builder:
                 collectors = {key: Collector(what) for key, what in one.read.collects.items()}
                 kept += collectors.values()
                 decode = collecting(collectors, self._readings.settings, decode)
-            if one.answer is not None:
-                encode = build_encode(one.answer, framing, context)
-                counts = COUNTERS in one.answer.names
+            if one.acknowledge is not None:
+                encode = build_encode(one.acknowledge, framing, context)
+                counts = COUNTERS in one.acknowledge.names
                 counters = (lambda: self.lines[name].counters) if counts else None
                 decode = answering(encode, partial(self._view, name), counters, replies, decode)
             if decode is not matcher.decode:

@@ -68,7 +68,7 @@ def _usable(convert: Callable[[object], Reading]) -> Convert:
 
 def _element_converter(signal: Signal) -> Callable[[object], Value]:
     """Return the function for a single value, or for one element of an array."""
-    kind = signal.of if signal.type == "array" else signal.type
+    kind = signal.items if signal.type == "array" else signal.type
     conversion = build_conversion(signal.conversion)
     typed = _typed_converter(signal, kind, rounds=bool(conversion))
     if conversion is None:

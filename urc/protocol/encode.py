@@ -113,7 +113,7 @@ def _elements(argument: Argument, value: object) -> tuple[Value, ...]:
     if len(value) > MOST_ELEMENTS:
         raise BadArgument(f"{name}: expected at most {MOST_ELEMENTS} elements, found {len(value)}")
     return tuple(
-        _one(argument._replace(name=f"{name}[{place}]", type=argument.of), element)
+        _one(argument._replace(name=f"{name}[{place}]", type=argument.items), element)
         for place, element in enumerate(value)
     )
 

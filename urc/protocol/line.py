@@ -352,7 +352,7 @@ class Line(Connection):
         if self._silent_at is not None and self._silent_at <= now:
             self._silent_at = None
             text = f"nothing received for {self.spec.stale_after_s:g} s"
-            events.append(Fault(self.spec.name, "silent", text))
+            events.append(Fault(self.spec.name, "no-data", text))
         return events + self._pump(now)
 
     def _frame(self, cut: bytes | FrameFault, now: float) -> list[LineEvent]:
@@ -508,7 +508,11 @@ class Line(Connection):
             exchange.tries_left -= 1
             self._flights.remove(flight)
             text = f"the robot asked for {exchange.ask.label} again"
-            return [*events, Fault(self.spec.name, "sent-again", text), *self._send(exchange, now)]
+            return [
+                *events,
+                Fault(self.spec.name, "retry-not-idempotent", text),
+                *self._send(exchange, now),
+            ]
         if offer.aside:
             times = 1 + exchange.ask.retries
             text = f"the robot asks for {exchange.ask.label} again after {times} transmissions"

@@ -21,10 +21,10 @@ _MANNERS: Final = frozenset(
     (
         *("username", "password", "key", "passphrase", "agent", "auth", "headers", "client_id"),
         *("baud", "data_bits", "parity", "stop_bits", "flow_control", "rts", "dtr", "exclusive"),
-        *("ros", "version", "will", "probe", "answer_timeout", "in_flight", "max_body"),
-        *("subprotocols", "send_as", "ping_every", "ping_timeout", "max_message", "pty"),
-        *("environment", "legacy", "alive_every", "negotiate", "echo", "binary", "terminal"),
-        "answers",
+        *("version", "will", "probe", "response_timeout", "in_flight", "max_body"),
+        *("subprotocols", "send_as", "ping_interval", "ping_timeout", "max_message", "pty"),
+        *("environment", "legacy", "keepalive_interval", "negotiate", "echo", "binary", "terminal"),
+        "replies",
     )
 )
 """Options about the manner of the connection. All others count as a place, also those of a
@@ -59,7 +59,7 @@ def _line(spec: TransportSpec, values: Mapping[str, Value]) -> list[Any]:
         for name, option in sorted(spec.options.items())
         if name not in _MANNERS
     ]
-    return [spec.name, spec.type, spec.via, places]
+    return [spec.name, spec.type, spec.tunnel, places]
 
 
 def _filled(option: object, values: Mapping[str, Value]) -> object:

@@ -21,7 +21,7 @@ from urc.runtime.lines import Made, make_lines
 
 __all__ = ["take_reins"]
 
-_DEAR: Final = frozenset(("ssh", "serial", "mqtt", "rosbridge"))
+_DEAR: Final = frozenset(("ssh", "serial", "mqtt", "ros"))
 """Transports that open slowly or maybe not again, so they are not reset at once."""
 
 _SOONER: Final = 0.9
@@ -75,7 +75,7 @@ def _is_dear(spec: TransportSpec, driver: Driver) -> bool:
     }
     if "abort" in said:  # the safer of two different values
         return False
-    return "wait" in said or spec.type in _DEAR or bool(spec.via)
+    return "wait" in said or spec.type in _DEAR or bool(spec.tunnel)
 
 
 def _silent_s(spec: TransportSpec) -> float | None:
@@ -97,7 +97,7 @@ def _line(made: Made, driver: Driver) -> LineSpec:
         factory=made.factory,
         options=dict(setup.options),
         subscriptions=[(one.topic, dict(one.attributes)) for one in setup.subscriptions],
-        via=spec.via,
+        tunnel=spec.tunnel,
         stalled_s=WAITED_S if is_dear else STALLED_S,
         is_strict=is_dear,
         silent_s=_silent_s(spec),

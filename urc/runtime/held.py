@@ -152,7 +152,7 @@ def period_of(driver: Driver, command: Command) -> float:
     return max(repeat_s, rate_s, gap_s)
 
 
-_LOSSY = frozenset(("udp", "serial", "mqtt", "rosbridge"))
+_LOSSY = frozenset(("udp", "serial", "mqtt", "ros"))
 """Transports on which one stop may be lost."""
 
 

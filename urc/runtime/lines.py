@@ -39,14 +39,14 @@ def make_lines(driver: Driver, settings: Mapping[str, Value], table: Table) -> d
     def make(name: str) -> Transport:
         if name not in made:
             spec = driver.transports[name]
-            # The loader has checked that `via` names a tunnel.
-            via = cast("Carrier", make(spec.via)) if spec.via else None
+            # The loader has checked that `tunnel` names a tunnel.
+            tunnel = cast("Carrier", make(spec.tunnel)) if spec.tunnel else None
             topics = listened(driver, name, settings)
             setup = Setup(
                 name,
                 options_of(spec, settings),
                 tuple(Subscription(*topic) for topic in topics.items()),
-                via,
+                tunnel,
             )
             row = table[spec.type]
             made[name] = Made(spec, row.factory, setup, row.load()(setup))

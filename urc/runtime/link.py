@@ -180,7 +180,7 @@ class Link:
     def count(self, fault: Fault) -> None:
         """Count a protocol violation, and log it at a limited rate."""
         self._report.count(fault)
-        if fault.code in ("reply-timeout", "silent"):
+        if fault.code in ("reply-timeout", "no-data"):
             self._is_overdue = True
             self._report.show("silent", fault.message)
 

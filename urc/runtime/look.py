@@ -96,8 +96,10 @@ def _of_transport(spec: TransportSpec, profile: Profile) -> str:
         "name": spec.name,
         "options": joined(", ", options) if options else phrase("no options"),
     }
-    if spec.via:
-        return phrase("connects by {type} ({name}) through {via}: {options}", via=spec.via, **names)
+    if spec.tunnel:
+        return phrase(
+            "connects by {type} ({name}) through {via}: {options}", via=spec.tunnel, **names
+        )
     return phrase("connects by {type} ({name}): {options}", **names)
 
 
@@ -163,7 +165,7 @@ def _risks_of_transport(spec: TransportSpec, profile: Profile) -> Iterator[str]:
             "{line} runs a program on the machine it logs in to: {text}", line=spec.name, text=text
         )
     if host := _fixed_host(options):
-        is_beyond = bool(spec.via) and _LOOPBACK.match(host) is not None
+        is_beyond = bool(spec.tunnel) and _LOOPBACK.match(host) is not None
         if not is_beyond:
             yield phrase("{line} connects to a fixed host: {host}", line=spec.name, host=host)
 

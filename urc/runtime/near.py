@@ -42,7 +42,7 @@ def is_near(host: str) -> bool:
 def check_hosts(profile: Profile) -> None:
     """Raise `UrcError` if the document of a package has this machine as a fixed host."""
     for spec in profile.driver.transports.values():
-        if spec.via or spec.options.get("mode") == "listen":
+        if spec.tunnel or spec.options.get("mode") == "listen":
             continue  # resolved on another machine, or the robot connects to URC
         host = _fixed(spec.options)
         if host:

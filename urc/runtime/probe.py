@@ -122,8 +122,8 @@ async def _opened_alone(session: Session, names: list[str], table: Table) -> dic
     made = make_lines(driver, session.settings, table)
     for name in names:
         spec, transport = driver.transports[name], made[name].transport
-        if spec.via:
-            text = f"is opened through {spec.via} when a command needs it; it was not tried"
+        if spec.tunnel:
+            text = f"is opened through {spec.tunnel} when a command needs it; it was not tried"
             tried[name] = Tried(name, spec.type, transport.address, "opens", text, "")
             continue
         try:

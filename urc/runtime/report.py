@@ -100,7 +100,7 @@ class LinkReport:
         if self.state == "connecting" and self._detail:
             # Connected without a good frame: the violation is the detail that helps most.
             self._detail = f"connected; {fault.message}"
-        if fault.code == "silent" and self.state != "silent":
+        if fault.code == "no-data" and self.state != "silent":
             return  # the following change of state says the same
         self.note("warning", f"fault {fault.code}", f"{fault.code}: {fault.message}")
 

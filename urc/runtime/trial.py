@@ -39,7 +39,7 @@ Exercised = tuple[Kind, str]
 """Kind and name of an item that a test can use."""
 _TWO_PEOPLE: Final = ("who wrote the test", "who runs it")
 """Confirmations for every command, because a test is about the wire."""
-_BRINGS_OBJECTS: Final = frozenset(("rosbridge",))
+_BRINGS_OBJECTS: Final = frozenset(("ros",))
 """Transport types whose messages are objects; the others carry bytes."""
 _MOST_TICKS: Final = 20_000
 """Limit of deadlines during one wait of a test."""

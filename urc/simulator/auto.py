@@ -200,7 +200,7 @@ class AutoLine:
     def message(self, name: str) -> Answer:
         """Return a declared message, to be sent."""
         message = self._robot.driver.messages[name]
-        names = message.answer.names if message.answer is not None else frozenset()
+        names = message.acknowledge.names if message.acknowledge is not None else frozenset()
         needed = frozenset(one for one in message.read.fields if one.startswith("_")) & names
         return self._answer(message.read)._replace(needed=needed)
 
@@ -318,8 +318,8 @@ class AutoLine:
             requests.append(self._sent("keepalive", keepalive.send, ()))
         requests += self._script("on_close", self._spec.on_close)[1]
         for message in driver.messages.values():
-            if message.transport == name and message.answer is not None:
-                requests.append(self._sent(message.name, message.answer, ()))
+            if message.transport == name and message.acknowledge is not None:
+                requests.append(self._sent(message.name, message.acknowledge, ()))
         yield from sorted(requests, key=lambda one: bool(one.names - _ALWAYS_KNOWN))
 
     def _request(

@@ -154,7 +154,7 @@ def _value(argument: Argument, raw: object) -> object:
     items = elements_of(raw)
     if argument.size is not None and len(items) != argument.size:
         raise ValueError(raw)
-    return tuple(_as(argument.of, item) for item in items)
+    return tuple(_as(argument.items, item) for item in items)
 
 
 def _as(kind: str, raw: object) -> object:

@@ -29,7 +29,7 @@ from urc.simulator.twin import Twin
 __all__ = ["serve"]
 
 _LOOPBACK = "127.0.0.1"
-_PORTS = {"ssh": 22, "telnet": 23, "rosbridge": 9090}
+_PORTS = {"ssh": 22, "telnet": 23, "ros": 9090}
 """Default ports of transports whose option `port` may be left out."""
 
 
@@ -74,11 +74,11 @@ async def serve(
                 spec=spec,
                 options=_options_of(spec, settings),
                 # Only the robot itself connects to a transport behind another one.
-                host=_LOOPBACK if spec.via else host,
+                host=_LOOPBACK if spec.tunnel else host,
                 line=lambda name=name: robot.line(name),  # type: ignore[misc] # of this turn
                 now=now,
                 topics=listened(profile.driver, name, settings),
-                is_anywhere=is_anywhere or bool(spec.via),
+                is_anywhere=is_anywhere or bool(spec.tunnel),
                 picture=lambda topics, name=name: robot.picture(name, topics, now()),  # type: ignore[misc] # of this turn
                 last_peer=last_peer,
                 carried=inside[name],
@@ -86,8 +86,8 @@ async def serve(
             server = _server(context)
             servers.append(server)
             listening[name] = await server.open()
-            if spec.via:
-                listening[name] = _put_inside(inside[spec.via], context, listening[name])
+            if spec.tunnel:
+                listening[name] = _put_inside(inside[spec.tunnel], context, listening[name])
         yield {name: listening[name] for name in transports}
     finally:
         for server in reversed(servers):
@@ -107,8 +107,8 @@ def _server(context: ServerContext) -> SimulatedServer:
 
 def _depth(transports: Mapping[str, TransportSpec], name: str) -> int:
     """Return the number of transports in front of this one."""
-    via = transports[name].via
-    return 1 + _depth(transports, via) if via else 0
+    tunnel = transports[name].tunnel
+    return 1 + _depth(transports, tunnel) if tunnel else 0
 
 
 def _put_inside(
@@ -120,7 +120,7 @@ def _put_inside(
         message = f"{context.spec.type} cannot be emulated behind another transport"
         raise UrcError(f"transports.{context.name}: {message}")
     inside[host.strip(), port] = found
-    text = f"{context.spec.type} {host_and_port(host, port)} through {context.spec.via}"
+    text = f"{context.spec.type} {host_and_port(host, port)} through {context.spec.tunnel}"
     options = {key: value for key, value in found.options.items() if key not in ("host", "port")}
     return found._replace(text=text, options=options | ({"url": url} if url else {}))
 

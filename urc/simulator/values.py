@@ -44,7 +44,7 @@ def plausible(signal: Signal, now_s: float) -> Reading:
     if signal.axes and signal.size == 4:
         return tuple(_quaternion(now_s).values())
     size = _ELEMENTS if signal.size is None else signal.size
-    return tuple(_single(signal, signal.of, place, now_s) for place in range(size))
+    return tuple(_single(signal, signal.items, place, now_s) for place in range(size))
 
 
 def _single(signal: Signal, kind: ElementType | SignalType, place: int, now_s: float) -> Value:

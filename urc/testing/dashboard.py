@@ -53,8 +53,8 @@ def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -
             types,
             unit=known.get(each, {}).get("unit", ""),
             is_required=known.get(each, {}).get("required", True),
-            is_many=known.get(each, {}).get("many", False),
-            is_each=known.get(each, {}).get("each", False),
+            is_multiple=known.get(each, {}).get("multiple", False),
+            keeps_all=known.get(each, {}).get("keep_all", False),
         )
         for each in {**known, **dict.fromkeys(inputs)}
     }
@@ -113,7 +113,7 @@ def dashboard_profile(
             commands=commands or {},
         ),
         slots={use.slot: use for use in given},
-        interfaces={"default": Interface("default", "Default", {"wide": grid})},
+        interfaces={"default": Interface("default", "Default", {"landscape": grid})},
         widgets=known,
     )
 

@@ -22,7 +22,7 @@ class Reach:
         host: str,
         port: int,
         *,
-        via: Carrier | None = None,
+        tunnel: Carrier | None = None,
         tls: Tls | None = None,
         read_ahead_bytes: int = READ_AHEAD_BYTES,
     ) -> None:
@@ -31,7 +31,7 @@ class Reach:
         self.port = port
         self.place = place_of(host, port)
         """For people."""
-        self._via = via
+        self._tunnel = tunnel
         self._tls = tls
         self._read_ahead_bytes = read_ahead_bytes
         self._lookup = Lookup(host, port, socket.SOCK_STREAM)
@@ -53,8 +53,8 @@ class Reach:
             raise ConnectFailed(explain(self.host, self.place, fault)) from fault
 
     async def _connect(self, timeout_s: float) -> ByteStream:
-        if self._via is not None:
-            return await self._via.connect(self.host, self.port, timeout_s)
+        if self._tunnel is not None:
+            return await self._tunnel.connect(self.host, self.port, timeout_s)
         dial = partial(_dial, read_ahead_bytes=self._read_ahead_bytes)
         return await self._lookup.first(dial, timeout_s)
 

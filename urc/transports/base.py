@@ -131,7 +131,7 @@ class Setup(NamedTuple):
     options: Mapping[str, object] = NOTHING
     """Evaluated options: plain values, and lists and mappings of them."""
     subscriptions: tuple[Subscription, ...] = ()
-    via: Carrier | None = None
+    tunnel: Carrier | None = None
     """Tunnel of the connection; None: the network of this machine."""
 
 

@@ -48,10 +48,10 @@ class HttpTransport:
         self._headers = options.headers()
         self._max_body = int(options.number("max_body", MAX_BODY_BYTES, 1, 2**28))
         self._most = int(options.number("in_flight", IN_FLIGHT, 1, 32))
-        self._answer_s = options.duration("answer_timeout", ANSWER_S, 0.05, 600)
+        self._answer_s = options.duration("response_timeout", ANSWER_S, 0.05, 600)
         self._probe = options.text("probe")
         self._streams = streams_of(setup.subscriptions)
-        self._dialer = Dialer(self._place, tls=options.tls(self._place), via=setup.via)
+        self._dialer = Dialer(self._place, tls=options.tls(self._place), tunnel=setup.tunnel)
         self._talk: _Talk | None = None
 
     @property

@@ -25,4 +25,4 @@ def from_setup(setup: Setup) -> Transport:
     from urc.transports.mqtt_client import MqttTransport  # imports paho
 
     place = WebPlace(options.tls is not None, options.host, options.port, "")
-    return MqttTransport(options, Dialer(place, tls=options.tls, via=setup.via))
+    return MqttTransport(options, Dialer(place, tls=options.tls, tunnel=setup.tunnel))

@@ -36,7 +36,7 @@ class TopicGraph:
         self._looked.clear()
         found = version_of(types.values())
         if self._declared is not None and found not in (None, self._declared):
-            self._say(f"this bridge is ROS {found}: write 'ros: {found}' or 'ros: auto'")
+            self._say(f"this bridge is ROS {found}: write 'version: {found}' or 'version: auto'")
 
     def subscribed(self, wanted: Mapping[str, str]) -> None:
         """Check the subscribed topics and their types against the existing ones."""

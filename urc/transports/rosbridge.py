@@ -12,8 +12,8 @@ connections.
 
 The bridge reports no errors: a topic without a publisher, a wrong type and an access list all cause
 silence. So rosapi is asked for the topics at the start, and for the subscribers of a topic at its
-first message; `urc.transports.ros_graph` reports mistakes. With ``ros: auto`` the reply precedes
-the subscriptions, because it decides the form of type names.
+first message; `urc.transports.ros_graph` reports mistakes. With ``version: auto`` the reply
+precedes the subscriptions, because it decides the form of type names.
 """
 
 import asyncio
@@ -164,6 +164,8 @@ def from_setup(setup: Setup) -> Transport:
         TransportError: an option is missing or invalid.
     """
     options = setup.options
+    if (via := options.get("via", "rosbridge")) != "rosbridge":
+        raise TransportError(f"ros needs rosbridge as via, not {via!r}")
     host, port = options.get("host"), options.get("port", DEFAULT_PORT)
     if not isinstance(host, str) or not host.strip():
         raise TransportError(f"rosbridge needs a host name or address, not {host!r}")
@@ -172,9 +174,9 @@ def from_setup(setup: Setup) -> Transport:
     path, tls = options.get("path", "/"), options.get("tls") or None
     if not isinstance(path, str) or not path.startswith("/"):
         raise TransportError(f"rosbridge needs a path that starts with /, not {path!r}")
-    ros = options.get("ros")
+    ros = options.get("version")
     if ros is not None and (isinstance(ros, bool) or ros not in (1, 2, AUTO)):
-        raise TransportError(f"rosbridge needs 1, 2 or auto as ros, not {ros!r}")
+        raise TransportError(f"rosbridge needs 1, 2 or auto as version, not {ros!r}")
     host = host.strip()
     where = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
     url = f"{'ws' if tls is None else 'wss'}://{where}{path}"

@@ -95,8 +95,8 @@ def from_setup(setup: Setup) -> Transport:
     port = _options.text("serial", options, "port").strip()
     if not port:
         raise TransportError("serial needs a port, as /dev/ttyUSB0 or socket://HOST:PORT")
-    if setup.via is not None:
-        raise TransportError("serial goes through no other transport; leave via out")
+    if setup.tunnel is not None:
+        raise TransportError("serial goes through no other transport; leave tunnel out")
     if not port.startswith(_SOCKET):
         _need_serialx()
     return SerialTransport(port, _settings_of(options))

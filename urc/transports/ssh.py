@@ -1,8 +1,8 @@
 """SSH to a robot: a shell, a program, or only a tunnel for other transports.
 
 All users share one connection: the transport's own channel, if its mode has one, and the transports
-that name it in ``via``. The first user opens it, the last one closes it, and all users learn of its
-loss.
+that name it in ``tunnel``. The first user opens it, the last one closes it, and all users learn of
+its loss.
 """
 
 import asyncio
@@ -76,7 +76,7 @@ def read_target(setup: Setup) -> Target:
             legacy=_options.flag("ssh", options, "legacy", default=False),
         ),
         keys=HostKeys(pinned, file),
-        alive_every_s=_alive_every(options.get("alive_every", "2s")),
+        keepalive_s=_keepalive(options.get("keepalive_interval", "2s")),
         name=setup.name,
     )
 
@@ -113,11 +113,11 @@ def _text(options: Mapping[str, object], name: str) -> str:
     return value
 
 
-def _alive_every(value: object) -> float:
+def _keepalive(value: object) -> float:
     found = _DURATION.fullmatch(value) if isinstance(value, str) else None
     seconds = float(found[1]) * _SECONDS[found[2]] if found else 0.0
     if not _ALIVE_S[0] <= seconds <= _ALIVE_S[1]:
-        raise TransportError(f"ssh: alive_every is a time from 200ms to 1m, not {value!r}")
+        raise TransportError(f"ssh: keepalive_interval is a time from 200ms to 1m, not {value!r}")
     return seconds
 
 
@@ -314,9 +314,9 @@ def from_setup(setup: Setup) -> SshTransport:
     Raises:
         TransportError: an option is missing or invalid.
     """
-    if setup.via is not None and not isinstance(setup.via, SshTransport):
+    if setup.tunnel is not None and not isinstance(setup.tunnel, SshTransport):
         raise TransportError("ssh goes through another ssh only, or through nothing")
-    return SshTransport(read_target(setup), read_program(setup), setup.via)
+    return SshTransport(read_target(setup), read_program(setup), setup.tunnel)
 
 
 @asynccontextmanager

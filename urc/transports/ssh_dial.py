@@ -43,7 +43,7 @@ class Target(NamedTuple):
     address: Address
     login: Login
     keys: HostKeys
-    alive_every_s: float = 2.0
+    keepalive_s: float = 2.0
     """Silence after which a keepalive is sent, in seconds."""
     name: str = ""
     """Name of the transport, for the command that trusts a key."""
@@ -129,7 +129,7 @@ async def _connect(
                 has_authorities=bool(known.authorities),
                 legacy=target.login.legacy,
             ),
-            keepalive_interval=target.alive_every_s,
+            keepalive_interval=target.keepalive_s,
             keepalive_count_max=ALIVE_COUNT,
             gss_host=None,
             host_based_auth=False,

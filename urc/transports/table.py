@@ -14,7 +14,7 @@ TRANSPORTS = Table(
         "telnet": "urc.transports.telnet:from_setup",
         "http": "urc.transports.http:from_setup",
         "websocket": "urc.transports.websocket:from_setup",
-        "rosbridge": "urc.transports.rosbridge:from_setup",
+        "ros": "urc.transports.rosbridge:from_setup",
         "mqtt": "urc.transports.mqtt:from_setup",
     },
 )

@@ -258,13 +258,13 @@ class TcpTransport(StreamLine):
         host: str,
         port: int,
         *,
-        via: Carrier | None = None,
+        tunnel: Carrier | None = None,
         tls: Tls | None = None,
         read_ahead_bytes: int = READ_AHEAD_BYTES,
     ) -> None:
         """Initialise for `host` (name or address) and `port` 1..65535, without connecting."""
         super().__init__()
-        self._reach = Reach(host, port, via=via, tls=tls, read_ahead_bytes=read_ahead_bytes)
+        self._reach = Reach(host, port, tunnel=tunnel, tls=tls, read_ahead_bytes=read_ahead_bytes)
 
     @property
     def address(self) -> str:
@@ -316,9 +316,11 @@ def from_setup(setup: Setup) -> Transport:
             raise TransportError("tcp takes bind and from with mode: listen only")
         host = _options.host("tcp", options)
         tls = Tls.of("tcp", options.get("tls"))
-        return TcpTransport(host, port, via=setup.via, tls=tls)
-    if setup.via is not None:
-        raise TransportError("tcp cannot listen through another transport; leave via or mode out")
+        return TcpTransport(host, port, tunnel=setup.tunnel, tls=tls)
+    if setup.tunnel is not None:
+        raise TransportError(
+            "tcp cannot listen through another transport; leave tunnel or mode out"
+        )
     bind = _options.text("tcp", options, "bind", _LOOPBACK)
     only = _options.text("tcp", options, "host")
     who = _options.choice("tcp", options, "from", ("any", "host"), "host" if only else "any")

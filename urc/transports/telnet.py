@@ -52,12 +52,12 @@ class Wishes(NamedTuple):
 class TelnetTransport(StreamLine):
     """One Telnet connection; it may be opened repeatedly."""
 
-    def __init__(self, host: str, port: int, wishes: Wishes, via: Carrier | None = None) -> None:
-        """Initialise for `host`, tunnelled through `via` if given, without connecting."""
+    def __init__(self, host: str, port: int, wishes: Wishes, tunnel: Carrier | None = None) -> None:
+        """Initialise for `host`, tunnelled through `tunnel` if given, without connecting."""
         super().__init__()
         self._address = Address(host, port)
         self._wishes = wishes
-        self._via = via
+        self._tunnel = tunnel
 
     @property
     def address(self) -> str:
@@ -87,9 +87,9 @@ class TelnetTransport(StreamLine):
                 await inner.abort()
 
     async def _connect(self, timeout_s: float) -> tuple[ByteStream, socket.socket | None]:
-        if self._via is not None:
+        if self._tunnel is not None:
             host, port = self._address.host, self._address.port
-            return await self._via.connect(host, port, timeout_s), None
+            return await self._tunnel.connect(host, port, timeout_s), None
         line = await self._address.dial(timeout_s)
         try:
             # A Synch is urgent data; out of band, its last byte would be missing.
@@ -166,7 +166,7 @@ def from_setup(setup: Setup) -> TelnetTransport:
         terminal=terminal,
     )
     host, port = _options.host("telnet", options), _options.port("telnet", options)
-    return TelnetTransport(host, port, wishes, setup.via)
+    return TelnetTransport(host, port, wishes, setup.tunnel)
 
 
 def _begin(wishes: Wishes) -> tuple[TelnetTalk, bytes]:

@@ -284,8 +284,8 @@ def from_setup(setup: Setup) -> Transport:
         TransportError: an option is missing or invalid.
     """
     options = setup.options
-    if setup.via is not None:
-        raise TransportError("udp goes through no other transport; leave via out")
+    if setup.tunnel is not None:
+        raise TransportError("udp goes through no other transport; leave tunnel out")
     host = _options.text("udp", options, "host").strip()
     port = _options.port("udp", options) if options.get("port") is not None else 0
     listen = _options.port("udp", options, "listen") if options.get("listen") is not None else 0

@@ -32,10 +32,10 @@ _PIECE_BYTES = 65536
 class Dialer:
     """Connects to one server, repeatedly."""
 
-    def __init__(self, place: WebPlace, *, tls: Tls | None, via: Carrier | None) -> None:
-        """Initialise for `place`, with `tls` and through `via` if given."""
-        self._reach = Reach(place.host, place.port, via=via, tls=tls)
-        is_plain = tls is None and via is None
+    def __init__(self, place: WebPlace, *, tls: Tls | None, tunnel: Carrier | None) -> None:
+        """Initialise for `place`, with `tls` and through `tunnel` if given."""
+        self._reach = Reach(place.host, place.port, tunnel=tunnel, tls=tls)
+        is_plain = tls is None and tunnel is None
         self._address = Address(place.host, place.port) if is_plain else None
         self._bridges: set[asyncio.Task[None]] = set()
         self._carried: ByteStream | None = None

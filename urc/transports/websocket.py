@@ -56,10 +56,10 @@ class WebSocketTransport:
         self._subprotocols = [Subprotocol(one) for one in options.tokens("subprotocols")]
         self._is_text = options.choice("send_as", ("text", "binary"), "text") == "text"
         self._max_bytes = int(options.number("max_message", MAX_MESSAGE_BYTES, 1, 2**26))
-        self._ping_s = options.duration("ping_every", 5.0, 0.1, 3600)
+        self._ping_s = options.duration("ping_interval", 5.0, 0.1, 3600)
         self._pong_s = options.duration("ping_timeout", 5.0, 0.1, 3600)
         tls = options.tls(self._place)
-        self._dialer = Dialer(self._place, tls=tls, via=setup.via)
+        self._dialer = Dialer(self._place, tls=tls, tunnel=setup.tunnel)
         self._socket: ClientConnection | None = None
 
     @property

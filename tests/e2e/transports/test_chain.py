@@ -54,7 +54,7 @@ transports:
     reconnect: { initial: 100ms, max: 500ms }
   console:
     type: telnet
-    via: jump
+    tunnel: jump
     host: 127.0.0.1
     port: "{{ settings.telnet_port }}"
     framing: { type: delimiter, tx: CR, rx: CRLF }

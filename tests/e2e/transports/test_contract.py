@@ -32,7 +32,7 @@ PEERS = {
     "telnet": "tests.e2e.transports.peers.telnet:TelnetPeer",
     "http": "tests.e2e.transports.peers.http:HttpPeer",
     "websocket": "tests.e2e.transports.peers.websocket:WebSocketPeer",
-    "rosbridge": "tests.e2e.transports.peers.rosbridge:RosbridgePeer",
+    "ros": "tests.e2e.transports.peers.rosbridge:RosbridgePeer",
     "mqtt": "tests.e2e.transports.peers.mqtt:MqttPeer",
 }
 """Kind of transport (a variant after a space) → class of its `Peer`."""

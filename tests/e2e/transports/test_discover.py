@@ -35,7 +35,7 @@ title: Rover
 settings: { port: { type: port, default: 9090 } }
 discovery: { mdns: [_rosbridge._tcp] }
 transports:
-  ros: { type: rosbridge, host: 127.0.0.1, port: "{{ settings.port }}" }
+  ros: { type: ros, host: 127.0.0.1, port: "{{ settings.port }}" }
 """
 ODOMETRY = """
 signals: { x: {} }

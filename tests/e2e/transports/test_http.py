@@ -185,7 +185,7 @@ async def test_robot_that_asks_who_we_are(web: Server, kind: str) -> None:
 @WEB
 async def test_request_without_an_answer_is_given_up(web: Server) -> None:
     """It fails after its time, and the robot, which is still there, is asked on."""
-    async with line(web.port, answer_timeout="300ms") as transport:
+    async with line(web.port, response_timeout="300ms") as transport:
         answer = await asked(transport, "/slow.cgi")
         assert answer.attributes == {"id": 1, "ok": False, "reason": "no answer within 0.3 s"}
         assert (await asked(transport, "/state.json")).attributes["ok"] is True
@@ -353,7 +353,7 @@ async def test_line_through_another_transport(web: Server) -> None:
     async with nothing_left():
         topics = (Subscription("/lines.cgi", {"stream": "lines"}),)
         options = {"url": "http://robot.inside"}
-        transport = from_setup(Setup("web", options, topics, via=Detour(web.port)))
+        transport = from_setup(Setup("web", options, topics, tunnel=Detour(web.port)))
         await transport.open(20.0)
         heard = [(await received(transport)).body for _ in range(3)]
         assert heard == [b"line 1", b"line 2", b"line 3"]

@@ -36,7 +36,7 @@ def lines(host: str, port: int) -> Mapping[str, Mapping[str, object]]:
         "telnet": place,
         "http": {"url": f"http://{shown}:{port}/"},
         "websocket": {"url": f"ws://{shown}:{port}/ws?robot=puppet"},
-        "rosbridge": place,
+        "ros": place,
         "mqtt": place,
         "ssh": {**place, **login},
     }
@@ -102,7 +102,7 @@ async def test_nor_through_an_ssh_server_of_this_machine(host: str, port: int) -
                 "mode": "forward",
             },
         )
-        line = TRANSPORTS["tcp"].load()(Setup("line", lines(host, port)["tcp"], via=jump))
+        line = TRANSPORTS["tcp"].load()(Setup("line", lines(host, port)["tcp"], tunnel=jump))
         with pytest.raises(ConnectFailed) as told:
             await line.open(WAIT_S)
         assert SAID in str(told.value)
@@ -110,7 +110,7 @@ async def test_nor_through_an_ssh_server_of_this_machine(host: str, port: int) -
         server = await asyncio.start_server(lambda _, writer: writer.close(), "127.0.0.1", 0)
         async with server:
             other = lines("localhost", server.sockets[0].getsockname()[1])["tcp"]
-            line = TRANSPORTS["tcp"].load()(Setup("line", other, via=jump))
+            line = TRANSPORTS["tcp"].load()(Setup("line", other, tunnel=jump))
             await line.open(WAIT_S)
             await line.close()
         await jump.close()

@@ -38,7 +38,7 @@ settings:
   host: { type: host, default: 127.0.0.1 }
   port: { type: port, default: 9090 }
 transports:
-  ros: { type: rosbridge, host: "{{ settings.host }}", port: "{{ settings.port }}" }
+  ros: { type: ros, host: "{{ settings.host }}", port: "{{ settings.port }}" }
 signals:
   x: { unit: m }
 messages:
@@ -130,7 +130,7 @@ async def test_line_subscribes_each_topic_once_and_asks_which_there_are() -> Non
         Subscription("/camera", {"compression": "cbor"}),
     )
     async with nothing_left(), bridge() as robot:
-        transport = line(robot.port, *topics, ros=2)
+        transport = line(robot.port, *topics, version=2)
         await transport.open(20.0)
         asked, imu, camera = await robot.hears(3)
         assert asked["service"] == "/rosapi/topics"
@@ -231,7 +231,7 @@ async def test_driving_where_nothing_listens_is_told() -> None:
     twist = Envelope("publish", {"topic": "/cmd_vel", "type": "geometry_msgs/Twist"}, {})
     stray = Envelope("publish", {"topic": "/nobody", "type": "geometry_msgs/Twist"}, {})
     async with nothing_left(), bridge() as robot:
-        transport = line(robot.port, Subscription("/odom"), ros=2)
+        transport = line(robot.port, Subscription("/odom"), version=2)
         await transport.open(20.0)
         asked, _ = await robot.hears(2)
         types = {"/cmd_vel": "geometry_msgs/msg/TwistStamped", "/odom": "nav_msgs/msg/Odometry"}
@@ -258,10 +258,10 @@ async def test_driving_where_nothing_listens_is_told() -> None:
     [(["nav_msgs/Odometry"], "nav_msgs/Odometry"), (["x/msg/Y"], "nav_msgs/msg/Odometry")],
 )
 async def test_a_line_spells_types_as_the_bridge_does(types: list[str], spelled: str) -> None:
-    """``ros: auto`` serves both versions: the answer comes before the subscriptions."""
+    """``version: auto`` serves both versions: the answer comes before the subscriptions."""
     async with nothing_left(), bridge() as robot:
         odometry = Subscription("/odom", {"type": "nav_msgs/Odometry"})
-        transport = line(robot.port, odometry, ros="auto")
+        transport = line(robot.port, odometry, version="auto")
         opening = asyncio.create_task(transport.open(20.0))
         (asked,) = await robot.hears(1)
         await robot.answer(asked, {"topics": ["/odom"], "types": types})

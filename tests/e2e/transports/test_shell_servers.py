@@ -44,11 +44,11 @@ transports:
   shell: { type: ssh, host: 127.0.0.1, port: "{{ settings.ssh_port }}", pty: false,
            username: root, password: "{{ settings.password }}",
            framing: { type: delimiter, tx: LF, rx: LF } }
-  hidden: { type: tcp, via: jump, host: 10.0.0.21, port: 6571,
+  hidden: { type: tcp, tunnel: jump, host: 10.0.0.21, port: 6571,
             framing: { type: delimiter, tx: LF, rx: LF } }
   console: { type: telnet, host: 127.0.0.1, port: "{{ settings.telnet_port }}",
              framing: { type: delimiter, tx: LF, rx: LF } }
-  inside: { type: telnet, via: jump, host: 10.0.0.20,
+  inside: { type: telnet, tunnel: jump, host: 10.0.0.20,
             framing: { type: delimiter, tx: CR, rx: CRLF } }
 
 signals:
@@ -87,7 +87,7 @@ settings:
 transports:
   shell: { type: ssh, host: 127.0.0.1, port: "{{ settings.port }}", username: root,
            password: "{{ settings.password }}", KEY framing: { type: delimiter, tx: LF, rx: LF } }
-  hidden: { type: tcp, via: shell, host: 10.0.0.21, port: 6571,
+  hidden: { type: tcp, tunnel: shell, host: 10.0.0.21, port: 6571,
             framing: { type: delimiter, tx: LF, rx: LF } }
 
 signals:
@@ -118,7 +118,7 @@ settings:
 transports:
   jump: { type: ssh, mode: forward, host: 127.0.0.1, port: "{{ settings.ssh_port }}",
           username: root, password: "{{ settings.password }}" }
-  web: { type: http, via: jump, url: "SCHEME://10.0.0.20/api" }
+  web: { type: http, tunnel: jump, url: "SCHEME://10.0.0.20/api" }
 
 signals:
   depth: { type: number, unit: m }

@@ -213,7 +213,7 @@ async def test_ssh_goes_through_ssh(sshd: Sshd) -> None:
         "host": "127.0.0.1", "port": sshd.port, "username": USER, "password": PASSWORD,
         "mode": "exec", "command": "cat", "host_key": sshd.fingerprint,
     }  # fmt: skip
-    inner = from_setup(Setup("inner", options, via=outer))
+    inner = from_setup(Setup("inner", options, tunnel=outer))
     async with nothing_left():
         for _ in range(2):
             await inner.open(OPEN_S)

@@ -351,7 +351,7 @@ async def test_line_goes_through_another_transport(authority: Authority) -> None
     async with secret_echo(authority.sign("arm.inside")) as port, nothing_left():
         relay = Relay(port)
         options = {"host": "arm.inside", "port": 443, "tls": {"ca": authority.file}}
-        transport = from_setup(Setup("wire", options, via=relay))
+        transport = from_setup(Setup("wire", options, tunnel=relay))
         assert isinstance(transport, TcpTransport)
         await transport.open(20.0)
         assert relay.asked == [("arm.inside", 443)]

@@ -102,7 +102,7 @@ OPTIONS = {
     "ssh": "host: 127.0.0.1\n    port: '{{ settings.port }}'\n    username: me\n    password: x\n"
            "    pty: false\n    host_key: '{{ settings.key }}'\n" + FRAMED + GREETED + LINES,
     "websocket": "url: 'ws://127.0.0.1:{{ settings.port }}/'\n" + GREETED + LINES,
-    "rosbridge": "host: 127.0.0.1\n    port: '{{ settings.port }}'\n" + MESSAGES,
+    "ros": "host: 127.0.0.1\n    port: '{{ settings.port }}'\n" + MESSAGES,
     "mqtt": "host: 127.0.0.1\n    port: '{{ settings.port }}'\n"
             + MESSAGES.replace(", type: a/B", ""),
     "http": "url: 'http://127.0.0.1:{{ settings.port }}'\n" + WEB,
@@ -219,7 +219,7 @@ async def test_server_that_dies_again_and_again_is_told_everything_once(
     assert len(told) == len(set(told)), "something was said twice"
     if kind != "http":  # requests under way on several connections may overtake each other
         assert told == sorted(told), "something old was said late"
-    if kind not in ("rosbridge", "mqtt", "http"):
+    if kind not in ("ros", "mqtt", "http"):
         assert ear.greetings >= DEATHS
 
 

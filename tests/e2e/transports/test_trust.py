@@ -27,7 +27,7 @@ settings:
 transports:
   jump: { type: ssh, mode: forward, host: 127.0.0.1, port: "{{ settings.port }}", username: USER,
           password: "{{ settings.password }}" }
-  console: { type: tcp, via: jump, host: 127.0.0.1, port: 1,
+  console: { type: tcp, tunnel: jump, host: 127.0.0.1, port: 1,
              framing: { type: delimiter, tx: LF, rx: LF } }
 """
 

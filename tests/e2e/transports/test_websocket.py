@@ -167,7 +167,7 @@ async def test_line_through_another_transport() -> None:
     """The far end of the carrier knows the name; nothing is left when either side ends."""
     async with robot("cat") as port, nothing_left():
         url = "ws://robot.inside:8765/robot"
-        transport = from_setup(Setup("socket", {"url": url}, via=Detour(port)))
+        transport = from_setup(Setup("socket", {"url": url}, tunnel=Detour(port)))
         for _ in range(2):
             await transport.open(20.0)
             for _ in range(3):

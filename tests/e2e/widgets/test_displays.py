@@ -33,9 +33,9 @@ SIGNALS = {
         Signal("way", unit="rad"),
         Signal("roll", unit="deg", stale_after_s=60),
         Signal("pitch", unit="deg", stale_after_s=60),
-        Signal("turned", "array", of="number", size=4),
+        Signal("turned", "array", items="number", size=4),
         Signal("rssi", "integer", unit="dBm"),
-        Signal("cells", "array", of="number", unit="V", precision=2),
+        Signal("cells", "array", items="number", unit="V", precision=2),
         Signal("mode", "string"),
         Signal("report", "object"),
         Signal("seen", "image"),
@@ -65,7 +65,7 @@ async def shown(
     )
     grid = Grid(-(-len(uses) // columns), columns, slots)
     robot = FakeRobot(
-        profile._replace(interfaces={"default": Interface("default", "", {"wide": grid})})
+        profile._replace(interfaces={"default": Interface("default", "", {"landscape": grid})})
     )
     async with running_dashboard(robot) as address:
         page = await new_page()

@@ -67,7 +67,7 @@ async def look(page: Page) -> list[list[int]]:
 
 async def test_points_that_have_gone_are_not_drawn(new_page: PageMaker) -> None:
     """The scene is then as it was before there were any; they come back with the line."""
-    signals = {"seen": Signal("seen", "array", of="number", unit="m", stale_after_s=60)}
+    signals = {"seen": Signal("seen", "array", items="number", unit="m", stale_after_s=60)}
     use = WidgetUse("s", "scene3d", {"points": "seen"}, options={"view": "top"})
     steps = [0.004 * place for place in range(-20, 21)]
     plane = tuple(part for x in steps for y in steps for part in (x, y, 1.0))

@@ -100,7 +100,7 @@ async def test_lists_arrays_and_units_reach_a_widget(new_page: PageMaker, tmp_pa
     """In the order of the binding; elements in the unit that the input asks for."""
     folder = made_widget(tmp_path, "lines", LINES)
     ports = {
-        "series": Port("series", is_many=True),
+        "series": Port("series", is_multiple=True),
         "turned": Port("turned", ("array",), unit="deg"),
     }
     use = WidgetUse("lines", "lines", {"turned": "turned"}, lists={"series": ("b", "a")})

@@ -75,7 +75,7 @@ async def test_the_legend_of_a_plot_shows_every_signal(
     plot = WidgetUse("plot", "plot", lists={"series": tuple(names)})
     grid = Grid(3, 2, (Slot("plot", 0, 0, 1, 2),))
     profile = dashboard_profile(signals=signals, uses=[plot])
-    robot = FakeRobot(profile._replace(interfaces={"x": Interface("x", "X", {"wide": grid})}))
+    robot = FakeRobot(profile._replace(interfaces={"x": Interface("x", "X", {"landscape": grid})}))
     async with running_dashboard(robot) as address:
         page = await new_page(size="desktop")
         await page.set_viewport_size({"width": width, "height": height})

@@ -31,7 +31,7 @@ WIDGETS = {
     "attitude": "inputs: { roll: { type: number, unit: rad }, pitch: { type: number, unit: rad },"
     " yaw: { type: number, unit: rad, required: false } }",
     "compass": "inputs: { heading: { type: number, unit: deg } }",
-    "table": "inputs: { rows: { type: [integer, number, boolean, string], many: true } }",
+    "table": "inputs: { rows: { type: [integer, number, boolean, string], multiple: true } }",
     "button": "outputs: { press: {} }",
     "select": "inputs: { state: { type: string, required: false } }\n"
     "outputs: { change: { arguments: { value: V. } } }",
@@ -214,8 +214,8 @@ def test_the_grid_has_the_stick_at_the_bottom_right() -> None:
     """Large views first, and other controls where there is room."""
     uses = (use("a", "value"), use("stick", "joystick", "m"), use("cam", "camera"))
     slots = {one.slot: one for one in (*uses, use("ring", "button", "p"))}
-    grids = default_interface(slots, "T").grids
-    assert grids["wide"] == Grid(
+    grids = default_interface(slots, "T").layouts
+    assert grids["landscape"] == Grid(
         4,
         4,
         (
@@ -225,8 +225,8 @@ def test_the_grid_has_the_stick_at_the_bottom_right() -> None:
             Slot("ring", 0, 3),
         ),
     )
-    assert [slot.name for slot in grids["phone"].slots] == ["cam", "a", "ring", "stick"]
-    assert grids["phone"].columns == 2
+    assert [slot.name for slot in grids["phone_portrait"].slots] == ["cam", "a", "ring", "stick"]
+    assert grids["phone_portrait"].columns == 2
 
 
 def test_a_phone_that_lies_has_the_sticks_under_both_thumbs() -> None:
@@ -234,13 +234,13 @@ def test_a_phone_that_lies_has_the_sticks_under_both_thumbs() -> None:
     sticks = (use("drive", "joystick", "m"), use("look", "joystick", "m"))
     shown = (use("cam", "camera"), *(use(f"v{place}", "value") for place in range(8)))
     slots = {one.slot: one for one in (*shown, *sticks)}
-    low = default_interface(slots, "T").grids["low"]
+    low = default_interface(slots, "T").layouts["phone_landscape"]
     places = {slot.name: slot for slot in low.slots}
     assert places["drive"] == Slot("drive", 0, 5, 2, 2)
     assert places["look"] == Slot("look", 0, 0, 2, 2)
     assert places["cam"] == Slot("cam", 0, 2, 2, 2)
     assert (low.rows, low.columns) == (3, 7)
-    few = default_interface({"a": shown[1], "drive": sticks[0]}, "T").grids["low"]
+    few = default_interface({"a": shown[1], "drive": sticks[0]}, "T").layouts["phone_landscape"]
     assert (few.rows, few.columns) == (2, 3)
 
 
@@ -279,7 +279,7 @@ def ordered(interface: Interface) -> dict[str, tuple[int, int, set[Slot]]]:
     """Return the grids, in whichever order their slots are written."""
     return {
         screen: (grid.rows, grid.columns, set(grid.slots))
-        for screen, grid in interface.grids.items()
+        for screen, grid in interface.layouts.items()
     }
 
 

@@ -133,7 +133,7 @@ tests:
     assert [problem.message for problem in exercise(profile).problems] == []
 
 
-@pytest.mark.parametrize(("said", "is_told"), [("", True), (", answers: never", False)])
+@pytest.mark.parametrize(("said", "is_told"), [("", True), (", replies: never", False)])
 def test_a_line_that_never_answers_is_not_asked_to_notice_a_loss(
     said: str, is_told: bool, tmp_path: object
 ) -> None:
@@ -145,4 +145,4 @@ commands:
   drive: {{ send: "V {{{{ v }}}}", args: {{ v: {{}} }},
     hold: {{ repeat: 50ms, release: {{ v: 0 }}, watchdog: 500ms }} }}
 """
-    assert ("unnoticed-loss" in codes(text, tmp_path)) == is_told
+    assert ("no-loss-detection" in codes(text, tmp_path)) == is_told

@@ -29,23 +29,25 @@ def interface(folder: Folder, text: str) -> Interface:
 def test_tabs_are_pages_in_their_order(folder: Folder) -> None:
     """Each with its own pictures; what two of them show is one slot."""
     found = interface(
-        folder, "{ tabs: { drive: { grid: a b }, more_on_it: { grids: { wide: b, phone: b } } } }"
+        folder,
+        "{ tabs: { drive: { grid: a b },"
+        " more_on_it: { layouts: { landscape: b, phone_portrait: b } } } }",
     )
     assert [(page.name, page.title) for page in found.pages] == [
         ("drive", "Drive"),
         ("more_on_it", "More on it"),
     ]
-    assert found.pages[0].grids == {"wide": Grid(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))}
-    assert list(found.pages[1].grids) == ["wide", "phone"]
+    assert found.pages[0].layouts == {"landscape": Grid(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))}
+    assert list(found.pages[1].layouts) == ["landscape", "phone_portrait"]
     assert found.shown == ("a", "b")
 
 
 def test_an_interface_without_tabs_is_one_page(folder: Folder) -> None:
     """Which has no name, and all that the interface says."""
-    found = interface(folder, "{ grid: a b, left: { wide: b a }, mirror: false }")
+    found = interface(folder, "{ grid: a b, left_handed: { landscape: b a }, mirror: false }")
     (page,) = found.pages
     assert (page.name, page.is_mirrored) == ("", False)
-    assert page.left == {"wide": Grid(1, 2, (Slot("b", 0, 0), Slot("a", 0, 1)))}
+    assert page.left_handed == {"landscape": Grid(1, 2, (Slot("b", 0, 0), Slot("a", 0, 1)))}
 
 
 def test_what_an_interface_says_of_mirroring_holds_for_its_tabs(folder: Folder) -> None:

@@ -90,7 +90,9 @@ def test_puppet_becomes_the_model_that_it_describes() -> None:
             "battery", "battery", {"level": "battery"}, options={"show_number": True}
         )
     }
-    assert profile.interfaces["default"].grids == {"wide": Grid(2, 3, (Slot("battery", 1, 2),))}
+    assert profile.interfaces["default"].layouts == {
+        "landscape": Grid(2, 3, (Slot("battery", 1, 2),))
+    }
     assert list(profile.widgets) == ["battery"]
     (test,) = profile.tests
     assert test == DocumentTest(
@@ -214,7 +216,7 @@ def test_without_an_interface_the_widgets_are_laid_out(checked: Checker) -> None
         + MESSAGE
         + "widgets:\n  a: { use: battery, bind: { level: battery } }\n"
     )
-    assert profile.interfaces["default"].grids["wide"] == Grid(1, 1, (Slot("a", 0, 0),))
+    assert profile.interfaces["default"].layouts["landscape"] == Grid(1, 1, (Slot("a", 0, 0),))
 
 
 @pytest.mark.parametrize(
@@ -237,31 +239,31 @@ def test_without_any_look_each_signal_is_shown(
     profile = checked.profile(
         HEAD + WIRE + "signals:\n" + "".join(f"  {name}: {{ unit: V }}\n" for name in names)
     )
-    grids = profile.interfaces["default"].grids
+    grids = profile.interfaces["default"].layouts
     assert {name: (grid.rows, grid.columns) for name, grid in grids.items()} == {
-        "wide": wide,
-        "phone": phone,
-        "low": low,
+        "landscape": wide,
+        "phone_portrait": phone,
+        "phone_landscape": low,
     }
-    assert [slot.name for slot in grids["wide"].slots] == names
+    assert [slot.name for slot in grids["landscape"].slots] == names
     assert profile.slots["s0"] == WidgetUse("s0", "value", {"value": "s0"}, title="S0")
 
 
 def test_robot_with_nothing_to_show_has_an_empty_interface(checked: Checker) -> None:
     """There is always one interface."""
-    grid = checked.profile(HEAD + WIRE).interfaces["default"].grids["wide"]
+    grid = checked.profile(HEAD + WIRE).interfaces["default"].layouts["landscape"]
     assert grid == Grid(1, 1, ())
 
 
 def test_grid_slots_span_rows_and_columns(checked: Checker) -> None:
     """The picture is read by words, however they are spaced."""
     profile = checked.profile(
-        HEAD + WIRE + "interfaces:\n  x:\n    grids:\n      wide: |\n        a a .\n"
-        "        a   a     b\n      phone: a\n"
+        HEAD + WIRE + "interfaces:\n  x:\n    layouts:\n      landscape: |\n        a a .\n"
+        "        a   a     b\n      phone_portrait: a\n"
     )  # fmt: skip
-    assert profile.interfaces["x"].grids == {
-        "wide": Grid(2, 3, (Slot("a", 0, 0, 2, 2), Slot("b", 1, 2))),
-        "phone": Grid(1, 1, (Slot("a", 0, 0),)),
+    assert profile.interfaces["x"].layouts == {
+        "landscape": Grid(2, 3, (Slot("a", 0, 0, 2, 2), Slot("b", 1, 2))),
+        "phone_portrait": Grid(1, 1, (Slot("a", 0, 0),)),
     }
 
 

@@ -58,8 +58,8 @@ def tree(text: str, name: str = "a.yaml") -> Tree:
         ("s: {type: integer, min: 1}", "s: {type: number}", {"s": {"type": "number", "min": 1}}),
         (
             "i: {grid: a, title: t}",
-            "i: {grids: {wide: a}}",
-            {"i": {"title": "t", "grids": {"wide": "a"}}},
+            "i: {layouts: {landscape: a}}",
+            {"i": {"title": "t", "layouts": {"landscape": "a"}}},
         ),
     ],
 )

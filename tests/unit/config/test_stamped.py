@@ -7,7 +7,7 @@ import pytest
 from tests.unit.config.folder import Folder, head
 from urc.runtime.selftest import exercise
 
-ROS = "transports: { ros: { type: rosbridge, host: robot, stale_after: 3s, ros: auto } }\n"
+ROS = "transports: { ros: { type: ros, host: robot, stale_after: 3s, version: auto } }\n"
 DRIVE = """
 commands:
   drive:
@@ -64,4 +64,4 @@ def test_choices_of_a_param_may_be_of_several_types(tmp_path: Path, given: str) 
     )
     profile = folder.check("bot").profile
     assert profile is not None
-    assert str(profile.driver.transports["ros"].options["ros"]) == given
+    assert str(profile.driver.transports["ros"].options["version"]) == given

@@ -13,16 +13,16 @@ ARM = """
 commands:
   text:
     send: "MOVE {{ joints | join(',') }};"
-    args: { joints: { type: array, of: number, size: 3, min: -3, max: 3 } }
+    args: { joints: { type: array, items: number, size: 3, min: -3, max: 3 } }
   json:
     send: { json: { go: "{{ joints }}", speed: "{{ speed }}" } }
-    args: { joints: { type: array, of: integer }, speed: { default: 1 } }
+    args: { joints: { type: array, items: integer }, speed: { default: 1 } }
   binary:
     send: { struct: [{ id: joints, type: i8, count: 3 }] }
-    args: { joints: { type: array, of: integer, size: 3, default: [1, -2, 3] } }
+    args: { joints: { type: array, items: integer, size: 3, default: [1, -2, 3] } }
   counted:
     send: { struct: [{ id: names, type: text, size: u8, count: u8 }] }
-    args: { names: { type: array, of: string, choices: [a, b] } }
+    args: { names: { type: array, items: string, choices: [a, b] } }
 """
 
 

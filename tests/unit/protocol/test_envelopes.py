@@ -20,7 +20,7 @@ settings:
   space: { type: string, default: /rover }
 
 transports:
-  ros: { type: rosbridge, host: 127.0.0.1 }
+  ros: { type: ros, host: 127.0.0.1 }
   broker: { type: mqtt, host: 127.0.0.1 }
   web: { type: http, url: "http://127.0.0.1:8080" }
 

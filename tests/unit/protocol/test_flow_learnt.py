@@ -23,7 +23,7 @@ commands:
     args: { v: {} }
     hold: { repeat: 50ms, release: { v: 0 }, watchdog: 500ms }
 messages:
-  ping: { regex: '^PING$', answer: "{{ _session }} PONG" }
+  ping: { regex: '^PING$', acknowledge: "{{ _session }} PONG" }
 polls: [{ every: 2s, send: "{{ _session }} VOLTS" }]
 sequences:
   twice: [{ send: "{{ _session }} ONE" }, { run: count }, { send: "{{ _session }} TWO" }]

@@ -117,10 +117,10 @@ messages: { mode: { regex: '^(?P<mode>\\w+) (?P<own>\\w+)$' } }
 """
     ).connect()
     talk.at(10.0)
-    assert talk.faults == ["silent"]
+    assert talk.faults == ["no-data"]
     talk.says("a b")
     talk.at(20.0)
-    assert talk.faults == ["silent", "silent"]
+    assert talk.faults == ["no-data", "no-data"]
     ages = {name: one.stale_after_s for name, one in talk.engine.known._signals.items()}
     assert ages == {"mode": 1.0, "own": 9.0}
 

@@ -29,7 +29,7 @@ commands:
     hold: { repeat: 50ms, release: { v: 0 }, watchdog: 500ms }
   raw: { send: { hex: "01 {{ nonce(2) }}" } }
 polls: [{ every: 1s, phase: 1h, send: "POLL {{ nonce(1) | b64encode }}" }]
-messages: { ask: { regex: '^ASK$', answer: "IT IS {{ now | iso }}" } }
+messages: { ask: { regex: '^ASK$', acknowledge: "IT IS {{ now | iso }}" } }
 sequences: { say: [{ send: "{{ nonce(1) | b64encode }}" }, { send: "{{ nonce(1) | b64encode }}" }] }
 """
 

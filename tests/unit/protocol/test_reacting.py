@@ -102,7 +102,7 @@ def test_half_a_scan_does_not_outlive_its_connection(tmp_path: Path) -> None:
 
 def test_a_scan_without_an_end_is_dropped_and_told_once(tmp_path: Path) -> None:
     """Nothing grows without bound, and the next whole one is told again."""
-    made = engine(tmp_path, POINT % "begin: _mark == '<', most: 3")
+    made = engine(tmp_path, POINT % "begin: _mark == '<', max: 3")
     events = made.receive("wire", b"<1\n.2\n.3\n.4\n.5\n<6\n<7\n", 1.0)
     assert values(events, "ranges") == [(6,)]
     assert faults(events) == ["ranges: more than 3 values came before the last; dropped"]
@@ -142,7 +142,7 @@ def test_a_message_is_answered_at_once_even_before_the_line_is_ready(tmp_path: P
     made = engine(
         tmp_path,
         "ping: { regex: '^PING (?P<_token>[a-z]+)$',"
-        " answer: 'PONG {{ _token }} {{ settings.who }}' }",
+        " acknowledge: 'PONG {{ _token }} {{ settings.who }}' }",
     )
     events = made.receive("wire", b"PING abc\nPING def\n", 1.0)
     assert sent(events) == [b"PONG abc urc\n", b"PONG def urc\n"]
@@ -151,7 +151,7 @@ def test_a_message_is_answered_at_once_even_before_the_line_is_ready(tmp_path: P
 
 def test_answers_are_counted(tmp_path: Path) -> None:
     """The counters are those of the connection."""
-    made = engine(tmp_path, "ping: { equals: P, answer: \"{{ seq('n', 1, 2) }}\" }")
+    made = engine(tmp_path, "ping: { equals: P, acknowledge: \"{{ seq('n', 1, 2) }}\" }")
     assert sent(made.receive("wire", b"P\nP\nP\n", 1.0)) == [b"1\n", b"2\n", b"1\n"]
     made.closed("wire", "pulled", 2.0)
     made.start("wire", 3.0)
@@ -162,7 +162,7 @@ def test_an_answer_knows_what_was_read_before_and_nothing_that_is_old(tmp_path: 
     made = engine(
         tmp_path,
         "volts: { regex: '^V(?P<volts>[0-9.]+)$' }\n"
-        "ask: { equals: ASK, answer: \"{{ volts | default('none') }}\" }",
+        "ask: { equals: ASK, acknowledge: \"{{ volts | default('none') }}\" }",
     )
     assert sent(made.receive("wire", b"ASK\n", 1.0)) == [b"none\n"]
     made.receive("wire", b"V2.5\n", 2.0)
@@ -173,7 +173,8 @@ def test_an_answer_knows_what_was_read_before_and_nothing_that_is_old(tmp_path: 
 def test_an_answer_that_cannot_be_written_is_a_fault_and_its_message_is_not(tmp_path: Path) -> None:
     made = engine(
         tmp_path,
-        "volts: { regex: '^V(?P<volts>[0-9.]+)( (?P<_token>\\w+))?$', answer: '{{ _token }}' }",
+        "volts: { regex: '^V(?P<volts>[0-9.]+)( (?P<_token>\\w+))?$',"
+        " acknowledge: '{{ _token }}' }",
     )
     events = made.receive("wire", b"V2.5\n", 1.0)
     assert (values(events, "volts"), sent(events)) == ([2.5], [])

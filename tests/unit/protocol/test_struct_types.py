@@ -39,7 +39,7 @@ commands:
     send: { struct: [{ id: head, type: header }, u8 6, u16be first, u16be level] }
     reply: { struct: [header, u8 6, u16be _first, u16be _level], match: _id == seq.id }
 signals:
-  registers: { type: array, of: integer }
+  registers: { type: array, items: integer }
 """
 
 

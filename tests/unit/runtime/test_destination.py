@@ -42,7 +42,7 @@ def test_how_one_talks_there_makes_no_other_place(changed: dict[str, str]) -> No
 
 
 def test_options_of_manner_make_no_other_place() -> None:
-    assert destination_of(rover(alive_every=5), "drivers/rover", VALUES) == BEFORE
+    assert destination_of(rover(keepalive_interval=5), "drivers/rover", VALUES) == BEFORE
 
 
 @pytest.mark.parametrize("changed", [{"host": "10.0.0.6"}, {"port": 2222}])

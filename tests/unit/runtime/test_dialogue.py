@@ -295,7 +295,7 @@ urc: 1
 kind: robot
 name: rover
 transports:
-  ros: { type: rosbridge, host: robot }
+  ros: { type: ros, host: robot }
   web: { type: http, url: "http://robot" }
 signals: { x: {}, level: {} }
 messages:
@@ -303,7 +303,7 @@ messages:
 commands:
   ring:
     to: ros
-    args: { how: { type: array, of: integer } }
+    args: { how: { type: array, items: integer } }
     send: { publish: { topic: /bell, type: std_msgs/Bell, json: { data: "{{ how }}" } } }
   reset:
     to: ros

@@ -31,7 +31,7 @@ class Stub:
         self.address = f"stub {setup.name}"
 
 
-KINDS = ("tcp", "udp", "serial", "mqtt", "rosbridge", "ssh")
+KINDS = ("tcp", "udp", "serial", "mqtt", "ros", "ssh")
 TABLE = Table("urc.transports", dict.fromkeys(KINDS, f"{__name__}:Stub"))
 
 
@@ -39,7 +39,7 @@ def reins(driver: Driver, *, is_guarded: bool = False) -> GuardClient:
     return take_reins(driver, {}, TABLE, FakeClock(), is_guarded=is_guarded)
 
 
-def robot(kind: str, *on_stall: str, via: str = "") -> Driver:
+def robot(kind: str, *on_stall: str, tunnel: str = "") -> Driver:
     """Return a robot with a line of a kind, and controls on it that say this of a stall."""
     commands = {}
     for number, said in enumerate(on_stall):
@@ -51,7 +51,7 @@ def robot(kind: str, *on_stall: str, via: str = "") -> Driver:
     commands["away"] = away._replace(hold=away.hold._replace(on_stall="abort"))
     specs = {
         "other": TransportSpec("other", "tcp"),
-        "wire": TransportSpec("wire", kind, via=via),
+        "wire": TransportSpec("wire", kind, tunnel=tunnel),
     }
     return Driver(specs, commands=commands)
 
@@ -64,8 +64,8 @@ def test_guard_is_told_the_terms_of_each_held_command() -> None:
 @pytest.mark.parametrize(
     ("driver", "is_dear"),
     [
-        *((robot(kind, ""), kind in ("serial", "mqtt", "rosbridge", "ssh")) for kind in KINDS),
-        (robot("tcp", "", via="other"), True),
+        *((robot(kind, ""), kind in ("serial", "mqtt", "ros", "ssh")) for kind in KINDS),
+        (robot("tcp", "", tunnel="other"), True),
         (robot("tcp", "wait"), True),
         (robot("ssh", "abort"), False),
         (robot("tcp", "wait", "abort"), False),
@@ -81,22 +81,22 @@ def test_line_that_is_dear_to_open_is_waited_for(driver: Driver, is_dear: bool) 
 
 def test_guard_is_told_how_to_make_each_line() -> None:
     """As it is made here, in the order in which they carry each other."""
-    other, line = reins(robot("ssh", via="other")).lines
+    other, line = reins(robot("ssh", tunnel="other")).lines
     assert other.make.line == "other"
-    assert (other.make.via, line.make.via) == ("", "other")
+    assert (other.make.tunnel, line.make.tunnel) == ("", "other")
     assert line.make.line == "wire"
     assert line.make.factory == f"{__name__}:Stub"
     assert (line.make.options, line.make.subscriptions) == ({}, [])
     assert isinstance(line.transport, Stub)
     assert line.transport.setup.name == "wire"
-    assert line.transport.setup.via is other.transport
+    assert line.transport.setup.tunnel is other.transport
 
 
 def test_guard_is_told_the_settings_and_what_is_listened_to() -> None:
     port = compile_template("{{ settings.port }}")
     read = ReadSpec("json", topic=compile_template("/odom"), listen={"type": "Odometry"})
     driver = Driver(
-        {"wire": TransportSpec("wire", "rosbridge", options={"port": port})},
+        {"wire": TransportSpec("wire", "ros", options={"port": port})},
         messages={"odom": Message("odom", "wire", read)},
     )
     movers = take_reins(driver, {"port": 9090}, TABLE, FakeClock(), is_guarded=False)

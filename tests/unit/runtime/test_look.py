@@ -82,4 +82,4 @@ def test_a_robots_file_of_another_name_is_still_warned_of(tmp_path: Path) -> Non
     home = write_package(tmp_path, "robot", "my-puppet")
     other = home.rename(home.with_name("other")) / "robot.yaml"
     problems = check(str(other), built_in_catalog(), shelf_of(other)).problems
-    assert "other-name" in {problem.code for problem in problems}
+    assert "name-mismatch" in {problem.code for problem in problems}

@@ -70,7 +70,7 @@ WEB = "type: websocket, framing: { type: datagram }"
         (f'{WEB}, url: "ws://169.254.1.2/{{{{ settings.n }}}}"', "169.254.1.2"),
         (f'{TCP}, host: "{{{{ settings.host }}}}"', ""),
         (f"{TCP}, host: 10.0.0.5", ""),
-        (f"{TCP}, host: 127.0.0.1, via: jump", ""),
+        (f"{TCP}, host: 127.0.0.1, tunnel: jump", ""),
     ],
 )
 def test_a_package_fixes_no_host_to_this_machine(line: str, host: str, tmp_path: Path) -> None:

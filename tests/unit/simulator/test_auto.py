@@ -311,7 +311,7 @@ def test_answers_repeat_the_counters_of_binary_requests(tmp_path: Path) -> None:
     body = """
 signals:
   level: { type: integer, min: 0, max: 9 }
-  any: { type: array, of: integer, size: 2 }
+  any: { type: array, items: integer, size: 2 }
 commands:
   read:
     args: { register: { type: integer } }

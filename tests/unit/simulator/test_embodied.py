@@ -44,7 +44,7 @@ simulator:
     body: { type: differential, acceleration: 100 }
     drive: { forward: "{{ v }}" }
     camera: { width: 64, height: 48, flip: "{{ turned }}" }
-    plan: { ground: grass }
+    map: { ground: grass }
     signals: { x: "{{ world.x }}", speed: "{{ world.speed }}", eye: "{{ world.picture }}" }
   wire:
     - { command: drive, set: { v: "{{ speed }}" } }
@@ -169,7 +169,7 @@ def test_a_rule_publishes_to_who_listens(tmp_path: Path) -> None:
 urc: 1
 kind: robot
 name: ros
-transports: { ros: { type: rosbridge, host: robot } }
+transports: { ros: { type: ros, host: robot } }
 signals: { x: {} }
 messages: { x: { subscribe: { topic: /x, type: std_msgs/Float32 }, json: { x: data } } }
 simulator:

@@ -34,7 +34,7 @@ simulator:
   state: { v: 0.0 }
   world:
     body: { type: differential, acceleration: 100 }
-    plan: { walls: [{ from: [3, -3], to: [3, 3] }] }
+    map: { walls: [{ from: [3, -3], to: [3, 3] }] }
     drive: { forward: "{{ v }}" }
     laser: { rays: 1, from: 0, to: 1, noise: 0.1 }
     signals:

@@ -8,7 +8,7 @@ from urc.simulator.twin import Twin
 
 ROS = """
 transports:
-  ros: { type: rosbridge, host: 127.0.0.1 }
+  ros: { type: ros, host: 127.0.0.1 }
 signals:
   v: { type: number, unit: m/s }
 commands:

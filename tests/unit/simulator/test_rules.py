@@ -332,7 +332,7 @@ urc: 1
 kind: robot
 name: rover
 transports:
-  ros: { type: rosbridge, host: robot }
+  ros: { type: ros, host: robot }
   web: { type: http, url: "http://robot" }
 signals: { x: { min: 0, max: 1 } }
 messages:

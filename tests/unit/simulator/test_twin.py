@@ -102,7 +102,7 @@ def test_a_reply_of_fields_that_mean_nothing_elsewhere_is_answered_all_the_same(
     path = tmp_path / "caller.yaml"
     path.write_text(
         "urc: 1\nkind: robot\nname: caller\n"
-        "transports: { ros: { type: rosbridge, host: 127.0.0.1 } }\n"
+        "transports: { ros: { type: ros, host: 127.0.0.1 } }\n"
         "signals: { x: {} }\n"
         "messages: { x: { subscribe: { topic: /x }, json: { x: data } } }\n"
         "commands:\n"

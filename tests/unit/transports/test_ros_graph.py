@@ -57,4 +57,4 @@ def test_the_version_of_ros_shows_in_its_types(types: list[str], version: int | 
 def test_another_version_than_the_documents_is_told() -> None:
     known, told = graph(2)
     known.learn({"/odom": "nav_msgs/Odometry"})
-    assert told == ["this bridge is ROS 1: write 'ros: 1' or 'ros: auto'"]
+    assert told == ["this bridge is ROS 1: write 'version: 1' or 'version: auto'"]

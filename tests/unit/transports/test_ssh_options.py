@@ -16,7 +16,7 @@ def test_least_that_ssh_needs() -> None:
     setup = Setup("jump", GOOD)
     target = read_target(setup)
     assert (target.address.text, target.login) == ("10.0.0.5:22", Login("robot"))
-    assert (target.alive_every_s, target.keys.is_pinned) == (2.0, False)
+    assert (target.keepalive_s, target.keys.is_pinned) == (2.0, False)
     assert read_program(setup) == Program("shell", "", True, ())
     assert from_setup(setup).address == "ssh 10.0.0.5:22"
 
@@ -46,8 +46,11 @@ def test_secrets_stay_out_of_what_is_printed() -> None:
         ({"mode": "exec"}, "ssh: 'mode: exec' needs a command"),
         ({"command": "cat"}, "ssh: a command needs 'mode: exec', not 'mode: shell'"),
         ({"pty": "yes"}, "ssh needs true or false as pty, not 'yes'"),
-        ({"alive_every": "2h"}, "ssh: alive_every is a time from 200ms to 1m, not '2h'"),
-        ({"alive_every": 5}, "ssh: alive_every is a time from 200ms to 1m, not 5"),
+        (
+            {"keepalive_interval": "2h"},
+            "ssh: keepalive_interval is a time from 200ms to 1m, not '2h'",
+        ),
+        ({"keepalive_interval": 5}, "ssh: keepalive_interval is a time from 200ms to 1m, not 5"),
         ({"environment": "A=b"}, "ssh: environment is a list of NAME: value"),
         ({"environment": {"A B": "c"}}, "ssh: 'A B' is no name of an environment variable"),
         ({"environment": {"A": 1}}, "ssh: environment.A is text; put it in quotation marks"),

@@ -63,8 +63,8 @@ BESIDE: list[tuple[dict[str, object], str]] = [
     ),
     ({"max_body": 0}, "http needs max_body from 1 to 2.68435e+08, not 0"),
     ({"in_flight": True}, "http needs a number as in_flight, not True"),
-    ({"answer_timeout": "soon"}, "http needs answer_timeout from 0.05s to 600s, not 'soon'"),
-    ({"answer_timeout": "20m"}, "http needs answer_timeout from 0.05s to 600s, not '20m'"),
+    ({"response_timeout": "soon"}, "http needs response_timeout from 0.05s to 600s, not 'soon'"),
+    ({"response_timeout": "20m"}, "http needs response_timeout from 0.05s to 600s, not '20m'"),
 ]
 
 

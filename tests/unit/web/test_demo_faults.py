@@ -27,7 +27,7 @@ def lamp(folder: Path) -> Widget:
     """Return the widget of the demo."""
     inputs = {
         "level": Port("level"),
-        "series": Port("series", is_many=True),
+        "series": Port("series", is_multiple=True),
         "extra": Port("extra", is_required=False),
     }
     options = {"label": {"type": "string", "maxLength": 8}}

@@ -40,7 +40,7 @@ states:
 def made(folder: Path, demo: str = DEMO) -> Widget:
     """Return a widget of a folder with this demo."""
     (folder / "demo.yaml").write_text(demo, "utf-8")
-    inputs = {name: Port(name, is_many=name == "series") for name in ("level", "series", "eye")}
+    inputs = {name: Port(name, is_multiple=name == "series") for name in ("level", "series", "eye")}
     outputs = {"moved": Port("moved", is_held=True, arguments=("x",)), "press": Port("press")}
     return Widget("lamp", "Lamp", folder, inputs, outputs)
 

@@ -142,7 +142,7 @@ class Expander:
         if unlike:
             self.findings.error(
                 part,
-                "unlike-values",
+                "incompatible-values",
                 f"the values of {unlike[0]!r} are of different kinds",
                 at=unlike[0],
                 hint="give only plain values, or only mappings with the same keys",

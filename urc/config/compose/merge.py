@@ -14,7 +14,7 @@ from urc.source import Document, Mark, Path
 __all__ = ["Tree", "children", "count_nodes", "item_name", "mark_inside", "merge"]
 
 _NAMES: Final = ("name", "id")
-_EXCLUSIVE: Final = (frozenset(("grid", "grids", "tabs")),)
+_EXCLUSIVE: Final = (frozenset(("grid", "layouts", "tabs")),)
 """Groups of keys that exclude each other, in addition to forms of frames."""
 _OF_USED_DRIVER: Final = frozenset(("use", "params", "overrides"))
 """Keys of a robot's ``driver`` that names a document."""

@@ -269,9 +269,9 @@ def link_driver(
         message = driver.messages[name]
         linker.transport(inner, "from", message.transport)
         linker.fields(inner, message.read)
-        if message.answer is not None:
+        if message.acknowledge is not None:
             known = (*message.read.fields, *driver.signals, *said_on(driver, message.transport))
-            linker.templates(inner.must("answer"), message.answer, known)
+            linker.templates(inner.must("acknowledge"), message.acknowledge, known)
     return linker.uses
 
 

@@ -78,7 +78,7 @@ def _link_slew(findings: Findings, slew: Mapping[str, Part], command: Command) -
         argument = known_argument(name, inner, command, findings)
         if argument is None:
             continue
-        kind = argument.of if argument.type == "array" else argument.type
+        kind = argument.items if argument.type == "array" else argument.type
         if kind not in ("integer", "number") or argument.choices:
             what = "has choices" if argument.choices else f"is {kind}"
             text = f"argument {name!r} {what}, and has no values in between"
@@ -263,7 +263,7 @@ def check_value(part: Part, argument: Argument, findings: Findings) -> None:
     """Check a plain value at `part` for an argument."""
     value = part.data
     try:
-        elements = fit_argument(value, argument.type, argument.of, argument.size)
+        elements = fit_argument(value, argument.type, argument.items, argument.size)
     except ValueError as error:
         text = f"argument {argument.name!r}: {error}"
         findings.error(part, "wrong-type", text, hint=fit_hint(value, argument.type))

@@ -142,8 +142,10 @@ def _bindings(
     outputs = _kept(old.outputs, widget.outputs)
     given = {key: one for key, one in old.given.items() if key in outputs}
     bound = _Bound(
-        _kept(old.inputs, {key: port for key, port in widget.inputs.items() if not port.is_many}),
-        _kept(old.lists, {key: port for key, port in widget.inputs.items() if port.is_many}),
+        _kept(
+            old.inputs, {key: port for key, port in widget.inputs.items() if not port.is_multiple}
+        ),
+        _kept(old.lists, {key: port for key, port in widget.inputs.items() if port.is_multiple}),
         outputs,
         given,
     )
@@ -185,13 +187,13 @@ def _bind_input(
             f"{port.name!r} is an input, so it needs the name of a signal",
             hint="only outputs take a command with its arguments",
         )
-    elif isinstance(part.data, list) and not port.is_many:
+    elif isinstance(part.data, list) and not port.is_multiple:
         findings.error(
             part,
             "wrong-type",
             f"{port.name!r} of widget {widget.name!r} takes one signal, not a list",
         )
-    elif port.is_many:
+    elif port.is_multiple:
         each = part.items() if isinstance(part.data, list) else [part]
         bound.lists[port.name] = tuple(inner.data for inner in each)
         if driver is not None:
@@ -261,9 +263,10 @@ def misfit(port: Port, signal: Signal) -> str:
     if signal.type not in types:
         return f"type {' or '.join(port.types)} is expected, the signal is {signal.type}"
     if signal.type == "array":
-        of = (*port.of, "integer") if "number" in port.of else port.of
-        if of and signal.of not in of:
-            return f"an array of {' or '.join(port.of)} is expected, the signal is of {signal.of}"
+        of = (*port.items, "integer") if "number" in port.items else port.items
+        if of and signal.items not in of:
+            wanted = " or ".join(port.items)
+            return f"an array of {wanted} is expected, the signal is of {signal.items}"
         if None not in (port.size, signal.size) and port.size != signal.size:
             return f"an array of {port.size} elements is expected, the signal has {signal.size}"
     if port.unit and conversion(signal.unit, port.unit) is None:

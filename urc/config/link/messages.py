@@ -19,7 +19,7 @@ def check_messages(part: Part, driver: Driver, findings: Findings) -> None:
     for name, inner in part.named("messages").items():
         spec = driver.transports.get(driver.messages[name].transport)
         _check_read(inner, spec, findings, wants_topic=True)
-        _check_answer(inner.get("answer"), spec, findings)
+        _check_answer(inner.get("acknowledge"), spec, findings)
     for place, inner in _requests(part):
         spec = driver.transports.get(_target(place, driver))
         verb = _check_send(inner.get("send"), spec, findings)
@@ -101,7 +101,7 @@ def _check_send(part: Part | None, spec: TransportSpec | None, findings: Finding
             key=True,
             hint="write text, or one of the forms hex, bytes, struct and json",
         )
-    elif form and spec.type == "rosbridge":
+    elif form and spec.type == "ros":
         _check_ros(part.must(form), findings)
     return form
 
@@ -113,7 +113,7 @@ def _check_ros(part: Part, findings: Findings) -> None:
             findings.error(
                 part,
                 "wrong-form",
-                f"rosbridge carries JSON and has no {key!r}",
+                f"ros carries JSON and has no {key!r}",
                 at=key,
                 key=True,
                 hint="write the message's fields: json: { data: … }",
@@ -193,35 +193,35 @@ def _check_head(part: Part, spec: TransportSpec, findings: Findings) -> None:
 def check_via(
     parts: Mapping[str, Part], transports: Mapping[str, TransportSpec], findings: Findings
 ) -> set[str]:
-    """Report a transport whose `via` cannot carry it; return the transports that carry others."""
+    """Report each `tunnel` that cannot carry its transport; return all tunnels."""
     carriers: set[str] = set()
     for name, spec in transports.items():
-        if not spec.via:
+        if not spec.tunnel:
             continue
         part = parts[name]
-        carrier = transports.get(spec.via)
+        carrier = transports.get(spec.tunnel)
         if carrier is None:
-            hint = did_you_mean(spec.via, transports, "transports")
-            text = f"there is no transport {spec.via!r}"
-            findings.error(part, "unknown-transport", text, at="via", hint=hint)
+            hint = did_you_mean(spec.tunnel, transports, "transports")
+            text = f"there is no transport {spec.tunnel!r}"
+            findings.error(part, "unknown-transport", text, at="tunnel", hint=hint)
         elif carrier.type not in CARRIERS:
-            text = f"{spec.via!r} has the type {carrier.type}, which cannot be a tunnel"
+            text = f"{spec.tunnel!r} has the type {carrier.type}, which cannot be a tunnel"
             hint = f"possible types: {', '.join(sorted(CARRIERS))}"
-            findings.error(part, "wrong-form", text, at="via", hint=hint)
+            findings.error(part, "wrong-form", text, at="tunnel", hint=hint)
         elif _is_circular(name, transports):
             text = f"{name!r} is a tunnel through itself"
-            findings.error(part, "wrong-form", text, at="via", hint="break the circle")
+            findings.error(part, "wrong-form", text, at="tunnel", hint="break the circle")
         else:
-            carriers.add(spec.via)
+            carriers.add(spec.tunnel)
     return carriers
 
 
 def _is_circular(name: str, transports: Mapping[str, TransportSpec]) -> bool:
     seen = {name}
-    through = transports[name].via
+    through = transports[name].tunnel
     while through in transports:
         if through in seen:
             return True
         seen.add(through)
-        through = transports[through].via
+        through = transports[through].tunnel
     return False

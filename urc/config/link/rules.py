@@ -64,12 +64,12 @@ def _value(part: Part, signal: Signal, findings: Findings) -> Reading:
         findings.error(part, "wrong-type", text)
         return None
     if (signal.type == "array") != isinstance(data, list):
-        wanted = f"a list of {signal.of}s" if signal.type == "array" else "no list"
+        wanted = f"a list of {signal.items}s" if signal.type == "array" else "no list"
         text = f"signal {signal.name!r} is of type {signal.type}: expected {wanted}"
         findings.error(part, "wrong-type", text)
         return None
     if isinstance(data, list):
-        return tuple(_single(inner, signal, signal.of, findings) for inner in part.items())
+        return tuple(_single(inner, signal, signal.items, findings) for inner in part.items())
     return _single(part, signal, signal.type, findings)
 
 

@@ -181,12 +181,12 @@ def _expected(
     if part.data is None or is_part:
         return None
     if (signal.type == "array") != isinstance(part.data, list):
-        wanted = f"a list of {signal.of}s" if signal.type == "array" else "no list"
+        wanted = f"a list of {signal.items}s" if signal.type == "array" else "no list"
         text = f"signal {name!r} is of type {signal.type}: expected {wanted}"
         findings.error(part, "wrong-type", text)
         return None
     if signal.type == "array":
-        return tuple(_fitting(inner, signal, signal.of, findings) for inner in part.items())
+        return tuple(_fitting(inner, signal, signal.items, findings) for inner in part.items())
     return _fitting(part, signal, signal.type, findings)
 
 
@@ -291,7 +291,7 @@ def _check_argument(
     if argument is None or may_fail:
         return  # a test of a failure may give invalid values
     try:
-        elements = fit_argument(part.data, argument.type, argument.of, argument.size)
+        elements = fit_argument(part.data, argument.type, argument.items, argument.size)
     except ValueError as error:
         findings.error(
             part,

@@ -42,9 +42,9 @@ def _check_needs(
 ) -> None:
     tried = part.named("bind")  # their problems are already reported
     given = {name for name, value in use.options.items() if value not in ("", None)}
-    if widget.needs and not {*bound, *tried, *given} & {*widget.needs}:
-        options = [name for name in widget.needs if name in widget.options]
-        ports = [name for name in widget.needs if name not in widget.options]
+    if widget.at_least_one_of and not {*bound, *tried, *given} & {*widget.at_least_one_of}:
+        options = [name for name in widget.at_least_one_of if name in widget.options]
+        ports = [name for name in widget.at_least_one_of if name not in widget.options]
         ways = [f"bind {_one_of(ports)}"] if ports else []
         ways += [f"give the option {_one_of(options)}"] if options else []
         findings.error(
@@ -64,7 +64,7 @@ def _check_groups(
     part: Part, widget: Widget, bound: Mapping[str, object], findings: Findings
 ) -> None:
     tried = part.named("bind")
-    for group in widget.together:
+    for group in widget.required_together:
         there = [name for name in group if name in bound or name in tried]
         missing = [name for name in group if name not in there]
         mine = [name for name in there if name in tried]
@@ -87,7 +87,7 @@ def _check_instead(
     """
     said = (*part.named("bind").items(), *part.named("options").items())
     for port in widget.inputs.values():
-        lost = [inner for name, inner in said if port.name in bound and name in port.instead_of]
+        lost = [inner for name, inner in said if port.name in bound and name in port.replaces]
         for inner in lost:
             findings.warn(
                 inner,
@@ -151,7 +151,7 @@ def _check_order(part: Part, use: WidgetUse, widget: Widget, findings: Findings)
     """Report an option that is not below the option that limits it."""
     own = part.named("options")
     for name, schema in widget.options.items():
-        above = schema.get("below") if isinstance(schema, Mapping) else None
+        above = schema.get("less_than") if isinstance(schema, Mapping) else None
         if above is None or not (name in own or above in own):
             continue
         low, high = use.options.get(name), use.options.get(above)
@@ -167,7 +167,7 @@ def _check_order(part: Part, use: WidgetUse, widget: Widget, findings: Findings)
 def _check_local(part: Part, widget: Widget, findings: Findings) -> None:
     """Report an address on another server."""
     options = part.get("options")
-    for name, inner in named_texts(options, widget.options, "local") if options else ():
+    for name, inner in named_texts(options, widget.options, "same_origin") if options else ():
         if inner.data and not _LOCAL.match(inner.data):
             findings.error(
                 inner,
@@ -185,10 +185,10 @@ def _check_given(
     options = part.get("options")
     if options is None:
         return
-    for name, inner in named_texts(options, widget.options, "gives"):
+    for name, inner in named_texts(options, widget.options, "argument_of"):
         schema: Any = widget.options[name]
-        is_item = "gives" not in schema
-        port = widget.outputs[schema["items"]["gives"] if is_item else schema["gives"]]
+        is_item = "argument_of" not in schema
+        port = widget.outputs[schema["items"]["argument_of"] if is_item else schema["argument_of"]]
         text = inner.data.partition("=")[0] if is_item else inner.data
         for argument in _arguments(use, port, driver):
             _check_text(inner, text, argument, use.outputs[port.name], findings)

@@ -66,7 +66,7 @@ def with_collected(part: Part, spec: ReadSpec, findings: Findings) -> ReadSpec:
                 value,
                 findings.expression(begin) if begin else None,
                 findings.expression(end) if end else None,
-                inner.integer("most") or Collect(value).most,
+                inner.integer("max") or Collect(value).max,
             )
     return spec._replace(fields=(*spec.fields, *found), collects=found) if found else spec
 

@@ -126,7 +126,7 @@ def spoken_name(name: str) -> str:
 
 def _message(part: Part, lines: _Lines, findings: Findings) -> Message:
     transport = lines.name(part, "from")
-    context, answer = lines.context(transport), part.get("answer")
+    context, answer = lines.context(transport), part.get("acknowledge")
     read = with_collected(part, parse_read(part, findings, context), findings)
     sent = None if answer is None else parse_write(answer, findings, context)
     return Message(part.name, transport, read, sent)
@@ -191,7 +191,7 @@ def _argument(part: Part, findings: Findings) -> Argument:
         is_required=part.flag("required", default=default is None),
         allows_control=part.flag("allow_control", default=False),
         description=part.text("description"),
-        of=of,  # type: ignore[arg-type]  # as above
+        items=of,  # type: ignore[arg-type]  # as above
         size=part.integer("size"),
     )
     return parse_choice_questions(part, argument, findings)
@@ -230,7 +230,7 @@ def _default(inner: Part, argument: Part, kind: str, findings: Findings) -> Read
     if size is not None and len(inner.data) != size:
         text = f"expected {size} elements, found {len(inner.data)}"
         findings.error(inner, "wrong-size", text)
-    return tuple(_fitting(one, argument.text("of", "number"), findings) for one in inner.items())
+    return tuple(_fitting(one, argument.text("items", "number"), findings) for one in inner.items())
 
 
 def _fitting(part: Part, kind: str, findings: Findings) -> Value:

@@ -324,7 +324,7 @@ def parse_choice_questions(part: Part, argument: Argument, findings: Findings) -
     asked = part.named("confirm")
     if not asked:
         return argument
-    kind = argument.of if argument.type == "array" else argument.type
+    kind = argument.items if argument.type == "array" else argument.type
     words = ["true", "false"] if kind == "boolean" else [_written(one) for one in argument.choices]
     if not words:
         findings.error(

@@ -5,7 +5,7 @@ from typing import Final
 
 from urc.config.parse.driver import spoken_name
 from urc.config.part import Findings, Part
-from urc.model.interface import DEBUG, Grid, Interface, Slot, Tab
+from urc.model.interface import DEBUG, SCREENS, Grid, Interface, Slot, Tab
 
 __all__ = ["check_names", "parse_interface"]
 
@@ -31,11 +31,11 @@ def parse_interface(part: Part, name: str, findings: Findings) -> Interface:
     interface = Interface(
         name=name,
         title=title,
-        grids=only.grids,
+        layouts=only.layouts,
         summary=part.text("summary"),
         licence=part.text("licence"),
         author=part.text("author"),
-        left=only.left,
+        left_handed=only.left_handed,
         is_mirrored=only.is_mirrored,
         tabs=tabs,
     )
@@ -64,7 +64,7 @@ def check_names(root: Part, findings: Findings) -> None:
 
 
 def _check_beside_tabs(part: Part, findings: Findings) -> None:
-    for key in ("grid", "grids", "left"):
+    for key in ("grid", "layouts", "left_handed"):
         if part.get(key) is not None:
             findings.error(
                 part,
@@ -79,18 +79,18 @@ def _check_beside_tabs(part: Part, findings: Findings) -> None:
 def _tab(part: Part, findings: Findings, around: Part | None = None) -> Tab:
     """Return one page; the mirroring keys of `around` are the defaults of its tabs."""
     is_mirrored = around.flag("mirror", default=True) if around is not None else True
-    left = part.get("left")
+    left = part.get("left_handed")
     return Tab(
         name=part.name if around is not None else "",
         title=part.text("title", spoken_name(part.name)) if around is not None else "",
-        grids=_pictures(part, findings, is_tab=around is not None),
-        left=_by_screen(left, findings) if left is not None else {},
+        layouts=_pictures(part, findings, is_tab=around is not None),
+        left_handed=_by_screen(left, findings) if left is not None else {},
         is_mirrored=part.flag("mirror", default=is_mirrored),
     )
 
 
 def _pictures(part: Part, findings: Findings, *, is_tab: bool) -> dict[str, Grid]:
-    one, several = part.get("grid"), part.get("grids")
+    one, several = part.get("grid"), part.get("layouts")
     if one is None and several is None:
         findings.error(
             part,
@@ -103,16 +103,16 @@ def _pictures(part: Part, findings: Findings, *, is_tab: bool) -> dict[str, Grid
         findings.error(
             several,
             "misplaced-key",
-            "'grid' and 'grids' exclude each other",
+            "'grid' and 'layouts' exclude each other",
             key=True,
-            hint="move 'grid' into 'grids' as 'wide'",
+            hint="move 'grid' into 'layouts' as 'landscape'",
         )
-    found = {"wide": _grid(one, findings)} if one is not None else {}
+    found = {"landscape": _grid(one, findings)} if one is not None else {}
     return found | (_by_screen(several, findings) if several is not None else {})
 
 
 def _by_screen(several: Part, findings: Findings) -> dict[str, Grid]:
-    pictures = {screen: several.get(screen) for screen in ("wide", "tall", "phone", "low")}
+    pictures = {screen: several.get(screen) for screen in SCREENS}
     return {
         screen: _grid(picture, findings)
         for screen, picture in pictures.items()

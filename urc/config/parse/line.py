@@ -7,6 +7,7 @@ from urc.config.parse.forms.json_text import compiled_tree, placed_templates
 from urc.config.parse.framing import parse_framing
 from urc.config.parse.headers import check_headers
 from urc.config.part import Findings, Part
+from urc.config.renames import renamed_value_hint
 from urc.config.suggest import did_you_mean
 from urc.expressions import Template
 from urc.model.driver import Backoff, FramingSpec, Timeouts, TransportSpec
@@ -16,8 +17,8 @@ __all__ = ["option_templates", "parse_transport"]
 
 _COMMON: Final = (
     "type", "connection", "framing", "send_framing", "encoding", "timeouts", "reconnect", "min_gap",
-    "queue", "keepalive", "on_connect", "on_close", "stale_after", "via",
-    "answers", "duplex", "errors",
+    "queue", "keepalive", "on_connect", "on_close", "stale_after", "tunnel",
+    "replies", "duplex", "errors",
 )  # fmt: skip
 
 
@@ -29,7 +30,8 @@ def parse_transport(part: Part, findings: Findings, catalog: Catalog) -> Transpo
             kind,
             "unknown-transport-type",
             f"there is no transport of type {kind.data!r}",
-            hint=did_you_mean(kind.data, catalog.transports, "types"),
+            hint=renamed_value_hint("type", kind.data)
+            or did_you_mean(kind.data, catalog.transports, "types"),
         )
     check_headers(part, findings)
     encoding = part.text("encoding", "utf-8")
@@ -49,9 +51,9 @@ def parse_transport(part: Part, findings: Findings, catalog: Catalog) -> Transpo
         timeouts=_timeouts(part.get("timeouts"), findings),
         backoff=_backoff(part.get("reconnect"), findings),
         min_gap_s=findings.duration(part, "min_gap", 0.0, least=0.0, most=3600),
-        via=part.text("via"),
+        tunnel=part.text("tunnel"),
         is_half_duplex=part.text("duplex") == "half",
-        never_answers=part.text("answers") == "never",
+        never_replies=part.text("replies") == "never",
     )
 
 

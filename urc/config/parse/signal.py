@@ -22,7 +22,7 @@ _BYTES: Final = ("image", "blob")
 def parse_signal(part: Part, title: str, findings: Findings) -> Signal:
     """Return the signal at `part`; `title` is the default of its title."""
     kind = part.text("type", "number")
-    element = part.text("of", "number") if kind == "array" else kind
+    element = part.text("items", "number") if kind == "array" else kind
     _check_vector(part, kind, findings)
     low, high = check_range(part, element, findings)
     if part.name == "pi":
@@ -47,7 +47,7 @@ def parse_signal(part: Part, title: str, findings: Findings) -> Signal:
         stale_after_s=findings.duration(part, "stale_after", 0.0, least=0.05),
         description=part.text("description"),
         conversion=parse_conversion(part, findings, element),
-        of=element if kind == "array" else "number",  # type: ignore[arg-type]  # as above
+        items=element if kind == "array" else "number",  # type: ignore[arg-type]  # as above
         size=part.integer("size"),
         axes=axes,  # type: ignore[arg-type]  # as above
         formula=_formula(part, findings),
@@ -97,7 +97,7 @@ def _with_age(signal: Signal, polls: tuple[Poll, ...]) -> Signal:
 
 
 def _check_vector(part: Part, kind: str, findings: Findings) -> None:
-    for key, kinds in (("of", ("array",)), ("size", ("array", *_BYTES))):
+    for key, kinds in (("items", ("array",)), ("size", ("array", *_BYTES))):
         if part.get(key) is not None and kind not in kinds:
             findings.error(
                 part,

@@ -39,7 +39,7 @@ __all__ = ["Simulated", "parse_simulator"]
 _DEGREES: Final = {
     "body": ("steer", "amplitude", "roughness"),
     "laser": ("first", "last"),
-    "camera": ("view", "tilt"),
+    "camera": ("fov", "tilt"),
 }
 """Part → numbers that documents give in degrees."""
 _KEYS: Final = {"first": "from", "last": "to"}
@@ -67,13 +67,13 @@ def parse_world(part: Part, findings: Findings) -> WorldSpec:
     if battery.empty >= battery.full:
         text = f"empty at {battery.empty:g} V is not below full at {battery.full:g} V"
         findings.error(part.must("battery"), "wrong-order", text, key=True)
-    plan, start, datum = part.get("plan"), part.get("start"), part.get("datum")
+    plan, start, datum = part.get("map"), part.get("start"), part.get("datum")
     return WorldSpec(
         body=body,
         drive={name: _value(one, findings) for name, one in part.named("drive").items()},  # type: ignore[misc]  # as the schema says
         senses=_templates(part.named("signals"), findings),
         failsafe=_failsafe(part.get("failsafe"), findings),
-        plan=None if plan is None else _plan(plan),
+        map=None if plan is None else _plan(plan),
         start=WorldSpec().start if start is None else _start(start),
         datum=WorldSpec().datum if datum is None else _datum(datum),
         seed=part.integer("seed") or 0 if "seed" in part.data else 1,

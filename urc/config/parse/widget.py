@@ -43,12 +43,14 @@ def parse_widget(document: Document, findings: Findings) -> Widget:
         outputs={key: _output(inner) for key, inner in part.named("outputs").items()},
         options={key: inner.data for key, inner in part.named("options").items()},
         min_cells=(smallest[0], smallest[1]) if smallest else (1, 1),
-        is_gate=part.flag("gate", default=False),
+        is_dead_man=part.flag("dead_man", default=False),
         summary=part.text("summary"),
         licence=part.text("licence"),
         author=part.text("author"),
-        needs=tuple(str(inner.data) for inner in part.listed("needs")),
-        together=tuple(tuple(map(str, inner.data)) for inner in part.listed("together")),
+        at_least_one_of=tuple(str(inner.data) for inner in part.listed("at_least_one_of")),
+        required_together=tuple(
+            tuple(map(str, inner.data)) for inner in part.listed("required_together")
+        ),
     )
     _check_names(part, widget, findings)
     return widget
@@ -58,19 +60,21 @@ def _check_names(part: Part, widget: Widget, findings: Findings) -> None:
     """Report each name of an input, output or option that the manifest does not have."""
     ports, options = {**widget.inputs, **widget.outputs}, widget.options
     told: list[tuple[Part, Iterable[str]]] = []
-    told += [(inner, (*ports, *options)) for inner in part.listed("needs")]
-    told += [(inner, ports) for group in part.listed("together") for inner in group.items()]
+    told += [(inner, (*ports, *options)) for inner in part.listed("at_least_one_of")]
+    told += [
+        (inner, ports) for group in part.listed("required_together") for inner in group.items()
+    ]
     for inner in (*part.named("inputs").values(), *part.named("outputs").values()):
         if "unit_of" in inner.data:
             told.append((inner.must("unit_of"), ports))
     for inner in part.named("inputs").values():
-        told += [(one, (*widget.inputs, *options)) for one in inner.listed("instead_of")]
+        told += [(one, (*widget.inputs, *options)) for one in inner.listed("replaces")]
     for inner in part.named("options").values():
-        if "below" in inner.data:
-            told.append((inner.must("below"), options))
+        if "less_than" in inner.data:
+            told.append((inner.must("less_than"), options))
         for one in (inner, inner.get("items")):
-            if one is not None and "gives" in one.data:
-                told.append((one.must("gives"), widget.outputs))
+            if one is not None and "argument_of" in one.data:
+                told.append((one.must("argument_of"), widget.outputs))
     for inner, known in told:
         if inner.data not in known:
             findings.error(
@@ -95,12 +99,12 @@ def _port(part: Part) -> Port:
 def _input(part: Part) -> Port:
     size = part.get("size")
     return _port(part)._replace(
-        of=_one_or_more(part.get("of")),
+        items=_one_or_more(part.get("items")),
         size=None if size is None else int(size.data),
-        is_many=part.flag("many", default=False),
-        is_each=part.flag("each", default=False),
+        is_multiple=part.flag("multiple", default=False),
+        keeps_all=part.flag("keep_all", default=False),
         quantity=part.text("quantity"),
-        instead_of=tuple(str(inner.data) for inner in part.listed("instead_of")),
+        replaces=tuple(str(inner.data) for inner in part.listed("replaces")),
     )
 
 

@@ -19,7 +19,7 @@ def check_answers(part: Part, driver: Driver, findings: Findings) -> None:
         _check_silence(inner, one.reply, driver.transports.get(one.transport), findings)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
         _check_silence(inner, poll.reply, driver.transports.get(poll.transport), findings)
-    mute = {name for name, spec in driver.transports.items() if spec.never_answers}
+    mute = {name for name, spec in driver.transports.items() if spec.never_replies}
     if not mute:
         return
     for name, inner in part.named("transports").items():
@@ -36,7 +36,7 @@ def check_answers(part: Part, driver: Driver, findings: Findings) -> None:
         if driver.messages[name].transport in mute:
             findings.error(
                 inner,
-                "never-answers",
+                "never-replies",
                 f"{driver.messages[name].transport!r} receives nothing: it has 'answers: never'",
                 key=True,
                 hint=_HINT,
@@ -69,7 +69,7 @@ def _check_silence(
 
 def _refuse(part: Part, key: str, name: str, findings: Findings) -> None:
     text = f"{name!r} waits for a reply on a transport with 'answers: never'"
-    findings.error(part, "never-answers", text, at=key, key=True, hint=_HINT)
+    findings.error(part, "never-replies", text, at=key, key=True, hint=_HINT)
 
 
 def _check_line(part: Part, spec: TransportSpec, findings: Findings) -> None:
@@ -77,7 +77,7 @@ def _check_line(part: Part, spec: TransportSpec, findings: Findings) -> None:
     for place, key in ((part, "stale_after"), (timeouts, "idle")):
         if place is not None and key in place.data:
             text = f"{key!r} waits for the robot on a transport with 'answers: never'"
-            findings.error(place, "never-answers", text, at=key, key=True, hint=_HINT)
+            findings.error(place, "never-replies", text, at=key, key=True, hint=_HINT)
     for key, steps in (("on_connect", spec.on_connect), ("on_close", spec.on_close)):
         if steps:
             _check_steps(part.must(key), steps, {spec.name}, findings)
@@ -87,5 +87,5 @@ def _check_steps(part: Part, steps: tuple[Step, ...], mute: set[str], findings: 
     for step in all_steps(steps):
         if isinstance(step, (ExpectStep, PromptStep)) and step.transport in mute:
             text = f"a step waits for {step.transport!r}, which has 'answers: never'"
-            findings.error(part, "never-answers", text, key=True, hint=_HINT)
+            findings.error(part, "never-replies", text, key=True, hint=_HINT)
             return

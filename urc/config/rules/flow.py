@@ -65,7 +65,7 @@ def _check_line(part: Part, spec: TransportSpec, findings: Findings) -> None:
     if waits_s > _GOOD_BYE_S:
         findings.warn(
             part.must("on_close"),
-            "long-good-bye",
+            "long-on-close",
             f"its waits take {shown_duration(waits_s)}, and the limit is"
             f" {shown_duration(_GOOD_BYE_S)} in all",
             key=True,
@@ -133,7 +133,7 @@ def _check_haste(part: Part, driver: Driver, name: str, findings: Findings) -> N
         if periods and not told and min(periods) > verify.within_s:
             findings.warn(
                 part.must("within"),
-                "hasty-verify",
+                "verify-too-early",
                 f"{signal!r} is read only every {shown_duration(min(periods))}",
                 hint="give it more than one period, or poll more often",
             )
@@ -147,7 +147,7 @@ def _check_poll(part: Part, poll: Poll, findings: Findings) -> None:
     if poll.offline is not None and poll.offline.retry_s < poll.every_s:
         findings.warn(
             part.must("offline").must("retry"),
-            "eager-retry",
+            "retry-too-early",
             f"an offline part is asked more often than an online part"
             f" (every {shown_duration(poll.every_s)})",
             hint="make it longer than 'every'",

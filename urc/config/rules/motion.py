@@ -19,7 +19,7 @@ from urc.model.framing import FrameLayout
 
 __all__ = ["check_motion", "least_frame_bytes"]
 
-_ASKED: Final = frozenset(("websocket", "rosbridge"))
+_ASKED: Final = frozenset(("websocket", "ros"))
 """Transport types that check liveness while a command is held."""
 LONG_LEASE_S: Final = 0.5
 _BITS_OF_A_BYTE: Final = 10
@@ -46,12 +46,12 @@ def check_motion(part: Part, driver: Driver, findings: Findings) -> None:
         if on_line:
             _check_baud(on_line, spec, findings)
             _check_will(on_line, spec, findings)
-    is_mute = all(driver.transports[one[1].transport].never_answers for one in held)
+    is_mute = all(driver.transports[one[1].transport].never_replies for one in held)
     noticed = any(_notices(spec, driver) for spec in driver.transports.values())
     if held and not is_mute and not noticed:
         findings.warn(
             held[0][0],
-            "unnoticed-loss",
+            "no-loss-detection",
             "the loss of the robot would go unnoticed: no transport has 'stale_after',"
             " and no poll has a reply",
             key=True,
@@ -68,12 +68,12 @@ def check_motion(part: Part, driver: Driver, findings: Findings) -> None:
 def _check_freeze(one: tuple[Part, Command, Hold], spec: TransportSpec, findings: Findings) -> None:
     """Warn of motion over a transport that cannot detect a frozen robot program."""
     part, command, _ = one
-    is_asked = spec.type in _ASKED or spec.never_answers
+    is_asked = spec.type in _ASKED or spec.never_replies
     if is_asked or spec.stale_after_s is not None or spec.connection == "per_request":
         return
     findings.warn(
         part,
-        "unnoticed-freeze",
+        "no-liveness-check",
         f"while {command.name!r} is held, a frozen robot program would go unnoticed:"
         f" {spec.name!r} has no liveness check",
         key=True,
@@ -128,7 +128,7 @@ def _check_step(part: Part, hold: Hold, step_s: float, findings: Findings) -> No
     if hold.repeat_s < step_s / _ROUNDING:
         findings.error(
             part.must("repeat"),
-            "steps-pile-up",
+            "step-backlog",
             f"it is repeated every {shown_duration(hold.repeat_s)}, and a step takes"
             f" {shown_duration(step_s)}: steps would pile up in the robot, and move it after the"
             " release",

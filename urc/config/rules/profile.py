@@ -47,7 +47,7 @@ def _check_name(sources: Sources, findings: Findings) -> None:
     if sources.kind == "robot" and is_other:
         findings.warn(
             sources.root,
-            "other-name",
+            "name-mismatch",
             f"the robot has the name {name!r}, and its file {file.name!r}",
             at="name",
             hint=f"write name: {file.stem}, or rename the file to {name}{file.suffix}",
@@ -132,7 +132,7 @@ def _drawn(part: Part, slot: str) -> tuple[Part, int] | None:
     """Return the first grid of an interface that shows a slot, and the offset in its text."""
     for page in (part, *part.named("tabs").values()):
         one = page.get("grid")
-        several = [*page.named("grids").values(), *page.named("left").values()]
+        several = [*page.named("layouts").values(), *page.named("left_handed").values()]
         for picture in (*([one] if one is not None else []), *several):
             found = re.search(rf"(?<!\S){re.escape(slot)}(?!\S)", picture.data)
             if found is not None:
@@ -160,7 +160,7 @@ def _check_pace(part: Part, poll: Poll, driver: Part, findings: Findings) -> Non
     if seconds is not None and seconds > max(poll.every_s, Timeouts().reply_s):
         findings.warn(
             part.must("every"),
-            "impatient-poll",
+            "short-poll-timeout",
             f"the next request is due after {shown_duration(poll.every_s)}, but a reply may take"
             f" {shown_duration(seconds)}",
             hint=f"shorten the timeout in {_place(where, part)}, or poll more slowly",

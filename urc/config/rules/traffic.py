@@ -117,7 +117,7 @@ def _check_pace(part: Part, command: Command, spec: TransportSpec, findings: Fin
         if limit_s > repeat_s * 1.001:  # Tolerance, because 1/20 s and 50 ms are the same.
             findings.warn(
                 part.must("repeat"),
-                "held-back",
+                "hold-rate-limited",
                 f"it is repeated every {shown_duration(repeat_s)}, and {what} allows it every"
                 f" {shown_duration(limit_s)}",
                 hint="make 'repeat' at least as long",

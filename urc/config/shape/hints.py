@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from urc.config.renames import renamed_hint
 from urc.config.suggest import did_you_mean
 from urc.source import Document, Path
 
@@ -58,8 +59,11 @@ _ELSEWHERE: Final = {
 """A misplaced key, and a key that identifies the place → the hint for it."""
 
 
-def key_hint(key: str, known: Mapping[str, Any], value: object = None) -> str:
+def key_hint(key: str, known: Mapping[str, Any], value: object = None, path: Path = ()) -> str:
     """Return the known key that an unknown key probably means, with its value."""
+    renamed = renamed_hint(path, key, known)
+    if renamed:
+        return renamed
     name, colon, _ = key.partition(":")
     if colon and name in known:
         return f"put a space after the colon: '{name}: '"

@@ -114,7 +114,7 @@ def _unknown_keys(document: Document, path: Path, error: _Error) -> list[Problem
             (*path, key),
             "unknown-key",
             f"{_cut(key)} is not a key of {_noun(error.schema)}",
-            hint=key_hint(key, known, error.value[key]),
+            hint=key_hint(key, known, error.value[key], path),
             key=True,
         )
         for key in islice((key for key in error.value if key not in known), _PROBLEMS_MOST)
@@ -126,7 +126,7 @@ def _missing_keys(document: Document, path: Path, error: _Error) -> list[Problem
     # Where any key is allowed, none is unknown.
     is_closed = bool(known) and error.schema.get("additionalProperties") is False
     misspelt = [
-        key_hint(key, known, error.value[key])
+        key_hint(key, known, error.value[key], path)
         for key in error.value
         if is_closed and key not in known
     ]

@@ -125,7 +125,7 @@ def _signal_channel(signal: Signal) -> Channel:
     if signal.type == "blob":
         value |= {"type": "string", "contentEncoding": "base64"}
     elif signal.type == "array":
-        value |= {"type": "array", "items": {"type": signal.of}}
+        value |= {"type": "array", "items": {"type": signal.items}}
     else:
         value |= {"type": signal.type}
     alarm = {"enum": list(get_args(Alarm))}

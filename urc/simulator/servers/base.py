@@ -100,7 +100,7 @@ SERVERS = Table(
         "telnet": "urc.simulator.servers.telnet:TelnetServer",
         "http": "urc.simulator.servers.http:HttpServer",
         "websocket": "urc.simulator.servers.websocket:WebSocketServer",
-        "rosbridge": "urc.simulator.servers.rosbridge:RosbridgeServer",
+        "ros": "urc.simulator.servers.rosbridge:RosbridgeServer",
         "mqtt": "urc.simulator.servers.mqtt:MqttRobot",
     },
 )

@@ -391,7 +391,7 @@ class RosbridgeServer(MessageServer):
         """Prepare the server; `open` listens."""
         super().__init__(context)
         # A bridge names types in the style of its ROS version. The default is ROS 2.
-        ros = {1: 1, 2: 2, "auto": 2}.get(context.options.get("ros"))
+        ros = {1: 1, 2: 2, "auto": 2}.get(context.options.get("version"))
         types = {name: str(how.get("type") or "") for name, how in context.topics.items()}
         self._bridge = Bridge({name: spelled(kind, "msg", ros) for name, kind in types.items()})
 

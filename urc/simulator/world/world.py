@@ -63,7 +63,7 @@ class World:
         holds: Callable[[Template | bool], bool] = bool,
     ) -> None:
         self.spec = spec
-        self.plan = Plan(ROOM if spec.plan is None else spec.plan)
+        self.plan = Plan(ROOM if spec.map is None else spec.map)
         x, y, yaw = spec.start
         self.motion = Motion(x=x, y=y, yaw=yaw)
         self.odometry = Odometry(spec)
@@ -133,7 +133,7 @@ class World:
 
             spec = self.spec.camera
             seen = camera_picture(
-                self.plan, self.faces(), self._eye(), (spec.width, spec.height), spec.view
+                self.plan, self.faces(), self._eye(), (spec.width, spec.height), spec.fov
             )
             return jpeg(seen, flip=flip, mirror=mirror)
 
@@ -164,7 +164,7 @@ class World:
         return Eye(
             motion.x,
             motion.y,
-            motion.z + camera.up,
+            motion.z + camera.mount_height,
             motion.yaw,
             motion.pitch - camera.tilt,
             motion.roll,

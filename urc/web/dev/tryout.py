@@ -165,7 +165,7 @@ def _cut(
 
 def _envelope(spec: TransportSpec, data: bytes, topic: str) -> Envelope:
     body: object = data
-    if spec.type == "rosbridge":  # its messages are structured data; others bring bytes
+    if spec.type == "ros":  # its messages are structured data; others bring bytes
         try:
             body = json.loads(data)
         except (ValueError, RecursionError) as error:

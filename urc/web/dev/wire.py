@@ -95,7 +95,7 @@ class _Found(msgspec.Struct, frozen=True):
 class _Argument(msgspec.Struct, frozen=True):
     name: str
     type: str
-    of: str
+    items: str
     title: str
     unit: str
     min: float | None
@@ -252,7 +252,7 @@ def _argument(one: Argument) -> _Argument:
     return _Argument(
         one.name,
         one.type,
-        one.of,
+        one.items,
         one.title,
         one.unit,
         one.min,

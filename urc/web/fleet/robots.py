@@ -177,7 +177,7 @@ def each_counts(profile: Profile) -> frozenset[str]:
     for use in uses:
         widget = profile.widgets.get(use.widget)
         for port in widget.inputs.values() if widget is not None else ():
-            if port.is_each:
+            if port.keeps_all:
                 found |= {*use.lists.get(port.name, ())} | {use.inputs.get(port.name, "")}
     return frozenset(found & profile.driver.signals.keys())
 

@@ -176,7 +176,7 @@ def widget_cell(
         **inputs_config(use, widget, profile.driver),
         "outputs": {name: output_config(use, name, widget, profile.driver) for name in use.outputs},
         "options": dict(context.options),
-        "gate": widget.is_gate,
+        "deadMan": widget.is_dead_man,
     }
     frame = frame_url(widget) if is_foreign else ""
     return Cell(index, json.dumps(config), html, error, is_background, frame)

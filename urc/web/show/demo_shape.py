@@ -44,7 +44,7 @@ _VALUE: Final = {
     "min": _NUMBER,
     "max": _NUMBER,
     "description": _TEXT,
-    "of": {"enum": _ELEMENTS},
+    "items": {"enum": _ELEMENTS},
     "size": _COUNT,
 }
 """Common keys of signals and arguments."""
@@ -115,7 +115,7 @@ def _demo(widget: Widget, data: Any) -> dict[str, Any]:
     signals = _part(data, "signals")
     outputs = _part(data, "outputs")
     ports = {
-        name: {"type": "array", "items": _SIGNAL} if port.is_many else _SIGNAL
+        name: {"type": "array", "items": _SIGNAL} if port.is_multiple else _SIGNAL
         for name, port in widget.inputs.items()
     }
     bound = _mapping("the inputs of this widget", ports) | {"type": ["object", "null"]}

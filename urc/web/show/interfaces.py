@@ -156,7 +156,7 @@ def _argument(argument: Argument, release: Mapping[str, Reading]) -> dict[str, o
         "name": argument.name,
         "title": argument.title,
         "type": argument.type,
-        "of": argument.of,
+        "items": argument.items,
         "unit": argument.unit,
         "min": argument.min,
         "max": argument.max,

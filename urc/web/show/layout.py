@@ -43,7 +43,7 @@ def grid_css(interface: Interface, slots: Sequence[str]) -> str:
         place = f'.urc-grid[data-page="{number}"]'
         if any(turned) and not turned[number]:
             css += f".urc-stage:has(> {place})>.urc-turn{{display:none}}"
-        right = _placed(page.grids, canvas)
+        right = _placed(page.layouts, canvas)
         css += _screens(place, right, canvas)
         left = _left_hand(page, right, canvas)
         if left != right:
@@ -61,10 +61,10 @@ class _Canvas(NamedTuple):
 
 def _left_hand(page: Tab, right: Mapping[str, Grid], canvas: _Canvas) -> dict[str, Grid]:
     """Return the layouts for left-handed operators: designed, mirrored or unchanged."""
-    if page.left:
+    if page.left_handed:
         turn = mirrored if page.is_mirrored else Grid._replace
-        others = {screen: turn(grid) for screen, grid in page.grids.items()}
-        return _placed({**others, **page.left}, canvas)
+        others = {screen: turn(grid) for screen, grid in page.layouts.items()}
+        return _placed({**others, **page.left_handed}, canvas)
     if not page.is_mirrored:
         return dict(right)
     # Mirrored after stacking, because a stack keeps the reading order.
@@ -81,8 +81,8 @@ def mirrored(grid: Grid) -> Grid:
 
 def needs_turning(page: Tab, slots: Sequence[str]) -> bool:
     """Return whether a phone in portrait shows another layout than the designed one."""
-    base = _placed(page.grids, _Canvas(slots, "")).get("base")
-    is_drawn = "phone" in page.grids or "tall" in page.grids
+    base = _placed(page.layouts, _Canvas(slots, "")).get("base")
+    is_drawn = "phone_portrait" in page.layouts or "portrait" in page.layouts
     return base is not None and not is_drawn and _cropped(base).columns > PHONE_COLUMNS
 
 
@@ -91,15 +91,17 @@ def _placed(grids: Mapping[str, Grid], canvas: _Canvas) -> dict[str, Grid]:
     if not grids:
         return {}
     crop = Grid._replace if canvas.background else _cropped
-    wide = grids.get("wide") or next(iter(grids.values()))
+    wide = grids.get("landscape") or next(iter(grids.values()))
     base = _filled(wide, canvas.slots)
     placed = {"base": base}
-    if "tall" in grids:
-        placed[TALL] = _filled(grids["tall"], canvas.slots)
-    placed[SHORT] = crop(_filled(grids["low"], canvas.slots) if "low" in grids else base)
-    upright = grids.get("phone") or grids.get("tall") or wide
+    if "portrait" in grids:
+        placed[TALL] = _filled(grids["portrait"], canvas.slots)
+    placed[SHORT] = crop(
+        _filled(grids["phone_landscape"], canvas.slots) if "phone_landscape" in grids else base
+    )
+    upright = grids.get("phone_portrait") or grids.get("portrait") or wide
     phone = crop(_filled(upright, canvas.slots))
-    if "phone" not in grids and phone.columns > PHONE_COLUMNS:
+    if "phone_portrait" not in grids and phone.columns > PHONE_COLUMNS:
         # The first row stays empty over a background, which shows through it.
         phone = _stacked(phone, first=1 if canvas.background else 0)
     placed[PHONE] = phone

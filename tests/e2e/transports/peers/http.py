@@ -51,7 +51,7 @@ class HttpPeer(TcpPeer):
         """Return a line that leads here."""
         flood = (Subscription("/flood", {"stream": "lines"}),)
         listens = flood if self._behaviour == "floods" else ()
-        options = {"url": f"http://127.0.0.1:{self.port}", "answer_timeout": "3s"}
+        options = {"url": f"http://127.0.0.1:{self.port}", "response_timeout": "3s"}
         return from_setup(Setup("wire", options, listens))
 
     async def stop(self) -> None:

@@ -130,7 +130,7 @@ class CarriedPeer(SshPeer):
     def transport(self) -> Transport:
         """Return a line that leads through the server."""
         way = from_setup(self.setup("forward"))
-        return telnet_from_setup(Setup("wire", {"host": "10.0.0.20"}, via=way))
+        return telnet_from_setup(Setup("wire", {"host": "10.0.0.20"}, tunnel=way))
 
 
 class _Server(asyncssh.SSHServer):

@@ -40,7 +40,7 @@ class WebSocketPeer(TcpPeer):
     def transport(self) -> Transport:
         """Return a line that leads here."""
         url = f"ws://127.0.0.1:{self.port}/robot"
-        return from_setup(Setup("wire", {"url": url, "ping_every": "1s", "ping_timeout": "2s"}))
+        return from_setup(Setup("wire", {"url": url, "ping_interval": "1s", "ping_timeout": "2s"}))
 
     async def stop(self) -> None:
         """Let packets pass again and close everything."""

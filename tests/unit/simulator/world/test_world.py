@@ -54,19 +54,19 @@ def reading(made: World, name: str, now_s: float) -> Mapping[str, float]:
 
 def test_a_body_stops_at_a_wall_and_says_on_which_side_it_touches() -> None:
     """It is never nearer than its radius, and slides along."""
-    made = world(WorldSpec(body=QUICK, plan=SQUARE), forward=0.5)
+    made = world(WorldSpec(body=QUICK, map=SQUARE), forward=0.5)
     made.advance(10.0)
     assert made.motion.x == pytest.approx(1.8)
     touch = reading(made, "contact", 10.0)
     assert (touch["bump"], touch["bump_left"], touch["bump_right"]) == (True, True, True)
-    slope = world(WorldSpec(body=QUICK, plan=SQUARE, start=(0, 0, 0.5)), forward=0.5)
+    slope = world(WorldSpec(body=QUICK, map=SQUARE, start=(0, 0, 0.5)), forward=0.5)
     slope.advance(20.0)
     assert (slope.motion.x, slope.motion.y) == pytest.approx((1.8, 1.8))
 
 
 def test_a_wall_to_the_right_is_touched_on_the_right() -> None:
     """Beside it, not ahead."""
-    spec = WorldSpec(body=QUICK, plan=SQUARE, start=(-1.0, -1.0, -0.4))
+    spec = WorldSpec(body=QUICK, map=SQUARE, start=(-1.0, -1.0, -0.4))
     made = world(spec, forward=0.5)
     while made.touch is None:
         made.advance((made.time_s or 0) + 0.02)
@@ -84,7 +84,7 @@ def test_what_flies_passes_over_a_box() -> None:
 def test_cliff_sensors_look_over_the_edge() -> None:
     """Before the robot is there, and on its own side."""
     plan = PlanSpec(holes=(Box(1.0, 0.0, 1.0, 2.0),))
-    made = world(WorldSpec(body=QUICK, plan=plan, start=(0.2, 0.0, 0.0)), forward=0.5)
+    made = world(WorldSpec(body=QUICK, map=plan, start=(0.2, 0.0, 0.0)), forward=0.5)
     assert not reading(made, "contact", 0.0)["cliff"]
     made.advance(0.2)
     touch = reading(made, "contact", 0.2)
@@ -107,7 +107,7 @@ def test_rays_go_as_far_as_geometry_says() -> None:
 
 def test_a_sweep_begins_where_it_says_and_goes_to_the_left() -> None:
     """Four rays: behind, right, ahead, left; what is too far is nothing."""
-    spec = WorldSpec(plan=SQUARE, start=(1.0, 0.5, 0.0), laser=LaserSpec(4, max=2.9, noise=0))
+    spec = WorldSpec(map=SQUARE, start=(1.0, 0.5, 0.0), laser=LaserSpec(4, max=2.9, noise=0))
     sweep = reading(world(spec), "laser", 0.0)
     assert sweep["ranges"] == (None, 2.5, 1.0, 1.5)
     assert (sweep["nearest"], sweep["ahead"]) == (1.0, 1.0)
@@ -116,7 +116,7 @@ def test_a_sweep_begins_where_it_says_and_goes_to_the_left() -> None:
 
 def test_noise_is_as_wide_as_declared() -> None:
     """Ten thousand ranges of 2 m, within three of their own standard errors."""
-    spec = WorldSpec(plan=SQUARE, laser=LaserSpec(2000, noise=0.05, max=5))
+    spec = WorldSpec(map=SQUARE, laser=LaserSpec(2000, noise=0.05, max=5))
     made = world(spec)
     angles = -math.pi + 2 * math.pi / 2000 * np.arange(2000)
     real = first_hits(made.faces(), 0.0, 0.0, 0.1, angles)
@@ -130,12 +130,12 @@ def test_noise_is_as_wide_as_declared() -> None:
 
 def test_odometry_is_always_a_little_wrong_and_the_imu_feels_gravity() -> None:
     """The same way each time, by no more than declared."""
-    spec = WorldSpec(body=QUICK, plan=PlanSpec(), odometry=OdometrySpec(0.05))
+    spec = WorldSpec(body=QUICK, map=PlanSpec(), odometry=OdometrySpec(0.05))
     made = world(spec, forward=0.5)
     told = reading(made, "odometry", 10.0)
     assert made.motion.x == pytest.approx(5.0)
     assert 0 < abs(told["x"] - 5.0) <= 0.05 * 5
-    exact = WorldSpec(body=QUICK, plan=PlanSpec(), odometry=OdometrySpec(0.0))
+    exact = WorldSpec(body=QUICK, map=PlanSpec(), odometry=OdometrySpec(0.0))
     still = reading(world(exact), "imu", 1.0)
     assert still["az"] == pytest.approx(9.81, abs=0.1)
     assert (still["ax"], still["ay"]) == pytest.approx((0, 0), abs=0.1)
@@ -162,7 +162,7 @@ def test_metres_become_degrees_on_the_earth() -> None:
 
 def test_a_receiver_writes_its_place_as_nmea_does() -> None:
     """Degrees and minutes side by side, south and west by letters."""
-    spec = WorldSpec(plan=PlanSpec(), datum=(-33.5, -7.25, 10.0))
+    spec = WorldSpec(map=PlanSpec(), datum=(-33.5, -7.25, 10.0))
     told = World(spec, lambda _: {}).view(1_700_000_000.0)["gps"]
     assert isinstance(told, Mapping)
     assert told["ddmm_latitude"].startswith(("3329.99", "3330.00"))
@@ -175,7 +175,7 @@ def test_a_receiver_writes_its_place_as_nmea_does() -> None:
 def test_a_battery_gives_as_much_as_is_drawn() -> None:
     """Five minutes of twelve amperes are half of two ampere hours; empty, it moves nothing."""
     spec = WorldSpec(
-        body=QUICK, plan=PlanSpec(), battery=BatterySpec(2.0, 100.0, idle=1.0, drive=2.0)
+        body=QUICK, map=PlanSpec(), battery=BatterySpec(2.0, 100.0, idle=1.0, drive=2.0)
     )
     made = world(spec._replace(battery=BatterySpec(2.0, 100.0, idle=12.0)))
     for minute in range(1, 6):
@@ -193,7 +193,7 @@ def test_a_battery_gives_as_much_as_is_drawn() -> None:
 
 def test_somebody_changes_an_empty_battery_of_a_robot_that_stands() -> None:
     """Half a minute later; a low one is left to the operator."""
-    spec = WorldSpec(body=QUICK, plan=PlanSpec(), battery=BatterySpec(2.0, 80.0, idle=0.1))
+    spec = WorldSpec(body=QUICK, map=PlanSpec(), battery=BatterySpec(2.0, 80.0, idle=0.1))
     made = world(spec)
     made.low_battery()
     made.advance(50.0)
@@ -234,7 +234,7 @@ def test_chance_is_even_and_normal() -> None:
 
 def test_a_world_that_nobody_looked_at_is_made_up_for_a_minute_at_most() -> None:
     """And a clock that is put back does not stop it for good."""
-    made = world(WorldSpec(body=QUICK, plan=PlanSpec()), forward=1.0)
+    made = world(WorldSpec(body=QUICK, map=PlanSpec()), forward=1.0)
     made.advance(1e6)
     assert made.motion.x == pytest.approx(FARTHEST_S, abs=0.05)
     made.advance(10.0)
@@ -252,7 +252,7 @@ def image(data: bytes) -> np.ndarray[tuple[int, ...], np.dtype[np.int16]]:
 def test_the_camera_sees_the_wall_it_looks_at() -> None:
     """A green one ahead, a blue one after a quarter turn to the left; sky above, ground below."""
     low = SQUARE._replace(walls=tuple(wall._replace(height=0.6) for wall in SQUARE.walls))
-    spec = WorldSpec(plan=low, camera=CameraSpec(view=0.9))
+    spec = WorldSpec(map=low, camera=CameraSpec(fov=0.9))
     ahead = image(world(spec).picture())
     assert ahead.shape == (240, 320, 3)
     red, green, blue = ahead[110, 160]
@@ -267,7 +267,7 @@ def test_the_horizon_follows_roll_and_pitch() -> None:
     """Nose down moves it up the picture; the right side down makes it rise to the right."""
 
     def horizon(column: int, **held: float) -> int:
-        made = world(WorldSpec(plan=PlanSpec(ground="grass")))
+        made = world(WorldSpec(map=PlanSpec(ground="grass")))
         for name, value in held.items():
             setattr(made.motion, name, value)
         seen = image(made.picture())[:, column]
@@ -304,7 +304,7 @@ def test_pictures_are_drawn_only_so_often() -> None:
 
 def test_a_still_shows_all_around_with_ahead_in_the_middle() -> None:
     """Of the square: green ahead, blue left, yellow behind at both edges, red right."""
-    seen = image(world(WorldSpec(plan=SQUARE)).panorama())
+    seen = image(world(WorldSpec(map=SQUARE)).panorama())
     assert seen.shape == (256, 512, 3)
     row = 120
     assert seen[row, 256].argmax() == 1
@@ -316,7 +316,7 @@ def test_a_still_shows_all_around_with_ahead_in_the_middle() -> None:
 
 def test_the_view_from_above_shows_where_it_is() -> None:
     """The robot's blue moves with it; a size that is none is made one."""
-    spec = WorldSpec(body=QUICK, plan=SQUARE)
+    spec = WorldSpec(body=QUICK, map=SQUARE)
 
     def blue(made: World) -> float:
         seen = image(made.top_view(200, 150))
@@ -328,7 +328,7 @@ def test_the_view_from_above_shows_where_it_is() -> None:
     gone.advance(2.0)
     assert blue(gone) > blue(start) + 20
     assert image(start.top_view(1, 10**6)).shape == (2000, 16, 3)
-    assert image(world(spec._replace(plan=PlanSpec())).top_view(64, 48)).shape == (48, 64, 3)
+    assert image(world(spec._replace(map=PlanSpec())).top_view(64, 48)).shape == (48, 64, 3)
     fish = spec._replace(body=BodySpec("swimmer"))
     assert image(world(fish, forward=1.0).top_view(64, 48)).shape == (48, 64, 3)
 

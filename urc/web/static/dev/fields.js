@@ -7,7 +7,7 @@
  * @typedef {object} Argument
  * @property {string} name
  * @property {string} type
- * @property {string} of
+ * @property {string} items
  * @property {string} title
  * @property {string} unit
  * @property {number | null} min
@@ -81,7 +81,7 @@ export function valuesOf(fields) {
 function caption(argument) {
   const { min, max } = argument;
   const range = min !== null && max !== null ? `${min} to ${max}` : min !== null ? `from ${min}` : max !== null ? `to ${max}` : "";
-  const kind = argument.type === "array" ? `list of ${argument.of}` : argument.type;
+  const kind = argument.type === "array" ? `list of ${argument.items}` : argument.type;
   const words = [kind, range, argument.unit, argument.required ? "" : "optional"].filter(Boolean);
   return `${argument.name} (${words.join(", ")})`;
 }

@@ -25,7 +25,7 @@
  *   signals to the unit of the input; left out if none is needed.
  * @property {Record<string, Output>} outputs
  * @property {Record<string, unknown>} options
- * @property {boolean} [gate] Whether it is a dead-man control.
+ * @property {boolean} [deadMan] Whether it is a dead-man control.
  *
  * @typedef {(command: string, args: Record<string, Given>, ticket?: import("../control/asks.js").Ticket) => Promise<Record<string, Value>>} Run
  *

@@ -71,7 +71,7 @@ export class Host {
     this.cells.set(cell.el, cell);
     this.sight.observe(cell.el);
     this.sizes.observe(cell.el);
-    if (cell.config.gate) this.doors.input.gated.add(cell.el);
+    if (cell.config.deadMan) this.doors.input.gated.add(cell.el);
     return cell.mount();
   }
 
