@@ -96,7 +96,7 @@ class Once:
         return WATCHES if client.role == "viewer" else ""
 
     def pull_refusal(self, client: Client, sequence: str, what: Pull) -> str:
-        """Return why this page may not skip or end a sequence; the driver may end any."""
+        """Return why this page may not steer a sequence; any operator may pause or end one."""
         if what in ("pause", "abort"):
             return WATCHES if client.role == "viewer" else ""
         return self.refusal(client, sequence)

@@ -213,7 +213,7 @@ class SettingsRoutes:
 
 
 def _epoch(station: Station | None) -> int:
-    """Return a number that changes with every STOP and every new driver."""
+    """Return a number that changes with every STOP and every new operator."""
     return station.controls.desk.lease.state.epoch if station is not None else 0
 
 

@@ -32,7 +32,7 @@ const MOST_STOPS = 5;
 /** Messages a second to the page itself. Browser extensions may send some; widgets have a port. */
 const MOST_ASIDE = 20;
 
-/** Wardens whose frames may send messages to the page. @type {Set<Warden>} */
+/** Frame hosts whose frames may send messages to the page. @type {Set<Warden>} */
 const wardens = new Set();
 // The first of all listeners, without a look at the content: a flood costs little.
 addEventListener("message", (event) => {
