@@ -84,7 +84,7 @@ def _item(value: Any, key: Any) -> Any:
     if isinstance(value, (list, tuple)) and isinstance(key, int):
         if -len(value) <= key < len(value):
             return value[key]
-        raise ValueError(f"item {key} is asked for, there are {len(value)}")
+        raise ValueError(f"there is no item {key} among {len(value)}")
     raise TypeError(f"{_short(value)} has no part {key!r}")
 
 
@@ -100,7 +100,7 @@ def _join(*parts: Any) -> str:
 
 def _text(value: Any) -> str:
     if isinstance(value, bytes):
-        raise TypeError("bytes are no text; 'hex:' and 'bytes:' take them")
+        raise TypeError("bytes are not text; send them by 'hex:' or 'bytes:'")
     return spelt(value)
 
 

@@ -4,8 +4,8 @@ Private to `urc.expressions`. Grammar and precedence are those of Jinja ("Expres
 template designer documentation). A parser of our own gives the column of every error, and saves 40
 ms for importing a template engine. `tests/unit/test_expressions.py` compares it with Jinja.
 
-WARNING: the result is passed to eval. It may contain only the `repr()` of constants, the text that
-`resolve` returns, and names of `urc._filters.SCOPE`.
+WARNING: the result is passed to eval. The Python source may contain only the `repr()` of constants,
+the text that `resolve` returns, and names of `urc._filters.SCOPE`.
 """
 
 import math

@@ -1,7 +1,7 @@
 """HTTP headers that documents must not set, because they identify the sender or frame the request.
 
-Browsers withhold them from scripts for the same reason. With them, a document could pretend to be a
-page of the dashboard, a page of another program, or a proxy.
+Browsers withhold them from scripts for the same reason. With these headers, a document could
+pretend to be a page of the dashboard, a page of another program, or a proxy.
 """
 
 from typing import Final

@@ -1,7 +1,8 @@
 """Filters and operators of expressions over lists and texts.
 
 Private to `urc._filters`. Each function accepts every value of a document: it returns a result, or
-raises TypeError or ValueError with a text for people. The size of its input bounds its result.
+raises TypeError or ValueError with a text for people. The size of the input bounds that of the
+result.
 """
 
 import re
@@ -81,7 +82,7 @@ def is_search(value: Any, source: str) -> bool:
 def _join(value: Any, between: Any = "") -> str:
     parts = [spelt(one) for one in _list(value)]
     if any(isinstance(one, bytes) for one in _list(value)):
-        raise TypeError("bytes are no text; 'hex:' and 'bytes:' take them")
+        raise TypeError("bytes are not text; send them by 'hex:' or 'bytes:'")
     text = _text(between)
     if sum(map(len, parts)) + len(parts) * len(text) > MAX_TEXT:
         raise ValueError(f"the text has more than {MAX_TEXT} characters")

@@ -75,7 +75,7 @@ _REFUSED: dict[Any, str] = {
 
 _INSTEAD: dict[Any, str] = dict.fromkeys(_REFUSED, "")
 _INSTEAD[_constants.ASSERT] = "; match the text itself, and let a named group take the part wanted"
-_INSTEAD[_constants.ASSERT_NOT] = "; match what may come instead, or exclude frames by 'when'"
+_INSTEAD[_constants.ASSERT_NOT] = "; match the allowed text instead, or exclude frames by 'when'"
 _INSTEAD[_constants.GROUPREF] = "; name both groups and compare them by 'when: a == b'"
 
 
@@ -166,8 +166,8 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
     cost = _cost(tree, 1 if is_over_bytes else _BEYOND_ASCII)
     if cost > MAX_COST:
         raise PatternError(
-            f"this pattern counts to {cost} parts; {MAX_COST} are allowed: use smaller numbers in"
-            " {…}, or start it with '^' and let no repeat run into what follows it"
+            f"this pattern has {cost} parts, and the limit is {MAX_COST}: use smaller numbers in"
+            " {…}, or start it with '^' and keep every repeat distinct from the next part"
         )
     return Pattern(text, groups, _re2_search(text), False)
 
@@ -349,7 +349,7 @@ def _re2_search(text: str) -> Any:
     except ImportError:
         raise PatternError(
             "this pattern needs the package google-re2, which is not installed here: start it with"
-            f" '^' and let no repeat run into what follows it: {text!r}"
+            f" '^' and keep every repeat distinct from the next part: {text!r}"
         ) from None
     options = re2.Options()
     options.log_errors = False
@@ -385,7 +385,7 @@ def _is_linear(tree: Any, text: str) -> bool:
 def _first_of(items: list[Any], follow: frozenset[int]) -> frozenset[int]:
     """Return the possible first characters of `items` followed by `follow`; check each item.
 
-    It goes backwards, so that the next characters of each item are known.
+    The check goes backwards, so that the next characters of each item are known.
     """
     for operation, argument in reversed(items):
         follow = _first_of_item(operation, argument, follow)

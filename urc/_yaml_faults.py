@@ -1,7 +1,7 @@
 """Translation of YAML parser errors into messages and hints for people.
 
-Private to `urc.source`. It handles both parsers of PyYAML (C and pure Python). Their messages
-differ, so the text at the place decides wherever possible.
+Private to `urc.source`. The module handles both parsers of PyYAML (C and pure Python). Their
+messages differ, so the text at the place decides wherever possible.
 """
 
 import re
@@ -100,7 +100,7 @@ def _reserved(at: _Clue) -> Fault | None:
         return None
     char = at.text[at.column : at.column + 1]
     if char == "\t":
-        return Fault(at.line, at.column, "tab", "a tab where YAML wants a space", "use spaces")
+        return Fault(at.line, at.column, "tab", "a tab where YAML needs a space", "use spaces")
     if char not in _RESERVED:
         return None
     return Fault(
@@ -231,7 +231,7 @@ def _block(at: _Clue) -> Fault | None:
         return Fault(
             *place,
             "indentation",
-            "this does not belong to what stands above",
+            "this does not belong to the lines above",
             "start every top-level key in column 1, as 'key: value'",
         )
     return None
@@ -271,7 +271,9 @@ def _rest(at: _Clue) -> Fault | None:
     if "node content" in at.said:
         char = at.text[at.column : at.column + 1]
         if not char:
-            return Fault(*place, "not-yaml", "a value is expected here", "close what is open")
+            return Fault(
+                *place, "not-yaml", "a value is expected here", "close the open brackets and quotes"
+            )
         return Fault(
             *place, "not-yaml", f"{char!r} where a value is expected", "quote it, if it is text"
         )

@@ -11,7 +11,7 @@ from typing import Final
 __all__ = ["DIGITS_MAX", "resolve_plain"]
 
 DIGITS_MAX: Final = 40
-"""Longest number of a robot. The conversion of Python is quadratic and refuses thousands of
+"""Longest number of a robot. The conversion in Python takes quadratic time and refuses thousands of
 digits."""
 _SCALAR = re.compile(
     r"""(?P<null>~|null|Null|NULL|)

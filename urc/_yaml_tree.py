@@ -1,8 +1,8 @@
 """Conversion of YAML events into plain data and a tree of marks of the same shape.
 
-Private to `urc.source`. The reader handles the events of the parser itself instead of composing
-them by the library. So nesting and aliases are bounded *while* reading: a bomb costs only its first
-lines. Every key and value has its place, and scalars follow the core schema of YAML 1.2.
+Private to `urc.source`. The reader processes the events of the parser without the composer of the
+library. So nesting and aliases are bounded *while* reading: a bomb costs only its first lines.
+Every key and value has its place, and scalars follow the core schema of YAML 1.2.
 """
 
 import re
@@ -110,7 +110,7 @@ class TreeReader:
         built = self._anchors.get(name)
         if built is None:
             if name in self._anchors:
-                self._report(event, "alias-loop", f"'*{name}' stands inside what it refers to")
+                self._report(event, "alias-loop", f"'*{name}' stands inside its own anchor")
                 raise StoppedError
             self._report(
                 event,
@@ -258,7 +258,7 @@ class TreeReader:
             event,
             "duplicate-key",
             f"{key!r} is given twice; the first is at {place}",
-            hint="keep one of them: the language never lets the last one win",
+            hint="keep one of them: the last one never overrides the others",
         )
 
     def _report_complex_key(self, event: Any, start: Any) -> None:
@@ -328,7 +328,7 @@ class TreeReader:
             self._report(
                 event,
                 "too-many-nodes",
-                f"more than {self._limits.nodes} keys and values once every alias is written out",
+                f"more than {self._limits.nodes} keys and values with every alias expanded",
             )
             raise StoppedError
 

@@ -157,7 +157,7 @@ def compile_expression(text: str, *, allows_bytes: bool = False) -> Template:
 def text_of(value: object) -> str:
     """Return `value` in its text form."""
     if isinstance(value, bytes):
-        raise ExpressionError("bytes are no text; 'hex:' and 'bytes:' take them")
+        raise ExpressionError("bytes are not text; send them by 'hex:' or 'bytes:'")
     return value if isinstance(value, str) else spelt(value)
 
 

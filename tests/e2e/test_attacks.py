@@ -30,7 +30,7 @@ pytestmark = pytest.mark.anyio
 ATTACKS = Path(__file__).resolve().parents[1] / "attacks" / "drivers"
 NAMES = ("steal-secret", "drive-another", "reset-stop")
 PASSWORD = "open-sesame"  # noqa: S105 - of a robot that is not there
-SAID = "that is this dashboard itself: no robot may be reached there"
+SAID = "this address is the dashboard itself; it cannot be a robot"
 VICTIM = """\
 urc: 1
 kind: robot

@@ -66,7 +66,7 @@ def test_brackets_do_not_hide_bytes(source: str) -> None:
 @pytest.mark.parametrize("source", ["{{ x | u8 | default(1) }}", "A{{ x | u8 | default(1) }}"])
 def test_bytes_that_slip_into_text_are_refused_when_sent(source: str) -> None:
     """Never the word b'...' on the wire."""
-    with pytest.raises(ExpressionError, match="bytes are no text"):
+    with pytest.raises(ExpressionError, match="bytes are not text"):
         compile_template(source).render({"x": 5})
 
 

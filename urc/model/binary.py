@@ -69,7 +69,7 @@ class Item(NamedTuple):
     condition: Template | None = None
     """Condition for the presence of the item."""
     const: int | float | bool | bytes | None = None
-    """Required raw value. Another value means another kind of frame."""
+    """Required raw value. A frame with another value is another kind of frame."""
     scale: float = 1
     offset: float = 0
     """value = raw · scale + offset"""

@@ -48,7 +48,7 @@ class Envelope(NamedTuple):
 
 
 NUMBERED: Final = frozenset(("call", "goal", "request"))
-"""Verbs of requests. Each gets a ``response`` with the same ``id``."""
+"""Verbs of requests. Each request gets a ``response`` with the same ``id``."""
 
 Payload = bytes | Envelope
 """The content of one frame, without its framing."""

@@ -94,8 +94,7 @@ class TransportSpec(NamedTuple):
     """Whether only one side sends at a time. Until the robot has replied, only a stop may be
     sent."""
     never_replies: bool = False
-    """Whether the robot never sends on this connection, by design; its silence is then no sign of a
-    loss."""
+    """Whether the robot never sends on this connection, so that silence is no sign of a loss."""
     errors: tuple[Pattern, ...] = ()
     """Patterns of error replies to any request."""
     faults: tuple[ErrorReply, ...] = ()
@@ -199,8 +198,8 @@ class Command(NamedTuple):
     is_idempotent: bool = False
     """Whether a repetition has the same effect as one execution."""
     retries: int = 0
-    """Most retries: after a timeout of an idempotent command, or on request of the robot. 0:
-    `RESENDS` where the robot may ask."""
+    """Most retries: after a timeout of an idempotent command, or on request of the robot. The value
+    0 means `RESENDS`, if the robot may ask for retransmissions."""
     retry: Retry = Retry()
     """Waits before the retries."""
     hold: Hold | None = None

@@ -105,15 +105,15 @@ class Hold(NamedTuple):
     lease_s: float = 0.25
     """Lease of the motion without a renewal by the operator, 0.1 to 1.0 s."""
     watchdog_s: float | None = None
-    """Watchdog of the robot, in seconds: motion continues this long after the last value. ``inf``:
-    without end; None: unknown. Only the rules of the loader read it."""
+    """Watchdog of the robot, in seconds: motion continues this long after the last value. The value
+    ``inf`` means without end, and None unknown. Only the rules of the loader read the value."""
     slew: Mapping[str, float] = NOTHING
     """Argument → largest increase per second, away from the value that stops the motion."""
     on_stall: Literal["abort", "wait"] | None = None
     """Reaction to a connection that stalls during motion; None: the default of its transport."""
     step_s: float | None = None
-    """Longest duration of a step, in seconds, after which the robot stops by itself, so that no
-    stop is sent. None: the robot moves until it is stopped."""
+    """Longest duration of a step, in seconds. The robot then stops by itself, so no stop is sent.
+    None: the robot moves until it is stopped."""
 
 
 class Confirm(NamedTuple):

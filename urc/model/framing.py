@@ -28,9 +28,9 @@ __all__ = [
 ]
 
 Spelling = Literal["raw", "hex", "HEX", "dec"]
-"""Spelling of a number in a frame: raw bytes, or digits (``HEX``: in capitals)."""
+"""Notation of a number in a frame: raw bytes, or digits (``HEX``: in capitals)."""
 Digits = Literal["", "hex", "HEX", "base64"]
-"""Spelling of the bytes between the start and end markers; "" for raw bytes."""
+"""Notation of the bytes between the start and end markers; "" for raw bytes."""
 
 
 class Window(NamedTuple):
@@ -51,8 +51,8 @@ class Salt(NamedTuple):
     table: Mapping[Any, bytes] = NOTHING
     """Number → bytes."""
     otherwise: Literal["fault", "skip", "pass"] = "fault"
-    """Treatment of a frame whose number is missing from the table: drop and report it, drop it
-    silently, or accept it without a check."""
+    """Treatment of a frame with an unknown number: drop and report it, drop it silently, or accept
+    it without a check."""
 
     def number(self, frame: bytes | bytearray) -> int | None:
         """Return the number that selects the row; None when the frame is too short."""
@@ -122,8 +122,8 @@ class LengthSpec(NamedTuple):
     flag_at: int = -1
     """Offset of a flag byte that tells whether the field is a length; -1: it always is."""
     flag_mask: int = 0
-    """Bits of the flag byte. If any is set, the field is a length; otherwise the frame has `adjust`
-    bytes."""
+    """Mask of the flag byte. If any of these bits is set, the field is a length; otherwise the
+    frame has `adjust` bytes."""
 
     @property
     def is_loose(self) -> bool:
@@ -139,7 +139,7 @@ class EscapeSpec(NamedTuple):
     table: Mapping[Any, int] = NOTHING
     """Stuffed byte → its replacement after `byte`."""
     xor: int | None = None
-    """XOR mask behind the table. A sender may stuff further bytes, too."""
+    """XOR mask behind the table. A sender may also stuff other bytes."""
     after: bytes = b""
     """Sequence after which `insert` is stuffed; `byte` and `table` are then unused."""
     insert: int = 0
@@ -168,7 +168,7 @@ class FrameLayout(NamedTuple):
     trail: TrailSpec | None = None
     """Trailing checksum, removed before all other checks and added after all others."""
     digits: Digits = ""
-    """Spelling of the bytes between start and end; places and `checksums` count decoded bytes."""
+    """Notation of the bytes between start and end; places and `checksums` count decoded bytes."""
 
 
 def spelt_size(bits: int, spelling: Spelling) -> int:

@@ -1,7 +1,7 @@
 """Units by quantity, and the conversion of values between them. Pure.
 
-The table has only the units of robot documents. Its symbols are those of UCUM where UCUM has a
-common one. An unknown unit converts only to itself.
+The table has only the units of robot documents. Symbols follow UCUM, except where the UCUM symbol
+is uncommon. An unknown unit converts only to itself.
 """
 
 import math

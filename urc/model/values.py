@@ -1,8 +1,8 @@
 """Signals: the named, typed values of a robot, and their samples.
 
-The values of the model are named tuples. They are as frozen and typed as frozen dataclasses. Their
-definition costs a tenth (every command line call pays it), and their construction a third (every
-sample pays it).
+The values of the model are named tuples. Named tuples are as immutable and typed as frozen
+dataclasses. Their definition takes a tenth of the time, at every start of the command line. Their
+construction takes a third, for every sample.
 """
 
 from collections.abc import Mapping

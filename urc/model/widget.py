@@ -24,7 +24,8 @@ class Port(NamedTuple):
     is_required: bool = True
     description: str = ""
     is_held: bool = False
-    """For an output: whether it is a hold-to-run control. It then takes only motion commands."""
+    """For an output: whether it is a hold-to-run control. A hold-to-run output takes only motion
+    commands."""
     arguments: tuple[str, ...] = ()
     """For an output: names of its values; those of a held output range from -1 to 1."""
     items: tuple[str, ...] = ()

@@ -208,7 +208,7 @@ class Heard(NamedTuple):
 
 
 def _is_about(fields: Fields, is_mine: IsMine | None) -> bool:
-    """Return whether a frame with `fields` belongs to the request; without fields, it does."""
+    """Return whether a frame with `fields` belongs to the request; a frame without fields does."""
     return is_mine is None or not fields or is_mine(fields)
 
 

@@ -117,7 +117,7 @@ class Builder:
     def step(self, label: str, step: SendStep) -> Ask:
         """Return the request of a step.
 
-        Its normal rank lets no request of the same step overtake it.
+        The normal rank keeps the order of the steps.
         """
         return self.plain(label, step.transport, step.send)._replace(rank=RANKS["normal"])
 

@@ -1,6 +1,6 @@
 """Checksums over part of a frame: verified on receipt, written when sending.
 
-Pure. `urc._sums` has the arithmetic. All operations take linear time.
+Pure. The arithmetic is in `urc._sums`. All operations take linear time.
 """
 
 import binascii

@@ -26,7 +26,7 @@ __all__ = [
 _MOST: Final = 256
 """Largest number of commands that await verification."""
 _BOTH: Final = 2
-"""People that the two-person rule asks for."""
+"""Number of people for the two-person rule."""
 
 
 def why_not_allowed(

@@ -42,7 +42,8 @@ class Connection:
         self.on_ready: Callable[[], None] | None = None
         """Called when the connection is ready; must not call the conversation back."""
         self.on_refused: Callable[[str, str], None] | None = None
-        """Called with a held command and the refusal of the robot; must not call back."""
+        """Called with a held command and the refusal of the robot; must not call the conversation
+        back."""
         self._flights = Flights()
         self._outbox = Outbox(spec, self._flights, self._size_of)
         self.inbox = Inbox(spec, self.framing, messages)
@@ -169,7 +170,7 @@ class Connection:
         raise NotImplementedError
 
     def _pump(self, now: float) -> list[LineEvent]:
-        """Send and open as far as the new state of the connection allows."""
+        """Send queued requests, as far as the state of the connection allows."""
         raise NotImplementedError
 
 

@@ -191,7 +191,7 @@ class Engine:
         return self._settle(self.lines[transport].receive(data, now), now)
 
     def command(self, request: Request, now: float) -> list[Event]:
-        """Run a command. Exactly one `Replied` or `Failed` reports its end."""
+        """Run a command. Exactly one `Replied` or `Failed` reports the end of the command."""
         asked, people = Asked(request), request.confirmed_by
         events = self.run(request.command, request.arguments, asked, now, confirmed_by=people)
         return self._settle(events, now)
@@ -253,7 +253,7 @@ class Engine:
     ) -> list[LineEvent]:
         """Run a command or sequence; its outcome goes to `sink`, exactly once.
 
-        It is not sent once `unless` returns a reason.
+        The command is not sent once `unless` returns a reason.
         """
         found = self._commands.get(command)
         if found is None:

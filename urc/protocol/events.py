@@ -21,7 +21,7 @@ __all__ = [
 
 
 class Request(NamedTuple):
-    """One command to run. Exactly one `Replied` or `Failed` answers its id."""
+    """One command to run. Exactly one `Replied` or `Failed` answers each request."""
 
     id: int
     command: str

@@ -78,7 +78,7 @@ class Ask(NamedTuple):
     """Waits before the retries."""
     has_counters: bool = False
     is_motion: bool = False
-    """Whether it moves the robot. It then fails on a connection that is not ready, instead of
+    """Whether it moves the robot. Motion fails on a connection that is not ready, instead of
     waiting."""
     learnt: frozenset[str] = frozenset()
     """Names in its templates that the login reads."""
@@ -110,7 +110,7 @@ class Ask(NamedTuple):
 
     @property
     def is_in_order(self) -> bool:
-        """Whether only the order of the replies identifies its own."""
+        """Whether only the order of replies identifies the reply to this request."""
         return self.match is None and not self.is_numbered
 
 
@@ -154,7 +154,7 @@ class Exchange:
         self.namespace = namespace
         """Names of its templates, without counters."""
         self.data = data
-        """None: `Ask.made` leaves it to the moment of sending."""
+        """Rendered payload; None if it is rendered when it is sent, see `Ask.made`."""
         self.gives_up_at = gives_up_at
         """Time at which it fails in the queue."""
         self.tries_left = ask.retries

@@ -45,7 +45,7 @@ def build_fast_encode(
     encoding: str,
     slow: Encode,
 ) -> Encode | None:
-    """Return the function from namespace to bytes on the wire, or None if it is unsupported."""
+    """Return the function from namespace to bytes, or None for an unsupported template."""
     if type(framing) is not DelimiterFraming or framing.seal is not None:
         return None
     names = sorted(template.names)
@@ -73,7 +73,7 @@ def _text_of(
     tx: bytes,
     encoding: str,
 ) -> str | None:
-    """Return the format string of a frame as source text, or None if it is unsupported."""
+    """Return the format string of a frame as source text, or None if unsupported."""
     whole = frozenset(variables[name] for name, kind in kinds.items() if kind == "integer")
     try:
         pieces = _pieces(ast.parse(template.python, mode="eval").body, variables, whole)

@@ -18,7 +18,7 @@ __all__ = ["Flight", "Flights"]
 
 
 class Flight:
-    """One transmission of a request, until its last reply arrives or is given up."""
+    """One transmission of a request, until its last reply arrives or times out."""
 
     __slots__ = (
         "_ear",
@@ -39,7 +39,8 @@ class Flight:
         self.stage = 0
         self._ear: Ear | None = None
         self.due = now + ask.answers[0].timeout_s
-        """Time at which its reply is overdue. For a late one: time at which it is forgotten."""
+        """Time at which its reply is overdue. For a late transmission, time at which it is
+        removed."""
         self.size = 0
         """Size in the receive buffer of the robot, in bytes."""
         self.since = now
@@ -130,7 +131,7 @@ class Flight:
 
 
 class Flights(list[Flight]):
-    """Transmissions in the order of sending. Late ones stay until they are forgotten."""
+    """Transmissions in the order of sending. Late transmissions stay until their deadline."""
 
     __slots__ = ()
 
@@ -206,7 +207,7 @@ class Flights(list[Flight]):
         return next((one for one in self if one.number is not None and one.number == number), None)
 
     def offer(self, frame: Frame, *, is_message: bool = False) -> tuple[Flight, Offer] | None:
-        """Return the transmission that a frame answers with the match result, or None."""
+        """Return the transmission that the frame answers, with the match result; or None."""
         if len(self) == 1:
             only = self[0].offer(frame, is_message=is_message)
             return None if only is None else (self[0], only)

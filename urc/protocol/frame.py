@@ -226,7 +226,9 @@ class LengthField:
                 raise BadFrame("wrong-size", text)
             return  # the bytes there belong to the payload
         if left:
-            raise BadFrame("wrong-size", f"the frame is counted in {spec.unit} bytes; {left} over")
+            raise BadFrame(
+                "wrong-size", f"the frame must be a multiple of {spec.unit} bytes; {left} left over"
+            )
         if self.end > stop or number < 0:
             raise BadFrame("wrong-size", f"{len(frame)} bytes are too few for this kind of frame")
         if spec.spelling == "raw":

@@ -1,8 +1,8 @@
 """Functions generated from source text, once per declaration, with readable tracebacks.
 
 The callers of `function_of` build the source from fixed names and from the `repr()` of constants.
-No other text of a document enters it. `linecache` holds the source during the lifetime of the
-function, so that a traceback shows the generated line.
+No other text of a document enters the source. `linecache` holds the source during the lifetime of
+the function, so that a traceback shows the generated line.
 """
 
 import weakref
@@ -24,7 +24,7 @@ def function_of(
         name: name of the function, a Python identifier.
         arguments: parameter list, as in a ``def``.
         lines: lines of the body, indented by at least four blanks.
-        scope: the only names that it sees besides its arguments.
+        scope: global names of the function.
     """
     import linecache  # what is made is made late, so that what makes it is imported late
 

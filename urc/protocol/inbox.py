@@ -128,7 +128,7 @@ class Inbox:
 
         Args:
             since: start of the wait.
-            instead: what the frame is not: "no answer to home".
+            instead: end of the sentence "which is …", such as "no answer to home".
         """
         time_s, text = self._stray
         if time_s < since:
@@ -233,7 +233,7 @@ class Inbox:
         if fault:
             return Fault(self._spec.name, "bad-value", self.secrets.hide(fault))
         if frame.topic is not None:
-            where = f"nothing declared matches what came on {frame.topic!r}"
+            where = f"nothing declared matches the data on {frame.topic!r}"
             return Fault(self._spec.name, "no-match", self.secrets.hide(where))
         was_text_wanted = getattr(frame, "was_text_wanted", False)
         try:

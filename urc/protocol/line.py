@@ -3,18 +3,18 @@
 Pure: time is passed in. Two callbacks, `on_ready` and `on_refused`, concern motion.
 
 Theory of operation. A connection is closed, opening or open. An open connection becomes *ready*
-after the steps of ``on_connect``, and stops being ready before those of ``on_close``. While it is
-not ready, it sends only the privileged exchanges of these steps. The session opens a persistent
+after the steps of ``on_connect``, and stops being ready before those of ``on_close``. A connection
+that is not ready sends only the privileged exchanges of these steps. The session opens a persistent
 connection. A per-request conversation asks for a connection (`Open`) when a request waits, and for
 its end (`Close`) afterwards.
 
 Requests in flight are kept in the order of sending. A received frame is offered to each of them,
-the oldest first. A request with a correlation takes its own reply only. Of the others only the
-oldest may take the frame, because replies arrive in order; real-time requests have an order of
+the oldest first. A request with a correlation takes its own reply only. Of the other requests, only
+the oldest may take the frame, because replies arrive in order; real-time requests have an order of
 their own. A request whose reply is overdue stays in flight as *late* for one more reply time. A
-frame that matches it is dropped, so that the next request does not take it. Until then, requests
-with confusable replies wait. After `MISSES_UNTIL_CLOSED` missing replies in a row the connection is
-closed and opened again.
+frame that matches it is dropped, so that the next request does not take it. Until the late reply
+arrives or times out, requests with confusable replies wait. After `MISSES_UNTIL_CLOSED` missing
+replies in a row the connection is closed and opened again.
 """
 
 from collections.abc import Mapping, Sequence

@@ -120,7 +120,7 @@ class Readings:
         return min((time for time in times if time is not None), default=None)
 
     def tick(self, now: float) -> list[Sample]:
-        """Return the samples that time alone has changed by `now`, with their original times.
+        """Return the samples that time alone has changed until `now`, with their own times.
 
         They are the newest samples of signals with a new alarm, and debounced values.
         """

@@ -13,7 +13,7 @@ PAUSE_S: Final = 600.0
 
 Pull = Literal["pause", "step", "resume", "abort"]
 """A request of the operator. ``step`` runs one outermost step and pauses again. Before the start,
-it makes the sequence start paused."""
+``step`` makes the sequence start paused."""
 
 
 class Reins:
@@ -34,8 +34,8 @@ class Reins:
         self.count = 0
         """Change counter of all attributes above."""
         self._halt: Literal["", "now", "next", "outer"] = ""
-        """Next pause. now: before any step; outer: before an outermost one; next: after one more of
-        those."""
+        """Place of the next pause. The value ``now`` means before any step, ``outer`` before an
+        outermost one, and ``next`` after one more outermost step."""
 
     def pull(self, what: Pull) -> None:
         """Apply a request of the operator."""

@@ -2,8 +2,8 @@
 
 Pure. This is the reverse of `urc.protocol.struct_read`. Theory of operation: every item becomes a
 step ``(pen, scope)`` that appends its bytes. Two kinds of values leave a gap that is filled in
-later: the size of a following text (its `Gap` waits in the scope), and expressions over the size of
-the whole frame (`Pen.late`).
+later: the size of a following text (its `Gap` waits in the scope), and values that depend on the
+size of the whole frame (`Pen.late`).
 """
 
 from collections.abc import Callable, Mapping
@@ -293,7 +293,7 @@ def _array_step(item: Item, count: Extent, rules: Rules) -> WriteStep:
 def _records_step(item: Item, count: Extent, rules: Rules) -> WriteStep:
     """Write nameless structs, one for each record of a list with its own signals.
 
-    There is one struct for each case with a complete set of fields; without a switch, there is
+    Each case with a complete set of fields gives one struct; without a switch, the record gives
     exactly one.
     """
     own = rules._replace(derived={**rules.derived, **derived_sizes(item.items)})

@@ -1,7 +1,8 @@
 """Composite values: arrays, objects, and bytes such as images.
 
 Pure. The input is JSON-like data, bytes, or text. The elements of an array in text are separated by
-blanks, commas or semicolons; bytes in text are base64. The size of the frame bounds everything.
+blanks, commas or semicolons; bytes in text are base64. The size of the frame bounds the size of the
+values.
 """
 
 import re

@@ -1,6 +1,6 @@
 """The form ``xml``: fields of a document, found by element paths.
 
-The parser of the standard library does the work. A document with a document type declaration is
+The form uses the parser of the standard library. A document with a document type declaration is
 rejected before parsing: entities cannot expand, and external resources are never loaded.
 """
 

@@ -17,7 +17,7 @@ _SHOWN = 200
 
 
 def one_line(said: str, most: int = _SHOWN) -> str:
-    """Return a text of the other side as part of a one-line message.
+    """Return a text of the other side on a single line, for a message.
 
     Control characters are escaped, and texts of more than `most` characters are cut.
     """
@@ -56,6 +56,6 @@ def explain(host: str, place: str, fault: OSError | UnicodeError) -> str:
 
 
 def reason(fault: BaseException) -> str:
-    """Return the system's text for `fault`, in lower case, without the error number."""
+    """Return the system's text for an error, in lower case, without the error number."""
     text = getattr(fault, "strerror", None) or str(fault) or type(fault).__name__
     return one_line(str(text).lower())

@@ -71,5 +71,5 @@ def choice(
     if found is None:
         return default
     if found not in among:
-        raise TransportError(f"{kind} knows {key}: {' | '.join(among)}, not {found!r}")
+        raise TransportError(f"{kind} needs {key}: {' | '.join(among)}, not {found!r}")
     return str(found)

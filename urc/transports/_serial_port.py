@@ -68,7 +68,8 @@ async def open_port(
 class _Rfc2217(RFC2217SerialTransport):
     """An RFC 2217 connection that needs no confirmation of unused notifications.
 
-    The library waits for it until its timeout; ser2net, the usual server, never sends it.
+    The library would wait for a confirmation until its timeout; ser2net, the usual server, never
+    sends one.
     """
 
     def _data_received(self, data: bytes) -> None:
@@ -80,13 +81,13 @@ class _Rfc2217(RFC2217SerialTransport):
             try:
                 super()._data_received(data[start : start + _AT_ONCE])
             except Exception as fault:  # the library checks little of its input
-                self._give_up(f"what the server sends is no RFC 2217 ({reason(fault)})")
+                self._give_up(f"the server does not speak RFC 2217 ({reason(fault)})")
                 return
             # Discard old unsolicited options: the library would keep them and search them each
             # time.
             del serial._engine._pending_telnet[:-_KEPT_OPTIONS]  # noqa: SLF001 - no public way
             if line.get_write_buffer_size() > UNTAKEN_BYTES:
-                self._give_up("the server asks, and takes none of the answers")
+                self._give_up("the server does not read the replies")
 
     def _give_up(self, why: str) -> None:
         if self._tcp_transport is not None:

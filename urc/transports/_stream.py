@@ -1,8 +1,8 @@
 """An open TCP connection, and a transport on top of a stream.
 
-Each connection receives into one fixed buffer. While it is full, the socket is not read: a flooding
-robot fills its own kernel's queue instead of our memory. `put` returns once the kernel has every
-byte, so a connection may be closed right after the last one.
+Each connection receives into one fixed buffer. While the buffer is full, the socket is not read: a
+flooding robot fills the queue of its own kernel instead of our memory. `put` returns once the
+kernel has every byte, so a connection may be closed right after the last one.
 """
 
 import asyncio
@@ -279,7 +279,7 @@ def as_bytes(payload: Payload) -> bytes:
     """
     if isinstance(payload, bytes):
         return payload
-    raise TransportError(f"this line carries bytes and cannot {payload.verb}")
+    raise TransportError(f"this transport carries bytes and cannot {payload.verb}")
 
 
 def forget_unsent(line: socket.socket) -> None:

@@ -1,8 +1,7 @@
 """TLS over any stream: a socket, or a tunnelled connection.
 
-The standard library implements TLS over sockets; here it works on two buffers in memory, which the
-underlying stream fills and empties. The minimum is TLS 1.2, and the certificate is verified unless
-disabled.
+The TLS of the standard library works on two buffers in memory, which the underlying stream fills
+and empties. The minimum is TLS 1.2, and the certificate is verified unless disabled.
 """
 
 import asyncio

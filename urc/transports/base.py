@@ -40,9 +40,9 @@ __all__ = [
 
 
 NOTICE: Final = "notice"
-"""Verb of envelopes that a transport itself creates. The body is a one-line text for people
-about an error that the robot does not report. It goes to the log of the robot and is no sign
-of liveness."""
+"""Verb of envelopes that a transport itself creates. The body is a one-line text for people about
+an error that the robot does not report. The notice goes to the log of the robot and does not prove
+that the robot is alive."""
 
 
 class TransportError(UrcError):
@@ -64,7 +64,7 @@ class PeerClosed(TransportError):
 class Transport(Protocol):
     """One connection to a robot.
 
-    It may be opened again after `close`, but never twice at a time.
+    A transport may be opened again after `close`, but never twice at a time.
     """
 
     @property
@@ -92,7 +92,7 @@ def bytes_of(data: Payload) -> bytes:
     """Return `data` for a connection that carries bytes; raise `TransportError` for an envelope."""
     if isinstance(data, bytes):
         return data
-    raise TransportError(f"a line of bytes cannot carry a message ({data.verb})")
+    raise TransportError(f"a transport of bytes cannot carry a message ({data.verb})")
 
 
 class ByteStream(Protocol):

@@ -59,9 +59,7 @@ async def announced(
     try:
         zeroconf = AsyncZeroconf(interfaces=list(interfaces) or InterfaceChoice.All)
     except OSError as fault:
-        raise TransportError(
-            f"nothing can be heard over mDNS ({fault.strerror or fault})"
-        ) from fault
+        raise TransportError(f"mDNS is not available ({fault.strerror or fault})") from fault
     try:
         wanted = [f"{one}.local." for one in types]
         browser = AsyncServiceBrowser(zeroconf.zeroconf, wanted, handlers=[changed])

@@ -20,7 +20,8 @@ async def read_body(response: httpx2.Response, max_bytes: int) -> bytes:
     """Return the whole body, decompressed.
 
     Raises:
-        HttpFault: it is longer than `max_bytes`, compressed or not, or has an unknown encoding.
+        HttpFault: the body is longer than `max_bytes`, compressed or not, or has an unknown
+            encoding.
     """
     too_long = f"the answer is longer than {max_bytes} bytes"
     if int(response.headers.get("content-length") or 0) > max_bytes:
@@ -34,13 +35,13 @@ async def read_body(response: httpx2.Response, max_bytes: int) -> bytes:
     if packing in ("identity", "") or not body:
         return bytes(body)
     if packing not in _FORMATS:
-        raise HttpFault(f"the answer is packed as {packing[:40]!r}, which was not asked for")
+        raise HttpFault(f"the answer has the encoding {packing[:40]!r}, which was not requested")
     unpacker = zlib.decompressobj(_FORMATS[packing])
     try:
         # One byte more than the limit reveals a longer body, and limits the decompression.
         plain = unpacker.decompress(body, max_bytes + 1)
     except zlib.error as fault:
-        raise HttpFault(f"the answer is not {packing} as it says ({fault})") from fault
+        raise HttpFault(f"the answer is not valid {packing} ({fault})") from fault
     if len(plain) > max_bytes:
         raise HttpFault(too_long)
     if not unpacker.eof:

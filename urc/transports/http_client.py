@@ -95,7 +95,7 @@ class Client:
         """Return a request for `path`, relative to the path of the document's URL.
 
         Raises:
-            HttpFault: it is not valid HTTP, or leaves the base path.
+            HttpFault: the request is not valid HTTP, or leaves the base path.
         """
         if leads_up(path):
             base = self._base.removeprefix(self._origin)
@@ -108,13 +108,13 @@ class Client:
         """Return a request for a URL from the robot: absolute, or relative to its root.
 
         Raises:
-            HttpFault: it is not valid HTTP, or leads to another host, port or protocol.
+            HttpFault: the request is not valid HTTP, or leads to another host, port or protocol.
         """
         try:
             base = httpx2.URL(f"{self._base}/")
             url = base.join(reference)
         except (httpx2.InvalidURL, UnicodeError, TypeError, ValueError) as fault:
-            raise HttpFault(f"{reference[:80]!r} is no URL ({fault})") from fault
+            raise HttpFault(f"{reference[:80]!r} is not a URL ({fault})") from fault
         if (url.scheme, url.host, url.port, url.userinfo) != (
             base.scheme,
             base.host,
@@ -138,7 +138,7 @@ class Client:
             url = httpx2.URL(target)
             request = self._client.build_request(method, url, headers=dict(headers), content=body)
         except (httpx2.InvalidURL, UnicodeError, TypeError, ValueError) as fault:
-            raise HttpFault(f"{method} {path[:80]!r} is no request ({fault})") from fault
+            raise HttpFault(f"{method} {path[:80]!r} is not a valid request ({fault})") from fault
         return request
 
     @asynccontextmanager
@@ -178,7 +178,7 @@ class Client:
             if isinstance(fault, _FAULTS):
                 raise
             where = self._place.authority
-            raise HttpFault(f"what {where} answers is not understood ({_short(fault)})") from fault
+            raise HttpFault(f"{where} sent an invalid response ({_short(fault)})") from fault
 
     def unsent(self) -> int:
         """Return the number of request bytes that have not been acknowledged."""
@@ -206,7 +206,7 @@ class Client:
             if "without sending" in str(fault):
                 text = "the robot closed the connection without an answer"
                 return HttpFault(text, is_unanswered=True)
-            return HttpFault(f"what {where} sends is not HTTP ({_short(fault)})")
+            return HttpFault(f"{where} does not speak HTTP ({_short(fault)})")
         if isinstance(fault, httpcore2.LocalProtocolError | NotImplementedError):
             return HttpFault(f"this request cannot be made ({_short(fault)})")
         return HttpFault(_short(fault), is_unanswered=True)
@@ -379,7 +379,7 @@ class _Connection(httpcore2.AsyncNetworkStream):
     def is_readable(self) -> bool:
         """Return whether `read` would return at once; an idle connection is then closed.
 
-        A stream has no other test than to begin `take`, and to cancel it if it waits.
+        The only test of a stream is a call of `take`, which is cancelled if it waits.
         """
         if self._early:
             return True

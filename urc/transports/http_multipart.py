@@ -40,7 +40,9 @@ def boundary_of(content_type: str) -> bytes:
     if not core:
         raise MultipartFault("the Content-Type names no boundary")
     if len(core) > MAX_BOUNDARY or not core.isascii():
-        raise MultipartFault(f"the boundary has more than {MAX_BOUNDARY} characters, or odd ones")
+        raise MultipartFault(
+            f"the boundary has more than {MAX_BOUNDARY} characters, or invalid ones"
+        )
     return core.encode()
 
 

@@ -65,7 +65,7 @@ def streams_of(subscriptions: Sequence[Subscription]) -> list[StreamSpec]:
             words = "mjpeg, stills, sse or lines"
             raise TransportError(f"http needs {words} as stream of {topic!r}, not {kind!r}")
         if event and kind != "sse":
-            raise TransportError(f"http knows events by name in streams of sse only: {topic!r}")
+            raise TransportError(f"http has named events only in streams of sse: {topic!r}")
         if not isinstance(every_s, int | float) or not 0.01 <= every_s <= 3600:
             raise TransportError(f"http needs every from 10ms to 1h for {topic!r}, not {every_s!r}")
         spec = StreamSpec(str(kind), path, float(every_s), frozenset({topic}))
@@ -79,7 +79,7 @@ def streams_of(subscriptions: Sequence[Subscription]) -> list[StreamSpec]:
 
 
 class Pulse:
-    """The time of the last data from the robot, on any connection."""
+    """Time of the last data from the robot, on any connection."""
 
     def __init__(self) -> None:
         self._clock = asyncio.get_running_loop().time

@@ -117,7 +117,7 @@ def _read(file: Path, host: str, port: int, *, is_asked_for: bool) -> Known:
             asyncssh.import_known_hosts(text), _name(host, port), "", None
         )
     except ValueError as fault:
-        raise TransportError(f"{file} is no known-hosts file ({fault})") from fault
+        raise TransportError(f"{file} is not a known-hosts file ({fault})") from fault
     trusted, authorities, revoked = (tuple(keys) for keys in found[:3])
     return Known(trusted, authorities, revoked)
 

@@ -1,6 +1,6 @@
 """Factory of the MQTT transport, for robots behind a broker.
 
-It needs no MQTT library, so that it can report a missing one.
+The module needs no MQTT library, so that it can report a missing one.
 """
 
 from importlib.util import find_spec

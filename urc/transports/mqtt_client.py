@@ -201,7 +201,7 @@ class _Session:
         except (ValueError, UnicodeEncodeError) as problem:
             raise TransportError(f"mqtt cannot publish to {topic!r} ({problem})") from problem
         if done.rc == MQTTErrorCode.MQTT_ERR_QUEUE_SIZE:
-            text = f"the broker has not acknowledged {MAX_UNACKNOWLEDGED} messages; none is taken"
+            text = f"the broker has not acknowledged {MAX_UNACKNOWLEDGED} messages; dropped"
             raise TransportError(text)
         while self._client.want_write() and self.inbox.ended is None:
             await self._until_writable()
@@ -271,7 +271,7 @@ class _Session:
                 if self._seen == before:
                     return
         except Exception as fault:  # paho checks little of its input
-            self._lose(f"what the broker sent is not understood ({reason(fault)})")
+            self._lose(f"the broker sent an invalid packet ({reason(fault)})")
 
     def _tick(self) -> None:
         """Send keepalives, and close a connection without replies."""
@@ -366,12 +366,12 @@ class _Client(Client):
         if self._in_packet["remaining_length"] > MAX_BYTES:
             return f"the broker sent a message of more than {MAX_BYTES} bytes"
         if len(self._out_packet) > MAX_UNTAKEN:
-            return f"the broker takes none of {MAX_UNTAKEN} acknowledgements"
+            return f"the broker has not read {MAX_UNTAKEN} acknowledgements"
         half = self._in_messages
         if half and (
             len(half) > MAX_HALF or sum(len(one.payload) for one in half.values()) > MAX_BYTES
         ):
-            return "the broker begins to deliver messages, and ends none of them"
+            return "the broker does not complete its message deliveries"
         return ""
 
     def _create_socket(self) -> Any:

@@ -19,7 +19,7 @@ class OwnDoor(OSError):
     """A connection leads to URC's own dashboard."""
 
     def __init__(self) -> None:
-        super().__init__(None, "that is this dashboard itself: no robot may be reached there")
+        super().__init__(None, "this address is the dashboard itself; it cannot be a robot")
 
 
 class OwnDoors:
@@ -62,7 +62,8 @@ class OwnDoors:
         Args:
             address: target address.
             port: target port.
-            is_near: whether it starts on this machine; elsewhere, loopback means another machine.
+            is_near: whether the connection starts on this machine; elsewhere, loopback means
+                another machine.
         """
         wanted = unmapped(address)
         if not is_near and (wanted.is_loopback or wanted.is_unspecified):

@@ -58,7 +58,7 @@ class TopicGraph:
     def subscribers(self, topic: str, nodes: Iterable[object]) -> None:
         """Check the subscribers of a published topic."""
         if not list(nodes):
-            self._say(f"nothing subscribes to {topic}: what is sent there moves nothing")
+            self._say(f"nothing subscribes to {topic}: its messages have no effect")
 
     def _compare(self, topic: str, kind: str, verb: str) -> None:
         known = self._types.get(topic, "")

@@ -12,8 +12,8 @@ connections.
 
 The bridge reports no errors: a topic without a publisher, a wrong type and an access list all cause
 silence. So rosapi is asked for the topics at the start, and for the subscribers of a topic at its
-first message; `urc.transports.ros_graph` reports mistakes. With ``version: auto`` the reply
-precedes the subscriptions, because it decides the form of type names.
+first message; `urc.transports.ros_graph` reports mistakes. With ``version: auto``, subscriptions
+wait for that reply, which decides the form of type names.
 """
 
 import asyncio
@@ -95,7 +95,7 @@ class RosbridgeTransport:
             await self._wire.close()
             if isinstance(fault, PeerClosed | TimeoutError):
                 told = str(fault) or "it takes nothing"
-                message = f"{self._where} took no subscription ({told})"
+                message = f"{self._where} refused the subscriptions ({told})"
                 raise ConnectFailed(message) from fault
             raise
 
@@ -192,7 +192,7 @@ def _listening(topic: str, attributes: Mapping[str, Value]) -> Listening:
     def number(name: str, factor: float = 1) -> int:
         value = attributes.get(name) or 0
         if isinstance(value, bool) or not isinstance(value, int | float) or value < 0:
-            raise TransportError(f"rosbridge: {name} of {topic} is no number, not {value!r}")
+            raise TransportError(f"rosbridge needs a number as {name} of {topic}, not {value!r}")
         return round(value * factor)
 
     compression = attributes.get("compression") or "none"

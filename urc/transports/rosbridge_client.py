@@ -2,9 +2,9 @@
 
 roslibpy implements the operations, their ids and pending requests. Its network connections are not
 used: they replay old messages after a reconnection, fail on binary frames, and never probe the
-other side. The figures are in docs/decisions. Here, its protocol writes into a list, which the
-transport sends over its own socket, and gets the received data of that socket. One object serves
-one connection, so nothing remains for the next one.
+other side. The figures are in docs/decisions. Here, roslibpy's protocol writes into a list, which
+the transport sends over its own socket. The transport passes received data to the protocol. One
+object serves one connection, so nothing remains for the next one.
 
 No I/O, no task, no thread.
 """
@@ -279,7 +279,7 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
 
 
 class _Factory(EventEmitterMixin):  # type: ignore[misc] # roslibpy ships no types
-    """roslibpy's connection factory, always connected, since it lives as long."""
+    """roslibpy's connection factory, which is connected during its whole life."""
 
     is_connected = True
 

@@ -94,7 +94,7 @@ class FrameReader:
         if not (isinstance(number, int) and isinstance(total, int) and isinstance(data, str)):
             raise BadFrame("a fragment without number, total or data")
         if not 0 <= number < total <= MAX_FRAGMENTS:
-            raise BadFrame(f"fragment {number} of {total} is none")
+            raise BadFrame(f"fragment {number} of {total} is invalid")
         key = str(name) if isinstance(name, str | int) else "?"
         if len(key) > _LONGEST_ID:
             raise BadFrame(f"the id of a fragment has {len(key)} characters")
@@ -169,10 +169,10 @@ class _Plain:
         """Return `value` with null for every number that JSON lacks."""
         self._room -= 1 + (len(value) if isinstance(value, str | bytes) else 0)
         if self._room < 0:
-            raise ValueError(f"it stands for more than {MAX_BYTES} bytes")
+            raise ValueError(f"it expands to more than {MAX_BYTES} bytes")
         self._left -= 1
         if self._left < 0:
-            raise ValueError(f"it stands for more than {self._values} values")
+            raise ValueError(f"it expands to more than {self._values} values")
         if isinstance(value, float):
             return value if math.isfinite(value) else None
         if isinstance(value, dict):
@@ -183,12 +183,12 @@ class _Plain:
             return value
         if isinstance(value, int) and value.bit_length() <= 64:
             return value
-        raise ValueError(f"{type(value).__name__} is no value of a message")
+        raise ValueError(f"{type(value).__name__} is not a value of a message")
 
 
 def _key(name: object) -> str:
     if not isinstance(name, str):
-        raise ValueError(f"{type(name).__name__} is no name of a field")
+        raise ValueError(f"{type(name).__name__} is not a name of a field")
     return name
 
 
@@ -204,7 +204,7 @@ def _png_text(operation: Mapping[str, Any]) -> bytes:
 def _pixels(image: bytes) -> bytes:
     """Return the pixel bytes of a non-interlaced 8-bit RGB image, as the bridge makes them."""
     if not image.startswith(_PNG_MAGIC):
-        raise BadFrame("the data of a png is no PNG image")
+        raise BadFrame("the data of a png is not a PNG image")
     width = height = 0
     packed = bytearray()
     at = len(_PNG_MAGIC)
@@ -220,7 +220,7 @@ def _pixels(image: bytes) -> bytes:
             packed += chunk
     size = height * (width * 3 + 1)
     if not 0 < size <= MAX_PNG_BYTES:
-        raise BadFrame(f"a png of {width} x {height} pixels is not taken")
+        raise BadFrame(f"a png of {width} x {height} pixels is too large")
     try:
         rows = zlib.decompressobj().decompress(bytes(packed), size)
     except zlib.error as problem:

@@ -96,7 +96,7 @@ def from_setup(setup: Setup) -> Transport:
     if not port:
         raise TransportError("serial needs a port, as /dev/ttyUSB0 or socket://HOST:PORT")
     if setup.tunnel is not None:
-        raise TransportError("serial goes through no other transport; leave tunnel out")
+        raise TransportError("serial cannot be tunnelled; remove tunnel")
     if not port.startswith(_SOCKET):
         _need_serialx()
     return SerialTransport(port, _settings_of(options))
@@ -114,7 +114,7 @@ def explain(port: str, shown: str, fault: BaseException) -> str:
     if code in (errno.EBUSY, errno.EAGAIN):
         return f"{shown} is in use by another program"
     if code in (errno.ENOTTY, errno.EISDIR):
-        return f"{shown} is no serial port"
+        return f"{shown} is not a serial port"
     if code == errno.EINVAL:
         return f"{shown} cannot be set up as asked; check baud, data_bits, parity and stop_bits"
     words = fault.args[1] if code is not None and len(fault.args) > 1 else reason(fault)
@@ -134,7 +134,9 @@ def _remedy(port: str) -> str:
         return ""
     if not state.st_mode & 0o060 or group == "root":
         return f"; its mode is {state.st_mode & 0o777:o}, and it belongs to the group {group!r}"
-    return f"; it takes the group {group!r}: sudo usermod -aG {group} $USER, and sign in again"
+    return (
+        f"; add yourself to the group {group!r}: sudo usermod -aG {group} $USER, and sign in again"
+    )
 
 
 def _settings_of(options: Mapping[str, object]) -> Settings:
@@ -161,7 +163,7 @@ def _number(options: Mapping[str, object], key: str, default: int, among: range)
 def _stop_bits(options: Mapping[str, object]) -> float:
     found = options.get("stop_bits", 1)
     if isinstance(found, bool) or found not in (1, 1.5, 2):
-        raise TransportError(f"serial knows stop_bits: 1 | 1.5 | 2, not {found!r}")
+        raise TransportError(f"serial needs stop_bits: 1 | 1.5 | 2, not {found!r}")
     return cast("float", found)
 
 

@@ -1,8 +1,8 @@
 """SSH to a robot: a shell, a program, or only a tunnel for other transports.
 
 All users share one connection: the transport's own channel, if its mode has one, and the transports
-that name it in ``tunnel``. The first user opens it, the last one closes it, and all users learn of
-its loss.
+that name it in ``tunnel``. The first user opens the connection, the last one closes it, and a loss
+ends all of them.
 """
 
 import asyncio
@@ -129,7 +129,7 @@ def _environment(value: object) -> tuple[tuple[str, str], ...]:
     pairs = []
     for name, text in value.items():
         if not isinstance(name, str) or not _NAME.fullmatch(name):
-            raise TransportError(f"ssh: {name!r} is no name of an environment variable")
+            raise TransportError(f"ssh: {name!r} is not a name of an environment variable")
         if not isinstance(text, str):
             raise TransportError(f"ssh: environment.{name} is text; put it in quotation marks")
         pairs.append((name, text))
@@ -315,7 +315,7 @@ def from_setup(setup: Setup) -> SshTransport:
         TransportError: an option is missing or invalid.
     """
     if setup.tunnel is not None and not isinstance(setup.tunnel, SshTransport):
-        raise TransportError("ssh goes through another ssh only, or through nothing")
+        raise TransportError("ssh can be tunnelled only through another ssh")
     return SshTransport(read_target(setup), read_program(setup), setup.tunnel)
 
 

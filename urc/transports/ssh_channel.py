@@ -140,7 +140,7 @@ class Channel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
     def unsent(self) -> int:
         """Return the number of bytes that the server has not acknowledged.
 
-        Includes those of the SSH connection itself and of its other channels.
+        The number includes the bytes of the SSH connection itself and of its other channels.
         """
         return self._channel.get_write_buffer_size() + self._wire.unsent()
 

@@ -170,7 +170,7 @@ def _explain(target: Target, client: _Client, fault: Exception) -> str:
             return f"the host key of {place} is not trusted ({_first(fault.reason)})"
         case asyncssh.KeyExchangeFailed():
             hint = "" if login.legacy else "; 'legacy: true' allows old ones"
-            return f"{place} speaks no algorithm that URC takes{hint} ({_first(fault.reason)})"
+            return f"{place} offers no algorithm that URC accepts{hint} ({_first(fault.reason)})"
         case asyncssh.ConnectionLost():
             return f"{place} closed the connection before the login was done"
         case asyncssh.ProtocolError() | asyncssh.ProtocolNotSupported():

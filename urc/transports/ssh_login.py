@@ -115,7 +115,7 @@ async def _private_key(login: Login) -> asyncssh.SSHKey:
     except asyncssh.KeyImportError as fault:
         if "passphrase" in str(fault).lower():
             raise ConnectFailed(f"cannot use {_shown(login.key)}: it needs a passphrase") from fault
-        raise ConnectFailed(f"{_shown(login.key)} is no private key of SSH") from fault
+        raise ConnectFailed(f"{_shown(login.key)} is not an SSH private key") from fault
     except (OSError, ValueError) as fault:
         why = str(getattr(fault, "strerror", None) or fault).lower()
         raise ConnectFailed(f"cannot read {_shown(login.key)} ({why})") from fault

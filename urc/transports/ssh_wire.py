@@ -20,9 +20,9 @@ _READ_BYTES = 65536
 UNTAKEN_BYTES = 8_388_608
 """Limit of unsent replies to a server, in bytes; larger than the window of a channel."""
 _LAST_TURNS = 10
-"""Turns of the event loop for the last bytes, before asyncssh learns of the end of the stream. It
-reads some packets in tasks. A refusing server often closes right after the packet with the reason:
-without these turns, the reason would be lost."""
+"""Turns of the event loop for the last bytes, before asyncssh learns of the end of the stream.
+asyncssh reads some packets in tasks. A refusing server often closes right after the packet with the
+reason: without these turns, the reason would be lost."""
 
 
 def why_lost(exc: Exception | None) -> str:
@@ -106,7 +106,7 @@ class Wire(asyncio.BufferedProtocol):
         after = self._transport.get_write_buffer_size()
         self._untaken = self._untaken + after - before if before else after
         if self._untaken > UNTAKEN_BYTES:
-            self.end("the connection broke (the robot asks, and takes none of the answers)")
+            self.end("the connection broke (the robot does not read the replies)")
             self._transport.abort()
 
     def eof_received(self) -> bool:

@@ -318,9 +318,7 @@ def from_setup(setup: Setup) -> Transport:
         tls = Tls.of("tcp", options.get("tls"))
         return TcpTransport(host, port, tunnel=setup.tunnel, tls=tls)
     if setup.tunnel is not None:
-        raise TransportError(
-            "tcp cannot listen through another transport; leave tunnel or mode out"
-        )
+        raise TransportError("tcp cannot listen through a tunnel; remove tunnel or mode")
     bind = _options.text("tcp", options, "bind", _LOOPBACK)
     only = _options.text("tcp", options, "host")
     who = _options.choice("tcp", options, "from", ("any", "host"), "host" if only else "any")

@@ -125,7 +125,7 @@ class Inbox:
                 return
 
     def _forget(self, topic: str) -> None:
-        """Remove the bookkeeping of the oldest message of `topic`."""
+        """Update the counts after the removal of the oldest message of `topic`."""
         queue = self._topics[topic]
         _, size = queue.popleft()
         self._bytes -= size

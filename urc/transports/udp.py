@@ -32,9 +32,10 @@ _AT_ONCE = 64
 """Datagrams per turn of the event loop."""
 _LONGEST = 65_536
 _RECVERR = {socket.AF_INET: (socket.IPPROTO_IP, 11), socket.AF_INET6: (socket.IPPROTO_IPV6, 25)}
-"""IP_RECVERR of Linux, missing in Python: it reports refusals on unconnected sockets, too."""
+"""IP_RECVERR of Linux, missing in Python. The option reports refusals on unconnected sockets,
+too."""
 _LOST_HERE = (errno.ENOBUFS, errno.EAGAIN, errno.ENOMEM)
-"""Errors that mean a datagram lost on this machine, as UDP permits."""
+"""Errors that mean the loss of a datagram on this machine, which UDP permits."""
 _NO_WAY = (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENETDOWN, errno.EADDRNOTAVAIL)
 
 _Address = tuple[str | int, ...]
@@ -285,7 +286,7 @@ def from_setup(setup: Setup) -> Transport:
     """
     options = setup.options
     if setup.tunnel is not None:
-        raise TransportError("udp goes through no other transport; leave tunnel out")
+        raise TransportError("udp cannot be tunnelled; remove tunnel")
     host = _options.text("udp", options, "host").strip()
     port = _options.port("udp", options) if options.get("port") is not None else 0
     listen = _options.port("udp", options, "listen") if options.get("listen") is not None else 0

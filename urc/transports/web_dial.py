@@ -1,7 +1,7 @@
 """Connections to the server of a web transport: direct or tunnelled, with or without TLS.
 
-`Reach` returns our own streams. A library with its own protocol needs a socket. It gets the socket
-of a plain connection, or one end of a socket pair with a relay.
+`Reach` returns our own streams. A library with its own protocol needs a socket. Such a library gets
+the socket of a plain connection, or one end of a socket pair with a relay.
 """
 
 import asyncio

@@ -185,9 +185,9 @@ class WebSocketTransport:
 
 
 class _Connection(ClientConnection):
-    """Limits the ping replies that the other side does not accept.
+    """A connection with a limit of unsent ping replies.
 
-    The library writes them without checking for buffer space.
+    The library writes ping replies without checking for buffer space.
     """
 
     _untaken = 0
@@ -216,12 +216,12 @@ class _Connection(ClientConnection):
         after = self.transport.get_write_buffer_size()
         self._untaken = self._untaken + after - before if before else after
         if self._untaken > UNTAKEN_BYTES:
-            self.set_connection_exc(OSError("the robot pings, and takes none of the answers"))
+            self.set_connection_exc(OSError("the robot does not read the replies to its pings"))
             self.transport.abort()
 
 
 class _Connect(connect):
-    """Follows no redirect: a robot must not lead elsewhere."""
+    """A connection without redirects: a robot must not lead elsewhere."""
 
     def process_redirect(self, exc: Exception) -> Exception | str:
         return exc
@@ -257,8 +257,8 @@ def _refusal(fault: Exception, where: str) -> str:
     if isinstance(fault, NegotiationError):
         return f"{where} requires a feature that was not offered ({one_line(str(fault))})"
     if isinstance(fault, InvalidMessage | EOFError | ConnectionError):
-        return f"what listens on {where} does not speak HTTP, or closed the connection"
-    return f"what listens on {where} is no WebSocket ({one_line(str(fault))})"
+        return f"the server on {where} does not speak HTTP, or closed the connection"
+    return f"the server on {where} is not a WebSocket ({one_line(str(fault))})"
 
 
 def _end(ended: ConnectionClosed) -> str:
@@ -270,7 +270,7 @@ def _end(ended: ConnectionClosed) -> str:
     if ours is not None and ours.code == CloseCode.INTERNAL_ERROR and "ping" in ours.reason:
         return "the robot answered no ping"
     if ours is not None and ours.code != _NORMAL:
-        return f"what the robot sent is not taken ({ours.code} {one_line(ours.reason)})"
+        return f"the robot sent invalid data ({ours.code} {one_line(ours.reason)})"
     if isinstance(cause, OSError) and cause.args:
         return broke(cause)
     return HUNG_UP

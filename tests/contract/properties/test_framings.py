@@ -184,7 +184,7 @@ REFUSED = [
     ("{ type: length, length: { offset: 0, size: 2, as: dec, adjust: 2 } }", bytes(100),
      "the length field cannot hold 100"),
     ("{ type: length, length: { offset: 0, size: 1, unit: 4, adjust: 1 } }", bytes(3),
-     "the frame is counted in 4 bytes; 3 over"),
+     "the frame must be a multiple of 4 bytes; 3 left over"),
     ("{ type: length, length: { offset: 0, size: 1, adjust: 5 } }", b"",
      "1 bytes are too few for this kind of frame"),
     ("{ type: slip }", b"", "SLIP cannot send an empty frame"),

@@ -100,7 +100,7 @@ async def test_method_query_headers_and_body_arrive(web: Server) -> None:
         ("/busy.cgi", "503 Service Unavailable: the arm is moving"),
         ("/moved", "robot redirected to http://127.0.0.1:1/elsewhere; redirects are not followed"),
         ("/basic/state.json", "401 Unauthorized"),
-        ("/a\nb", "GET '/a\\nb' is no request"),
+        ("/a\nb", "GET '/a\\nb' is not a valid request"),
         ("/flood.cgi", "the answer is longer than 100000 bytes"),
     ],
 )
@@ -164,7 +164,7 @@ async def test_a_url_that_leads_elsewhere_is_not_asked_for(web: Server, url: str
         assert answer.attributes["ok"] is False
         assert "status" not in answer.attributes
         reason = str(answer.attributes["reason"])
-        assert "only the robot is asked" in reason or "is no URL" in reason
+        assert "only the robot is asked" in reason or "is not a URL" in reason
 
 
 @WEB

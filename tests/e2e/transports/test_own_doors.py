@@ -15,7 +15,7 @@ from urc.transports.table import TRANSPORTS
 
 pytestmark = pytest.mark.anyio
 
-SAID = "that is this dashboard itself: no robot may be reached there"
+SAID = "this address is the dashboard itself; it cannot be a robot"
 WAIT_S = 5.0
 
 

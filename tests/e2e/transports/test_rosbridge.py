@@ -248,7 +248,7 @@ async def test_driving_where_nothing_listens_is_told() -> None:
         await robot.say({"op": "publish", "topic": "/odom", "msg": {}})
         assert await notices(transport) == [
             "/cmd_vel takes geometry_msgs/TwistStamped, not geometry_msgs/Twist",
-            "nothing subscribes to /nobody: what is sent there moves nothing",
+            "nothing subscribes to /nobody: its messages have no effect",
         ]
         await transport.close()
 

@@ -145,8 +145,8 @@ async def test_what_is_no_port_is_told(tmp_path: Path) -> None:
     file.write_text("notes")
     for path, told in (
         (tmp_path / "ttyUSB0", f"there is no {tmp_path}/ttyUSB0; is it plugged in?"),
-        (tmp_path, f"{tmp_path} is no serial port"),
-        (file, f"{file} is no serial port"),
+        (tmp_path, f"{tmp_path} is not a serial port"),
+        (file, f"{file} is not a serial port"),
     ):
         async with nothing_left():
             with pytest.raises(ConnectFailed) as problem:
@@ -164,7 +164,7 @@ async def test_missing_permission_names_the_group(tmp_path: Path) -> None:
     port.chmod(0o660)
     group = grp.getgrgid(port.stat().st_gid).gr_name
     assert explain(str(port), str(port), denied) == (
-        f"no permission for {port}; it takes the group {group!r}: "
+        f"no permission for {port}; add yourself to the group {group!r}: "
         f"sudo usermod -aG {group} $USER, and sign in again"
     )
     port.chmod(0o600)
@@ -181,8 +181,8 @@ async def test_missing_permission_names_the_group(tmp_path: Path) -> None:
         ({"port": "socket://arm"}, "serial needs socket://HOST:PORT, not 'socket://arm'"),
         ({"baud": "fast"}, "serial needs baud from 50 to 20000000, not 'fast'"),
         ({"data_bits": 9}, "serial needs data_bits from 5 to 8, not 9"),
-        ({"parity": "N"}, "serial knows parity: none | odd | even | mark | space, not 'N'"),
-        ({"stop_bits": 3}, "serial knows stop_bits: 1 | 1.5 | 2, not 3"),
+        ({"parity": "N"}, "serial needs parity: none | odd | even | mark | space, not 'N'"),
+        ({"stop_bits": 3}, "serial needs stop_bits: 1 | 1.5 | 2, not 3"),
         ({"dtr": "low"}, "serial needs true or false as dtr, not 'low'"),
     ],
 )

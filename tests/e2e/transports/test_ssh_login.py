@@ -67,7 +67,7 @@ async def test_what_is_no_key_is_told(sshd: Sshd, tmp_path: Path) -> None:
     """Before anybody is asked."""
     (tmp_path / "poem.txt").write_text("roses are red\n", "ascii")
     said = await refusal(line_to(sshd, key=str(tmp_path / "poem.txt")))
-    assert said == f"the key {tmp_path / 'poem.txt'} is no private key of SSH"
+    assert said == f"the key {tmp_path / 'poem.txt'} is not an SSH private key"
     said = await refusal(line_to(sshd, key=str(tmp_path / "gone")))
     assert said == f"cannot read the key {tmp_path / 'gone'} (no such file or directory)"
 
@@ -196,7 +196,7 @@ async def test_server_of_2010_needs_legacy(tmp_path_factory: pytest.TempPathFact
     await sshd.start()
     try:
         said = await refusal(line_to(sshd))
-        assert "speaks no algorithm that URC takes; 'legacy: true' allows old ones" in said
+        assert "offers no algorithm that URC accepts; 'legacy: true' allows old ones" in said
         line = line_to(sshd, legacy=True, mode="exec", command="echo old")
         await line.open(OPEN_S)
         assert await hears(line, b"\n") == b"old\n"

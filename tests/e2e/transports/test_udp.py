@@ -231,7 +231,7 @@ async def test_unknown_host_and_taken_port_are_told() -> None:
         ({"port": 1}, "udp needs a host name or address as host"),
         ({"listen": 1, "from": "host"}, "udp needs a host name or address as host"),
         ({"listen": 70_000}, "udp needs a port from 1 to 65535 as listen, not 70000"),
-        ({"listen": 1, "from": "me"}, "udp knows from: any | host, not 'me'"),
+        ({"listen": 1, "from": "me"}, "udp needs from: any | host, not 'me'"),
     ],
 )
 async def test_bad_option_is_one_line(options: dict[str, object], told: str) -> None:

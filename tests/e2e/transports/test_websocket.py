@@ -102,7 +102,7 @@ async def test_message_that_is_too_long_ends_the_line() -> None:
     """It is not taken, and the reason says so."""
     script = "head -c 5000 /dev/zero | tr '\\0' x; echo; cat"
     async with robot("sh", "-c", script) as port, line(port, max_message=4096) as transport:
-        with pytest.raises(PeerClosed, match=r"what the robot sent is not taken \(1009 "):
+        with pytest.raises(PeerClosed, match=r"the robot sent invalid data \(1009 "):
             await received(transport)
 
 

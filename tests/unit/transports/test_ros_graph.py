@@ -41,7 +41,7 @@ def test_a_topic_without_a_subscriber_is_told() -> None:
     assert not known.publishes("/nobody", "geometry_msgs/Twist")
     known.subscribers("/nobody", [])
     known.subscribers("/cmd_vel", ["/base"])
-    assert told == ["nothing subscribes to /nobody: what is sent there moves nothing"]
+    assert told == ["nothing subscribes to /nobody: its messages have no effect"]
     known.learn(TYPES)
     assert known.publishes("/nobody", "geometry_msgs/Twist"), "a new connection is asked again"
 

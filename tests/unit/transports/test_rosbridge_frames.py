@@ -122,7 +122,7 @@ def test_image_that_takes_long_to_unpack_is_refused() -> None:
 
     head = chunk(b"IHDR", struct.pack(">IIBBBBB", 2000, 2700, 8, 2, 0, 0, 0))
     image = b"\x89PNG\r\n\x1a\n" + head + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
-    with pytest.raises(BadFrame, match="is not taken"):
+    with pytest.raises(BadFrame, match="is too large"):
         read(json.dumps({"op": "png", "data": base64.b64encode(image).decode()}))
 
 
@@ -157,7 +157,7 @@ def test_cbor_is_read_as_json_would_be() -> None:
         (b'{"op":"fragment","id":"1","num":5,"total":2,"data":""}', "fragment 5 of 2"),
         (b'{"op":"fragment","id":"1","num":0,"total":%d,"data":""}' % (MAX_FRAGMENTS + 1), "none"),
         (b'{"op":"png","data":"%%"}', "not base64"),
-        (b'{"op":"png","data":"%s"}' % base64.b64encode(b"GIF89a"), "no PNG"),
+        (b'{"op":"png","data":"%s"}' % base64.b64encode(b"GIF89a"), "not a PNG"),
         (b'{"op":"png","data":"%s"}' % SCAN_PNG[:200].encode(), "png"),
     ],
 )

@@ -42,7 +42,7 @@ def test_secrets_stay_out_of_what_is_printed() -> None:
         ({"port": 0}, "ssh needs a port from 1 to 65535 as port, not 0"),
         ({"username": None}, "ssh needs a username"),
         ({"password": 1234}, "ssh: password is text; put it in quotation marks"),
-        ({"mode": "sftp"}, "ssh knows mode: shell | exec | forward, not 'sftp'"),
+        ({"mode": "sftp"}, "ssh needs mode: shell | exec | forward, not 'sftp'"),
         ({"mode": "exec"}, "ssh: 'mode: exec' needs a command"),
         ({"command": "cat"}, "ssh: a command needs 'mode: exec', not 'mode: shell'"),
         ({"pty": "yes"}, "ssh needs true or false as pty, not 'yes'"),
@@ -52,7 +52,7 @@ def test_secrets_stay_out_of_what_is_printed() -> None:
         ),
         ({"keepalive_interval": 5}, "ssh: keepalive_interval is a time from 200ms to 1m, not 5"),
         ({"environment": "A=b"}, "ssh: environment is a list of NAME: value"),
-        ({"environment": {"A B": "c"}}, "ssh: 'A B' is no name of an environment variable"),
+        ({"environment": {"A B": "c"}}, "ssh: 'A B' is not a name of an environment variable"),
         ({"environment": {"A": 1}}, "ssh: environment.A is text; put it in quotation marks"),
         (
             {"host_key": "aa:bb"},
@@ -71,7 +71,7 @@ def test_bad_option_of_ssh_is_told(options: dict[str, object], complaint: str) -
     ("options", "complaint"),
     [
         ({"host": 5}, "telnet needs a host name or address as host, not 5"),
-        ({"negotiate": "never"}, "telnet knows negotiate: full | passive, not 'never'"),
+        ({"negotiate": "never"}, "telnet needs negotiate: full | passive, not 'never'"),
         ({"echo": 1}, "telnet needs true or false as echo, not 1"),
         (
             {"terminal": "VT\x1b"},

@@ -62,7 +62,7 @@ async def test_answers_that_nobody_takes_end_the_line() -> None:
     wire = asked(line := Line(kernel=100_000), 1000)
     assert line.is_cut
     assert line.held <= UNTAKEN_BYTES + 65536
-    assert "takes none of the answers" in wire.fault
+    assert "does not read the replies" in wire.fault
 
 
 async def test_answers_that_are_taken_do_not() -> None:

@@ -110,7 +110,7 @@ STREAMS: list[tuple[list[Subscription], str]] = [
     ),
     (
         [Subscription("/cam#x", {"stream": "mjpeg"})],
-        "http knows events by name in streams of sse only: '/cam#x'",
+        "http has named events only in streams of sse: '/cam#x'",
     ),
     (
         [Subscription("/s", {"stream": "stills", "every": 0.001})],

@@ -51,7 +51,7 @@ class FrameFault(NamedTuple):
 
 
 class Decoder(Protocol):
-    """Cuts one stream. Each connection has a new one, without old data."""
+    """Cuts one stream. Each connection has a new decoder, without old data."""
 
     @property
     def pending(self) -> int:

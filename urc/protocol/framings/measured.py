@@ -1,10 +1,9 @@
 """The framings ``fixed`` and ``length``: the first bytes of a frame determine its size.
 
-Theory of operation of the search. If the frame has start bytes, the decoder advances to the next
-ones; otherwise every byte may begin a frame. An invalid frame (bad length, wrong end bytes, wrong
-checksum) costs only its first byte: the true frame may begin right after it. Only checksums would
-then scan the same bytes again and again, so `Credit` limits them; after that, the whole candidate
-is dropped.
+Theory of operation. If the frame has start bytes, the decoder advances to the next ones; otherwise
+every byte may begin a frame. An invalid frame (bad length, wrong end bytes, wrong checksum) costs
+only its first byte: the true frame may begin right after it. Only checksums would then scan the
+same bytes again and again, so `Credit` limits them; after that, the whole candidate is dropped.
 """
 
 from typing import NamedTuple
