@@ -155,7 +155,10 @@ def test_cbor_is_read_as_json_would_be() -> None:
         (b"\xa1", "not CBOR"),
         (dumps({"op": "publish", "msg": CBORTag(9999, b"")}), "not CBOR"),
         (b'{"op":"fragment","id":"1","num":5,"total":2,"data":""}', "fragment 5 of 2"),
-        (b'{"op":"fragment","id":"1","num":0,"total":%d,"data":""}' % (MAX_FRAGMENTS + 1), "none"),
+        (
+            b'{"op":"fragment","id":"1","num":0,"total":%d,"data":""}' % (MAX_FRAGMENTS + 1),
+            "invalid",
+        ),
         (b'{"op":"png","data":"%%"}', "not base64"),
         (b'{"op":"png","data":"%s"}' % base64.b64encode(b"GIF89a"), "not a PNG"),
         (b'{"op":"png","data":"%s"}' % SCAN_PNG[:200].encode(), "png"),
