@@ -211,7 +211,7 @@ def test_what_is_wrong_is_refused_in_one_line(
     assert "files of this kind do not belong" in anna.refuses("publish", dial, *lab.to)
     (lab.home / "widgets/dial/notes.py").unlink()
     anna.does("repo", "token", "remove", "x", "--tokens", str(lab.tokens))
-    assert "a token of this repository is needed" in anna.refuses("publish", dial, *lab.to)
+    assert "this repository needs a token" in anna.refuses("publish", dial, *lab.to)
     for url in ("http://robots.example/", "http://192.168.1.5:8090/"):
         told = anna.does("publish", dial, "--to", url, "--token-file", str(lab.token), code=2)
         assert f"{url} is not encrypted: anybody on the way can read the token" in told

@@ -1,1 +1,1 @@
-"""Packages: what they are, where they come from, what they need, and where they are kept."""
+"""Packages: their format, their sources, their needs, and their storage."""

@@ -1,8 +1,8 @@
-"""The one form of an archive: a ZIP file without compression whose bytes follow from its files.
+"""The format of an archive: a ZIP file without compression, whose bytes depend only on its files.
 
 Entries are stored, sorted, and dated 1980. So the same files give the same bytes on every machine,
-whatever its zlib; nothing in an archive can be larger than the archive; and an archive that would
-not be written so is not read. `zipfile` parses, but nothing is ever extracted by it.
+regardless of zlib, and no entry can be larger than the archive. An archive with other bytes is
+rejected. `zipfile` parses archives, but never extracts them.
 """
 
 import re
@@ -58,7 +58,7 @@ _BARE: Final = frozenset(("LICENSE", "LICENCE", "NOTICE", "README", "AUTHORS"))
 
 
 def name_fault(path: str) -> str:
-    """Return what is wrong with a path in a package, or ""."""
+    """Return the fault of a path in a package, or ""."""
     if path.startswith(("/", "\\")) or re.match(r"[A-Za-z]:", path):
         return f"{path!r} is an absolute path"
     parts = path.split("/")
@@ -79,12 +79,12 @@ def name_fault(path: str) -> str:
 
 
 def names_fault(paths: Sequence[str]) -> str:
-    """Return which two paths cannot stand side by side on every system, or ""."""
+    """Return the fault of two paths that some systems cannot distinguish, or ""."""
     seen: dict[str, str] = {}
     for path in paths:
         other = seen.setdefault(path.casefold(), path)
         if other is not path:
-            same = "twice" if other == path else f"beside {other!r}: only capitals differ"
+            same = "twice" if other == path else f"together with {other!r}: only capitals differ"
             return f"{path!r} is there {same}"
     return _folder_fault(seen)
 
@@ -95,7 +95,7 @@ def _folder_fault(seen: dict[str, str]) -> str:
         for folder in _folders(path):
             other = folders.setdefault(folder.casefold(), folder)
             if other != folder:
-                return f"{folder!r} is there beside {other!r}: only capitals differ"
+                return f"{folder!r} is there together with {other!r}: only capitals differ"
             if folder.casefold() in seen:
                 return f"{folder!r} is a file and a folder"
     return ""
@@ -107,7 +107,7 @@ def _folders(path: str) -> Iterable[str]:
 
 
 class ArchiveLimits(NamedTuple):
-    """What an archive may hold at most."""
+    """Limits of an archive."""
 
     entries: int
     entry_bytes: int
@@ -115,7 +115,7 @@ class ArchiveLimits(NamedTuple):
 
     @property
     def archive_bytes(self) -> int:
-        """What the archive itself may take: its files, and its own words about each."""
+        """Limit of the archive itself, in bytes: its files and their headers."""
         return self.total_bytes + 1024 * self.entries
 
 
@@ -129,15 +129,15 @@ _TYPES: Final = {0o120000: "a link", 0o060000: "a device", 0o020000: "a device",
 
 
 def write_archive(files: Mapping[str, bytes], limits: ArchiveLimits, name: str) -> bytes:
-    """Return the archive of some files, path → content.
+    """Return the archive of some files.
 
     Args:
-        files: paths are relative, with '/'.
-        limits: what it may hold.
-        name: what it is called in errors.
+        files: path → content; paths are relative, with '/'.
+        limits: limits of the archive.
+        name: name in messages.
 
     Raises:
-        PackageError: a path that not every system can have, or too much of something.
+        PackageError: a path is not portable, or a limit is exceeded.
     """
     _check_names(files, name, limits)
     _check_sizes(((path, len(content)) for path, content in files.items()), limits, name)
@@ -148,7 +148,7 @@ def read_archive(data: bytes, limits: ArchiveLimits, name: str) -> dict[str, byt
     """Return the files of an archive, path → content, in the order of their paths.
 
     Raises:
-        PackageError: one line that says what is wrong with it.
+        PackageError: one line about the fault of the archive.
     """
     if len(data) > limits.archive_bytes:
         raise PackageError(f"{name}: an archive has at most {limits.archive_bytes >> 20} MiB")
@@ -160,22 +160,22 @@ def read_archive(data: bytes, limits: ArchiveLimits, name: str) -> dict[str, byt
         raise PackageError(f"{name}: the archive is damaged or cut off: {error}") from None
     if _written(files) != data:
         raise PackageError(
-            f"{name}: something is in this archive beside its files; make it with 'urc bundle'"
+            f"{name}: this archive contains data outside its files; make it with 'urc bundle'"
         )
     return files
 
 
 def _check_end(data: bytes, limits: ArchiveLimits, name: str) -> None:
-    """Look at the number of entries before anything is made of them."""
+    """Check the number of entries before the directory is parsed."""
     if not data.startswith(b"PK"):
-        raise PackageError(f"{name}: this is no package: a ZIP archive is expected")
+        raise PackageError(f"{name}: this is not a package: expected a ZIP archive")
     end = data[-_END_BYTES:]
     if len(end) < _END_BYTES or not end.startswith(_END):
         raise PackageError(f"{name}: the archive is cut off, or something was added at its end")
     entries, size, start = struct.unpack("<HII", end[10:20])
     if entries > limits.entries:
         raise PackageError(f"{name}: {entries} entries, at most {limits.entries} are allowed")
-    # A central directory with more entries than its end tells would be read as far as it goes.
+    # `zipfile` reads the whole directory, even if it has more entries than its end declares.
     if start + size + _END_BYTES != len(data) or size > limits.entries * 1024:
         raise PackageError(f"{name}: the archive is damaged or cut off: its parts do not fit")
 
@@ -235,7 +235,7 @@ def _written(files: Mapping[str, bytes]) -> bytes:
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED, allowZip64=False) as archive:
         for path in sorted(files):
             entry = zipfile.ZipInfo(path, _DATE)
-            entry.create_system = 3  # Unix, wherever it is written: it says what the mode means
+            entry.create_system = 3  # always Unix, which defines the meaning of the mode
             entry.external_attr = _MODE << 16
             archive.writestr(entry, files[path])
     return buffer.getvalue()

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all, whenever the process or the machine ends."""
+"""Atomic files: complete or absent, even after a crash of the process or the machine."""
 
 import os
 import shutil
@@ -19,12 +19,12 @@ _POLL_S: Final = 0.05
 
 
 def put_file(file: Path, data: bytes, work: Path) -> None:
-    """Write a file: after this it holds `data`, even if the power goes; before, what it held.
+    """Write a file atomically: after a power failure, it is either old or new.
 
     Args:
-        file: what it is called; its folder is made.
-        data: all of it.
-        work: a folder of the same disk, for what is not whole yet.
+        file: path of the file; its folder is created.
+        data: its whole content.
+        work: a folder on the same disk, for incomplete files.
 
     Raises:
         OSError: the disk is full, for example; then nothing has changed.
@@ -32,7 +32,7 @@ def put_file(file: Path, data: bytes, work: Path) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     work.mkdir(parents=True, exist_ok=True)
     name = work / f"{token_hex(8)}.new"
-    # Not `mkstemp`: a web server of another user must be able to read a repository.
+    # Not `mkstemp`: the web server of another user must be able to read a repository.
     number = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     try:
         try:
@@ -49,10 +49,10 @@ def put_file(file: Path, data: bytes, work: Path) -> None:
 
 
 def put_folder(folder: Path, files: Mapping[str, bytes], work: Path) -> None:
-    """Make a folder with these files, all at once; one that is there already is replaced.
+    """Create a folder with these files in one step, or replace an existing one.
 
-    WARNING: the files are not forced to the disk, since they can be made again: whoever uses them
-    compares them with what they were made of.
+    WARNING: the files are not synced to the disk, because they can be extracted again. Readers
+    must compare them with their archives.
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
     work.mkdir(parents=True, exist_ok=True)
@@ -74,7 +74,7 @@ def put_folder(folder: Path, files: Mapping[str, bytes], work: Path) -> None:
 
 
 def discard(path: Path, work: Path) -> None:
-    """Take a file or folder away, if it is there: of a folder first its name, then the rest."""
+    """Delete a file or folder, if it exists; a folder disappears in one step."""
     if not path.is_dir():
         path.unlink(missing_ok=True)
         return
@@ -82,13 +82,13 @@ def discard(path: Path, work: Path) -> None:
         work.mkdir(parents=True, exist_ok=True)
         gone = Path(mkdtemp(dir=work))
         os.replace(path, gone / "gone")
-    except OSError:  # a full disk has no room for another name
+    except OSError:  # a full disk has no room for a new name
         gone = path
     shutil.rmtree(gone, ignore_errors=True)
 
 
 def clear(work: Path) -> None:
-    """Remove what an interrupted change left."""
+    """Delete the files of an interrupted change."""
     if work.is_dir():
         for entry in work.iterdir():
             if entry.is_dir():
@@ -99,10 +99,10 @@ def clear(work: Path) -> None:
 
 @contextmanager
 def exclusive(file: Path) -> Iterator[None]:
-    """Keep other processes out while the context lasts; the system lets go when this one ends.
+    """Lock out other processes during the context; the end of this process releases the lock.
 
     Raises:
-        PackageError: another one stays in for longer than ten seconds.
+        PackageError: another process holds the lock for longer than ten seconds.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
     number = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
@@ -142,7 +142,7 @@ def _write_all(number: int, data: bytes) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make a new name in a folder last. Windows has no such thing, and needs none."""
+    """Sync a folder, so that a new name in it is permanent. Windows neither has nor needs it."""
     if os.name == "nt":
         return
     number = os.open(folder, os.O_RDONLY)

@@ -1,7 +1,7 @@
-"""The head of an index: its number, its digest, and who answers for it until when.
+"""The head of an index: its number, its digest, its signature, and its expiry.
 
-A keeper with a key signs the head, and through the digest all that the index says. It holds for
-some days: who keeps a client from hearing of newer ones cannot do so for ever.
+A maintainer with a key signs the head, and thereby the digest of the whole index. A signature is
+valid for some days, so an attacker cannot hide newer versions from a client for longer.
 """
 
 import time
@@ -19,13 +19,13 @@ __all__ = ["HEAD", "HEAD_BYTES", "VALID_S", "Head", "Seal", "check_key", "next_h
 HEAD: Final = "index/head.json"
 HEAD_BYTES: Final = 4096
 VALID_S: Final = 14 * 86400.0
-"""For how long a signed head holds, unless its keeper says otherwise."""
+"""Default validity of a signed head, in seconds."""
 _STATEMENT: Final = "URC index signature 1\n{number}\n{sha256}\n{expires}\n{by}\n"
 _TIME: Final = "%Y-%m-%dT%H:%M:%SZ"
 
 
 class Seal(NamedTuple):
-    """What a keeper signs an index with."""
+    """The maintainer's signer of an index."""
 
     signer: Signer
     valid_s: float = VALID_S
@@ -33,75 +33,75 @@ class Seal(NamedTuple):
 
 
 class Head(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What is asked for first."""
+    """The head, which clients request first."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     number: Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]
     sha256: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
-    """Of `index.json`."""
+    """Digest of `index.json`."""
     expires: str = ""
-    """``2026-12-05T20:00:00Z``, from when on it is not believed; "" where it is not signed."""
+    """End of its validity, such as ``2026-12-05T20:00:00Z``; "" without a signature."""
     signature: Signature | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
-        """Refuse times that are none, and those that nobody answers for."""
+        """Reject invalid times, and a time without a signature."""
         if self.expires:
-            datetime.strptime(self.expires, _TIME)  # noqa: DTZ007 (its Z says it)
+            datetime.strptime(self.expires, _TIME)  # noqa: DTZ007 (the format has a Z)
         if bool(self.expires) != isinstance(self.signature, Signature):
             raise ValueError("a time of expiry goes with a signature")
 
     @property
     def signed(self) -> Signature | None:
-        """Who answers for it, or None."""
+        """Signature, or None."""
         return self.signature if isinstance(self.signature, Signature) else None
 
     def left_s(self, now_s: float) -> float:
-        """Return for how many seconds it still holds."""
+        """Return the rest of its validity, in seconds."""
         end = datetime.strptime(self.expires, _TIME).replace(tzinfo=UTC)
         return end.timestamp() - now_s
 
     def is_sound(self) -> bool:
-        """Return whether its signature is of exactly this, where it has one."""
+        """Return whether its signature, if any, is valid."""
         signature = self.signed
         return signature is None or signature.verifies(_statement(self, signature.by))
 
     def to_bytes(self) -> bytes:
-        """Return the file."""
+        """Return the bytes of the file."""
         return msgspec.json.encode(self) + b"\n"
 
 
 def read_head(data: bytes, where: str) -> Head:
-    """Return a head that came from outside; raise `PackageError`."""
+    """Return a head from an untrusted source; raise `PackageError`."""
     try:
         return msgspec.json.decode(data, type=Head)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise PackageError(f"{where}: this is no head of an index: {error}") from None
+        raise PackageError(f"{where}: this is not a head of an index: {error}") from None
 
 
 def check_key(old: Head | None, seal: Seal | None) -> None:
-    """Raise `PackageError` when a head is signed by a key that is not at hand.
+    """Raise `PackageError` if the key of a signed head is not available.
 
-    Nobody who knows that key would believe the next one.
+    Clients have pinned that key, so they would reject a head with another one.
     """
     signed = old.signed if old is not None else None
     if signed is not None and (seal is None or seal.signer.key != signed.key):
         raise PackageError(
             f"the index is signed by {signed}: name that key with --key; if it is lost, remove"
-            f" {HEAD}, and tell everybody who added the repository to remove and add it again"
+            f" {HEAD}, and ask all users to remove the repository and to add it again"
         )
 
 
 def next_head(old: Head | None, number: int, digest: str, seal: Seal | None) -> Head:
-    """Return the head of an index; the old one where that still does.
+    """Return the head of an index, or the old one while it is still valid.
 
     Args:
-        old: what stands there, if anything sound.
-        number: of the index.
-        digest: of its bytes.
-        seal: the keeper's; None: it is not signed.
+        old: the current head, if it is valid.
+        number: number of the index.
+        digest: digest of its bytes.
+        seal: signer of the maintainer; None without a signature.
 
     Raises:
-        PackageError: the old one is signed by a key that is not at hand.
+        PackageError: the key of the signed old head is not available.
     """
     signed = old.signed if old is not None else None
     is_same = old is not None and (old.number, old.sha256) == (number, digest)

@@ -1,4 +1,4 @@
-"""``index.json``: what a repository has. A plain file, so that any web server can give it out."""
+"""``index.json``: the list of a repository, in a plain file that any web server can serve."""
 
 from collections.abc import Iterable, Sequence
 from typing import Annotated, Final
@@ -37,42 +37,42 @@ class Entry(msgspec.Struct, frozen=True):
     version: Annotated[str, msgspec.Meta(max_length=64)]
     sha256: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
     size: Annotated[int, msgspec.Meta(ge=0, le=PACKAGE.archive_bytes)]
-    """Bytes of the archive."""
+    """Size of the archive, in bytes."""
     language: int = 1
     licence: _Text = ""
     authors: tuple[_Text, ...] = ()
     summary: _Text = ""
     needs: dict[str, _Text] = {}
     signature: Signature | msgspec.UnsetType = msgspec.UNSET
-    """Who made it, if anybody says so."""
+    """Signature, if any."""
     withdrawn: _Text | msgspec.UnsetType = msgspec.UNSET
-    """Why it is not offered any more."""
+    """Reason of a withdrawal."""
     provenance: Provenance | msgspec.UnsetType = msgspec.UNSET
-    """Where it was made, if anybody says so."""
+    """Origin, if declared."""
 
     @property
     def why_withdrawn(self) -> str:
-        """Why it is not offered any more; "" while it is."""
+        """Reason of a withdrawal, or ""."""
         return self.withdrawn if isinstance(self.withdrawn, str) else ""
 
     @property
     def signed(self) -> Signature | None:
-        """Who made it, or None."""
+        """Signature, or None."""
         return self.signature if isinstance(self.signature, Signature) else None
 
     @property
     def key(self) -> Key:
-        """Which package it is a version of."""
+        """Its package."""
         return Key(self.kind, self.name)
 
     @property
     def number(self) -> Version:
-        """Its version, to be compared."""
+        """Its version in comparable form."""
         return parse_version(self.version)
 
     @property
     def file(self) -> str:
-        """Where its archive is, relative to the index."""
+        """Path of its archive, relative to the index."""
         return f"archives/{self.key}/{self.version}.zip"
 
     def __str__(self) -> str:
@@ -80,13 +80,13 @@ class Entry(msgspec.Struct, frozen=True):
 
 
 class Index(msgspec.Struct, frozen=True):
-    """All that a repository has."""
+    """All versions in a repository."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     name: _Text
     packages: tuple[Entry, ...]
     number: Annotated[int, msgspec.Meta(ge=0, le=1 << 53)] = 0
-    """Grows with every change of a repository; 0 where nobody counts."""
+    """Number that grows with every change of the repository; 0 without numbers."""
 
     def to_bytes(self) -> bytes:
         """Return the file; the same packages give the same bytes."""
@@ -96,7 +96,7 @@ class Index(msgspec.Struct, frozen=True):
 def entry_of(
     package: Package, signature: Signature | None = None, notes: Notes | None = None
 ) -> Entry:
-    """Return what an index says of a package."""
+    """Return the index entry of a package."""
     notes = notes or Notes()
     said = package.manifest
     return Entry(
@@ -116,9 +116,9 @@ def entry_of(
 
 
 def read_index(data: bytes, where: str) -> Index:
-    """Return an index that came from outside; raise `PackageError`.
+    """Return an index from an untrusted source; raise `PackageError`.
 
-    Versions and ranges are checked here, so that nothing later trips over one.
+    Versions and ranges are checked here, so that later code can rely on them.
     """
     if len(data) > INDEX_BYTES:
         raise PackageError(f"{where}: an index has at most {INDEX_BYTES >> 20} MiB")
@@ -126,20 +126,20 @@ def read_index(data: bytes, where: str) -> Index:
         index = msgspec.json.decode(data, type=Index)
         check_entries(index.packages)
     except (msgspec.DecodeError, PackageError, RecursionError, UnicodeDecodeError) as error:
-        raise PackageError(f"{where}: this is no index of a repository: {error}") from None
+        raise PackageError(f"{where}: this is not an index of a repository: {error}") from None
     return index
 
 
 def in_order(entries: Iterable[Entry]) -> tuple[Entry, ...]:
-    """Return entries as they stand in an index."""
+    """Return entries in the order of an index."""
     return tuple(sorted(entries, key=lambda entry: (entry.key, entry.number)))
 
 
 def check_entries(entries: Iterable[Entry]) -> None:
-    """Raise `PackageError` for a version or range that is none."""
+    """Raise `PackageError` for an invalid version or range."""
     versions: set[str] = set()
     needs: set[tuple[str, str]] = set()
-    for entry in entries:  # thousands say the same: each is read once
+    for entry in entries:  # thousands have equal texts, so each text is parsed once
         versions.add(entry.version)
         needs.update(entry.needs.items())
     for version in versions:
@@ -150,9 +150,9 @@ def check_entries(entries: Iterable[Entry]) -> None:
 
 
 def search(entries: Iterable[Entry], words: Sequence[str], kind: str = "") -> list[Entry]:
-    """Return the newest version of each package that has all words, those named so first.
+    """Return the newest version of each package with all words; matches in the name come first.
 
-    What was withdrawn is left out.
+    Withdrawn versions are left out.
     """
     wanted = [word.casefold() for word in words]
     found: dict[tuple[str, str], Entry] = {}

@@ -1,4 +1,4 @@
-"""From what somebody asks for to what is put into the store."""
+"""The way from a user's request to an install plan."""
 
 from collections.abc import Callable, Iterable, Sequence
 
@@ -37,18 +37,18 @@ def plan_wish(
     *,
     takes_withdrawn: bool = False,
 ) -> Plan:
-    """Return what a wish comes to, with all archives fetched.
+    """Return the plan of a requirement, with all archives.
 
     Args:
-        wish: what is asked for.
-        sources: in the order in which they are asked.
-        store: what it has is not fetched again.
-        complain: takes lines for people.
-        pinned: these versions and bytes, and no others; also those that were withdrawn since.
-        takes_withdrawn: what was withdrawn is taken like all others.
+        wish: the requirement.
+        sources: the sources, in the order of requests.
+        store: store whose archives are not fetched again.
+        complain: receives lines for people.
+        pinned: only these versions and bytes, even if they were withdrawn later.
+        takes_withdrawn: whether withdrawn versions are accepted.
 
     Raises:
-        PackageError: nobody has it, needs collide, or an archive is not what was promised.
+        PackageError: no source has it, its needs conflict, or an archive differs from the index.
     """
     everything = merged(sources, complain)
     found = everything
@@ -68,13 +68,13 @@ def plan_wish(
 def plan_file(
     source: FileSource, others: Sequence[Source], store: Store, complain: Callable[[str], None]
 ) -> Plan:
-    """Return what the package in a file or folder comes to.
+    """Return the plan of the package in a file or folder.
 
-    The other sources are asked only for what it does not bring.
+    The other sources are asked only for needs that it does not include.
     """
     root = source.roots[0]
     own = merged([source], complain)
-    # A version may be a pre-release: what somebody holds in hand is asked for as it is.
+    # The exact version, because a pre-release in a user's own file must be accepted.
     version = own[root][0][0].version
     try:
         plan = plan_root(root, version, own, store)
@@ -91,14 +91,14 @@ def plan_file(
 def plan_root(
     root: Key, wanted: str, found: Found, store: Store, pinned: Lock | None = None
 ) -> Plan:
-    """Return what one package comes to, with all archives fetched.
+    """Return the plan of one package, with all archives.
 
     Args:
-        root: which.
+        root: the package.
         wanted: range of its versions.
-        found: what there is, as `merged` returns it.
-        store: what it has is not fetched again.
-        pinned: what must come of it.
+        found: available packages, as from `merged`.
+        store: store whose archives are not fetched again.
+        pinned: expected result.
 
     Raises:
         PackageError: as `plan_wish`.
@@ -125,12 +125,12 @@ def plan_root(
 
 
 def settle(root: Key, wanted: str, found: Found) -> dict[Key, Entry]:
-    """Return which versions are taken; nothing is fetched. Raise `PackageError`."""
+    """Return the chosen versions without fetching them; raise `PackageError`."""
     return resolve(root, wanted, {key: [entry for entry, _ in some] for key, some in found.items()})
 
 
 def check_names(chosen: Iterable[Key]) -> None:
-    """Raise `PackageError` for a widget that would stand in for one of URC's own."""
+    """Raise `PackageError` for a widget with the name of a built-in one."""
     for key in chosen:
         if key.kind == "widget" and (shipped("widgets") / key.name / "widget.yaml").is_file():
             raise PackageError(
@@ -139,7 +139,7 @@ def check_names(chosen: Iterable[Key]) -> None:
 
 
 def origin_lines(plan: Plan, store: Store) -> list[str]:
-    """Return for people, one line for each package: where it comes from, and who signed it."""
+    """Return a line with origin and signer for each package."""
     keys = store.state().keys
     lines: list[str] = []
     for name, pin in plan.lock.packages.items():
@@ -159,7 +159,7 @@ def origin_lines(plan: Plan, store: Store) -> list[str]:
 
 
 def withdrawn_lines(lock: Lock, entries: Sequence[Entry]) -> list[str]:
-    """Return for people what was withdrawn of an installed package, and why; one line each."""
+    """Return a line for each withdrawn part of an installed package, with the reason."""
     return [
         phrase("{package} was withdrawn: {why}", package=entry, why=entry.why_withdrawn)
         for name, pin in lock.packages.items()
@@ -169,7 +169,7 @@ def withdrawn_lines(lock: Lock, entries: Sequence[Entry]) -> list[str]:
 
 
 def _remark(entry: Entry) -> str:
-    """Return what a repository says of a version beside the package itself."""
+    """Return the repository's remarks about a version."""
     said: list[str] = []
     if entry.why_withdrawn:
         said.append(phrase("WITHDRAWN: {why}", why=entry.why_withdrawn))
@@ -177,7 +177,7 @@ def _remark(entry: Entry) -> str:
 
 
 def _withdrawn(wish: Wish, found: Found) -> str:
-    """Return which versions that somebody may have meant were withdrawn, and why."""
+    """Return the withdrawn versions that match the requirement, with the reasons."""
     wanted = parse_range(wish.range)
     gone = [
         f"{entry} was withdrawn: {entry.why_withdrawn}"

@@ -1,4 +1,4 @@
-"""What a repository does with a package that somebody sends: looks at it, then lists it, or not."""
+"""Uploads to a repository: the check of a package, and its listing."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -23,7 +23,7 @@ __all__ = ["Refused", "Taken", "take"]
 
 
 class Refused(PackageError):
-    """A package that is not taken, with the status of HTTP that says so."""
+    """A rejected upload, with its HTTP status."""
 
     def __init__(self, status: int, text: str) -> None:
         super().__init__(text)
@@ -31,11 +31,11 @@ class Refused(PackageError):
 
 
 class Taken(NamedTuple):
-    """What came of it."""
+    """Result of an upload."""
 
     entry: Entry
     is_new: bool
-    """False: exactly this was listed already."""
+    """False if exactly this version was already listed."""
 
 
 def take(
@@ -47,37 +47,37 @@ def take(
     provenance: Provenance | None = None,
     seal: Seal | None = None,
 ) -> Taken:
-    """List a package, after looking at it as at any that a stranger sends.
+    """Check and list an untrusted package.
 
     Args:
-        folder: the repository.
-        entry_file: ``archives/drivers/puppet/1.0.0.zip``, what it was sent as.
+        folder: folder of the repository.
+        entry_file: path of the upload, ``archives/drivers/puppet/1.0.0.zip``.
         data: the archive.
-        signature: who signed it, if anybody says so.
-        examine: returns what is wrong with a document that stands in a folder of packages.
-        provenance: where it was made, if anybody says so.
-        seal: the keeper's, which signs the index.
+        signature: its signature, if any.
+        examine: returns the errors of a document in a folder of packages.
+        provenance: its origin, if declared.
+        seal: signer of the maintainer, for the index.
 
     Raises:
-        Refused: with what is wrong.
-        OSError: the disk is full, for example; what was listed stays as it was.
+        Refused: the upload is rejected.
+        OSError: the disk is full, for example; the index is unchanged.
     """
     package, entry = _opened(entry_file, data, signature)
     with changing(folder) as work:
         with open(folder / INDEX, "rb") as file:
             index = read_index(file.read(INDEX_BYTES + 1), INDEX)
-        check_key(head_in(folder), seal)  # before anything is written
+        check_key(head_in(folder), seal)  # before any write
         archive = folder / entry.file
         is_known = archive.is_file()
         if is_known and archive.read_bytes() != data:
             raise Refused(
                 409,
-                f"{entry} is listed with other bytes already;"
+                f"{entry} is already listed with other bytes;"
                 " a changed package needs a new version",
             )
         before = read_signature(archive) if is_known else None
         if before is not None and signature is not None and before != signature:
-            raise Refused(409, f"{entry} is listed already, signed by {before}")
+            raise Refused(409, f"{entry} is already listed, signed by {before}")
         notes = _noted(read_notes(archive) if is_known else Notes(), provenance, entry)
         entry = entry_of(package, signature or before, notes)
         if entry in index.packages:
@@ -91,14 +91,14 @@ def take(
 
 
 def _noted(notes: Notes, provenance: Provenance | None, entry: Entry) -> Notes:
-    """Return the notes about a version, and where it was made; the first who says that counts."""
+    """Return the notes about a version, with its origin; the first declared origin counts."""
     if None not in (notes.provenance, provenance) and notes.provenance != provenance:
-        raise Refused(409, f"{entry} is listed already, {notes.provenance}")
+        raise Refused(409, f"{entry} is already listed, {notes.provenance}")
     return msgspec.structs.replace(notes, provenance=notes.provenance or provenance)
 
 
 def _opened(file: str, data: bytes, signature: Signature | None) -> tuple[Package, Entry]:
-    """Return the package in an archive that somebody sent, and what the index would say of it."""
+    """Return the package in an uploaded archive, and its entry of the index."""
     try:
         package = open_package(data, file)
         entry = entry_of(package, signature)
@@ -120,7 +120,7 @@ def _look(
     work: Path,
     examine: Callable[[Path], list[str]],
 ) -> None:
-    """Put a package and all that it needs into a folder of its own, and look at it there."""
+    """Extract a package and its needs into a separate folder, and check it there."""
     known: dict[Key, list[Entry]] = {}
     for one in (*others, entry):
         if not one.why_withdrawn:

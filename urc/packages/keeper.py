@@ -1,11 +1,11 @@
-"""A repository's folder: packages to write in, and the files that any web server can give out.
+"""The folder of a repository: source packages, and the files for any web server to serve.
 
-DIR/drivers/puppet/package.yaml …     what the keeper writes, one folder for each package
+DIR/drivers/puppet/package.yaml …     source of a package, edited by the maintainer
 DIR/archives/drivers/puppet/1.0.0.zip every version that was ever listed
-DIR/archives/drivers/puppet/1.0.0.sig who signed it, if anybody did
-DIR/archives/drivers/puppet/1.0.0.json where it was made, and whether it is withdrawn
+DIR/archives/drivers/puppet/1.0.0.sig its signature, if any
+DIR/archives/drivers/puppet/1.0.0.json its origin, and whether it is withdrawn
 DIR/index.json                        all versions, with a number that grows with each change
-DIR/index/head.json                   its number and digest, signed by the keeper, see `head`
+DIR/index/head.json                   its number and digest, signed by the maintainer, see `head`
 DIR/drivers/puppet/urcpm.json         the same in the thesis's form
 """
 
@@ -47,29 +47,29 @@ _SIGNED: Final = ".sig"
 
 
 class Listing(NamedTuple):
-    """What came of looking through a repository's folder."""
+    """Result of a scan of a repository's folder."""
 
     listed: Index
     faults: tuple[str, ...]
-    """One line for each package that is not listed."""
+    """One line for each rejected package."""
 
 
 def make_index(
     folder: Path, name: str, examine: Callable[[Path], list[str]], seal: Seal | None = None
 ) -> Listing:
-    """Look at every package in a folder, list those that are sound, and write `index.json`.
+    """Check every package in a folder, list the valid ones, and write `index.json`.
 
     Args:
-        folder: the repository.
-        name: what it is called.
-        examine: returns what is wrong with a package's document, one line each.
-        seal: the keeper's, which signs the index, and what is new in the keeper's folders.
+        folder: folder of the repository.
+        name: name of the repository.
+        examine: returns the errors of a package's document, one line each.
+        seal: signer of the maintainer, for the index and for new source packages.
 
     Raises:
-        PackageError: there is no such folder, or it cannot be written to.
+        PackageError: the folder is missing or not writable.
     """
     if not folder.is_dir():
-        raise PackageError(f"{folder}: there is no such folder")
+        raise PackageError(f"{folder}: the folder does not exist")
     try:
         with changing(folder) as work:
             faults: list[str] = []
@@ -91,10 +91,10 @@ def make_index(
 
 @contextmanager
 def changing(folder: Path) -> Iterator[Path]:
-    """Keep other processes from changing a repository; yields a folder for what is not whole yet.
+    """Lock a repository against other processes; yield a folder for incomplete files.
 
     Raises:
-        PackageError: another one changes it for longer than ten seconds.
+        PackageError: another process holds the lock for longer than ten seconds.
     """
     work = folder / ".work"
     with disk.exclusive(folder / ".changing"):
@@ -112,9 +112,9 @@ def keep(
     work: Path,
     notes: Notes | None = None,
 ) -> Entry:
-    """Put an archive into a repository; it is listed when the index is written next.
+    """Put an archive into a repository; the next index lists it.
 
-    What is said of it goes first: an archive that is there is whole in every way.
+    Signature and notes are written first, so an existing archive is always complete.
     """
     entry = entry_of(package, signature, notes)
     archive = folder / entry.file
@@ -122,14 +122,14 @@ def keep(
     if signature is not None:
         disk.put_file(archive.with_suffix(_SIGNED), msgspec.json.encode(signature) + b"\n", work)
     elif not archive.is_file():
-        archive.with_suffix(_SIGNED).unlink(missing_ok=True)  # of another try, with other bytes
+        archive.with_suffix(_SIGNED).unlink(missing_ok=True)  # from an interrupted attempt
     if not archive.is_file():
         disk.put_file(archive, package.data, work)
     return entry
 
 
 def notes_of(entry: Entry) -> Notes:
-    """Return what an index says of a version beside the package itself; raise `PackageError`."""
+    """Return the notes about a version in an index; raise `PackageError`."""
     provenance = entry.provenance if isinstance(entry.provenance, Provenance) else None
     try:
         return Notes(entry.why_withdrawn, provenance)
@@ -138,29 +138,29 @@ def notes_of(entry: Entry) -> Notes:
 
 
 def withdraw(folder: Path, key: Key, version: str, why: str, seal: Seal | None) -> Entry:
-    """Offer a version no more, or again; return what the index says of it.
+    """Withdraw a version, or offer it again; return its entry of the index.
 
     Args:
-        folder: the repository.
-        key: which package.
-        version: which version of it.
-        why: what is told who has it installed; "": it is offered again.
-        seal: the keeper's, for an index that is signed.
+        folder: folder of the repository.
+        key: the package.
+        version: its version.
+        why: reason for users who have it installed; "" to offer it again.
+        seal: signer of the maintainer, for a signed index.
 
     Raises:
-        PackageError: it is not listed, or the repository cannot be written to.
+        PackageError: the version is not listed, or the repository is not writable.
     """
     try:
         with changing(folder) as work:
             with open(folder / INDEX, "rb") as file:
                 index = read_index(file.read(INDEX_BYTES + 1), INDEX)
             head = head_in(folder)
-            check_key(head, seal)  # before anything is written
+            check_key(head, seal)  # before any write
             before = _listed(index, key, version)
             after = msgspec.structs.replace(before, withdrawn=why or msgspec.UNSET)
             notes = _checked(notes_of(after))
             entries = [after if one is before else one for one in index.packages]
-            # The note goes first: an index that is made anew in between says the same.
+            # The note goes first, so that an index written in between agrees with it.
             write_notes(folder / before.file, notes, work)
             is_signed = head is not None and head.signed is not None
             write_index(folder, index.name, entries, work, seal if is_signed else None)
@@ -174,11 +174,11 @@ def _listed(index: Index, key: Key, version: str) -> Entry:
         if (one.key, one.version) == (key, version):
             return one
     there = ", ".join(one.version for one in index.packages if one.key == key)
-    raise PackageError(f"{key} {version} is not listed; of it there is {there or 'nothing'}")
+    raise PackageError(f"{key} {version} is not listed; listed: {there or 'nothing'}")
 
 
 def _checked(notes: Notes) -> Notes:
-    """Return notes that can be read again; raise `PackageError`."""
+    """Return notes after a check that they can be read; raise `PackageError`."""
     try:
         return msgspec.json.decode(msgspec.json.encode(notes), type=Notes)
     except msgspec.DecodeError as error:
@@ -186,7 +186,7 @@ def _checked(notes: Notes) -> Notes:
 
 
 def renew(folder: Path, seal: Seal) -> None:
-    """Sign an index anew where that is due; raise `PackageError`, or `OSError`."""
+    """Sign an index again if that is due; raise `PackageError`, or `OSError`."""
     with changing(folder) as work:
         with open(folder / INDEX, "rb") as file:
             index = read_index(file.read(INDEX_BYTES + 1), INDEX)
@@ -201,11 +201,11 @@ def write_index(
     After an interruption every served file is complete, and the next call repairs the rest.
 
     Args:
-        folder: the repository, which no other process changes meanwhile.
-        name: of the repository.
+        folder: folder of the repository, locked against other processes.
+        name: name of the repository.
         entries: all versions.
-        work: for incomplete files.
-        seal: the keeper's, which signs the head.
+        work: folder for incomplete files.
+        seal: signer of the maintainer, for the head.
 
     Raises:
         PackageError: the index is signed with another key; nothing has changed.
@@ -227,19 +227,19 @@ def write_index(
 
 
 def _before(folder: Path) -> tuple[Index | None, int]:
-    """Return the present index, None for a damaged one, and the last number."""
+    """Return the current index, None for a damaged one, and the last number."""
     data = _content(folder / INDEX, INDEX_BYTES + 1)
     with suppress(PackageError):
         if data is not None:
             index = read_index(data, INDEX)
-            # A number means certain bytes, so an index in another spelling gets a new number.
+            # A number identifies exact bytes, so an index in other bytes gets a new number.
             return (index if data == index.to_bytes() else None), index.number
     head = head_in(folder)
     return None, head.number if head is not None else 0
 
 
 def head_in(folder: Path) -> Head | None:
-    """Return the head in a repository's folder, None without a valid one."""
+    """Return the head in a repository's folder, or None without a valid one."""
     with suppress(PackageError):
         return read_head(_content(folder / HEAD, HEAD_BYTES) or b"", HEAD)
     return None
@@ -254,7 +254,7 @@ def _content(file: Path, most: int) -> bytes | None:
 
 
 def _homes(folder: Path) -> list[Path]:
-    """Return the folders of packages that the keeper writes in."""
+    """Return the folders of the maintainer's source packages."""
     return sorted(
         home
         for kind in FOLDERS
@@ -271,7 +271,7 @@ def _take(
     examine: Callable[[Path], list[str]],
     signer: Signer | None,
 ) -> list[str]:
-    """Make the archive of a package that is new; return what is wrong with it."""
+    """Write the archive of a new version; return its errors."""
     try:
         package = pack_folder(home)
     except PackageError as error:
@@ -279,7 +279,7 @@ def _take(
     said = package.manifest
     wanted = folder / str(said.key)
     if home != wanted:
-        return [f"{home}: {said.key} belongs into {wanted}"]
+        return [f"{home}: {said.key} belongs in {wanted}"]
     entry = entry_of(package)
     archive = folder / entry.file
     if archive.is_file():
@@ -296,7 +296,7 @@ def _take(
 
 
 def _known(folder: Path) -> dict[str, Entry]:
-    """Return what the last index says, by file: an archive of the same bytes is not read again."""
+    """Return the entries of the last index by file, so that known archives are not read again."""
     try:
         with open(folder / INDEX, "rb") as file:
             index = read_index(file.read(INDEX_BYTES + 1), INDEX)
@@ -324,12 +324,12 @@ def _entry(folder: Path, file: Path, known: Mapping[str, Entry]) -> Entry:
         if signature is not None:
             signature.check(entry.key, entry.version, entry.sha256)
     if folder / entry.file != file:
-        raise PackageError(f"{file}: this is {entry}, which belongs into {folder / entry.file}")
+        raise PackageError(f"{file}: this is {entry}, which belongs in {folder / entry.file}")
     return entry
 
 
 def read_signature(archive: Path) -> Signature | None:
-    """Return the signature that stands beside an archive, or None; raise `PackageError`."""
+    """Return the signature of an archive, or None; raise `PackageError`."""
     file = archive.with_suffix(_SIGNED)
     try:
         with open(file, "rb") as opened:
@@ -337,7 +337,7 @@ def read_signature(archive: Path) -> Signature | None:
     except FileNotFoundError:
         return None
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise PackageError(f"{file}: this is no signature: {error}") from None
+        raise PackageError(f"{file}: this is not a signature: {error}") from None
 
 
 def urcpm(said: Manifest, files: Mapping[str, bytes]) -> bytes:

@@ -1,4 +1,4 @@
-"""The lock: which version, with which bytes, of each package that one package needs."""
+"""The lock: version and digest of each package that one package needs."""
 
 from collections.abc import Mapping
 from typing import Annotated, Final
@@ -26,16 +26,16 @@ class Pin(msgspec.Struct, frozen=True):
 
 
 class Lock(msgspec.Struct, frozen=True):
-    """A package with all that it needs: an ecosystem of its own."""
+    """A package with all its needs, as a separate ecosystem."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     root: str
-    """``drivers/puppet``: what was asked for."""
+    """Requested package, such as ``drivers/puppet``."""
     packages: dict[str, Pin]
-    """``drivers/puppet`` → what was taken; `root` is among them."""
+    """``drivers/puppet`` → its version; includes `root`."""
 
     def __post_init__(self) -> None:
-        """Refuse names and versions that are none."""
+        """Reject invalid names and versions."""
         if len(self.packages) > _PACKAGES_MOST or self.root not in self.packages:
             raise ValueError(
                 f"1 to {_PACKAGES_MOST} packages are expected, and the root among them"
@@ -46,22 +46,22 @@ class Lock(msgspec.Struct, frozen=True):
 
     @property
     def key(self) -> Key:
-        """What was asked for."""
+        """Requested package."""
         return parse_key(self.root)
 
     @property
     def version(self) -> str:
-        """The root's."""
+        """Version of the root."""
         return self.packages[self.root].version
 
     @property
     def number(self) -> Version:
-        """The root's version, to be compared."""
+        """Version of the root in comparable form."""
         return parse_version(self.version)
 
     @property
     def digest(self) -> str:
-        """What names this ecosystem."""
+        """Digest that identifies this ecosystem."""
         return sha256(self.to_bytes())
 
     def to_bytes(self) -> bytes:
@@ -73,7 +73,7 @@ class Lock(msgspec.Struct, frozen=True):
 
 
 def lock_of(root: Key, chosen: Mapping[Key, Entry]) -> Lock:
-    """Return the lock of what was resolved."""
+    """Return the lock of resolved versions."""
     pins = {
         str(key): Pin(entry.version, entry.sha256, entry.size)
         for key, entry in sorted(chosen.items())
@@ -86,4 +86,4 @@ def read_lock(data: bytes, where: str) -> Lock:
     try:
         return msgspec.json.decode(data, type=Lock)
     except (msgspec.DecodeError, PackageError, RecursionError, UnicodeDecodeError) as error:
-        raise PackageError(f"{where}: this is no lock: {error}") from None
+        raise PackageError(f"{where}: this is not a lock: {error}") from None

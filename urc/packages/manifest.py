@@ -1,4 +1,4 @@
-"""``package.yaml``: what a package says of itself."""
+"""``package.yaml``: the manifest of a package."""
 
 from typing import Any, Final, NamedTuple
 
@@ -11,7 +11,7 @@ __all__ = ["LANGUAGE", "MANIFEST", "Manifest", "parse_manifest"]
 
 MANIFEST: Final = "package.yaml"
 LANGUAGE: Final = 1
-"""Version of the language of documents that this URC reads."""
+"""Version of the document language that this URC supports."""
 _NEEDS_MOST: Final = 64
 _AUTHORS_MOST: Final = 32
 _LONGEST: Final = 500
@@ -20,11 +20,11 @@ _MUST: Final = _KEYS[:6]
 
 
 class Manifest(NamedTuple):
-    """What ``package.yaml`` says, checked."""
+    """The checked content of ``package.yaml``."""
 
     key: Key
     version: str
-    """SemVer."""
+    """Version by SemVer."""
     licence: str
     """SPDX expression."""
     authors: tuple[str, ...]
@@ -35,15 +35,15 @@ class Manifest(NamedTuple):
 
     @property
     def main(self) -> str:
-        """The document in the package: ``driver.yaml`` of a driver."""
+        """Name of the main document, such as ``driver.yaml`` for a driver."""
         return f"{self.key.kind}.yaml"
 
 
 def parse_manifest(content: bytes, file: str) -> Manifest:
-    """Return what a manifest says.
+    """Return the content of a manifest.
 
     Raises:
-        PackageError: what is wrong with it, and on which line.
+        PackageError: its fault, with the line.
     """
     try:
         document = parse_document(content, file, Limits(size_bytes=65536))
@@ -53,7 +53,7 @@ def parse_manifest(content: bytes, file: str) -> Manifest:
     data = reader.mapping
     for key in data:
         if key not in _KEYS:
-            raise reader.fault((key,), f"there is no key {key!r}; known: {', '.join(_KEYS)}")
+            raise reader.fault((key,), f"unknown key {key!r}; expected one of: {', '.join(_KEYS)}")
     for key in _MUST:
         if key not in data:
             raise reader.fault((), f"{key!r} is missing")
@@ -71,13 +71,13 @@ def parse_manifest(content: bytes, file: str) -> Manifest:
 
 
 class _Reader:
-    """Takes the values out of a manifest, and says on which line one is wrong."""
+    """A reader of the values of a manifest, with lines for faults."""
 
     def __init__(self, document: Document) -> None:
         self._document = document
         self.mapping: dict[str, Any] = {}
         if not isinstance(document.data, dict):
-            raise self.fault((), f"keys are expected: {', '.join(_MUST)}")
+            raise self.fault((), f"expected the keys: {', '.join(_MUST)}")
         self.mapping = document.data
 
     def fault(self, path: Path, message: str) -> PackageError:
@@ -91,20 +91,20 @@ class _Reader:
 
     def _text(self, path: Path, value: object) -> str:
         if not isinstance(value, str) or not value.strip() or len(value) > _LONGEST:
-            raise self.fault(path, f"a text of 1 to {_LONGEST} characters is expected")
+            raise self.fault(path, f"expected a text of 1 to {_LONGEST} characters")
         if not value.isprintable():
-            raise self.fault(path, "a text on one line is expected, without control characters")
+            raise self.fault(path, "expected a text on one line, without control characters")
         return value
 
     def kind(self) -> str:
         if self.mapping["package"] not in KINDS:
-            raise self.fault(("package",), f"one of {', '.join(KINDS)} is expected")
+            raise self.fault(("package",), f"expected one of {', '.join(KINDS)}")
         return str(self.mapping["package"])
 
     def name(self) -> str:
         name = self.mapping["name"]
         if not isinstance(name, str) or not NAME.fullmatch(name):
-            raise self.fault(("name",), "small letters, digits and '-' are expected, 64 at most")
+            raise self.fault(("name",), "expected at most 64 lower-case letters, digits and '-'")
         return name
 
     def version(self) -> str:
@@ -116,13 +116,13 @@ class _Reader:
     def authors(self) -> tuple[str, ...]:
         found = self.mapping["authors"]
         if not isinstance(found, list) or not 0 < len(found) <= _AUTHORS_MOST:
-            raise self.fault(("authors",), f"a list of 1 to {_AUTHORS_MOST} names is expected")
+            raise self.fault(("authors",), f"expected a list of 1 to {_AUTHORS_MOST} names")
         return tuple(self._text(("authors", at), one) for at, one in enumerate(found))
 
     def needs(self) -> dict[str, str]:
         found = self.mapping["needs"]
         if not isinstance(found, dict) or len(found) > _NEEDS_MOST:
-            raise self.fault(("needs",), f"at most {_NEEDS_MOST} packages are expected")
+            raise self.fault(("needs",), f"expected at most {_NEEDS_MOST} packages")
         needs: dict[str, str] = {}
         for key, wanted in found.items():
             try:

@@ -1,4 +1,4 @@
-"""What packages are called: a kind and a name, as ``drivers/puppet``, and perhaps a version."""
+"""Names of packages: a kind and a name, such as ``drivers/puppet``, with an optional version."""
 
 import re
 from typing import Final, NamedTuple
@@ -9,16 +9,16 @@ __all__ = ["FOLDERS", "KINDS", "NAME", "Key", "PackageError", "Wish", "parse_key
 
 KINDS: Final = ("driver", "interface", "widget", "robot")
 FOLDERS: Final = {f"{kind}s": kind for kind in KINDS}
-"""Folder of a kind → kind: packages of one kind stand in one folder, everywhere."""
+"""Folder → kind of the packages in it."""
 NAME: Final = re.compile(r"[a-z][a-z0-9-]{0,63}")
 
 
 class PackageError(UrcError):
-    """What cannot be done with a package, a repository or the store, in one line."""
+    """A failed operation on a package, a repository or the store, with a one-line message."""
 
 
 class Key(NamedTuple):
-    """What tells packages apart, whatever their version."""
+    """The identity of a package, without its version."""
 
     kind: str
     """One of `KINDS`."""
@@ -29,10 +29,10 @@ class Key(NamedTuple):
 
 
 class Wish(NamedTuple):
-    """What somebody asks for on a command line."""
+    """A requirement from a command line."""
 
     kind: str
-    """"" for whichever has the name."""
+    """Kind; "" for any kind with this name."""
     name: str
     range: str = "*"
 
@@ -42,7 +42,7 @@ class Wish(NamedTuple):
 
 
 def parse_key(text: str) -> Key:
-    """Return the package that ``drivers/puppet`` names; raise `PackageError`."""
+    """Return the package with the name ``drivers/puppet``; raise `PackageError`."""
     folder, slash, name = text.partition("/")
     if not slash or folder not in FOLDERS or not NAME.fullmatch(name):
         raise PackageError(
@@ -53,7 +53,7 @@ def parse_key(text: str) -> Key:
 
 
 def parse_wish(text: str) -> Wish:
-    """Return what ``puppet``, ``drivers/puppet`` or ``puppet@^1.2`` asks for."""
+    """Return the requirement in ``puppet``, ``drivers/puppet`` or ``puppet@^1.2``."""
     package, at, wanted = text.partition("@")
     if "/" in package:
         key = parse_key(package)
@@ -65,5 +65,5 @@ def parse_wish(text: str) -> Wish:
             f"{text!r} names no package: write NAME or drivers/NAME, and @VERSION for a version"
         )
     if at and not wanted:
-        raise PackageError(f"{text!r}: a version is expected after '@'")
+        raise PackageError(f"{text!r}: expected a version after '@'")
     return Wish(kind, name, wanted or "*")

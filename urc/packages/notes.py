@@ -1,6 +1,6 @@
-"""What a repository says of a version beside the package: where it was made, if it is withdrawn.
+"""Notes of a repository about a version: its origin, and its withdrawal.
 
-It stands in a small file beside the archive, and in the index.
+They are stored in a small file next to the archive, and in the index.
 """
 
 import re
@@ -15,25 +15,25 @@ from urc.packages.names import PackageError
 __all__ = ["PROVENANCE", "Notes", "Provenance", "notes_beside", "read_notes", "write_notes"]
 
 PROVENANCE: Final = "urc-provenance"
-"""Header of a request that brings a package: where it was made as JSON, in base64."""
+"""Header of an upload: the origin as JSON, in base64."""
 _LONGEST: Final = 300
 _COMMIT: Final = re.compile("[0-9a-f]{7,64}", re.ASCII)
 
 
 class Provenance(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Where a package was made, as its publisher says.
+    """The origin of a package, as declared by its publisher.
 
-    In an index that comes from outside it may say more than is known here: see `check`.
+    In an index of another repository, it may break the rules of `check`.
     """
 
     source: Annotated[str, msgspec.Meta(max_length=_LONGEST)] = ""
-    """Address of what it was made from."""
+    """Address of the source."""
     commit: Annotated[str, msgspec.Meta(max_length=100)] = ""
     tool: Annotated[str, msgspec.Meta(max_length=100)] = ""
-    """Program that packed it, with its version."""
+    """Packaging program, with its version."""
 
     def check(self) -> None:
-        """Raise `PackageError` for what is not taken from a publisher."""
+        """Raise `PackageError` for an origin that is not accepted from a publisher."""
         if not self.source.startswith(("https://", "http://", "ssh://")):
             raise PackageError("a source begins with https://, http:// or ssh://")
         if self.commit and not _COMMIT.fullmatch(self.commit):
@@ -48,25 +48,25 @@ class Provenance(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Notes(msgspec.Struct, frozen=True, omit_defaults=True):
-    """All of it, of one version."""
+    """All notes about one version."""
 
     withdrawn: Annotated[str, msgspec.Meta(max_length=_LONGEST)] = ""
-    """Why it is not offered any more; "" while it is."""
+    """Reason of a withdrawal, or ""."""
     provenance: Provenance | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what would hide something when it is shown."""
+        """Reject text with hidden characters."""
         if not self.withdrawn.isprintable():
             raise ValueError("a reason on one line is expected")
 
 
 def notes_beside(archive: Path) -> Path:
-    """Return where the notes about an archive stand."""
+    """Return the path of the notes about an archive."""
     return archive.with_suffix(".json")
 
 
 def read_notes(archive: Path) -> Notes:
-    """Return what stands beside an archive; raise `PackageError` when it is damaged."""
+    """Return the notes about an archive; raise `PackageError` for a damaged file."""
     file = notes_beside(archive)
     try:
         with open(file, "rb") as opened:
@@ -74,11 +74,11 @@ def read_notes(archive: Path) -> Notes:
     except FileNotFoundError:
         return Notes()
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise PackageError(f"{file}: these are no notes about a package: {error}") from None
+        raise PackageError(f"{file}: these are not notes about a package: {error}") from None
 
 
 def write_notes(archive: Path, notes: Notes, work: Path) -> None:
-    """Put notes beside an archive."""
+    """Write the notes about an archive."""
     if notes == Notes():
         notes_beside(archive).unlink(missing_ok=True)
     else:

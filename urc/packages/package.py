@@ -1,4 +1,4 @@
-"""One package: its manifest, its files, and the archive that is the same everywhere."""
+"""A package: its manifest, its files, and its reproducible archive."""
 
 import hashlib
 import os
@@ -16,35 +16,35 @@ from urc.source import parse_document
 __all__ = ["LEFT_OUT", "Package", "open_package", "pack_folder", "sha256"]
 
 LEFT_OUT = ("urcpm.json",)
-"""Files of a package's folder that are made from it, and are no part of it."""
+"""Generated files in a package's folder that are not part of the package."""
 
 
 class Package(NamedTuple):
-    """A package in memory, whole and checked."""
+    """A complete, checked package in memory."""
 
     manifest: Manifest
     files: dict[str, bytes]
     data: bytes
-    """The archive."""
+    """Bytes of the archive."""
     digest: str
     """SHA-256 of the archive, 64 hex digits."""
 
 
 def sha256(data: bytes) -> str:
-    """Return the digest that names content."""
+    """Return the digest that identifies content."""
     return hashlib.sha256(data).hexdigest()
 
 
 def open_package(data: bytes, name: str) -> Package:
-    """Return the package in an archive; raise `PackageError`. `name` is used in errors."""
+    """Return the package in an archive; raise `PackageError`, with `name` in the message."""
     return _package(read_archive(data, PACKAGE, name), data, name)
 
 
 def pack_folder(folder: Path) -> Package:
-    """Return the package in a folder. Names that begin with '.' are no part of it.
+    """Return the package in a folder, without files whose names begin with '.'.
 
     Raises:
-        PackageError: it has no manifest, a link, or what may not be in a package.
+        PackageError: the manifest is missing, or the folder has a link or a forbidden file.
     """
     files: dict[str, bytes] = {}
     total = 0
@@ -60,13 +60,13 @@ def pack_folder(folder: Path) -> Package:
     except OSError as error:
         raise PackageError(f"{error.filename or folder}: {error.strerror or error}") from None
     if MANIFEST not in files:
-        raise PackageError(f"{folder}: this is no package: there is no {MANIFEST} in it")
+        raise PackageError(f"{folder}: this is not a package: it has no {MANIFEST}")
     data = write_archive(files, PACKAGE, str(folder))
     return _package(dict(sorted(files.items())), data, str(folder))
 
 
 def _files(folder: Path, below: str = "", depth: int = 0) -> Iterator[tuple[str, str]]:
-    """Yield the path in the package and the file of everything in a folder."""
+    """Yield path and file of every entry in a folder."""
     if depth > 8:
         raise PackageError(f"{folder}: folders are nested too deep")
     with os.scandir(folder) as entries:
@@ -86,16 +86,16 @@ def _files(folder: Path, below: str = "", depth: int = 0) -> Iterator[tuple[str,
 
 def _package(files: dict[str, bytes], data: bytes, name: str) -> Package:
     if MANIFEST not in files:
-        raise PackageError(f"{name}: this is no package: there is no {MANIFEST} in it")
+        raise PackageError(f"{name}: this is not a package: it has no {MANIFEST}")
     manifest = parse_manifest(files[MANIFEST], f"{name}/{MANIFEST}")
     if manifest.main not in files:
-        raise PackageError(f"{name}: there is no {manifest.main} in it, the document itself")
+        raise PackageError(f"{name}: its document {manifest.main} is missing")
     _check_document(files[manifest.main], manifest, f"{name}/{manifest.main}")
     return Package(manifest, files, data, sha256(data))
 
 
 def _check_document(content: bytes, manifest: Manifest, file: str) -> None:
-    """See to it that the document is what the manifest calls it."""
+    """Check that the document agrees with the manifest."""
     try:
         data = parse_document(content, file).data
     except ProblemsError as error:

@@ -1,4 +1,4 @@
-"""What would be installed: a lock, the archives that it takes, and who signed them."""
+"""An install plan: a lock, with new archives and their signatures."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -10,17 +10,17 @@ __all__ = ["Plan"]
 
 
 class Plan(NamedTuple):
-    """What would be installed."""
+    """An installation that is not executed yet."""
 
     lock: Lock
     archives: Mapping[str, bytes]
-    """Digest → bytes of what the store has not."""
+    """Digest → bytes, for archives that the store lacks."""
     origins: Mapping[str, str]
-    """``drivers/puppet`` → where it comes from."""
+    """``drivers/puppet`` → its source."""
     signatures: Mapping[str, Signature]
-    """Digest → who made it; of what is not signed nothing."""
+    """Digest → signature, for signed archives."""
     own: frozenset[str] = frozenset()
-    """``drivers/puppet``, of what comes from a folder that somebody named: it is taken as it is,
-    whoever signed earlier versions."""
+    """Packages from a folder that the user named. They are accepted without a check of the pinned
+    key."""
     remarks: Mapping[str, str] = {}
-    """Digest → what its repository says of it beside: that it is withdrawn, where it was made."""
+    """Digest → remark of its repository, about a withdrawal or the origin."""

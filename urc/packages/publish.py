@@ -1,4 +1,4 @@
-"""Sends a package to a repository that takes packages."""
+"""Upload of a package to a repository."""
 
 import base64
 import ipaddress
@@ -18,13 +18,13 @@ __all__ = ["Published", "is_overheard", "publish"]
 
 
 class Published(msgspec.Struct, frozen=True):
-    """What a repository answered."""
+    """Response of a repository."""
 
     listed: str
-    """``drivers/puppet 1.0.0``."""
+    """Listed version, such as ``drivers/puppet 1.0.0``."""
     sha256: str
     is_new: bool = True
-    """False: exactly this was listed already."""
+    """False if exactly this version was already listed."""
 
 
 class _Fault(msgspec.Struct, frozen=True):
@@ -32,7 +32,7 @@ class _Fault(msgspec.Struct, frozen=True):
 
 
 def is_overheard(url: str) -> bool:
-    """Return whether a token sent to an address can be read by others on the way."""
+    """Return whether others on the network can read a token sent to an address."""
     parts = urlsplit(url)
     if parts.scheme == "https":
         return False
@@ -49,17 +49,17 @@ def publish(
     token: str,
     provenance: Provenance | None = None,
 ) -> Published:
-    """Send a package to the repository at an address, where it is checked, tested and listed.
+    """Upload a package to a repository, which checks, tests and lists it.
 
     Args:
-        url: of the repository. Redirects are not followed: a token goes nowhere else.
-        package: what is published.
-        signature: who made it, if it is signed.
-        token: the keeper's.
-        provenance: where it was made, to be told who installs it.
+        url: address of the repository. Redirects are not followed, to protect the token.
+        package: the package.
+        signature: its signature, if any.
+        token: upload token from the maintainer.
+        provenance: its origin, shown at installation.
 
     Raises:
-        PackageError: what the repository has against it, or that it cannot be reached.
+        PackageError: the repository rejects it, or is unreachable.
     """
     address = repository_url(url) + entry_of(package).file
     headers = {
@@ -76,7 +76,9 @@ def publish(
         try:
             said = msgspec.json.decode(answer.body, type=Published)
         except (msgspec.DecodeError, UnicodeDecodeError):
-            raise PackageError(f"{address}: it is taken, says the server, but not what") from None
+            raise PackageError(
+                f"{address}: it was accepted, but the server's response is invalid"
+            ) from None
         if said.sha256 != package.digest:
             raise PackageError(f"{address}: the server listed other bytes than were sent")
         return msgspec.structs.replace(said, is_new=answer.status == 201)
@@ -86,8 +88,8 @@ def publish(
 def _reason(status: int, body: bytes) -> str:
     if status in (404, 405, 501):
         return (
-            f"this server takes no packages (it answers {status});"
-            " 'urc repo serve DIR --tokens FILE' does"
+            f"this server accepts no packages (status {status});"
+            " start one with 'urc repo serve DIR --tokens FILE'"
         )
     try:
         return printable(msgspec.json.decode(body, type=_Fault).error)[:2000]

@@ -1,4 +1,4 @@
-"""A repository behind HTTP: any web server that gives out the index and the archives."""
+"""A repository over HTTP, on any web server that serves the index and the archives."""
 
 import asyncio
 import ssl
@@ -17,40 +17,42 @@ __all__ = ["Answer", "ask", "fetch_archive", "put", "repository_url"]
 _CONNECT_S: Final = 5.0
 _READ_S: Final = 10.0
 _TOTAL_S: Final = 120.0
-"""For one file, however slowly it drips."""
+"""Limit for one file, in seconds, also for a slow transfer."""
 _ANSWER_BYTES: Final = 65536
 _CHECKED_S: Final = 90.0
-"""In which a repository must have checked what was sent to it."""
+"""Limit for the check of an upload by the repository, in seconds."""
 
 
 class Answer(NamedTuple):
-    """What a server gave."""
+    """Response of a server."""
 
     status: int
-    """200; 304: nothing has changed; 404: there is none, where that may be."""
+    """200; 304 for an unchanged file; 404 for a missing file, if that is allowed."""
     etag: str
     body: bytes
 
 
 def repository_url(text: str) -> str:
-    """Return the address of a repository as it is remembered; raise `PackageError`."""
+    """Return the address of a repository in its stored form; raise `PackageError`."""
     try:
         url = httpx2.URL(text)
     except httpx2.InvalidURL:
         url = httpx2.URL("")
     if url.scheme not in ("http", "https") or not url.host or url.userinfo or url.query:
-        raise PackageError(f"{text!r} is no address of a repository, as http://192.168.1.5:8090/")
+        raise PackageError(
+            f"{text!r} is not an address of a repository, such as http://192.168.1.5:8090/"
+        )
     return str(url.copy_with(fragment=None)).rstrip("/") + "/"
 
 
 def fetch_archive(url: str, entry: Entry) -> bytes:
-    """Return an archive with the bytes that the index promised; raise `PackageError`."""
+    """Return an archive with the digest in the index; raise `PackageError`."""
     address = url + entry.file
     data = ask(address, entry.size).body
     if len(data) != entry.size or sha256(data) != entry.sha256:
         raise PackageError(
-            f"{address}: these are not the bytes that the index names;"
-            f" {len(data)} of {entry.size} came"
+            f"{address}: the bytes differ from those named in the index;"
+            f" received {len(data)} of {entry.size}"
         )
     return data
 
@@ -58,17 +60,17 @@ def fetch_archive(url: str, entry: Entry) -> bytes:
 def ask(
     url: str, most: int, etag: str = "", total_s: float = _TOTAL_S, *, may_lack: bool = False
 ) -> Answer:
-    """Return what a server has under an address, at most `most` bytes.
+    """Return the file at an address, up to `most` bytes.
 
     Args:
         url: the address; redirects are not followed.
-        most: bytes that are taken.
-        etag: of what is here already.
-        total_s: for all of it.
-        may_lack: any other answer means that there is none: not every server says 404.
+        most: limit of the file, in bytes.
+        etag: ETag of the local copy.
+        total_s: limit of the whole transfer, in seconds.
+        may_lack: whether any other status counts as 404, because some servers have no 404.
 
     Raises:
-        PackageError: it does not answer, stalls, sends too much, or something else.
+        PackageError: the server is unreachable or slow, or its response is too large or invalid.
     """
     headers = {"if-none-match": etag} if etag else {}
     accepted: Container[int] = {200, 304} if etag else {200}
@@ -78,10 +80,10 @@ def ask(
 
 
 def put(url: str, body: bytes, headers: Mapping[str, str], total_s: float = _TOTAL_S) -> Answer:
-    """Send something to an address, and return what is answered, whatever that is.
+    """Upload a file to an address, and return the response with any status.
 
     Raises:
-        PackageError: it does not answer, or stalls.
+        PackageError: the server is unreachable or slow.
     """
     sent = _exchange("PUT", url, headers, body, _ANSWER_BYTES, range(200, 600))
     return asyncio.run(_within(url, sent, total_s))
@@ -92,11 +94,11 @@ async def _within(url: str, exchange: Coroutine[None, None, Answer], total_s: fl
         async with asyncio.timeout(total_s):
             return await exchange
     except TimeoutError:
-        raise PackageError(f"{url}: not all of it came within {total_s:g} s") from None
+        raise PackageError(f"{url}: the transfer was incomplete after {total_s:g} s") from None
     except httpx2.ConnectTimeout:
         raise PackageError(f"{url}: no answer within {_CONNECT_S:g} s") from None
     except httpx2.TimeoutException:
-        raise PackageError(f"{url}: the server fell silent") from None
+        raise PackageError(f"{url}: the server stopped sending") from None
     except (httpx2.HTTPError, httpx2.InvalidURL, OSError) as error:
         reason = str(error) or type(error).__name__
         raise PackageError(f"{url}: {reason}") from None
@@ -104,7 +106,7 @@ async def _within(url: str, exchange: Coroutine[None, None, Answer], total_s: fl
 
 @cache
 def _trust() -> ssl.SSLContext:
-    """Return who is believed to speak for a host: read once, for an index asks many times."""
+    """Return the trusted authorities; cached, because an index needs many requests."""
     return httpx2.create_ssl_context()
 
 
@@ -116,7 +118,7 @@ async def _exchange(
     most: int,
     accepted: Container[int],
 ) -> Answer:
-    # Not compressed: what comes is then never more than what was sent.
+    # Without compression, so that the response cannot grow after the transfer.
     asked = {"accept-encoding": "identity", **headers}
     timeout = httpx2.Timeout(_CHECKED_S if body else _READ_S, connect=_CONNECT_S)
     async with (
@@ -129,10 +131,10 @@ async def _exchange(
         if method == "GET" and status != 200:
             return Answer(status if status == 304 else 404, "", b"")
         if response.headers.get("content-encoding", "identity") != "identity":
-            raise PackageError(f"{url}: the server compresses, which it was not asked to")
+            raise PackageError(f"{url}: the server compresses its response without being asked")
         content = bytearray()
         async for piece in response.aiter_raw():
             content += piece
             if len(content) > most:
-                raise PackageError(f"{url}: more than the {most} bytes that are expected")
+                raise PackageError(f"{url}: more than the expected {most} bytes")
         return Answer(status, response.headers.get("etag", ""), bytes(content))

@@ -1,4 +1,4 @@
-"""The repositories that this user knows, and what they said last."""
+"""The user's repositories, and the last known index of each."""
 
 import hashlib
 import time
@@ -22,7 +22,7 @@ __all__ = ["Repositories", "Repository"]
 _MOST: Final = 32
 _LIST_BYTES: Final = 1 << 20
 _TRIES: Final = 2
-"""A repository may change between two questions."""
+"""Attempts, because a repository may change between two requests."""
 
 
 class _Known(msgspec.Struct, frozen=True):
@@ -32,19 +32,19 @@ class _Known(msgspec.Struct, frozen=True):
 
 class _Tags(msgspec.Struct, frozen=True):
     sha256: str
-    """Of the index that they belong to."""
+    """Digest of the index with these tags."""
     index: str = ""
     """ETag of the index."""
     head: str = ""
     said: Head | None = None
-    """The head itself, once it was checked; None: there was none that fits."""
+    """The head after its check; None without a matching one."""
 
 
 class Repository:
-    """One repository. What it said last is kept, and used where it cannot be reached.
+    """One repository. Its last index is stored, and used while the repository is unreachable.
 
-    Its number only ever grows: one that goes back is not believed, and what it said last is used.
-    The key that signs it first is kept; another one, or none, is not believed from then on.
+    Its number only grows: an index with a lower number is rejected, and the stored one is used. The
+    first signing key is pinned; an index with another key, or without a signature, is rejected.
     """
 
     def __init__(
@@ -64,19 +64,19 @@ class Repository:
 
     @property
     def keeper(self) -> str:
-        """Who signs the index, with the fingerprint; "" for nobody."""
+        """Name and fingerprint of the index's signer, or ""."""
         return self._trust.keeper
 
     def known(self) -> tuple[Entry, ...]:
-        """Return what it said last, without asking; nothing where that is not known."""
+        """Return the entries of the stored index, without a request; () if there is no index."""
         kept = self._kept()
         return kept[0].packages if kept is not None else ()
 
     def entries(self) -> tuple[Entry, ...]:
-        """Return what it has, or what it had when it was last reached.
+        """Return the current entries, or the stored ones while the repository is unreachable.
 
         Raises:
-            PackageError: it was never reached, or what it said last has expired.
+            PackageError: it was never reached, or its stored index has expired.
         """
         try:
             return self.refresh().packages
@@ -89,22 +89,22 @@ class Repository:
             return kept[0].packages
 
     def refresh(self) -> Index:
-        """Ask the repository for what is new, and return all that it has.
+        """Request the newest index, and return it.
 
         Raises:
-            PackageError: it does not answer, sends something else, goes back, has expired, or is
-                not signed by the key that was kept.
+            PackageError: the repository is unreachable, or its index is invalid, expired, older
+                than the stored one, or not signed by the pinned key.
         """
         for _ in range(_TRIES):
             index = self._asked()
             if index is not None:
                 return index
         raise PackageError(
-            f"{self.name}{INDEX}: these are not the bytes that {HEAD} names; try again"
+            f"{self.name}{INDEX}: the bytes differ from those named in {HEAD}; try again"
         )
 
     def _asked(self) -> Index | None:
-        """Ask once; None: what came does not fit its signed head."""
+        """Make one attempt; return None if the index does not match its signed head."""
         kept = self._kept()
         said = kept[1].said if kept is not None else None
         etag = kept[1].head if kept is not None and said is not None else ""
@@ -115,7 +115,7 @@ class Repository:
             return kept[0]
         if kept is not None and head is not None:
             index, tags = kept
-            if (head.number, head.sha256) == (index.number, tags.sha256):  # renewed, nothing else
+            if (head.number, head.sha256) == (index.number, tags.sha256):  # only signed again
                 self._keep(_Tags(tags.sha256, tags.index, answer.etag, head))
                 return index
         return self._whole(kept, head, answer.etag)
@@ -123,10 +123,10 @@ class Repository:
     def _whole(
         self, kept: tuple[Index, _Tags] | None, head: Head | None, etag: str
     ) -> Index | None:
-        """Take the whole index; None: it is not what a signed head names.
+        """Request the whole index; return None if it does not match its signed head.
 
         Raises:
-            PackageError: it is older than what is known.
+            PackageError: it is older than the stored one.
         """
         address = self.name + INDEX
         answer = ask(address, INDEX_BYTES, kept[1].index if kept is not None else "")
@@ -148,17 +148,17 @@ class Repository:
         is_other = kept is not None and index.number == kept[0].number > 0 and index != kept[0]
         if index.number < number or is_other:
             raise PackageError(
-                f"{address}: it went back from number {number} to {index.number}, or changed"
-                f" without a new one; if its keeper says that this is right,"
+                f"{address}: its number went back from {number} to {index.number}, or it"
+                f" changed without a new one; if its maintainer confirms this, run"
                 f" 'urc repo remove {self.name}' and add it again"
             )
 
     def fetch(self, entry: Entry) -> bytes:
-        """Return an archive of it."""
+        """Return an archive of the repository."""
         return fetch_archive(self.name, entry)
 
     def forget(self) -> None:
-        """Drop what it said last."""
+        """Delete the stored index."""
         self._index.unlink(missing_ok=True)
         self._tags.unlink(missing_ok=True)
         self._trust.forget()
@@ -173,14 +173,14 @@ class Repository:
         disk.put_file(self._tags, msgspec.json.encode(tags), work)
 
     def _kept(self) -> tuple[Index, _Tags] | None:
-        """Return what it said last, with the tags if they belong to it; None: it said nothing."""
+        """Return the stored index, with its tags if they match, or None."""
         data = _content(self._index, INDEX_BYTES)
         if data is None:
             return None
         try:
             index = read_index(data, str(self._index))
         except PackageError as error:
-            self._complain(f"{error}; it is asked for anew")
+            self._complain(f"{error}; it is requested again")
             return None
         try:
             tags = msgspec.json.decode(_content(self._tags, 4096) or b"", type=_Tags)
@@ -190,7 +190,7 @@ class Repository:
 
 
 class Repositories:
-    """The list of them, in the order in which they are asked."""
+    """The user's list of repositories, in the order of requests."""
 
     def __init__(self, folder: Path, complain: Callable[[str], None]) -> None:
         self._folder = folder / "repositories"
@@ -198,11 +198,11 @@ class Repositories:
         self._complain = complain
 
     def all(self) -> list[Repository]:
-        """Return those that were added, the first first."""
+        """Return the added repositories, in their order."""
         return [self._repository(url) for url in self._urls()]
 
     def add(self, text: str) -> tuple[str, Index]:
-        """Remember a repository that answers; return its address, and what it has."""
+        """Add a reachable repository; return its address and its index."""
         url = repository_url(text)
         index = self._repository(url).refresh()
         with disk.exclusive(self._folder / "changing"):
@@ -214,13 +214,13 @@ class Repositories:
         return url, index
 
     def remove(self, text: str) -> str:
-        """Forget a repository; what was installed from it stays."""
+        """Remove a repository; packages from it stay installed."""
         url = repository_url(text)
         with disk.exclusive(self._folder / "changing"):
             urls = self._urls()
             if url not in urls:
                 known = ", ".join(urls) or "none"
-                raise PackageError(f"{url} was never added; these were: {known}")
+                raise PackageError(f"{url} was never added; expected one of: {known}")
             self._write(tuple(one for one in urls if one != url))
         self._repository(url).forget()
         return url
@@ -243,7 +243,7 @@ class Repositories:
 
 
 def _head(answer: Answer, url: str) -> Head | None:
-    """Return the head in an answer; None: there is none, or it is damaged."""
+    """Return the head in a response, or None for a missing or damaged one."""
     with suppress(PackageError):
         return read_head(answer.body, url + HEAD)
     return None

@@ -1,7 +1,8 @@
-"""Which versions to take, so that everything that needs something gets what it asks for.
+"""The choice of versions, so that every need of every package is satisfied.
 
-`resolvelib` searches (it is what pip resolves with): it goes back when two needs collide, and says
-which ones did. What a package is, and which version is best, is said here: the newest that fits.
+`resolvelib`, the resolver of pip, does the search. It backtracks after a conflict, and reports the
+conflict if there is no solution. This module defines packages, needs and the best version, which is
+the newest matching one.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -31,17 +32,17 @@ Entries = Mapping[Key, Sequence[Entry]]
 
 
 def choose(entries: Entries, wish: Wish) -> Key:
-    """Return the package that a person means.
+    """Return the package of a requirement.
 
     Raises:
-        PackageError: there is none, or several kinds have one of that name.
+        PackageError: no package, or packages of several kinds, have this name.
     """
     found = [key for key in entries if key.name == wish.name and wish.kind in ("", key.kind)]
     if len(found) == 1:
         return found[0]
     if found:
         names = ", ".join(map(str, sorted(found)))
-        raise PackageError(f"{wish.name!r} may be one of {names}; write which")
+        raise PackageError(f"{wish.name!r} is ambiguous; write one of {names}")
     from difflib import get_close_matches
 
     near = get_close_matches(wish.name, [key.name for key in entries], 1)
@@ -50,15 +51,15 @@ def choose(entries: Entries, wish: Wish) -> Key:
 
 
 def resolve(root: Key, wanted: str, entries: Entries) -> dict[Key, Entry]:
-    """Return one version of `root` and of everything that it needs.
+    """Return one version of `root` and of each of its needs.
 
     Args:
-        root: the package that is asked for.
+        root: the requested package.
         wanted: range of its versions.
-        entries: every version there is.
+        entries: all available versions.
 
     Raises:
-        PackageError: what collides, and who asks for what.
+        PackageError: the conflicting needs, and the packages with these needs.
     """
     resolver: Resolver[_Need, Entry, Key] = Resolver(_Provider(entries), BaseReporter())
     try:
@@ -87,7 +88,7 @@ class _Provider(AbstractProvider[_Need, Entry, Key]):
         information: Mapping[Key, Iterator[Any]],
         backtrack_causes: Sequence[Any],
     ) -> tuple[bool, Key]:
-        """Settle first what collided before."""
+        """Prefer packages of an earlier conflict."""
         causes = {cause.requirement.key for cause in backtrack_causes}
         return identifier not in causes, identifier
 
@@ -117,12 +118,12 @@ class _Provider(AbstractProvider[_Need, Entry, Key]):
 
 @lru_cache(maxsize=65536)
 def _allows(wanted: str, version: str) -> bool:
-    """Return whether a version is in a range; a search asks the same again and again."""
+    """Return whether a version is in a range; cached, because a search repeats the question."""
     return parse_range(wanted).allows(parse_version(version))
 
 
 def _conflict(error: "ResolutionImpossible[_Need, Entry]", entries: Entries) -> str:
-    """Say what is asked for, by whom, and what there is."""
+    """Return a message with each need, its package, and the available versions."""
     causes: Iterable[Any] = error.causes
     asked: dict[Key, list[str]] = {}
     for cause in causes:

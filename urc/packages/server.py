@@ -1,7 +1,7 @@
 """A repository over HTTP: the files of its folder, and the lists of the thesis's figure B.3.
 
-Only what is in the index is given out. The index is read anew when it has changed, so listing a new
-package needs no restart.
+Only listed files are served. The index is read again after each change, so a new package needs no
+restart.
 """
 
 import asyncio
@@ -43,7 +43,7 @@ _HEADERS: Final = {"cache-control": "no-store", "x-content-type-options": "nosni
 
 
 class Door:
-    """Takes `PUT archives/drivers/puppet/1.0.0.zip`, with `authorization: Bearer TOKEN`."""
+    """A service for `PUT archives/drivers/puppet/1.0.0.zip`, with `authorization: Bearer TOKEN`."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class Door:
         self._waiting = 0
 
     async def answer(self, request: Request) -> Response:
-        """Answer one request; 201 when it is listed now, 200 when it was before."""
+        """Answer one request: 201 if the version is new, 200 if it was listed before."""
         refusal: Refused | None = None
         key = None
         try:
@@ -68,10 +68,10 @@ class Door:
         except Refused as error:
             refusal = error
         try:
-            # Also of one that is refused: who is still sending would not hear the answer.
+            # Read the body of refused requests too, or the client may miss the response.
             body = await _body(request, is_kept=refusal is None)
             if refusal is not None or key is None:
-                raise refusal or Refused(404, "there is no such place")
+                raise refusal or Refused(404, "this path does not exist")
             taken = await self._taken(request, body)
         except Refused as error:
             headers = {"www-authenticate": "Bearer"} if error.status == 401 else {}
@@ -81,21 +81,21 @@ class Door:
         except PackageError as error:
             return _told(503, {"error": str(error)})
         except OSError as error:
-            return _told(507, {"error": f"it cannot be kept: {error.strerror or error}"})
+            return _told(507, {"error": f"it cannot be stored: {error.strerror or error}"})
         said = {"listed": str(taken.entry), "sha256": taken.entry.sha256}
         return _told(201 if taken.is_new else 200, said)
 
     async def _admitted(self, request: Request) -> Key:
-        """Return what somebody may publish who shows this token; raise `Refused`."""
+        """Return the package that this token may publish; raise `Refused`."""
         scheme, _, text = request.headers.get("authorization", "").partition(" ")
         token = None
         if scheme.lower() == "bearer":
             try:
                 token = await asyncio.to_thread(self._tokens.find, text.strip())
-            except PackageError:  # a stranger is not told which file of the keeper's is damaged
+            except PackageError:  # clients must not learn about damaged files
                 raise Refused(503, "the tokens of this repository cannot be read") from None
         if token is None:
-            raise Refused(401, "a token of this repository is needed; its keeper gives one")
+            raise Refused(401, "this repository needs a token; ask its maintainer for one")
         found = _FILE.fullmatch(request.path_params["path"])
         if found is None or found[1] not in FOLDERS:
             raise Refused(404, "archives/drivers/NAME/VERSION.zip is expected")
@@ -107,7 +107,7 @@ class Door:
 
     async def _taken(self, request: Request, body: bytes) -> Taken:
         signature = _header(request, SIGNATURE, Signature, "no signature")
-        provenance = _header(request, PROVENANCE, Provenance, "nothing of where it was made")
+        provenance = _header(request, PROVENANCE, Provenance, "no origin")
         try:
             if provenance is not None:
                 provenance.check()
@@ -118,7 +118,7 @@ class Door:
         self._waiting += 1
         try:
             async with self._turn:
-                # In a thread that ends by itself: who goes away does not leave half of anything.
+                # In a thread, so that a client that disconnects cannot interrupt a change.
                 return await asyncio.shield(
                     asyncio.to_thread(
                         take,
@@ -136,7 +136,7 @@ class Door:
 
 
 async def _body(request: Request, *, is_kept: bool) -> bytes:
-    """Return what is sent, or nothing of it; raise `Refused` when it is too much."""
+    """Return the body, or nothing if it is not kept; raise `Refused` if it is too large."""
     size = 0
     pieces = []
     async for piece in request.stream():
@@ -148,12 +148,12 @@ async def _body(request: Request, *, is_kept: bool) -> bytes:
     wanted = request.headers.get("urc-sha256", "")
     body = b"".join(pieces)
     if is_kept and wanted and sha256(body) != wanted:
-        raise Refused(400, "what came is not what was sent; try again")
+        raise Refused(400, "the upload was damaged on the way; try again")
     return body
 
 
 def _header(request: Request, name: str, kind: type[_Told], lacks: str) -> _Told | None:
-    """Return what a header says as JSON in base64, None where there is none; raise `Refused`."""
+    """Return the value of a header, JSON in base64, or None; raise `Refused`."""
     text = request.headers.get(name, "")
     if not text:
         return None
@@ -171,13 +171,13 @@ def _told(status: int, said: dict[str, str], headers: dict[str, str] | None = No
 
 _ANSWER_HEADERS: Final = {
     "x-content-type-options": "nosniff",
-    # What is in a package is for dashboards; opened as a page here, it may do nothing.
+    # Archives are for dashboards; opened as a page, they must not run anything.
     "content-security-policy": "default-src 'none'; sandbox",
     "cache-control": "no-cache",
 }
 _THESIS: Final = ("drivers", "widgets", "interfaces")
 _LASTING: Final = "public, max-age=31536000, immutable"
-"""Of archives, which never change under their address."""
+"""For archives, whose content never changes."""
 
 
 def repository_app(
@@ -186,13 +186,13 @@ def repository_app(
     examine: Callable[[Path], list[str]] | None = None,
     seal: Seal | None = None,
 ) -> Starlette:
-    """Return the application that gives out the repository in a folder.
+    """Return the application that serves the repository in a folder.
 
     Args:
-        folder: the repository.
-        tokens: who may publish into it; None: nobody.
-        examine: looks at what is published, see `urc.packages.intake.take`.
-        seal: the keeper's, which signs what is published into the index.
+        folder: folder of the repository.
+        tokens: upload tokens; None to refuse uploads.
+        examine: checks uploads, see `urc.packages.intake.take`.
+        seal: signer of the maintainer, for the index with uploads.
     """
     shop = _Shop(folder)
     routes = [Route("/{path:path}", shop.answer, methods=["GET", "HEAD"])]
@@ -246,7 +246,7 @@ class _Shop:
         return data
 
     def _refresh(self) -> None:
-        """Read the index when its file is another one than before, or its head is."""
+        """Read the index if its file or its head has changed."""
         file = self._folder / INDEX
         head, stamp = self._head()
         seen = (*_stamp(os.stat(file)), *stamp)
@@ -257,7 +257,7 @@ class _Shop:
         digest = sha256(data)
         if head is None or head.sha256 != digest:
             if head is not None and head.signed and self._seen:
-                return  # it is being changed: until it is signed anew, the old one is given out
+                return  # a change is in progress: until the new signature, serve the old index
             head = None
         index = read_index(data, str(file))
         newest = {str(entry.key): entry for entry in search(index.packages, ())}
@@ -268,7 +268,7 @@ class _Shop:
         self._seen = seen
 
     def _head(self) -> tuple[Head | None, tuple[int, ...]]:
-        """Return the head as the keeper wrote it, and what tells its file from others."""
+        """Return the stored head, and the stamp of its file."""
         try:
             with open(self._folder / HEAD, "rb") as opened:
                 stamp = _stamp(os.fstat(opened.fileno()))
@@ -281,12 +281,12 @@ class _Shop:
 
 
 def _stamp(status: os.stat_result) -> tuple[int, ...]:
-    """Return what tells a file from what was there before it."""
+    """Return a stamp that changes with the file."""
     return status.st_mtime_ns, status.st_size, status.st_ino
 
 
 def _lists(name: str, newest: Mapping[str, Entry]) -> dict[str, bytes]:
-    """Return the answers to the paths of the thesis's figure B.3."""
+    """Return the responses for the paths of the thesis's figure B.3."""
     paths = {
         folder: [f"/{key}/" for key, entry in sorted(newest.items()) if entry.kind == kind]
         for folder, kind in FOLDERS.items()

@@ -1,8 +1,8 @@
-"""Who made a package: Ed25519 signatures of `cryptography`, over a statement in plain words.
+"""Signatures of packages: Ed25519 of `cryptography`, over a statement in plain words.
 
-A signature says that the holder of a key calls exactly these bytes that version of that package.
-Whose key it is nobody says: it is kept when a package is first installed, and a later version with
-another one is refused. That is what SSH does with host keys.
+A signature says that the holder of a key declares these bytes to be that version of that package.
+The owner of a key is not verified. The key is pinned when a package is first installed, and a later
+version with another key is rejected. SSH does the same with host keys.
 """
 
 import base64
@@ -30,9 +30,9 @@ __all__ = [
 ]
 
 PUBLISHER: Final = "publisher.pem"
-"""File of the user's own key in the data folder."""
+"""File of the user's own key, in the data folder."""
 SIGNATURE: Final = "urc-signature"
-"""Header of a request that brings a package: the signature as JSON, in base64."""
+"""Header of an upload: the signature as JSON, in base64."""
 _STATEMENT: Final = "URC package signature 1\n{package}\n{version}\n{sha256}\n{by}\n"
 _NAMED: Final = "Publisher: "
 _KEY_BYTES: Final = 16384
@@ -40,17 +40,17 @@ _LONGEST: Final = 100
 
 
 class Signature(msgspec.Struct, frozen=True):
-    """A signature as an index carries it."""
+    """A signature in an index."""
 
     by: Annotated[str, msgspec.Meta(min_length=1, max_length=_LONGEST)]
-    """The name that the publisher goes by; nobody vouches for it but the key."""
+    """Name of the publisher, which only the key confirms."""
     key: Annotated[str, msgspec.Meta(pattern=r"\A[A-Za-z0-9+/]{43}=\Z")]
     """Ed25519 public key, 32 bytes in base64."""
     value: Annotated[str, msgspec.Meta(pattern=r"\A[A-Za-z0-9+/]{86}==\Z")]
-    """64 bytes in base64."""
+    """Signature, 64 bytes in base64."""
 
     def __post_init__(self) -> None:
-        """Refuse what has a second way to be written, or would hide something when it is shown."""
+        """Reject ambiguous base64, and names with hidden characters."""
         for text in (self.key, self.value):
             if base64.b64encode(base64.b64decode(text)).decode() != text:
                 raise ValueError("base64 with bits left over")
@@ -59,15 +59,15 @@ class Signature(msgspec.Struct, frozen=True):
 
     @property
     def fingerprint(self) -> str:
-        """What people compare: ``SHA256:…``, of the public key."""
+        """Fingerprint of the public key for people: ``SHA256:…``."""
         return fingerprint(self.key)
 
     def check(self, package: Key, version: str, sha256: str) -> None:
-        """Raise `PackageError` unless the key's holder signed exactly this."""
+        """Raise `PackageError` unless the key's holder signed exactly these bytes."""
         if not self.verifies(_statement(package, version, sha256, self.by)):
             raise PackageError(
-                f"{package} {version}: the signature is not of these bytes: {self} never signed"
-                " them, or somebody changed them"
+                f"{package} {version}: the signature does not match these bytes: {self} never"
+                " signed them, or they were changed"
             )
 
     def verifies(self, statement: bytes) -> bool:
@@ -96,15 +96,15 @@ class Signer:
 
     @property
     def fingerprint(self) -> str:
-        """What people compare."""
+        """Fingerprint of the public key."""
         return fingerprint(self.key)
 
     def sign(self, package: Key, version: str, sha256: str) -> Signature:
-        """Return the signature; the same package always gives the same one."""
+        """Return the signature, which is the same for the same package."""
         return self.signs(_statement(package, version, sha256, self.by))
 
     def signs(self, statement: bytes) -> Signature:
-        """Return the signature of a statement, which names the signer and what it is about."""
+        """Return the signature of a statement, which contains the signer and the subject."""
         value = self._private.sign(statement)
         return Signature(self.by, self.key, base64.b64encode(value).decode())
 
@@ -113,17 +113,17 @@ class Signer:
 
 
 def fingerprint(key: str) -> str:
-    """Return what people compare instead of a public key, as SSH writes it."""
+    """Return the fingerprint of a public key, in the form of SSH."""
     digest = hashlib.sha256(base64.b64decode(key)).digest()
     return "SHA256:" + base64.b64encode(digest).decode().rstrip("=")
 
 
 def new_signer(by: str, file: Path) -> Signer:
-    """Make a key and keep it in a new file that only its owner can read.
+    """Generate a key in a new file that only its owner can read.
 
     Raises:
-        PackageError: the name is none, or there is such a file already.
-        OSError: it cannot be written.
+        PackageError: the name is invalid, or the file exists.
+        OSError: the file cannot be written.
     """
     from cryptography.hazmat.primitives import serialization
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -141,7 +141,7 @@ def new_signer(by: str, file: Path) -> Signer:
         number = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     except FileExistsError:
         raise PackageError(
-            f"{file}: there is a key already; packages signed with it are known by it"
+            f"{file}: a key exists already; users recognise your packages by it"
         ) from None
     with os.fdopen(number, "wb") as opened:
         opened.write(f"{_NAMED}{by}\n".encode() + text)
@@ -149,7 +149,7 @@ def new_signer(by: str, file: Path) -> Signer:
 
 
 def read_signer(file: Path) -> Signer | None:
-    """Return the key in a file, or None when there is no such file; raise `PackageError`."""
+    """Return the key in a file, or None without a file; raise `PackageError`."""
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
@@ -173,9 +173,9 @@ def read_signer(file: Path) -> Signer | None:
 
 
 def _no_key(file: Path) -> str:
-    return f"{file}: this is no key of a publisher; 'urc repo key new NAME' makes one"
+    return f"{file}: this is not a publisher's key; create one with 'urc repo key new NAME'"
 
 
 def _statement(package: Key, version: str, sha256: str, by: str) -> bytes:
-    """Return what is signed. None of its parts can hold a line end, so no two read alike."""
+    """Return the statement to sign. No part contains a line end, so no two look alike."""
     return _STATEMENT.format(package=package, version=version, sha256=sha256, by=by).encode()

@@ -1,4 +1,4 @@
-"""Where packages come from: repositories, bundles, archives and folders, all alike."""
+"""Sources of packages: repositories, bundles, archives and folders, with one interface."""
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -17,11 +17,11 @@ _ENDINGS: Final = (".urcof", ".zip")
 
 
 class Source(Protocol):
-    """Has packages."""
+    """A source of packages."""
 
     @property
     def name(self) -> str:
-        """What it is called in lines for people."""
+        """Name in messages."""
 
     def entries(self) -> tuple[Entry, ...]:
         """Return every version of every package; raise `PackageError`."""
@@ -44,15 +44,15 @@ class FileSource:
     ) -> None:
         self.name = name
         self.is_folder = is_folder
-        """Whether it is somebody's own folder, in which packages are still being written."""
+        """Whether the source is a folder of packages in development."""
         self.signatures = dict(signatures or {})
-        """Digest → who signed it, of what is signed."""
+        """Digest → signature, for signed archives."""
         self.roots = tuple(roots)
-        """What is installed when the whole source is asked for."""
+        """Packages to install for a request of the whole source."""
         self._packages = {package.digest: package for package in packages}
 
     def entries(self) -> tuple[Entry, ...]:
-        """Return what is in it."""
+        """Return the entries of its packages."""
         return tuple(
             entry_of(package, self.signatures.get(digest))
             for digest, package in self._packages.items()
@@ -60,24 +60,24 @@ class FileSource:
 
     @property
     def packages(self) -> tuple[Package, ...]:
-        """What is in it, what is installed first of all at the front."""
+        """The packages, with those to install first."""
         return tuple(self._packages.values())
 
     def fetch(self, entry: Entry) -> bytes:
-        """Return an archive that is in it."""
+        """Return an archive of the source."""
         return self._packages[entry.sha256].data
 
 
 def open_source(path: Path) -> FileSource:
-    """Return what a path holds: a folder, an archive, or a bundle; raise `PackageError`."""
+    """Return the source at a path: a folder, an archive, or a bundle; raise `PackageError`."""
     if path.is_dir():
         packages = _pack_with_needs(path)
         return FileSource(str(path), packages, [packages[0].manifest.key], is_folder=True)
     if path.suffix not in _ENDINGS:
-        raise PackageError(f"{path}: a folder, or a file that ends in .urcof or .zip, is expected")
+        raise PackageError(f"{path}: expected a folder, or a file that ends in .urcof or .zip")
     try:
         if not path.is_file():
-            raise PackageError(f"{path}: there is no such file")
+            raise PackageError(f"{path}: the file does not exist")
         with open(path, "rb") as file:
             data = file.read(BUNDLE.archive_bytes + 1)
     except OSError as error:
@@ -89,11 +89,11 @@ def open_source(path: Path) -> FileSource:
 
 
 def _pack_with_needs(folder: Path) -> list[Package]:
-    """Return the package in a folder, and those it needs that stand in the same repository."""
+    """Return the package in a folder, and its needs from the same repository."""
     packages = [pack_folder(folder)]
     top = folder.resolve().parent.parent
     known = {packages[0].manifest.key}
-    for package in packages:  # grows while it is walked
+    for package in packages:  # grows during the loop
         for key in map(parse_key, package.manifest.needs):
             home = top / str(key)
             if key not in known and (home / MANIFEST).is_file() and len(known) < BUNDLE.entries:
@@ -108,10 +108,10 @@ def make_bundle(
     """Return the bytes of a bundle: a small repository in one file.
 
     Args:
-        root: what somebody wants who installs it.
-        archives: digest → bytes of `root` and of all that it needs.
-        signatures: digest → who signed it, of what is signed.
-        name: what it is called in errors.
+        root: package to install.
+        archives: digest → bytes, of `root` and all its needs.
+        signatures: digest → signature, for signed archives.
+        name: name in messages.
     """
     entries = in_order(
         entry_of(open_package(data, digest), signatures.get(digest))
@@ -126,7 +126,7 @@ def make_bundle(
 def _open_bundle(data: bytes, name: str) -> FileSource:
     files = read_archive(data, BUNDLE, name)
     if INDEX not in files:
-        raise PackageError(f"{name}: this is no bundle: there is no {INDEX} in it")
+        raise PackageError(f"{name}: this is not a bundle: it has no {INDEX}")
     index = read_index(files.pop(INDEX), f"{name}/{INDEX}")
     packages = []
     signatures: dict[str, Signature] = {}
@@ -138,7 +138,7 @@ def _open_bundle(data: bytes, name: str) -> FileSource:
         if entry.signed is not None:
             signatures[package.digest] = entry.signed
         if entry_of(package, signatures.get(package.digest)) != entry:
-            raise PackageError(f"{name}: {entry}: the index says something else than the package")
+            raise PackageError(f"{name}: {entry}: the index and the package disagree")
         packages.append(package)
     if files:
         raise PackageError(f"{name}: {min(files)!r} is not in the index of this bundle")
@@ -146,14 +146,16 @@ def _open_bundle(data: bytes, name: str) -> FileSource:
         package.manifest.key for package in packages if str(package.manifest.key) == index.name
     ]
     if len(roots) != 1:
-        raise PackageError(f"{name}: the bundle is for {index.name!r}, which is not in it once")
+        raise PackageError(
+            f"{name}: the bundle is for {index.name!r}, but does not contain it exactly once"
+        )
     return FileSource(name, packages, roots, signatures)
 
 
 def offered(
     found: Mapping[Key, list[tuple[Entry, Source]]],
 ) -> dict[Key, list[tuple[Entry, Source]]]:
-    """Return what was not withdrawn."""
+    """Return the versions that are not withdrawn."""
     kept = {key: [one for one in some if not one[0].why_withdrawn] for key, some in found.items()}
     return {key: some for key, some in kept.items() if some}
 
@@ -161,14 +163,14 @@ def offered(
 def merged(
     sources: Iterable[Source], complain: Callable[[str], None]
 ) -> dict[Key, list[tuple[Entry, Source]]]:
-    """Return every version of every package, the withdrawn ones too, and where it is from.
+    """Return every version of every package, also withdrawn ones, with its source.
 
-    The first source that has a package gives all its versions: another one, added later, cannot
-    slip in a newer version under a name that is known.
+    All versions of a package come from the first source that has it. So a source that is added
+    later cannot offer a newer version under a known name.
 
     Args:
-        sources: in the order in which they are asked.
-        complain: takes one line for each that does not answer.
+        sources: the sources, in the order of requests.
+        complain: receives a line for each unreachable source.
     """
     found: dict[Key, list[tuple[Entry, Source]]] = {}
     for source in sources:

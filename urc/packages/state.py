@@ -1,4 +1,4 @@
-"""What is installed, as ``state.json`` says it: pure steps from one state to the next."""
+"""The installed packages, as stored in ``state.json``: pure functions from state to state."""
 
 from collections.abc import Iterable, Mapping
 from typing import Annotated
@@ -14,33 +14,33 @@ __all__ = ["State"]
 
 
 class State(msgspec.Struct, frozen=True, omit_defaults=True):
-    """All that a store knows beside the archives themselves."""
+    """The state of a store, without the archives."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     installed: tuple[Lock, ...]
     keys: dict[str, str] = {}
-    """``drivers/puppet`` → public key that signed it when it was first installed. They stay when a
-    package is removed: else removing it would be a way round them."""
+    """``drivers/puppet`` → public key of its first installation. It stays after a removal, which
+    would otherwise bypass the check of keys."""
     before: dict[str, Lock] = {}
-    """Digest of an installed lock → what an update replaced by it: the one step back."""
+    """Digest of an installed lock → the lock that an update replaced, for one step back."""
 
     def with_installed(self, plan: Plan) -> "State":
-        """Return the state with what was planned. Another version of it stays beside it."""
+        """Return the state with a plan installed. Other versions of the package stay."""
         lock = plan.lock
         others = [one for one in self.installed if not _same(one, lock)]
         return self._next((*others, lock), self.before, plan)
 
     def with_update(self, old: Lock, plan: Plan) -> "State":
-        """Return the state with one lock in the place of another, which is kept for going back."""
+        """Return the state with `old` replaced; it stays available for one step back."""
         gone = (old, plan.lock)
         others = [one for one in self.installed if not any(_same(one, lock) for lock in gone)]
         return self._next((*others, plan.lock), {**self.before, plan.lock.digest: old}, plan)
 
     def with_back(self, lock: Lock) -> "State":
-        """Return the state with what `lock` had replaced; doing it again undoes it.
+        """Return the state before the update to `lock`; a second call undoes the first.
 
         Raises:
-            PackageError: nothing is known that it replaced.
+            PackageError: no update to `lock` is known.
         """
         old = self.before.get(lock.digest)
         if old is None:
@@ -55,7 +55,7 @@ class State(msgspec.Struct, frozen=True, omit_defaults=True):
         return self._next(kept, self.before, None)
 
     def without_key(self, key: Key) -> "State":
-        """Return the state that takes any signature of a package; raise `PackageError`."""
+        """Return the state without a package's pinned key; raise `PackageError`."""
         if str(key) not in self.keys:
             known = ", ".join(sorted(self.keys)) or "none"
             raise PackageError(f"no key is kept for {key}; there are keys for: {known}")
@@ -64,14 +64,14 @@ class State(msgspec.Struct, frozen=True, omit_defaults=True):
 
     @property
     def kept(self) -> tuple[Lock, ...]:
-        """Everything whose archives are still needed."""
+        """All locks whose archives are still needed."""
         return (*self.installed, *self.before.values())
 
     def check(self, plan: Plan) -> None:
-        """Raise `PackageError` where a plan is not what was agreed to before.
+        """Raise `PackageError` for a plan that contradicts the state.
 
-        Other bytes of a version that is known, a signature that is none, another key than the one
-        that was kept, or no signature where there was one.
+        Contradictions are other bytes of a known version, an invalid signature, another key than
+        the pinned one, and a missing signature in spite of a pinned key.
         """
         for name, pin in plan.lock.packages.items():
             self._check_known(name, pin)
@@ -84,13 +84,13 @@ class State(msgspec.Struct, frozen=True, omit_defaults=True):
                 continue
             found = f"signed by another key, {signature}," if signature else "not signed, other"
             raise PackageError(
-                f"{name} {pin.version} is {found} than {fingerprint(kept)} that was kept when it"
-                " was first installed: do not install it, unless its publisher confirms the change;"
-                f" then 'urc repo key forget {name}' first"
+                f"{name} {pin.version} is {found} than {fingerprint(kept)} that was pinned at"
+                " the first installation; install it only if its publisher confirms the change,"
+                f" after 'urc repo key forget {name}'"
             )
 
     def _check_known(self, name: str, pin: Pin) -> None:
-        """Refuse other bytes under a version that is known: nobody may change one silently."""
+        """Reject other bytes under a known version, which would be a silent change."""
         for lock in self.kept:
             known = lock.packages.get(name)
             if known and known.version == pin.version and known.sha256 != pin.sha256:
@@ -102,7 +102,7 @@ class State(msgspec.Struct, frozen=True, omit_defaults=True):
     def _next(
         self, installed: tuple[Lock, ...], before: Mapping[str, Lock], plan: Plan | None
     ) -> "State":
-        """Return the next state: sorted, with new keys, without steps back of what is gone."""
+        """Return the next state: sorted, with new keys, without steps back to removed locks."""
         digests = {lock.digest for lock in installed}
         keys = dict(self.keys)
         if plan is not None:

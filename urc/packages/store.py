@@ -1,14 +1,14 @@
-"""The packages of this user on this machine, kept for ever after without any network.
+"""The installed packages of this user on this machine, usable without any network.
 
     packages/
-      state.json              what is installed: one lock for each; whose keys are known
+      state.json              installed packages, one lock each, and pinned keys
       blobs/<sha256>.zip      the archives, each under the digest of its bytes
-      signatures/<sha256>.json  who signed them, of those that are signed
-      ecosystems/<sha256>/    the files of one lock, made from its blobs
-      work/                   what is not whole yet, or no longer wanted
+      signatures/<sha256>.json  signatures of the archives, if any
+      ecosystems/<sha256>/    the files of one lock, extracted from its blobs
+      work/                   incomplete files, and files to delete
 
-Only `state.json` says what is installed, and it changes in one step. Whatever it does not name is
-rubbish, which the next change takes away. So the store is whole at every moment.
+Only `state.json` defines the installed packages, and it changes atomically. The next change
+deletes all files that it does not name. So the store is consistent at every moment.
 """
 
 import os
@@ -36,7 +36,7 @@ _STATE_BYTES: Final = 16 << 20
 
 
 class Store:
-    """The store in one folder; nothing is made before something is installed."""
+    """The store in one folder, which is created with the first installation."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -44,7 +44,7 @@ class Store:
         self._state = folder / "state.json"
 
     def installed(self) -> tuple[Lock, ...]:
-        """Return what was asked for and is there, by name and version.
+        """Return the requested and installed packages, by name and version.
 
         Raises:
             PackageError: the state cannot be read.
@@ -52,7 +52,7 @@ class Store:
         return self.state().installed
 
     def state(self) -> State:
-        """Return all that is known; raise `PackageError`."""
+        """Return the state; raise `PackageError`."""
         try:
             with open(self._state, "rb") as file:
                 data = file.read(_STATE_BYTES)
@@ -64,23 +64,23 @@ class Store:
             raise PackageError(f"{self._state}: this file is damaged: {error}") from None
 
     def previous(self, lock: Lock) -> Lock | None:
-        """Return what an update replaced by `lock`, or None."""
+        """Return the lock that an update replaced by `lock`, or None."""
         return self.state().before.get(lock.digest)
 
     def find(self, wish: Wish) -> Lock | None:
-        """Return the newest installed version of what is named, or None.
+        """Return the newest installed version of a requirement, or None.
 
         Raises:
-            PackageError: several kinds have one of that name.
+            PackageError: packages of several kinds have this name.
         """
         found = _meant(wish, self.installed())
         return max(found, key=lambda lock: lock.number, default=None)
 
     def document(self, lock: Lock) -> Path:
-        """Return the document of an installed package, its files compared with its blobs first.
+        """Return the document of an installed package, after a comparison with its blobs.
 
         Raises:
-            PackageError: its files were changed, and the blobs too.
+            PackageError: both its files and its blobs were changed.
         """
         folder = self.place(lock)
         if not _holds(folder, self._files(lock)):
@@ -93,7 +93,7 @@ class Store:
         return self.folder / "ecosystems" / lock.digest
 
     def blob(self, digest: str) -> bytes:
-        """Return an archive that is in the store; raise `PackageError` if it is not, or damaged."""
+        """Return an archive of the store; raise `PackageError` for a missing or damaged one."""
         try:
             with open(self.blob_file(digest), "rb") as file:
                 data = file.read(PACKAGE.archive_bytes + 1)
@@ -110,11 +110,11 @@ class Store:
         return self.blob_file(digest).is_file()
 
     def blob_file(self, digest: str) -> Path:
-        """Return where an archive is, or would be."""
+        """Return the path of an archive, which may not exist."""
         return self.folder / "blobs" / f"{digest}.zip"
 
     def signature(self, digest: str) -> Signature | None:
-        """Return who signed an archive that is in the store, or None. It is checked when used."""
+        """Return the unchecked signature of an archive, or None."""
         try:
             with open(self._signature_file(digest), "rb") as file:
                 return msgspec.json.decode(file.read(4096), type=Signature)
@@ -122,18 +122,18 @@ class Store:
             return None
 
     def keep_signature(self, digest: str, signature: Signature) -> None:
-        """Keep who signed an archive; only a `Change` may."""
+        """Store the signature of an archive; only for `Change`."""
         if self.signature(digest) != signature:
             data = msgspec.json.encode(signature) + b"\n"
             disk.put_file(self._signature_file(digest), data, self.work)
 
     def make(self, lock: Lock) -> Path:
-        """Return the folder of a lock's files, made anew where it is not whole.
+        """Return the folder of a lock's files; extract them again if they are incomplete.
 
-        Only while nobody else is `changing` the store.
+        The caller must hold the lock of `changing`.
 
         Raises:
-            PackageError: an archive of it is missing or damaged.
+            PackageError: one of its archives is missing or damaged.
         """
         files = self._files(lock)
         if not _holds(self.place(lock), files):
@@ -145,7 +145,7 @@ class Store:
 
     @contextmanager
     def changing(self) -> Iterator["Change"]:
-        """Keep other processes from changing the store; at the end rubbish is taken away."""
+        """Lock the store against other processes; at the end, delete unused files."""
         with disk.exclusive(self.folder / "changing"):
             with suppress(OSError):
                 disk.clear(self.work)
@@ -157,12 +157,12 @@ class Store:
                     self._collect()
 
     def write_state(self, state: State) -> None:
-        """Say what is installed; only a `Change` may."""
+        """Write the state; only for `Change`."""
         data = msgspec.json.format(msgspec.json.encode(state, order="sorted"), indent=1)
         disk.put_file(self._state, data + b"\n", self.work)
 
     def _files(self, lock: Lock) -> dict[str, bytes]:
-        """Return what a lock's folder must hold."""
+        """Return the expected files of a lock's folder."""
         files = {LOCK: lock.to_bytes()}
         for key, pin in lock.packages.items():
             for path, data in read_archive(self.blob(pin.sha256), PACKAGE, key).items():
@@ -170,11 +170,11 @@ class Store:
         return files
 
     def _collect(self) -> None:
-        """Take away what no lock names. What cannot go now goes at the next change."""
+        """Delete files without a lock; files in use are deleted at the next change."""
         locks = self.state().kept
         digests = {pin.sha256 for lock in locks for pin in lock.packages.values()}
         for folder, wanted in (
-            # What an update replaced is kept whole: a dashboard may still be using it.
+            # Replaced locks keep their files, because a dashboard may still use them.
             ("ecosystems", {lock.digest for lock in locks}),
             ("blobs", {f"{digest}.zip" for digest in digests}),
             ("signatures", {f"{digest}.json" for digest in digests}),
@@ -187,20 +187,20 @@ class Store:
 
 
 class Change:
-    """A change of the store, while nobody else can make one."""
+    """A change of the store, under its lock."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
 
     def stage(self, plan: Plan) -> Path:
-        """Make the files of a plan, to be looked at; they are not installed yet.
+        """Extract the files of a plan for a preview, without installing them.
 
         Returns:
-            the folder with a folder for each kind: ``drivers/puppet/driver.yaml``.
+            The folder, with a folder for each kind: ``drivers/puppet/driver.yaml``.
 
         Raises:
-            PackageError: an archive is not what the lock says, other bytes of a version are
-                installed already, or a signature is not the one that was expected.
+            PackageError: an archive differs from the lock, other bytes of a version are already
+                installed, or a signature is not the expected one.
         """
         store = self._store
         store.state().check(plan)
@@ -210,7 +210,7 @@ class Change:
             if data is None:
                 data = store.blob(pin.sha256)
             elif sha256(data) != pin.sha256:
-                raise PackageError(f"{key} {pin.version}: these are not the bytes that were named")
+                raise PackageError(f"{key} {pin.version}: the bytes differ from those in the lock")
             said = open_package(data, f"{key} {pin.version}").manifest
             if (str(said.key), said.version) != (key, pin.version):
                 raise PackageError(f"{key} {pin.version}: this is {said.key} {said.version}")
@@ -224,15 +224,15 @@ class Change:
         return store.make(plan.lock)
 
     def commit(self, plan: Plan) -> None:
-        """Install what was staged. Another version of it stays beside it."""
+        """Install a staged plan. Other versions of the package stay installed."""
         self._store.write_state(self._store.state().with_installed(plan))
 
     def replace(self, old: Lock, plan: Plan) -> None:
-        """Install what was staged in the place of `old`, which is kept for going back."""
+        """Install a staged plan in place of `old`, which stays available for `back`."""
         self._store.write_state(self._store.state().with_update(old, plan))
 
     def back(self, lock: Lock) -> Lock:
-        """Put back what an update replaced by `lock`, and return it; raise `PackageError`."""
+        """Restore the lock that an update replaced by `lock`; raise `PackageError`."""
         state = self._store.state().with_back(lock)
         old = self._store.state().before[lock.digest]
         self._store.make(old)
@@ -240,13 +240,13 @@ class Change:
         return old
 
     def remove(self, wish: Wish) -> tuple[list[Lock], list[str]]:
-        """Remove what was installed, and what only it needed.
+        """Remove an installed package, and the packages that only it needed.
 
         Returns:
-            what had been asked for, and all that is gone, as ``drivers/puppet 1.0.0``.
+            The removed requests, and all removed packages, as ``drivers/puppet 1.0.0``.
 
         Raises:
-            PackageError: it is not installed, or something else needs it.
+            PackageError: it is not installed, or another package needs it.
         """
         state = self._store.state()
         gone = _meant(wish, state.installed)
@@ -257,24 +257,24 @@ class Change:
         return gone, sorted(_all(state.installed) - _all(after.installed))
 
     def forget_key(self, key: Key) -> None:
-        """Take any signature of a package from now on; raise `PackageError`."""
+        """Accept any signature of a package from now on; raise `PackageError`."""
         self._store.write_state(self._store.state().without_key(key))
 
 
 def _check_needs(said: Manifest, lock: Lock) -> None:
-    """See to it that an index did not tell other needs than the package itself."""
+    """Check that the index and the package declare the same needs."""
     for need, wanted in said.needs.items():
         pin = lock.packages.get(need)
         if pin is None or not parse_range(wanted).allows(parse_version(pin.version)):
             found = f"comes with {pin.version}" if pin else "does not come with it"
             raise PackageError(
                 f"{said.key} {said.version} needs {need} {wanted}, which {found}:"
-                " what lists it says something else than the package"
+                " the index and the package disagree"
             )
 
 
 def ecosystem_of(document: Path) -> Path | None:
-    """Return the folder of files that an installed document belongs to, or None."""
+    """Return the folder of an installed document's files, or None."""
     for folder in document.resolve().parents:
         if (folder / LOCK).is_file():
             return folder
@@ -282,7 +282,7 @@ def ecosystem_of(document: Path) -> Path | None:
 
 
 def _meant(wish: Wish, locks: tuple[Lock, ...]) -> list[Lock]:
-    """Return those that a wish means; without a range, whatever is installed is wanted."""
+    """Return the locks of a requirement; without a range, any installed version counts."""
     wanted = parse_range(wish.range)
     found = [
         lock
@@ -293,7 +293,7 @@ def _meant(wish: Wish, locks: tuple[Lock, ...]) -> list[Lock]:
     ]
     if len({lock.key for lock in found}) > 1:
         names = ", ".join(sorted({lock.root for lock in found}))
-        raise PackageError(f"{wish.name!r} may be one of {names}; write which")
+        raise PackageError(f"{wish.name!r} is ambiguous; write one of {names}")
     return found
 
 
@@ -317,7 +317,7 @@ def _not_installed(wish: Wish, locks: tuple[Lock, ...]) -> str:
 
 
 def _holds(folder: Path, files: Mapping[str, bytes]) -> bool:
-    """Return whether a folder holds these files, to the last byte, and nothing else."""
+    """Return whether a folder contains exactly these files."""
     found = 0
     for parent, folders, names in os.walk(folder):
         for name in names:

@@ -1,4 +1,4 @@
-"""Who may publish into a repository: tokens, of which only the digests are kept."""
+"""Upload tokens of a repository, of which only the digests are stored."""
 
 import re
 import secrets
@@ -23,16 +23,16 @@ _TOKEN: Final = re.compile(r"urc_[A-Za-z0-9_-]{43}")
 
 
 class Token(msgspec.Struct, frozen=True):
-    """What is kept of a token."""
+    """The stored form of a token."""
 
     name: str
     sha256: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
-    """Of the token. A slow digest would add nothing: 256 random bits cannot be guessed."""
+    """Digest of the token. A slow hash is not needed, because 256 random bits resist guessing."""
     may: tuple[str, ...]
-    """``drivers/puppet``, ``drivers/puppet*``, ``widgets/*`` or ``*``."""
+    """Allowed packages: ``drivers/puppet``, ``drivers/puppet*``, ``widgets/*`` or ``*``."""
 
     def allows(self, key: Key) -> bool:
-        """Return whether it may publish a package."""
+        """Return whether the token allows uploads of a package."""
         text = str(key)
         return any(
             text.startswith(one[:-1]) if one.endswith("*") else text == one for one in self.may
@@ -45,25 +45,25 @@ class _File(msgspec.Struct, frozen=True):
 
 
 class Tokens:
-    """A file of tokens; each question reads it, so what is removed counts no more at once."""
+    """A file of tokens; each call reads it, so that a removal takes effect at once."""
 
     def __init__(self, file: Path) -> None:
         self.file = file
 
     def all(self) -> tuple[Token, ...]:
-        """Return what is kept; raise `PackageError` when it cannot be read."""
+        """Return the stored tokens; raise `PackageError` for an unreadable file."""
         try:
             with open(self.file, "rb") as opened:
                 return msgspec.json.decode(opened.read(_BYTES), type=_File).tokens
         except FileNotFoundError:
             return ()
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
-            raise PackageError(f"{self.file}: this is no file of tokens: {error}") from None
+            raise PackageError(f"{self.file}: this is not a file of tokens: {error}") from None
         except OSError as error:
             raise PackageError(f"{self.file}: {error.strerror or error}") from None
 
     def find(self, text: str) -> Token | None:
-        """Return the token that somebody shows, or None; how long it takes tells nothing."""
+        """Return the token with this text, or None, in constant time."""
         digest = sha256(text.encode())
         found = None
         for token in self.all():
@@ -72,13 +72,13 @@ class Tokens:
         return found
 
     def add(self, name: str, may: tuple[str, ...]) -> str:
-        """Make a token and return it: it is never shown again.
+        """Generate a token and return its text, which is not stored.
 
         Raises:
-            PackageError: the name is taken or none, or what it may do names no packages.
+            PackageError: the name is in use or invalid, or `may` names no packages.
         """
         if not _NAME.fullmatch(name):
-            raise PackageError(f"{name!r}: a name of letters, digits, '-', '_' and '.' is expected")
+            raise PackageError(f"{name!r}: expected a name of letters, digits, '-', '_' and '.'")
         for one in may:
             if not _MAY.fullmatch(one):
                 raise PackageError(
@@ -88,18 +88,18 @@ class Tokens:
         text = new_token()
         with self._changing() as known:
             if any(token.name == name for token in known):
-                raise PackageError(f"{self.file}: there is a token {name!r} already")
+                raise PackageError(f"{self.file}: a token {name!r} exists already")
             if len(known) >= _MOST:
                 raise PackageError(f"{self.file}: at most {_MOST} tokens can be kept")
             self._write((*known, Token(name, sha256(text.encode()), may)))
         return text
 
     def remove(self, name: str) -> None:
-        """Forget a token; raise `PackageError` when there is none of that name."""
+        """Remove a token; raise `PackageError` for an unknown name."""
         with self._changing() as known:
             if all(token.name != name for token in known):
                 names = ", ".join(token.name for token in known) or "none"
-                raise PackageError(f"{self.file}: there is no token {name!r}; there are: {names}")
+                raise PackageError(f"{self.file}: unknown token {name!r}; expected one of: {names}")
             self._write(tuple(token for token in known if token.name != name))
 
     @contextmanager
@@ -113,7 +113,7 @@ class Tokens:
 
 
 def new_token() -> str:
-    """Return a token that nobody can guess: 256 random bits."""
+    """Return a new token: 256 random bits."""
     return f"urc_{secrets.token_urlsafe(32)}"
 
 
@@ -125,5 +125,5 @@ def read_token(file: Path) -> str:
     except OSError as error:
         raise PackageError(f"{file}: {error.strerror or error}") from None
     if not _TOKEN.fullmatch(text):
-        raise PackageError(f"{file}: one token is expected, as 'urc repo token add' printed it")
+        raise PackageError(f"{file}: expected one token, as printed by 'urc repo token add'")
     return text

@@ -1,4 +1,4 @@
-"""Whose index a repository's is: the key that signed it first is kept, as keys of packages are."""
+"""The pinned key of each repository: the first key that signs its index, as for packages."""
 
 import time
 from collections.abc import Callable
@@ -19,19 +19,19 @@ class _Pin(msgspec.Struct, frozen=True):
     key: Annotated[str, msgspec.Meta(pattern=r"\A[A-Za-z0-9+/]{43}=\Z")]
     by: str
     number: int
-    """The highest that was seen under this key."""
+    """Highest number of an index signed with this key."""
 
 
 class Trust:
-    """What is known of the key of one repository."""
+    """The pinned key of one repository."""
 
     def __init__(self, url: str, file: Path, now: Callable[[], float] = time.time) -> None:
-        """Read nothing yet.
+        """Store the arguments, without reading the file.
 
         Args:
-            url: of the repository, for people.
-            file: where the key is kept.
-            now: seconds since the epoch.
+            url: address of the repository, for messages.
+            file: file of the key.
+            now: source of time, in seconds since 1970.
         """
         self._url = url
         self._file = file
@@ -39,21 +39,21 @@ class Trust:
 
     @property
     def keeper(self) -> str:
-        """Who signs the index, with the fingerprint; "" for nobody."""
+        """Name and fingerprint of the index's signer, or ""."""
         pin = self._pin()
         return f"{pin.by} ({fingerprint(pin.key)})" if pin is not None else ""
 
     @property
     def number(self) -> int:
-        """The highest number that was signed; an index never goes back behind it."""
+        """Highest signed number; a valid index never has a lower one."""
         pin = self._pin()
         return pin.number if pin is not None else 0
 
     def check(self, head: Head | None) -> None:
-        """Raise `PackageError` unless a head is the known key's, of now, and not an older one.
+        """Raise `PackageError` unless a head has the pinned key, is valid now, and is not older.
 
         Args:
-            head: what the repository said; None: there is none, or it cannot be read.
+            head: head of the repository; None for a missing or damaged one.
         """
         signature = head.signed if head is not None else None
         if head is not None and not head.is_sound():
@@ -62,26 +62,26 @@ class Trust:
         if pin is not None and (signature is None or signature.key != pin.key):
             found = f"signed by another key, {signature}," if signature else "not signed, other"
             raise PackageError(
-                f"{self._url}: the index is {found} than {fingerprint(pin.key)} that was kept; if"
-                f" its keeper says that this is right, 'urc repo remove {self._url}' and add it"
+                f"{self._url}: the index is {found} than {fingerprint(pin.key)} that was pinned;"
+                f" if its maintainer confirms this, run 'urc repo remove {self._url}' and add it"
                 " again"
             )
         if head is None or signature is None:
             return
         if pin is not None and head.number < pin.number:
             raise PackageError(
-                f"{self._url}: it went back from number {pin.number} to {head.number}; if its"
-                f" keeper says that this is right, 'urc repo remove {self._url}' and add it again"
+                f"{self._url}: its number went back from {pin.number} to {head.number}; if its"
+                f" maintainer confirms this, run 'urc repo remove {self._url}' and add it again"
             )
         if head.left_s(self._now()) <= 0:
             raise PackageError(
-                f"{self._url}: the index was to be renewed before {head.expires}: nothing is"
-                " installed from it until its keeper does, or the clock of this machine is wrong;"
-                " what is installed stays"
+                f"{self._url}: the index expired at {head.expires}: nothing is"
+                " installed from it until its maintainer renews it; check this machine's clock too;"
+                " installed packages stay"
             )
 
     def keep(self, head: Head, work: Path) -> None:
-        """Remember who signed a head that was checked."""
+        """Pin the key of a checked head."""
         signature = head.signed
         if signature is None:
             return
@@ -90,7 +90,7 @@ class Trust:
             disk.put_file(self._file, msgspec.json.encode(new) + b"\n", work)
 
     def forget(self) -> None:
-        """Take any key the next time."""
+        """Accept any key the next time."""
         self._file.unlink(missing_ok=True)
 
     def _pin(self) -> _Pin | None:

@@ -1,8 +1,8 @@
-"""Newer versions of what is installed: which there are, what they change, and the way back.
+"""Updates of installed packages: the list, the changes, and the way back.
 
-The verb and the pages do the same: `newer` lists, `plan_update` fetches, `staged_difference` shows
-what would change once `Change.stage` has made the files, `Change.replace` installs, and
-`Change.back` undoes it.
+The command line and the pages use the same functions. `newer` lists updates, and `plan_update`
+fetches one. After `Change.stage`, `staged_difference` shows the changes. `Change.replace` installs
+the update, and `Change.back` undoes it.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -32,60 +32,60 @@ __all__ = [
 
 
 class Newer(NamedTuple):
-    """An update that there is."""
+    """An available update."""
 
     old: Lock
     new: Lock
 
     @property
     def lines(self) -> list[str]:
-        """What changes, for people: one line for each package."""
+        """Changed versions, one line for each package."""
         return version_lines(self.old, self.new)
 
 
 class Seen(Protocol):
-    """What can be said of a package by looking at its documents; `urc.runtime.look` does."""
+    """The preview of a package's documents; `urc.runtime.look` implements it."""
 
     @property
     def permissions(self) -> Sequence[str]:
-        """What it may do, one line each."""
+        """Permissions, one line each."""
 
     @property
     def risks(self) -> Sequence[str]:
-        """What of this machine it uses by itself, one line each."""
+        """Local resources without a setting, one line each."""
 
     @property
     def wire(self) -> Mapping[str, str]:
-        """Place in the document → what stands there, of all that decides what goes to the robot."""
+        """Path in the document → its value, for all keys that decide the sent bytes."""
 
 
 Look = Callable[[Path, Path, Sequence[str]], Seen]
-"""Document, folder with all that it needs, names of the widgets that come along → what is seen."""
+"""Arguments: document, folder with all its files, names of included widgets."""
 
 
 class Difference(NamedTuple):
-    """What an update changes."""
+    """The changes of an update."""
 
     versions: list[str]
-    """``widgets/dial 1.0.0 → 1.1.0``."""
+    """Changed versions, such as ``widgets/dial 1.0.0 → 1.1.0``."""
     gained: list[str]
-    """What it may do that the old one may not."""
+    """New permissions."""
     lost: list[str]
     risks: list[str]
-    """What of this machine the new one uses by itself, that the old one does not."""
+    """New uses of local resources without a setting."""
     wire: list[str]
-    """``- commands.beep.send: "beep"`` and ``+ commands.beep.send: "BEEP"``."""
+    """Changed keys, as ``- commands.beep.send: "beep"`` and ``+ commands.beep.send: "BEEP"``."""
 
 
 def newer(store: Store, sources: Sequence[Source], complain: Callable[[str], None]) -> list[Newer]:
-    """Return the updates there are for what is installed; nothing is fetched but indexes.
+    """Return the available updates; only indexes are fetched.
 
-    Of several installed versions of a package the newest counts.
+    Of several installed versions of a package, the newest counts.
 
     Args:
-        store: what is installed.
-        sources: the repositories, in the order in which they are asked.
-        complain: takes a line for each that does not answer, or whose packages do not fit.
+        store: store with the installed packages.
+        sources: the repositories, in the order of requests.
+        complain: receives a line for each unreachable repository, or one with conflicting packages.
 
     Raises:
         PackageError: the store cannot be read.
@@ -112,17 +112,17 @@ def plan_update(
     complain: Callable[[str], None],
     wanted: str = "*",
 ) -> Plan | None:
-    """Return what the newest version comes to, with its archives fetched; None: it is up to date.
+    """Return the plan of the newest version, with its archives, or None without an update.
 
     Args:
-        old: what is installed.
+        old: the installed package.
         sources: as for `newer`.
-        store: where it is installed.
-        complain: takes lines for people.
-        wanted: range of versions, of which the newest is taken.
+        store: its store.
+        complain: receives lines for people.
+        wanted: range of versions, whose newest is chosen.
 
     Raises:
-        PackageError: no source has it, needs collide, or an archive is not what was promised.
+        PackageError: no source has it, its needs conflict, or an archive differs from the index.
     """
     found = offered(merged(sources, complain))
     if old.key not in found:
@@ -132,17 +132,17 @@ def plan_update(
 
 
 def staged_difference(old: Lock, plan: Plan, store: Store, staged: Path, look: Look) -> Difference:
-    """Return what an update changes, its files having been made.
+    """Return the changes of a staged update.
 
     Args:
-        old: what is installed.
-        plan: what would be.
-        store: where both are.
-        staged: what `Change.stage` returned for the plan.
-        look: tells what documents may do.
+        old: the installed package.
+        plan: plan of the update.
+        store: store of both.
+        staged: result of `Change.stage` for the plan.
+        look: returns the preview of documents.
 
     Raises:
-        UrcError: the new document is broken, or reaches out of its package.
+        UrcError: the new document has errors, or refers to a file outside its package.
     """
     before = _seen(old, store.make(old), look)
     after = _seen(plan.lock, staged, look)
@@ -153,18 +153,18 @@ def staged_difference(old: Lock, plan: Plan, store: Store, staged: Path, look: L
 
 
 def differences(before: Iterable[str], after: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Return what is only in the second, and what is only in the first, in their order."""
+    """Return the items only in the second, and the items only in the first, in their order."""
     old, new = list(before), list(after)
     return [one for one in new if one not in old], [one for one in old if one not in new]
 
 
 def headline(old: Lock, new: Lock) -> str:
-    """Return what becomes of a package, for people: ``drivers/puppet 1.0.0 → 1.1.0``."""
+    """Return the change of a package, as text: ``drivers/puppet 1.0.0 → 1.1.0``."""
     return str(old) if old.version == new.version else f"{old} → {new.version}"
 
 
 def version_lines(old: Lock, new: Lock) -> list[str]:
-    """Return which packages change, for people."""
+    """Return a line for each changed package."""
     lines: list[str] = []
     for name in sorted({*old.packages, *new.packages}):
         before, after = old.packages.get(name), new.packages.get(name)
@@ -205,7 +205,7 @@ def _newest(locks: Iterable[Lock]) -> list[Lock]:
 
 
 def _lock(old: Lock, wanted: str, found: Found) -> Lock | None:
-    """Return the lock of the newest version, or None where that is no update of `old`."""
+    """Return the lock of the newest version, or None if it is not an update of `old`."""
     new = lock_of(old.key, settle(old.key, wanted, found))
     if new == old or new.number < old.number:
         return None
@@ -215,7 +215,7 @@ def _lock(old: Lock, wanted: str, found: Found) -> Lock | None:
 
 
 def _is_step_up(old: Lock, new: Lock) -> bool:
-    """Return whether something that the same version needs got newer, and nothing older."""
+    """Return whether a need of the same version got newer, and none got older."""
     pairs = [
         (parse_version(pin.version), parse_version(new.packages[name].version))
         for name, pin in old.packages.items()

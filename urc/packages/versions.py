@@ -1,6 +1,6 @@
-"""Versions by Semantic Versioning 2.0, and the ranges that a package asks for.
+"""Versions by Semantic Versioning 2.0, and the ranges of a package's needs.
 
-`semver` reads and orders versions. It knows no ranges, so these few lines are ours:
+`semver` parses and compares versions. It has no ranges, so URC parses them here:
 ``^1.2``, ``~1.2.3``, ``>=1.2, <2``, ``1.2.3`` and ``*``.
 """
 
@@ -25,7 +25,7 @@ _PART = re.compile(
 
 @lru_cache(maxsize=65536)
 def parse_version(text: str) -> Version:
-    """Return a version; raise `PackageError` for what is none, and for one with build metadata.
+    """Return a version; raise `PackageError` for an invalid one, or for build metadata.
 
     Two builds of one version would be the same version with different bytes.
     """
@@ -35,7 +35,7 @@ def parse_version(text: str) -> Version:
         version = Version.parse(text)
     except ValueError:
         raise PackageError(
-            f"{text[:_LONGEST]!r} is no version; MAJOR.MINOR.PATCH is expected, as 1.2.0"
+            f"{text[:_LONGEST]!r} is not a version; expected MAJOR.MINOR.PATCH, such as 1.2.0"
         ) from None
     if version.build:
         raise PackageError(f"{text!r}: a package's version has no build metadata ('+…')")
@@ -44,7 +44,7 @@ def parse_version(text: str) -> Version:
 
 class _Bound(NamedTuple):
     sign: str
-    """``>=``, ``>``, ``<``, ``<=``."""
+    """Comparison: ``>=``, ``>``, ``<`` or ``<=``."""
     version: Version
 
     def allows(self, version: Version) -> bool:
@@ -60,7 +60,7 @@ class _Bound(NamedTuple):
 
 
 class Range:
-    """Which versions are wanted."""
+    """A range of versions."""
 
     def __init__(self, text: str, bounds: tuple[_Bound, ...]) -> None:
         self.text = text
@@ -72,8 +72,8 @@ class Range:
     def allows(self, version: Version) -> bool:
         """Return whether a version is in the range.
 
-        A pre-release is in it only when the range names a pre-release of the same x.y.z: nobody
-        gets an unfinished version who has not asked for it.
+        A pre-release matches only if the range names a pre-release of the same x.y.z. So no user
+        gets an unfinished version without asking for it.
         """
         if version.prerelease and _core(version) not in self._unfinished:
             return False
@@ -94,7 +94,7 @@ def _core(version: Version) -> tuple[int, int, int]:
 
 @lru_cache(maxsize=4096)
 def parse_range(text: str) -> Range:
-    """Return a range: parts that must all hold, with commas between; raise `PackageError`."""
+    """Return a range: comma-separated parts that must all match; raise `PackageError`."""
     if text.strip() == "*":
         return Range("*", ())
     bounds: list[_Bound] = []
@@ -102,20 +102,20 @@ def parse_range(text: str) -> Range:
         found = _PART.fullmatch(part.strip()) if len(text) <= 2 * _LONGEST else None
         if found is None:
             raise PackageError(
-                f"{text[: 2 * _LONGEST]!r} is no range of versions;"
-                " ^1.2, ~1.2.3, '>=1.2, <2', 1.2.3 or * is expected"
+                f"{text[: 2 * _LONGEST]!r} is not a range of versions;"
+                " expected ^1.2, ~1.2.3, '>=1.2, <2', 1.2.3 or *"
             )
         bounds += _bounds(found)
     return Range(text.strip(), tuple(bounds))
 
 
 def _bounds(found: re.Match[str]) -> list[_Bound]:
-    """Return the bounds of one part. What is left out of its number is any number."""
+    """Return the bounds of one part. A missing number matches any number."""
     sign = found["sign"] or "="
     major, minor, patch = (
         None if found[name] is None else int(found[name]) for name in ("major", "minor", "patch")
     )
-    assert major is not None  # noqa: S101 (the pattern has it in every match)
+    assert major is not None  # noqa: S101 (every match of the pattern has it)
     low = Version(major, minor or 0, patch or 0, found["pre"])
     match sign:
         case ">=" | "<":
@@ -133,14 +133,14 @@ def _bounds(found: re.Match[str]) -> list[_Bound]:
 
 
 def _after(low: Version, minor: int | None) -> Version:
-    """Return the first version that `1` or `1.2` no longer means."""
+    """Return the first version after all that `1` or `1.2` matches."""
     if minor is None:
         return Version(low.major + 1, 0, 0, "0")
     return Version(low.major, low.minor + 1, 0, "0")
 
 
 def _caret(major: int, minor: int | None, patch: int | None) -> Version:
-    """Return the first version that may break: the left-most number that is not 0 changes."""
+    """Return the first incompatible version: the left-most number that is not 0 changes."""
     if major or minor is None:
         return Version(major + 1, 0, 0, "0")
     if minor or patch is None:

@@ -1,4 +1,4 @@
-"""A clock that moves only when a test says so."""
+"""A clock that moves only under control of a test."""
 
 import asyncio
 import heapq
@@ -8,14 +8,14 @@ from itertools import count
 __all__ = ["FakeClock", "settle"]
 
 _TURNS = 30
-"""Turns of the loop in which everything that is ready has run; no chain in URC is as long."""
+"""Turns of the loop after which all ready tasks have run; it exceeds every chain in URC."""
 _QUIET_TURNS = 3
-"""After so many in which nobody else had anything to do, nobody will: a chain has no gaps."""
+"""Idle turns after which no task is ready any more, because a chain has no gaps."""
 
 
 async def settle() -> None:
-    """Let every task that is ready run until it waits."""
-    # What the loop will run next; another kind of loop may not tell, and is given every turn.
+    """Run every ready task until it waits."""
+    # The loop's queue of ready callbacks; a loop without it gets all turns.
     ready = getattr(asyncio.get_running_loop(), "_ready", None)
     quiet = 0
     for _ in range(_TURNS):
@@ -34,7 +34,7 @@ class _FakeAlarm:
 
 
 class FakeClock:
-    """Stands in for `urc.runtime.clock.LoopClock`; starts at `start_s`."""
+    """A replacement for `urc.runtime.clock.LoopClock`; it starts at `start_s`."""
 
     def __init__(self, start_s: float = 1000.0) -> None:
         self._now = start_s
@@ -42,11 +42,11 @@ class FakeClock:
         self._numbers = count()
 
     def now(self) -> float:
-        """Return the time that `advance` has reached."""
+        """Return the current fake time."""
         return self._now
 
     async def sleep(self, seconds: float) -> None:
-        """Return once `advance` has passed `seconds` from now; at once when there are none."""
+        """Return once `advance` has passed `seconds` from now; at once for zero seconds."""
         if seconds <= 0:
             await asyncio.sleep(0)
             return
@@ -58,18 +58,18 @@ class FakeClock:
             alarm.cancel()
 
     def call_at(self, time_s: float, action: Callable[[], None]) -> _FakeAlarm:
-        """Make `action` run when `advance` reaches `time_s`."""
+        """Call `action` when `advance` reaches `time_s`."""
         alarm = _FakeAlarm(action)
         heapq.heappush(self._due, (time_s, next(self._numbers), alarm))
         return alarm
 
     async def hold_up(self, seconds: float) -> None:
-        """Let the time pass with nothing done in it, as a busy loop does; then what is due."""
+        """Pass time without running anything, as a blocked loop does; then run overdue calls."""
         self._now += seconds
         await self.advance(0)
 
     async def advance(self, seconds: float) -> None:
-        """Move on, stopping at everything that falls due, in order, and letting it take effect."""
+        """Pass time, and run each due call and its effects in order."""
         end_s = self._now + seconds
         await settle()
         while self._due and self._due[0][0] <= end_s:

@@ -1,4 +1,4 @@
-"""A robot for the dashboard without a robot: profiles with widgets, and a session that is a hub."""
+"""A fake robot for the dashboard: profiles with widgets, and a session with only a hub."""
 
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
@@ -35,13 +35,13 @@ BATTERY = Signal(
 )
 
 
-@lru_cache(maxsize=64)  # the same few, for each profile anew
+@lru_cache(maxsize=64)  # profiles share a few manifests
 def _declared(manifest: str) -> Any:
     return yaml.safe_load(manifest)
 
 
 def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -> Widget:
-    """Return a widget of the shipped folder `name`, or of `folder`, that takes anything."""
+    """Return a widget of the shipped folder `name`, or of `folder`, that accepts any type."""
     place = folder or shipped("widgets") / name
     manifest = place / "widget.yaml"
     declared = _declared(manifest.read_text("utf-8")) if manifest.is_file() else {}
@@ -68,7 +68,7 @@ def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -
 
 
 def option_defaults(widget: Widget) -> dict[str, object]:
-    """Return the defaults of the widget's manifest, which the loader fills in."""
+    """Return the defaults in the widget's manifest, which the loader applies."""
     return {
         name: schema["default"]
         for name, schema in widget.options.items()
@@ -85,9 +85,9 @@ def dashboard_profile(
     settings: Mapping[str, Setting] | None = None,
     commands: Mapping[str, Command] | None = None,
 ) -> Profile:
-    """Return a profile whose slots stand side by side; by default the puppet's one battery.
+    """Return a profile with slots in one row; by default, one battery as in the puppet.
 
-    Options that a use leaves out take the defaults of the widget's manifest.
+    Missing options of a use take the defaults of the widget's manifest.
     """
     wanted = uses or (WidgetUse("battery", "battery", {"level": "battery"}),)
     known = {each.name: each for each in widgets}
@@ -119,7 +119,7 @@ def dashboard_profile(
 
 
 class FakeRobot:
-    """Plays a session's part; the test says what the robot says. Counts how often it was opened."""
+    """A fake session under control of a test. It counts its openings."""
 
     def __init__(self, profile: Profile, clock: Clock | None = None) -> None:
         self.profile = profile
@@ -129,18 +129,18 @@ class FakeRobot:
         self.is_open = False
         self.commands: list[tuple[str, dict[str, Reading]]] = []
         self.confirmed_by: list[tuple[str, ...]] = []
-        """Who said yes to each of them."""
+        """Confirming people of each command."""
         self.pulls: list[tuple[str, Pull]] = []
-        """What was wanted of sequences."""
+        """Requests to sequences."""
         self.latched: list[str] = []
-        """Why nothing may be begun that moves by itself, each time that it was said."""
+        """Reasons of all latches."""
         self.frames = FakeFrames(profile.driver)
         self.movers: Movers | None = FakeMovers(self.clock)
         self.on_command: Callable[[str, Mapping[str, Reading]], Mapping[str, Value]] | None = None
-        """Makes a command's reply, or raises what the session would; None: nothing is returned."""
+        """Returns the values of a command's reply, or raises an error; None: no values."""
 
     def open(self) -> AbstractAsyncContextManager["FakeRobot"]:
-        """Return the context in which the robot is connected."""
+        """Return the context of a connected robot."""
         return self._open()
 
     @asynccontextmanager
@@ -162,7 +162,7 @@ class FakeRobot:
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
     ) -> Replied:
-        """Keep the command, say that its name was sent, and answer as the test says."""
+        """Record the command, report its name as sent, and return the reply of the test."""
         if on_sent is not None:
             on_sent(name.encode())
         self.confirmed_by.append(confirmed_by)
@@ -171,22 +171,22 @@ class FakeRobot:
         return Replied(len(self.commands), name, values)
 
     def pull(self, sequence: str, what: Pull) -> None:
-        """Keep what is wanted of a sequence."""
+        """Record the request to a sequence."""
         self.pulls.append((sequence, what))
 
     def latch(self, reason: str) -> None:
-        """Keep why nothing may be begun that moves by itself."""
+        """Record the reason of a latch."""
         self.latched.append(reason)
 
     def say(self, signal: str, value: Reading, *, alarm: Alarm = "", age_s: float = 0.0) -> None:
-        """Let a reading arrive that was measured `age_s` ago."""
+        """Deliver a reading that was measured `age_s` ago."""
         self.hub.put([Sample(signal, value, self.clock.now() - age_s, alarm)])
 
     def link(self, state: LinkState, detail: str = "", *, age_s: float = 0.0) -> None:
-        """Set the state of the one line, as it has been for `age_s`."""
+        """Set the state of the one transport, as of `age_s` ago."""
         since_s = self.clock.now() - age_s
         self.hub.set_link(LinkStatus("wire", state, "tcp 127.0.0.1:6789", since_s, detail))
 
     def tell(self, text: str) -> None:
-        """Write a line into the log."""
+        """Add a log entry."""
         self.hub.note(Note(self.clock.now(), "info", "wire", text))

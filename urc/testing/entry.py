@@ -1,4 +1,4 @@
-"""The way into a dashboard of a test: known keys, and what a browser sends that has handed one in.
+"""Access to the dashboard of a test: known keys, and the cookies of an admitted browser.
 
 For tests alone.
 """
@@ -10,19 +10,19 @@ from urc.web.serve.access import Access
 __all__ = ["ACCESS", "BEARER", "HERE", "HERE_COOKIE", "KEY", "MANAGER", "OPEN"]
 
 KEY = "the-start-key-of-a-test"
-TOKEN = "the-token-of-managers-in-a-test"  # noqa: S105 - it opens nothing else
+TOKEN = "the-token-of-managers-in-a-test"  # noqa: S105 - valid only in tests
 
 ACCESS = Access(key=KEY, instance="test", token=TOKEN)
-"""Of a dashboard for this machine alone."""
+"""Access to a dashboard on this machine only."""
 OPEN = copy(ACCESS)
-"""Of one that others reach, too. Both know the same browsers."""
+"""Access to a dashboard that other machines can reach, with the same browsers."""
 OPEN.is_open = True
 
 HERE = {ACCESS.cookie: str(ACCESS.admit(KEY))}
-"""Cookies of a browser that has the start key."""
+"""Cookies of a browser with the start key."""
 HERE_COOKIE = f"{ACCESS.cookie}={HERE[ACCESS.cookie]}"
-"""The header with it."""
+"""Header with these cookies."""
 MANAGER = {ACCESS.cookie: str(ACCESS.admit(TOKEN))}
-"""Cookies of a browser that has the token of managers."""
+"""Cookies of a browser with the token of managers."""
 BEARER = {"authorization": f"Bearer {KEY}"}
-"""The header that a program sends."""
+"""Header of a program."""

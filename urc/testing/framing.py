@@ -1,4 +1,4 @@
-"""One sample of traffic, cut in every way the network may cut it."""
+"""Test of a framing with data split in several ways."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol, TypeVar
@@ -9,7 +9,7 @@ Frame = TypeVar("Frame", covariant=True)
 
 
 class Feedable(Protocol[Frame]):
-    """Anything that cuts bytes into frames."""
+    """A decoder of bytes into frames."""
 
     def feed(self, data: bytes) -> Sequence[Frame]:
         """Return the frames that `data` completes."""
@@ -21,9 +21,9 @@ def feed_three_ways(
     """Feed `data` whole, byte by byte, and with `trailing` bytes after it; return the frames.
 
     Args:
-        decoder: makes a fresh decoder for each way.
-        data: ends at the end of a frame.
-        trailing: the begin of a frame that never ends.
+        decoder: returns a new decoder for each way.
+        data: complete frames.
+        trailing: beginning of an incomplete frame.
 
     Raises:
         AssertionError: two ways gave different frames.

@@ -1,4 +1,4 @@
-"""A robot's line for motion without a line: what is written, when, and frames that can be read."""
+"""A fake motion backend: it records written frames with their times, as readable text."""
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
@@ -20,26 +20,26 @@ class FakeFrames:
     def __init__(self, driver: Driver) -> None:
         self.driver = driver
         self.refusal = ""
-        """Why there is no frame; "" when there is."""
+        """Reason to refuse frames, or ""."""
         self.on_count: Callable[[str], None] = _unheard
         self.on_ready: Callable[[str], None] = _unheard
         self.on_refused: Callable[[str, str], None] = _unrefused
         self.is_greeted = True
-        """Whether the line's start-up steps are done."""
+        """Whether the steps of the connection are done."""
         self.number = 0
-        """Of the newest frame, where they carry one; 0 where they do not."""
+        """Counter of the newest frame; 0 for frames without counters."""
 
     def is_lasting(self, command: str) -> bool:
-        """Return whether its stop is the same for ever."""
+        """Return whether its stop frame never changes."""
         self._known(command)
         return not self.number
 
     def has_stops(self, command: str) -> bool:
-        """Return whether its stops are enough for now."""
+        """Return whether its stop frames are enough for now."""
         return False
 
     def is_ready(self, command: str) -> bool:
-        """Return whether its line is ready."""
+        """Return whether its transport is ready."""
         self._known(command)
         return self.is_greeted
 
@@ -48,7 +48,7 @@ class FakeFrames:
             raise KeyError(command)
 
     def send(self, line: str = "wire") -> int:
-        """Use a number up on another frame, and return it."""
+        """Use up a counter for another frame, and return it."""
         self.number = number = self.number + 1
         self.on_count(line)
         return number
@@ -57,11 +57,11 @@ class FakeFrames:
         return f"{self.number + 1} " if self.number else ""
 
     def stop_frame(self, command: str) -> Payload:
-        """Return what stops it; it uses no number up before it leaves."""
+        """Return its stop frame, without using up a counter."""
         return f"{self._numbered()}{command} stop".encode()
 
     def motion_frame(self, command: str, arguments: Mapping[str, Reading], now: float) -> Payload:
-        """Return its arguments, checked as the engine checks them."""
+        """Return its arguments, after the checks of the engine."""
         if self.refusal:
             raise UrcError(self.refusal)
         values = check_arguments(self.driver.commands[command], arguments)
@@ -74,15 +74,15 @@ class FakeFrames:
 
 
 class FakeMovers:
-    """Real movers over a line that takes everything at once, for as long as `is_up`."""
+    """Real movers with a fake transport that accepts all data while `is_up`."""
 
     def __init__(self, clock: Clock, write: Callable[[bytes], None] | None = None) -> None:
         self.written: list[tuple[float, str]] = []
-        """When, and what; also of a line that is down, nothing."""
+        """Time and text of each write; writes to a closed transport are missing."""
         self.reasons: list[Reason] = []
-        """Of the stops, in their order."""
+        """Reasons of the stops, in order."""
         self.ticked_s = float("-inf")
-        """When the newest tick was taken."""
+        """Time of the last accepted tick."""
         self.is_up = True
         self._clock = clock
         self._write = write
@@ -92,11 +92,11 @@ class FakeMovers:
 
     @property
     def texts(self) -> list[str]:
-        """What was written."""
+        """Return the written texts."""
         return [text for _, text in self.written]
 
     def arm(self, command: str, terms: Terms) -> None:
-        """Take ticks from now on."""
+        """Accept ticks from now on."""
         mover = self._movers.get(command)
         if mover is None or mover.state == "idle":
             mover = self._movers[command] = Mover(terms)
@@ -104,13 +104,13 @@ class FakeMovers:
 
     def tick(self, command: str, data: Payload | Counted) -> None:
         """Renew the lease."""
-        assert not isinstance(data, Counted)  # noqa: S101 - nobody shares its counters
+        assert not isinstance(data, Counted)  # noqa: S101 - the fake has no shared counters
         if self._movers[command].tick(data or None, self._clock.now()):
             self.ticked_s = self._clock.now()
         self.step()
 
     def renew(self, command: str, stop: Payload | Series) -> None:
-        """Stop it with these bytes from now on."""
+        """Replace the stop frame."""
         mover = self._movers[command]
         mover.renew(mover.terms.stopped_by(stop))
 
@@ -119,17 +119,17 @@ class FakeMovers:
         return command in self._movers and self._movers[command].state != "idle"
 
     def is_open(self, command: str) -> bool:
-        """Return whether its line is there."""
+        """Return whether its transport is connected."""
         return self.is_up
 
     def release(self, command: str) -> None:
-        """Let go."""
+        """Release the control."""
         if command in self._movers:
             self._movers[command].stop("released", self._clock.now())
         self.step()
 
     def stop(self, stops: Mapping[str, Payload | Series]) -> None:
-        """Stop everything."""
+        """Stop all motion."""
         for command, frame in stops.items():
             terms = Terms(b"", period_s=0.05).stopped_by(frame)
             mover = self._movers.setdefault(command, Mover(terms))
@@ -137,11 +137,11 @@ class FakeMovers:
         self.step()
 
     async def stops(self) -> Sequence[tuple[str, Reason]]:
-        """Wait for stops that were written."""
+        """Wait for written stops."""
         return [await self._stops.get()]
 
     def step(self) -> None:
-        """Write what is due; also after the line is up again."""
+        """Write the due frames, also after the transport is up again."""
         now = self._clock.now()
         for command, mover in self._movers.items():
             while self.is_up and (data := mover.due(now, is_clear=True)) is not None:
@@ -162,8 +162,8 @@ class FakeMovers:
 
 
 def _unrefused(command: str, why: str) -> None:
-    """Nobody wants to know."""
+    """Ignore a refusal."""
 
 
 def _unheard(line: str) -> None:
-    """Nobody wants to know."""
+    """Ignore a transport."""

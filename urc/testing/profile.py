@@ -1,4 +1,4 @@
-"""A robot of one line, made without a document."""
+"""A robot with one transport, built without a document."""
 
 from urc.expressions import compile_template
 from urc.model.codec import ReadSpec, WriteSpec
@@ -28,7 +28,7 @@ def regex(source: str) -> ReadSpec:
 
 
 def text(source: str) -> WriteSpec:
-    """Return the form ``text`` of what is sent."""
+    """Return the form ``text`` of a frame to send."""
     template = compile_template(source)
     return WriteSpec("text", {"template": template}, template.names, template.settings)
 
@@ -48,12 +48,12 @@ def line_profile(
     """Return a profile like the puppet's: line feeds, one number signal, one poll, two commands.
 
     Args:
-        is_per_request: each request has its own connection.
-        every_s: period of the poll; None for a robot that only listens.
-        timeouts: of the one transport, named ``wire``.
-        backoff: of the one transport.
+        is_per_request: whether each request has its own connection.
+        every_s: period of the poll, in seconds; None for a robot without polls.
+        timeouts: timeouts of the one transport, named ``wire``.
+        backoff: backoff of the transport.
         transport: row of the transports table.
-        max_bytes: longest frame.
+        max_bytes: limit of a frame, in bytes.
     """
     wire = TransportSpec(
         name="wire",

@@ -1,4 +1,4 @@
-"""What stands under ``reply:`` or a message's name, made from its YAML."""
+"""The form of a reply or message, built from its YAML."""
 
 from collections.abc import Collection
 
@@ -17,7 +17,7 @@ def read_spec(text: str, signals: Collection[str] = (), encoding: str = "utf-8")
     """Return the form in `text`, which fits the schema.
 
     Raises:
-        ProblemsError: with what is wrong in it.
+        ProblemsError: the form has errors.
     """
     document = parse_document(text, "reply.yaml")
     findings = Findings()

@@ -1,4 +1,4 @@
-"""Binary frames' forms, made of YAML text without a whole document."""
+"""Forms of binary frames, built from YAML without a whole document."""
 
 from collections.abc import Mapping
 
@@ -17,34 +17,34 @@ __all__ = ["frame", "reader", "struct_read", "struct_write", "writer"]
 
 
 def struct_read(source: str) -> ReadSpec:
-    """Return the form of ``struct:``, with ``types:`` and ``enums:`` beside it, in `source`.
+    """Return the form of ``struct:`` in `source`, which may also have ``types:`` and ``enums:``.
 
     Raises:
-        AssertionError: a finding, as it is told.
+        AssertionError: the form has problems.
     """
     part, context, findings = _context(source)
     spec = parse_read(part.must("struct"), findings, context)
     _assert_none(findings)
-    assert spec is not None  # noqa: S101  # what this function is for
+    assert spec is not None  # noqa: S101  # the purpose of this function
     return spec
 
 
 def struct_write(source: str) -> WriteSpec:
-    """Return the same as something to send."""
+    """Return the same form for sending."""
     part, context, findings = _context(source)
     spec = parse_write(part.must("struct"), findings, context)
     _assert_none(findings)
-    assert spec is not None  # noqa: S101  # what this function is for
+    assert spec is not None  # noqa: S101  # the purpose of this function
     return spec
 
 
 def reader(source: str, encoding: str = "utf-8") -> Reader:
-    """Return what reads such frames."""
+    """Return the reader of such frames."""
     return build_reader(struct_read(source), CodecContext(encoding))
 
 
 def writer(source: str, encoding: str = "utf-8") -> Writer:
-    """Return what writes such frames."""
+    """Return the writer of such frames."""
     return build_writer(struct_write(source), CodecContext(encoding))
 
 
@@ -65,4 +65,4 @@ def _context(source: str) -> tuple[Part, FormContext, Findings]:
 
 def _assert_none(findings: Findings) -> None:
     told = "".join(map(to_text, findings))
-    assert not told, told  # noqa: S101  # what this module is for
+    assert not told, told  # noqa: S101  # the purpose of this module

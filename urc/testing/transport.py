@@ -1,4 +1,4 @@
-"""A line without a wire: the test plays the robot."""
+"""An in-memory transport: the test plays the robot."""
 
 import asyncio
 from collections import deque
@@ -11,12 +11,11 @@ __all__ = ["MemoryTransport", "table_of"]
 
 
 class MemoryTransport:
-    """Stands in for any transport.
+    """A replacement for any transport.
 
-    Bytes go in by `feed`, or come from `answer`, which is called with everything that is sent and
-    returns the chunks the robot says in turn. What was sent is in `sent`, in the pieces in which it
-    was handed over. The robot hangs up by `hang_up`, refuses by `refuse`, and hangs by `stall_open`
-    and `stall_sends`.
+    Received bytes come from `feed`, or from `answer`, which is called with all sent data and
+    returns the chunks of the reply. `sent` has the sent data, in its original pieces. `hang_up`
+    closes the connection, `refuse` rejects it, and `stall_open` and `stall_sends` block.
     """
 
     def __init__(
@@ -27,14 +26,14 @@ class MemoryTransport:
         address: str = "memory",
     ) -> None:
         self.address = address
-        """Where it leads, for people."""
+        """Address for people."""
         self.sent: list[bytes] = []
-        """Everything handed over, over all connections."""
+        """All sent pieces of all connections."""
         self.opens = 0
-        """How often `open` was called, successful or not."""
+        """Number of calls of `open`, including failures."""
         self.is_open = False
         self.stall_open = False
-        """While true, `open` waits until its time is up, and longer: the promise broken."""
+        """While true, `open` blocks beyond its timeout, which breaks its contract."""
         self._answer = answer
         self._greeting = tuple(chunks)
         self._arriving: deque[bytes | PeerClosed] = deque()
@@ -46,21 +45,21 @@ class MemoryTransport:
     # -- the robot's side
 
     def feed(self, *chunks: bytes) -> None:
-        """Let the robot say `chunks`, each arriving by itself."""
+        """Send `chunks` as the robot, each on its own."""
         self._arriving.extend(chunks)
         self._changed.set()
 
     def hang_up(self, reason: str = "the robot closed the connection") -> None:
-        """Let the robot close the line, after what was fed before."""
+        """Close the connection as the robot, after all data fed before."""
         self._arriving.append(PeerClosed(reason))
         self._changed.set()
 
     def refuse(self, reason: str = "refused", times: int = 1) -> None:
-        """Let the next `times` attempts to open fail."""
+        """Reject the next `times` attempts to connect."""
         self._refusals.extend([reason] * times)
 
     def stall_sends(self, is_stalled: bool = True) -> None:
-        """Let the robot take no more bytes, or take them again."""
+        """Make the robot accept no more bytes, or accept them again."""
         if is_stalled:
             self._flowing.clear()
         else:
@@ -69,7 +68,7 @@ class MemoryTransport:
     # -- the five members of a transport
 
     async def open(self, timeout_s: float) -> None:
-        """Connect, unless the robot was told to refuse or to hang."""
+        """Connect, unless `refuse` or `stall_open` prevents it."""
         self.opens += 1
         if self.stall_open:
             await asyncio.Event().wait()
@@ -80,7 +79,7 @@ class MemoryTransport:
         self.feed(*self._greeting)
 
     async def receive(self) -> bytes:
-        """Return the next chunk fed."""
+        """Return the next fed chunk."""
         while not self._arriving:
             if not self.is_open:
                 raise PeerClosed("the connection is closed")
@@ -88,12 +87,12 @@ class MemoryTransport:
             await self._changed.wait()
         chunk = self._arriving.popleft()
         if isinstance(chunk, PeerClosed):
-            self._arriving.appendleft(chunk)  # said again to whoever asks again
+            self._arriving.appendleft(chunk)  # raised again at the next call
             raise chunk
         return chunk
 
     async def send(self, data: bytes) -> None:
-        """Record `data`, and let the robot answer."""
+        """Record `data`, and feed the robot's reply."""
         await self._flowing.wait()
         if not self.is_open:
             raise PeerClosed("the connection is closed")
@@ -109,7 +108,7 @@ class MemoryTransport:
 
 
 def table_of(**transports: Transport) -> Table:
-    """Return a transports table whose rows give these very transports, whatever the options."""
+    """Return a transports table whose rows return these transports, with any options."""
     return _GivenTable(transports)
 
 

@@ -72,10 +72,13 @@ HOSTILE: dict[str, tuple[Callable[[], bytes], str]] = {
     "link": (lambda: zipped((special("a.txt", 0o120777), b"/etc")), "'a.txt' is a link; only"),
     "device": (lambda: zipped((special("a.txt", 0o020666), b"")), "'a.txt' is a device; only"),
     "pipe": (lambda: zipped((special("a.txt", 0o010666), b"")), "'a.txt' is a pipe; only"),
-    "case": (lambda: zipped(("a.txt", b""), ("A.txt", b"")), "'A.txt' is there beside 'a.txt'"),
+    "case": (
+        lambda: zipped(("a.txt", b""), ("A.txt", b"")),
+        "'A.txt' is there together with 'a.txt'",
+    ),
     "case of folder": (
         lambda: zipped(("a/x.txt", b""), ("A/y.txt", b"")),
-        "'A' is there beside 'a': only capitals differ",
+        "'A' is there together with 'a': only capitals differ",
     ),
     "file and folder": (
         lambda: zipped(("a.txt/b.txt", b""), ("a.txt", b"")),
@@ -108,11 +111,11 @@ HOSTILE: dict[str, tuple[Callable[[], bytes], str]] = {
         lambda: crowded(5000)[:-14] + struct.pack("<2H2LH", 1, 1, 47 * 5000, 4, 0),
         "its parts do not fit",
     ),
-    "no archive": (lambda: b"#!/bin/sh\n", "this is no package: a ZIP archive is expected"),
-    "empty": (lambda: b"", "this is no package: a ZIP archive is expected"),
+    "no archive": (lambda: b"#!/bin/sh\n", "this is not a package: expected a ZIP archive"),
+    "empty": (lambda: b"", "this is not a package: expected a ZIP archive"),
     "end added": (lambda: GOOD + b"more", "cut off, or something was added at its end"),
     "twice": (lambda: _twice(), "is there twice"),
-    "dated": (lambda: zipped(("a.txt", b"x")), "something is in this archive beside its files"),
+    "dated": (lambda: zipped(("a.txt", b"x")), "this archive contains data outside its files"),
 }
 
 
@@ -197,8 +200,8 @@ def test_a_folder_with_a_link_is_not_packed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("path", "content", "told"),
     [
-        ("package.yaml", None, "this is no package: there is no package.yaml in it"),
-        ("widget.yaml", None, "there is no widget.yaml in it, the document itself"),
+        ("package.yaml", None, "this is not a package: it has no package.yaml"),
+        ("widget.yaml", None, "its document widget.yaml is missing"),
         ("widget.yaml", "urc: 1\nkind: driver\n", "kind: 'widget' is expected, as package.yaml"),
         ("widget.yaml", "kind: widget\nname: x\n", "name: 'dial' is expected, as package.yaml"),
         ("widget.yaml", "a: [", "widget.yaml"),

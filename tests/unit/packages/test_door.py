@@ -112,7 +112,7 @@ def test_other_bytes_of_a_version_are_refused(lab: Lab) -> None:
     status, told = lab.puts(package("widget", "dial", notes="more"))
     assert status == 409
     assert told == (
-        "widgets/dial 1.0.0 is listed with other bytes already;"
+        "widgets/dial 1.0.0 is already listed with other bytes;"
         " a changed package needs a new version"
     )
     assert lab.holds() == before
@@ -190,7 +190,7 @@ def test_what_was_changed_on_the_way_is_told(lab: Lab) -> None:
         "archives/widgets/dial/1.0.0.zip", content=DIAL.data[:-1], headers=headers
     )
     assert (answer.status_code, answer.json()["error"]) == (
-        400, "what came is not what was sent; try again",
+        400, "the upload was damaged on the way; try again",
     )  # fmt: skip
 
 
@@ -245,7 +245,7 @@ def test_a_signature_is_checked_and_listed(lab: Lab, anna: Signer) -> None:
     anna.by = "Somebody else"
     status, told = lab.puts(DIAL, anna.sign(Key("widget", "dial"), "1.0.0", DIAL.digest))
     assert status == 409
-    assert told.startswith("widgets/dial 1.0.0 is listed already, signed by Anna (SHA256:")
+    assert told.startswith("widgets/dial 1.0.0 is already listed, signed by Anna (SHA256:")
     make_index(lab.folder, "Lab", fine)  # the keeper lists anew: nothing is lost
     assert read_index(lab.client.get(INDEX).content, "").packages == (entry,)
 
@@ -308,7 +308,7 @@ def test_a_server_that_ends_at_any_moment_leaves_the_repository_whole(
         if status == 201:
             break
         deaths += 1
-        assert (status, told) == (507, "it cannot be kept: No space left on device")
+        assert (status, told) == (507, "it cannot be stored: No space left on device")
         assert lab.lists() in (before, [*before, f"widgets/dial 1.{minor}.0"])
         assert lab.puts(made, signature)[0] in (200, 201)
         assert f"widgets/dial 1.{minor}.0" in lab.lists()
@@ -343,9 +343,9 @@ def test_tokens_are_shown_once_and_kept_as_digests(tmp_path: Path) -> None:
         "drivers/puppet", "drivers/puppet-2", "widgets/dial",
     ]  # fmt: skip
     assert tokens.find(text[:-1]) is None
-    with pytest.raises(PackageError, match="there is a token 'ci' already"):
+    with pytest.raises(PackageError, match="a token 'ci' exists already"):
         tokens.add("ci", ("*",))
-    with pytest.raises(PackageError, match="there is no token 'x'; there are: ci"):
+    with pytest.raises(PackageError, match="unknown token 'x'; expected one of: ci"):
         tokens.remove("x")
 
 
@@ -361,7 +361,7 @@ def test_a_damaged_file_of_tokens_lets_nobody_in(lab: Lab, text: str) -> None:
     """The keeper is told by name of the file."""
     lab.tokens.file.write_text(text, encoding="latin-1")
     assert lab.puts(DIAL)[0] == 503
-    with pytest.raises(PackageError, match=r"tokens\.json: this is no file of tokens: "):
+    with pytest.raises(PackageError, match=r"tokens\.json: this is not a file of tokens: "):
         lab.tokens.all()
 
 
@@ -369,7 +369,9 @@ def test_a_file_without_a_token_is_told(tmp_path: Path) -> None:
     """Also one with more than a token in it."""
     for text in ("", "urc_short", "urc_" + "x" * 43 + "\nmore"):
         (tmp_path / "token").write_text(text)
-        with pytest.raises(PackageError, match="one token is expected, as 'urc repo token add'"):
+        with pytest.raises(
+            PackageError, match="expected one token, as printed by 'urc repo token add'"
+        ):
             read_token(tmp_path / "token")
     with pytest.raises(PackageError, match="No such file"):
         read_token(tmp_path / "gone")

@@ -131,7 +131,7 @@ def test_a_repository_that_goes_back_is_not_believed(lab: Lab) -> None:
     lab.write(entries(3))
     lab.asks()
     lab.web.instead |= old
-    with pytest.raises(PackageError, match="it went back from number 2 to 1"):
+    with pytest.raises(PackageError, match="its number went back from 2 to 1"):
         lab.client.refresh()
     lab.web.instead[HEAD] = None  # nor when it hides that
     with pytest.raises(PackageError, match="'urc repo remove http://lab/' and add it again"):
@@ -153,7 +153,7 @@ def test_one_number_means_one_index(lab: Lab) -> None:
         )
     )
     lab.web.instead |= {INDEX: false, HEAD: head}
-    with pytest.raises(PackageError, match="or changed without a new one"):
+    with pytest.raises(PackageError, match="or it changed without a new one"):
         lab.client.refresh()
 
 
@@ -175,7 +175,7 @@ def test_what_a_client_kept_may_be_damaged(lab: Lab) -> None:
     (kept,) = (lab.folder.parent / "client").glob("*.index.json")
     kept.write_bytes(b"{")
     assert lab.asks() == [HEAD, INDEX]
-    assert "it is asked for anew" in lab.said.pop()
+    assert "it is requested again" in lab.said.pop()
 
 
 def test_a_keeper_killed_at_any_moment_leaves_a_repository_to_read(

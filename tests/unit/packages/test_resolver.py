@@ -105,7 +105,9 @@ def test_a_name_means_the_one_package_that_has_it() -> None:
     """Else it is asked which."""
     known = entries({"drivers/bot": {"1.0.0": {}}, "robots/bot": {"1.0.0": {}}})
     assert choose(known, Wish("robot", "bot")) == Key("robot", "bot")
-    with pytest.raises(PackageError, match="'bot' may be one of drivers/bot, robots/bot; write"):
+    with pytest.raises(
+        PackageError, match="'bot' is ambiguous; write one of drivers/bot, robots/bot"
+    ):
         choose(known, Wish("", "bot"))
     with pytest.raises(PackageError, match="no repository has bod; did you mean 'bot'"):
         choose(known, Wish("", "bod"))

@@ -133,7 +133,7 @@ def test_bytes_that_are_not_those_of_the_lock_are_refused(store: Store) -> None:
     """Whoever handed them over."""
     lock = install(Store(store.folder.parent / "other"), BOT, DIAL)
     with (
-        pytest.raises(PackageError, match="these are not the bytes that were named"),
+        pytest.raises(PackageError, match="the bytes differ from those in the lock"),
         store.changing() as change,
     ):
         change.stage(Plan(lock, {BOT.digest: BOT.data, DIAL.digest: DIAL_2.data}, {}, {}))

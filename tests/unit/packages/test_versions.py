@@ -40,7 +40,9 @@ def test_a_range_holds_what_it_says(wanted: str, inside: str, outside: str) -> N
 )
 def test_what_is_no_range_is_told(text: str) -> None:
     """One line, with what is expected."""
-    with pytest.raises(PackageError, match=r"is no range of versions; \^1\.2, ~1\.2\.3"):
+    with pytest.raises(
+        PackageError, match=r"is not a range of versions; expected \^1\.2, ~1\.2\.3"
+    ):
         parse_range(text)
 
 
@@ -49,7 +51,7 @@ def test_what_is_no_range_is_told(text: str) -> None:
 )
 def test_what_is_no_version_is_told(text: str) -> None:
     """Semantic Versioning asks for three numbers."""
-    with pytest.raises(PackageError, match=r"is no version; MAJOR\.MINOR\.PATCH is expected"):
+    with pytest.raises(PackageError, match=r"is not a version; expected MAJOR\.MINOR\.PATCH"):
         parse_version(text)
 
 
