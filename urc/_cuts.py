@@ -1,8 +1,8 @@
 """Filters that parse the content of one field: tables, digits, packed numbers.
 
 Private to `urc._filters`. Each filter accepts every value of a document, takes linear time, and
-returns at most `MAX_PARTS` values. It returns a result, or raises TypeError or ValueError with a
-text for people.
+returns at most `MAX_PARTS` values. A filter returns a result, or raises TypeError or ValueError
+with a text for people.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -59,7 +59,7 @@ def plain_reader(number: Number) -> Callable[[bytes, int], Any]:
 def plain_writer(number: Number) -> Callable[[Any], bytes]:
     """Return the function from a raw number, which must fit, to its bytes.
 
-    It raises `OverflowError` or `struct.error` for a float too large for 16 or 32 bits.
+    The function raises `OverflowError` or `struct.error` for a float too large for 16 or 32 bits.
     """
     code = format_of(number)
     if not code:
@@ -73,7 +73,7 @@ def reader_of(
 ) -> Callable[[bytes, int, int], tuple[Any, int]]:
     """Return the function from data, begin and end to the raw number and its end.
 
-    It raises `fault` for an invalid number.
+    The function raises `fault` for an invalid number.
     """
     if number.is_variable:
         return _varint_reader(fault, is_zigzag=number.kind == "zigzag")

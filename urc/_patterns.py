@@ -2,17 +2,17 @@ r"""Regular expressions of documents: matched in linear time, or refused.
 
 Private to `urc.patterns` and `urc._lists`. The dialect is that of RE2: no look-around, no
 back-references, ``$`` is the very end, ``\d`` is ASCII. A pattern that `_is_linear` proves harmless
-runs on `re`, ten times faster on short lines; all others run on RE2. Without an installed RE2, such
-a pattern is refused.
+runs on `re`, ten times faster on short lines; all others run on RE2. Without an installed RE2,
+unproven patterns are refused.
 
 Theory of operation: backtracking exceeds linear time only if two parts of a pattern can share the
-same characters in many ways. So the pattern must be anchored at the start, and alternatives must
-differ in their first character. Every repeat must be over one set of characters, disjoint from the
-possible next characters.
+same characters in many ways. A proven pattern must therefore be anchored at the start, and
+alternatives must differ in their first character. Every repeat must be over one set of characters,
+disjoint from the possible next characters.
 
-The time of RE2 is proportional to the text and to its program, in which ``{n}`` is expanded. So the
-size of an unproven pattern is bounded. The size is computed here, from the source: the result is
-the same without RE2.
+The time of RE2 is proportional to the text and to its program, in which ``{n}`` is expanded. The
+size of an unproven pattern is therefore bounded. It is computed here, from the source, so that the
+result is the same without RE2.
 """
 
 import re

@@ -1,7 +1,7 @@
 """Translation of YAML parser errors into messages and hints for people.
 
-Private to `urc.source`. The module handles both parsers of PyYAML (C and pure Python). Their
-messages differ, so the text at the place decides wherever possible.
+Private to `urc.source`. The module handles both parsers of PyYAML (C and pure Python). The messages
+of the two parsers differ, so the text at the place decides wherever possible.
 """
 
 import re

@@ -1,8 +1,8 @@
 """Conversion of YAML events into plain data and a tree of marks of the same shape.
 
 Private to `urc.source`. The reader processes the events of the parser without the composer of the
-library. So nesting and aliases are bounded *while* reading: a bomb costs only its first lines.
-Every key and value has its place, and scalars follow the core schema of YAML 1.2.
+library. Nesting and aliases are thus bounded *while* reading: an alias bomb costs only its first
+lines. Every key and value has its place, and scalars follow the core schema of YAML 1.2.
 """
 
 import re
@@ -20,7 +20,8 @@ __all__ = ["Limits", "StoppedError", "TreeReader"]
 _TAGS: Final = "tag:yaml.org,2002:"
 _PATH_SHOWN: Final = 12
 _PROBLEMS_MOST: Final = 100
-"""Most problems of one text: each of them reads its line, which may be long."""
+"""Largest number of problems in one text, because each problem reads its line, which may be
+long."""
 _CUT_COMMENT = re.compile(r" #[^\s#!]")
 
 
@@ -31,7 +32,7 @@ class Limits(NamedTuple):
     depth: int = 64
     """Largest nesting depth of mappings and lists, through aliases."""
     nodes: int = 10_000
-    """Most keys, values, mappings and lists, with every alias expanded."""
+    """Largest number of keys, values, mappings and lists, with every alias expanded."""
 
 
 class StoppedError(Exception):

@@ -1,10 +1,10 @@
 """Templates and expressions of documents: a subset of Jinja, compiled to Python functions.
 
-`urc._grammar` defines the supported subset. It is a sandbox: no attributes of Python objects, no
-loops, and no operator that expands a short text. The only calls are the filters of `urc._filters`.
-Literal text is preserved to the byte, whereas Jinja converts CR to LF and drops a final newline.
-Where Jinja hides an error (``'abc' | int`` is 0), URC raises: a reading must not become zero by
-accident.
+`urc._grammar` defines the supported subset. Expressions are a sandbox: no attributes of Python
+objects, no loops, and no operator that expands a short text. The only calls are the filters of
+`urc._filters`. Literal text is preserved to the byte, whereas Jinja converts CR to LF and drops a
+final newline. Where Jinja hides an error (``'abc' | int`` is 0), URC raises: a reading must not
+become zero by accident.
 
 A template of exactly one ``{{ expression }}`` keeps the type of the expression.
 """

@@ -1,7 +1,7 @@
 """Location of the shipped folders: schemas, robots, widgets, templates, third-party JS.
 
-In a checkout, they are in the top folder of the repository, so that edits take effect at once. In
-an installed wheel, they are inside the package.
+In a checkout, the folders are in the top folder of the repository, so that edits take effect at
+once. In an installed wheel, the folders are inside the package.
 """
 
 from importlib.util import find_spec

@@ -1,7 +1,7 @@
 """Conversion of YAML text into a `Document`: plain data, and the position of every value.
 
-This module knows YAML, but nothing about robots. It raises only `ProblemsError`, whose problems
-have the place and a hint. Time and memory are bounded for any content.
+This module knows YAML, but nothing about robots. The only exception is `ProblemsError`, whose
+problems have the place and a hint. Time and memory are bounded for any content.
 """
 
 import re
@@ -332,7 +332,7 @@ def _inside_lines(
 ) -> Span | None:
     """Return the place of a character in a scalar of several lines.
 
-    The function looks up the lines in the value one by one. This works for literal and folded
+    The function looks up the lines in the value one by one. The method works for literal and folded
     blocks and for plain and quoted text, unless escapes occur.
     """
     position = 0

@@ -64,7 +64,7 @@ class Count(NamedTuple):
 
 
 class Numbered(NamedTuple):
-    """A frame with counters. It may be sent only while its numbers are the next ones."""
+    """A frame with counters. The frame may be sent only while its numbers are the next ones."""
 
     data: Payload
     takes: Count
@@ -129,8 +129,8 @@ class Collect(NamedTuple):
     begin: Template | None = None
     """Condition that marks the first frame of a new value."""
     end: Template | None = None
-    """Condition that marks the last frame. Without it, the first frame of the next value ends
-    it."""
+    """Condition that marks the last frame. Without a condition, the first frame of the next value
+    ends this one."""
     max: int = 4096
     """Largest number of values, or of bytes, in total."""
 

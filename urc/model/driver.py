@@ -110,7 +110,7 @@ class Reply(NamedTuple):
     """Reply timeout, in seconds; None: ``timeouts.reply`` of the transport."""
     match: Template | None = None
     """Correlation over the fields, the arguments of the command, and ``seq.NAME``, the counters in
-    the request. None: replies arrive in the order of the requests."""
+    the request. Without a correlation, replies arrive in the order of the requests."""
     stages: tuple[Stage, ...] = ()
     """Further replies that complete the request."""
     faults: tuple[ErrorReply, ...] = ()
@@ -163,7 +163,8 @@ class Argument(NamedTuple):
     default: Reading = None
     is_required: bool = True
     allows_control: bool = False
-    """Whether a string may contain control characters. Otherwise no argument can end a frame."""
+    """Whether a string may contain control characters. Without control characters, no argument can
+    end a frame."""
     description: str = ""
     items: ElementType = "number"
     """Type of the elements of an array; range and choices apply to each of them."""
@@ -198,8 +199,8 @@ class Command(NamedTuple):
     is_idempotent: bool = False
     """Whether a repetition has the same effect as one execution."""
     retries: int = 0
-    """Most retries: after a timeout of an idempotent command, or on request of the robot. The value
-    0 means `RESENDS`, if the robot may ask for retransmissions."""
+    """Largest number of retries, after a timeout of an idempotent command or on request of the
+    robot. The value 0 means `RESENDS`, if the robot may ask for retransmissions."""
     retry: Retry = Retry()
     """Waits before the retries."""
     hold: Hold | None = None
@@ -273,7 +274,7 @@ class Driver(NamedTuple):
     def learnt(self, transport: str) -> frozenset[str]:
         """Return the names that the login of a connection reads, such as ``_nonce``.
 
-        They are known while the connection is open.
+        These names are known while the connection is open.
         """
         names: set[str] = set()
         for step in all_steps(self.transports[transport].on_connect):

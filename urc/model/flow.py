@@ -113,7 +113,7 @@ class Hold(NamedTuple):
     """Reaction to a connection that stalls during motion; None: the default of its transport."""
     step_s: float | None = None
     """Longest duration of a step, in seconds. The robot then stops by itself, so no stop is sent.
-    None: the robot moves until it is stopped."""
+    Without a duration, the robot moves until it is stopped."""
 
 
 class Confirm(NamedTuple):

@@ -1,7 +1,7 @@
 """Interfaces of readers and writers, and their context.
 
-Pure. A form is one notation for the content of a frame. It works in both directions, so that the
-emulated robot uses the same declaration; `urc.protocol.forms` has the table of all forms.
+Pure. A form is one notation for the content of a frame. A form works in both directions, so that
+the emulated robot uses the same declaration; `urc.protocol.forms` has the table of all forms.
 """
 
 from collections.abc import Mapping

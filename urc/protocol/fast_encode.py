@@ -1,7 +1,7 @@
 """Generated encoders: one function per command, from arguments to bytes.
 
 The function handles the common case: every argument is a number of its type. All other cases go to
-the closures of `urc.protocol.encode`, which are also the oracle of its tests. Only sums, products
+the closures of `urc.protocol.encode`, which are also the oracle of the tests. Only sums, products
 and ``fixed`` over numbers are supported.
 """
 

@@ -1,8 +1,8 @@
 """Generated text decoders: one function per kind of frame, from text to samples.
 
 As in `urc.protocol.fast_encode`, the function handles the common case: every field is present and a
-valid value of its signal. In all other cases the closures (`slow`) read the frame again; they are
-also the oracle of its tests.
+valid value of its signal. In all other cases the closures (`slow`) read the frame again. The
+closures are also the oracle of the tests.
 """
 
 from typing import TYPE_CHECKING, Final, cast

@@ -48,7 +48,7 @@ class Flight:
         self.is_extended = False
         """Whether the robot has extended the timeout."""
         self.is_late = False
-        """Whether it has timed out. Its reply may still arrive, and must not match another
+        """Whether it has timed out. The late reply may still arrive, and must not match another
         request."""
         self.values: dict[str, Reading] = {}
         self.number: int | None = None

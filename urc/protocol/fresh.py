@@ -1,7 +1,7 @@
 """Times and nonces of sent frames.
 
-Pure. Both come from injected sources: a clock and a generator for a robot, fixed ones for tests.
-The same document then always gives the same frames in tests.
+Pure. Times and nonces come from injected sources: a clock and a generator for a robot, fixed ones
+for tests. The same document then always gives the same frames in tests.
 """
 
 from collections.abc import Callable

@@ -1,10 +1,10 @@
 """The form ``json`` for reading: fields of a document, found by paths.
 
-Theory of operation. Plain paths become `msgspec` types with a member for each step of a path. Its
-decoder skips everything else, and a generated function picks the fields (`urc.protocol.generate`).
-If a document has another structure, that decoder raises an error; the document is then decoded
-whole and walked step by step. JMESPath always uses the second way. Both ways give the same fields
-for the same document.
+Theory of operation. Plain paths become `msgspec` types with a member for each step of a path. The
+decoder of `msgspec` skips everything else, and a generated function picks the fields
+(`urc.protocol.generate`). If a document has another structure, that decoder raises an error; the
+document is then decoded whole and walked step by step. JMESPath always uses the second way. Both
+ways give the same fields for the same document.
 """
 
 import json

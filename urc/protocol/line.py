@@ -476,7 +476,7 @@ class Line(Connection):
     ) -> list[LineEvent]:
         """Return the events of a frame with the match result `offer` for a request.
 
-        A provisional reply may be a message as well. Without a `frame`, its message has already
+        A provisional reply may be a message as well. Without a `frame`, the message has already
         been reported.
         """
         exchange = flight.exchange

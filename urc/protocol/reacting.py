@@ -1,8 +1,8 @@
 """Effects of messages besides their samples: collection over several frames, and acknowledgement.
 
-Pure. Both hook into the step from fields to samples, which runs exactly once per message. Collected
-values are cleared with the connection. Acknowledgements wait in `Replies` until the conversation
-has reported the frame.
+Pure. Both effects belong to the step from fields to samples, which runs exactly once per message.
+Collected values are cleared with the connection. Acknowledgements wait in `Replies` until the
+conversation has reported the frame.
 """
 
 from collections.abc import Callable, Mapping

@@ -122,7 +122,7 @@ class Readings:
     def tick(self, now: float) -> list[Sample]:
         """Return the samples that time alone has changed until `now`, with their own times.
 
-        They are the newest samples of signals with a new alarm, and debounced values.
+        The list has the newest samples of signals with a new alarm, and debounced values.
         """
         samples: list[Sample] = []
         if self._steady:

@@ -48,7 +48,7 @@ def note(out: Out, name: str, meaning: Callable[[Any], Any], raw: Any) -> None:
 def coded_reader(number: Number) -> Callable[[bytes, int, int], tuple[Any, int]]:
     """Return the function from data, begin and end to the raw number and its end.
 
-    It raises `OtherFrame` for an invalid number.
+    The function raises `OtherFrame` for an invalid number.
     """
     return reader_of(number, OtherFrame)
 

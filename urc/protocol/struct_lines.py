@@ -1,6 +1,6 @@
 """Builder for the source text of a generated struct function.
 
-Pure. WARNING: the lines are compiled and run. They may contain only text of this package, the
+Pure. WARNING: the lines are compiled and run. The lines may contain only text of this package, the
 `repr()` of a constant, or a name made by `Lines.bind`; never text of a document.
 """
 

@@ -14,7 +14,7 @@ from urc.protocol.struct_read import BitPart, bit_parts
 __all__ = ["Leaf", "Run", "runs_of"]
 
 MOST_IN_A_RUN = 256
-"""Most values of one `struct.Struct`; closures read longer arrays."""
+"""Largest number of values of one `struct.Struct`; closures read longer arrays."""
 
 
 class Leaf(NamedTuple):

@@ -1,8 +1,8 @@
 """Struct items read by one generated function per declaration.
 
 Pure. Each run of fixed items becomes one `struct.Struct` and straight-line Python. The closures of
-`urc.protocol.struct_read` read all other items. They are also the oracle of the tests, which
-require the same result for the same bytes.
+`urc.protocol.struct_read` read all other items. The closures are also the oracle of the tests,
+which require the same result for the same bytes.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,7 +24,7 @@ Read = Callable[[Frame], Mapping[str, object] | None]
 def generate_read(items: tuple[Item, ...], encoding: str) -> Read:
     """Return the function from a frame to its fields, or to None for another kind of frame.
 
-    It raises `BadItem` for a matching frame with an invalid value.
+    The function raises `BadItem` for a matching frame with an invalid value.
     """
     source = Lines()
     source.scope |= {"FAULT": FAULT, "not_valid": not_valid, "BadItem": BadItem}

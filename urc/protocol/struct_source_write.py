@@ -1,7 +1,7 @@
 """Struct items written by one generated function per declaration.
 
-Pure. This is the reverse of `urc.protocol.struct_source`. It supports only declarations of fixed
-items; closures handle all other items and all invalid values.
+Pure. The module is the reverse of `urc.protocol.struct_source`. Generated writers support only
+declarations of fixed items; closures handle all other items and all invalid values.
 """
 
 import struct

@@ -1,7 +1,8 @@
 """Conversion between the raw form of one struct item and its value.
 
-Pure. The closures and the slow paths of the generator share it. The raw form is the one in the
-frame. The value is that of fields and arguments: scaled, and a word if the item has an enum.
+Pure. The closures and the slow paths of the generator share this conversion. The raw form is the
+one in the frame. The value is that of fields and arguments: scaled, and a word if the item has an
+enum.
 """
 
 import struct

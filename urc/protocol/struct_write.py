@@ -1,9 +1,9 @@
 """Struct items written by closures: values → bytes.
 
-Pure. This is the reverse of `urc.protocol.struct_read`. Theory of operation: every item becomes a
-step ``(pen, scope)`` that appends its bytes. Two kinds of values leave a gap that is filled in
-later: the size of a following text (its `Gap` waits in the scope), and values that depend on the
-size of the whole frame (`Pen.late`).
+Pure. The module is the reverse of `urc.protocol.struct_read`. Theory of operation: every item
+becomes a step ``(pen, scope)`` that appends its bytes. Two kinds of values leave a gap that is
+filled in later. The `Gap` of the size of a following text waits in the scope. Values that depend on
+the size of the whole frame are in `Pen.late`.
 """
 
 from collections.abc import Callable, Mapping

@@ -20,8 +20,8 @@ class Lookup:
     """The address lookup of one host and port.
 
     The thread pool of the event loop delays the end of the program, and a resolver without a
-    network may take half a minute. So each lookup has a thread of its own. Only one lookup runs at
-    a time: a retry joins it.
+    network may take half a minute. Each lookup therefore has a thread of its own. Only one lookup
+    runs at a time: a retry joins it.
     """
 
     def __init__(self, host: str, port: int, kind: socket.SocketKind) -> None:
@@ -35,7 +35,7 @@ class Lookup:
         """Return every address of the host.
 
         Raises:
-            OSError, UnicodeError: the lookup failed. It has no timeout of its own.
+            OSError, UnicodeError: the lookup failed. The lookup has no timeout of its own.
         """
         if self._answer is None or self._answer.done():
             self._answer = _look_up(self._host, self._port, self._kind)

@@ -104,7 +104,7 @@ class _Rfc2217(RFC2217SerialTransport):
 class SerialPort(asyncio.Protocol):
     """A `ByteStream` with `unsent` and `reset`.
 
-    Without a reader, it stops reading from the port.
+    While no task reads the stream, the port is not read either.
     """
 
     def __init__(self) -> None:

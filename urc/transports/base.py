@@ -1,8 +1,8 @@
 """Interfaces of transports, and their errors.
 
 A transport carries payloads without interpreting them: bytes for streams and datagrams, envelopes
-for messages (topics, requests, calls). It translates every exception of a library into one of the
-errors below.
+for messages (topics, requests, calls). A transport translates every exception of a library into one
+of the errors below.
 
 `urc.runtime.link` is the only user; it is independent of the process in which a transport runs.
 """

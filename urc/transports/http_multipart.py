@@ -1,8 +1,8 @@
 """Parser for ``multipart/x-mixed-replace`` bodies (MJPEG). Pure: bytes in, parts out.
 
-Many cameras violate the format (RFC 2046, section 5.1). The boundary may be quoted or not, the
-header may include the two dashes of the body, a part may lack Content-Length, and lines may end in
-LF alone. The parser accepts all of these. Every piece has a bound; beyond it, the stream is
+Many cameras violate the format (RFC 2046, section 5.1). The parser accepts quoted and plain
+boundaries, and a header with the two dashes of the body. It also accepts parts without
+Content-Length, and lines that end in LF alone. Every piece has a bound; beyond it, the stream is
 invalid.
 """
 

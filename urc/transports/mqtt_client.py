@@ -1,9 +1,9 @@
 """Robots behind an MQTT broker, version 5 or 3.1.1.
 
 Theory of operation. The library paho implements the protocol; the connection is our own. Each
-`open` dials a socket and passes it to a new paho client, which lives as long as the connection. So
-no message of an earlier connection can be sent late: paho alone would keep unacknowledged messages
-and send them again. No thread is involved.
+`open` dials a socket and passes it to a new paho client, which lives as long as the connection. No
+message of an earlier connection can thus be sent late. A paho client alone would keep
+unacknowledged messages and send them again. No thread is involved.
 
 The session is always clean. The broker publishes a last will whenever the connection ends, also
 when URC closes it: an extra stop is harmless.

@@ -1,9 +1,9 @@
 """ROS 1 and ROS 2 robots behind a rosbridge server: topics, services and actions.
 
 Theory of operation. Each connection is one WebSocket of URC's own transport, with pings. The
-protocol on it is that of roslibpy (`urc.transports.rosbridge_client`). Its state ends with the
-connection, so nothing can be sent late. A task always reads, however slowly the messages are
-consumed: one stalled reader freezes the topic for every client of the bridge.
+protocol on it is that of roslibpy (`urc.transports.rosbridge_client`). The state of roslibpy ends
+with the connection, so nothing can be sent late. A task always reads, however slowly the messages
+are consumed: one stalled reader freezes the topic for every client of the bridge.
 
 A bridge delivers a first message only after its publisher has connected to the subscribers, and
 drops it when its client leaves before that. `settle` is for leaving clients: it queries rosapi,
@@ -11,9 +11,9 @@ whose reply also shows that the bridge has processed all earlier data, and waits
 connections.
 
 The bridge reports no errors: a topic without a publisher, a wrong type and an access list all cause
-silence. So rosapi is asked for the topics at the start, and for the subscribers of a topic at its
-first message; `urc.transports.ros_graph` reports mistakes. With ``version: auto``, subscriptions
-wait for that reply, which decides the form of type names.
+silence. The transport therefore asks rosapi for the topics at the start, and for the subscribers of
+a topic at its first message. `urc.transports.ros_graph` reports mistakes. With ``version: auto``,
+subscriptions wait for that reply, which decides the form of type names.
 """
 
 import asyncio

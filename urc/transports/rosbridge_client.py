@@ -1,10 +1,10 @@
 """roslibpy's part of a rosbridge connection, without its network connection.
 
-roslibpy implements the operations, their ids and pending requests. Its network connections are not
-used: they replay old messages after a reconnection, fail on binary frames, and never probe the
-other side. The figures are in docs/decisions. Here, roslibpy's protocol writes into a list, which
-the transport sends over its own socket. The transport passes received data to the protocol. One
-object serves one connection, so nothing remains for the next one.
+roslibpy implements the operations, their ids and pending requests. The network connections of
+roslibpy are not used: they replay old messages after a reconnection, fail on binary frames, and
+never probe the other side. The figures are in docs/decisions. Here, roslibpy's protocol writes into
+a list, which the transport sends over its own socket. The transport passes received data to the
+protocol. One object serves one connection, so nothing remains for the next one.
 
 No I/O, no task, no thread.
 """

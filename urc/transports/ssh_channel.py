@@ -24,7 +24,7 @@ MAX_PACKET = 32768
 _CLOSES_WITHIN_S = 1.0
 """Timeout for the exit of a program that has closed its output, in seconds."""
 _LAST_WORDS = 200
-"""Most bytes of standard error in the message about the end of a program."""
+"""Largest part of standard error in the message about the end of a program, in bytes."""
 
 
 class Channel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):

@@ -82,8 +82,8 @@ class Connection:
     async def _checked(self, host: str, port: int) -> str:
         """Return the target address for `host`; raise `OwnDoor` for the own dashboard.
 
-        An SSH server on this machine can reach all its listeners. In that case a name is looked up
-        here, once, so that the server cannot find another address for it.
+        An SSH server on this machine can reach all its listeners. For such a server, a name is
+        looked up here, once, so that the server cannot find another address.
         """
         is_near = self._is_on_this_machine()
         addresses = [host]

@@ -27,7 +27,7 @@ __all__ = ["READ_AHEAD_BYTES", "TcpListener", "TcpTransport", "from_setup"]
 
 HANDOVER_S = 6.0
 """Lifetime of a robot's connection that has replaced another one, in seconds, until the next
-`open`. It is slightly longer than the backoff between attempts."""
+`open`. The lifetime is slightly longer than the backoff between attempts."""
 _WAITING = 8
 _AGAIN_S = 0.1
 """Delay after a failed accept, in seconds."""

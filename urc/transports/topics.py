@@ -1,8 +1,8 @@
 """The bounded queue of received topic messages.
 
 A fast publisher must neither be blocked nor fill our memory: one stalled reader would freeze a
-topic for all clients. So each topic keeps its newest messages. Responses are kept separately, since
-they are not repeated.
+topic for all clients. Each topic therefore keeps its newest messages. Responses are kept
+separately, since they are not repeated.
 """
 
 import asyncio

@@ -105,7 +105,7 @@ class StreamDecoder:
 
     @property
     def deadline(self) -> float | None:
-        """None: only bytes complete a frame."""
+        """Always None, because only bytes complete a frame."""
         return None
 
     def push(self, data: bytes, now: float = 0.0) -> None:

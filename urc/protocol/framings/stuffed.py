@@ -1,6 +1,6 @@
 """Byte stuffing: ``slip`` (RFC 1055) and ``cobs`` (Cheshire and Baker, 1999).
 
-Both remove one byte value from the payload, which then ends the frame.
+Both framings remove one byte value from the payload, which then ends the frame.
 """
 
 import re
@@ -19,7 +19,7 @@ _END, _ESCAPE = b"\xc0", b"\xdb"
 _ESCAPED_END, _ESCAPED_ESCAPE = b"\xdb\xdc", b"\xdb\xdd"
 _BAD_ESCAPE: Final = re.compile(rb"\xdb(?![\xdc\xdd])")
 _BLOCK: Final = 254
-"""Most non-zero bytes after one code byte of COBS."""
+"""Largest number of non-zero bytes after one code byte of COBS."""
 
 
 class SlipFraming(NamedTuple):
