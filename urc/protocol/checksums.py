@@ -50,7 +50,7 @@ class Checksum:
     def right(self, frame: bytes | bytearray, window: bytes) -> bytes | None:
         """Return the required checksum bytes, computed over `window`.
 
-        The result is None if the salt is unknown, and the frame is accepted unchecked.
+        With an unknown salt, the result may be None: the frame is then accepted unchecked.
         """
         data = window
         if self.spec.is_from_hex:
