@@ -37,7 +37,7 @@ PROGRAMS = {
     "browser_widgets": "chromium",
     "motion_input": "chromium",
 }
-"""Benchmark → the program beside Python that it needs, as the tests name it."""
+"""Benchmark → the program that it needs in addition to Python, by its name in the tests."""
 
 
 def main() -> int:

@@ -10,12 +10,12 @@ from bench.peers.robot import MODULUS, START
 __all__ = ["LEAST_SHARE", "TooFew", "ages"]
 
 LEAST_SHARE = 0.5
-"""Of what the robot told; below it nothing is said."""
+"""Smallest share of the robot's values for a valid measurement."""
 FIRST_S = 20.0
 MODULUS_MS = MODULUS / 10
-# The text counts that was laid out in a frame: a page that writes outside of frames may change it
-# before it is read. An observer of sizes is called after the callbacks of a frame and before it is
-# drawn. A message that it posts arrives after drawing; then the age is taken.
+# The text in the layout of a frame counts, because a page that writes outside of frames may change
+# it before it is read. An observer of sizes runs after the callbacks of a frame and before drawing.
+# Its message arrives after drawing; then the age is measured.
 WATCH = """
 async (seconds) => {
   const isClock = (text) => /^[0-9]{10}$/.test(text);
@@ -68,7 +68,7 @@ async (seconds) => {
 
 
 class TooFew(Exception):
-    """A page did not show enough of what the robot told."""
+    """A page that showed too few of the robot's values."""
 
 
 async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:

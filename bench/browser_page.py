@@ -1,7 +1,7 @@
-"""A page in a real Chromium, and what is measured of it: ages of values, frames, time spent.
+"""A page in a real Chromium, with measurements: ages of values, frames, processor time.
 
-Ages are taken by one clock, the machine's monotonic one: robots tell it (``peers/robot.py``), and
-the browser says when its page began by it.
+Ages use one clock, the machine's monotonic clock. Robots send its time (``peers/robot.py``), and
+the browser reports the start of its page in it.
 """
 
 import asyncio
@@ -43,7 +43,7 @@ transports:
   wire:
     {{ type: tcp, host: 127.0.0.1, port: {port}, framing: {{ type: delimiter, tx: LF, rx: LF }} }}
 """
-# A page that is looked at twice counts already: a second counter would count each frame again.
+# A page that is opened twice already counts: a second counter would count each frame again.
 COUNT = """
 () => {
   if (window.benchFrames !== undefined) return;
@@ -56,26 +56,26 @@ COUNT = """
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """A page, and the browser's own word about it."""
+    """A page, and its debugging connection."""
 
     page: Page
     line: CDPSession
     origin_ms: float
-    """When the page began, by the monotonic clock."""
+    """Start of the page, on the monotonic clock, in milliseconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """What the frames of a page cost."""
+    """Cost of the frames of a page."""
 
     fps: float
     frame_ms: float
-    """Time of the main thread for each frame."""
+    """Time of the main thread for each frame, in milliseconds."""
 
 
 @contextmanager
 def peer(script: str, *arguments: object) -> Iterator[int]:
-    """Run a program of ``peers/``; give the port that it tells."""
+    """Run a program of ``peers/``; yield its port."""
     command = [sys.executable, "-P", str(HERE / "peers" / script), *map(str, arguments)]
     with Program(command) as program:
         yield int(program.wait_for("ready", 30.0)[1])
@@ -87,7 +87,7 @@ def served(robot_port: int, document: str, work: Path) -> Iterator[str]:
 
     Args:
         robot_port: where the robot listens.
-        document: what the profile says beside its name and its transport.
+        document: the profile without its name and its transport.
         work: a folder for it.
     """
     file = work / "bench.yaml"
@@ -98,7 +98,7 @@ def served(robot_port: int, document: str, work: Path) -> Iterator[str]:
 
 @asynccontextmanager
 async def opened(browser: Browser, address: str, *, script: str = "") -> AsyncIterator[Opened]:
-    """Open a page by itself; `script` runs before its own."""
+    """Open a page in a new context; `script` runs before the page's scripts."""
     context = await browser.new_context(
         locale="en-GB", viewport={"width": SIZE[0], "height": SIZE[1]}
     )
@@ -153,7 +153,7 @@ async def _metrics(line: CDPSession) -> dict[str, float]:
 
 
 def kept(name: str, costs: Sequence[Cost], *, of: Mapping[str, str] | None = None) -> Result:
-    """Return whether a page kept its frames: how long one took, against the longest allowed."""
+    """Return the time of a frame, relative to the longest allowed time."""
     periods = sorted(1000 / cost.fps for cost in costs)
     most = 1000 / LEAST_FPS
     middle = periods[len(periods) // 2]
@@ -170,5 +170,5 @@ def kept(name: str, costs: Sequence[Cost], *, of: Mapping[str, str] | None = Non
 
 
 def at_share(ordered: Sequence[float], share: float) -> float:
-    """Return the value below which a share of all lies."""
+    """Return the quantile of the values."""
     return round(ordered[min(len(ordered) - 1, int(len(ordered) * share))], 3)

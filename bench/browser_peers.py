@@ -1,9 +1,9 @@
-"""How old a value is when it is shown: URC beside a page by hand, Node-RED and NiceGUI.
+"""Ages of shown values: URC against a hand-written page, Node-RED and NiceGUI.
 
-One robot tells its clock 50 times a second, over TCP, to each of the four. A real Chromium opens
-each in turn; in every frame, after it was drawn, the value on the screen is looked at, and when it
-is a new one its age is taken. The others come from npm and PyPI when they are first asked for;
-where they cannot be brought they are left out, and told.
+One robot sends its clock 50 times a second, over TCP, to each of the four. A real Chromium opens
+each in turn. After the drawing of every frame, the age of a new value on the screen is measured.
+The other dashboards come from npm and PyPI at their first use. Missing ones are left out, with a
+message.
 """
 
 import asyncio
@@ -61,7 +61,7 @@ Ages = dict[str, list[list[float]]]
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Compare the medians and the slowest hundredth."""
+    """Compare the medians and the 99th percentiles."""
     seconds = LOOK_IF_FULL_S if full else LOOK_S
     rounds = ROUNDS_IF_FULL if full else ROUNDS
     with ExitStack() as stack, tempfile.TemporaryDirectory(prefix="urc-bench-") as folder:
@@ -101,7 +101,7 @@ async def _look_all(addresses: Mapping[str, str], seconds: float, rounds: int) -
 
 
 async def _look(browser: Browser, address: str, seconds: float) -> list[float]:
-    """Return the ages in one look; one that was disturbed is taken again."""
+    """Return the ages of one measurement; repeat a disturbed one."""
     for tries_left in reversed(range(TRIES)):
         async with opened(browser, address) as one:
             await ages(one, SETTLE_S, 0.0)  # it shows values: what it does at its start is over
@@ -202,7 +202,7 @@ def _in(folder: Path) -> list[str]:
 
 
 def _answers(port: int) -> None:
-    """Wait until somebody listens there."""
+    """Wait until the port accepts connections."""
     end_s = time.monotonic() + START_S
     while True:
         try:

@@ -1,9 +1,8 @@
 """Sixty widgets that receive ten thousand values a second: the number of frames.
 
-Real widgets with a real server behind them; also with the page's processor slowed six times, as on
-an old phone. When a frame has no time for all sixty, widgets take turns
-(``static/widgets/pace.js``): each is drawn with its newest value in every twentieth frame or more
-often.
+Real widgets show values of a real server, also with the page's processor slowed six times, as on an
+old phone. When a frame is too short for all sixty, widgets take turns (``static/widgets/pace.js``).
+Each is drawn with its newest value in every twentieth frame or more often.
 """
 
 import asyncio
@@ -24,7 +23,7 @@ LOOK_S, LOOK_IF_FULL_S = 3.0, 8.0
 ROUNDS, ROUNDS_IF_FULL = 2, 9
 COLUMNS, ROWS = 10, 6
 EVERY = 3
-"""So many signals apart are the ones that are shown; the page is sent all of them."""
+"""Distance of the shown signals; the page receives only shown signals."""
 KINDS = (
     ("value", "value", ""),
     ("gauge", "value", "V"),
@@ -38,7 +37,7 @@ KINDS = (
     ("compass", "heading", "deg"),
 )
 """Widget, input, unit."""
-# A cell that cannot be seen is not drawn: all sixty have to be, and to say something.
+# A hidden cell is not drawn, so all sixty must be visible and live.
 READY = """
 (count) => {
   const cells = [...document.querySelectorAll(".urc-grid [data-config]")];

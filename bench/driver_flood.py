@@ -1,6 +1,7 @@
-"""What a flood of lines costs over a real socket, against a driver written by hand.
+"""Cost of a flood of lines over a real socket, against a hand-written driver.
 
-CPU time of this process from asking for the lines until the newest value of each is kept.
+It is the CPU time of this process, from the request until the newest value of each signal is
+stored.
 """
 
 import asyncio
@@ -20,10 +21,10 @@ WARM_UP = 1000
 
 
 class Driver(Protocol):
-    """What all of them can do."""
+    """The interface of all drivers."""
 
     async def flood(self, count: int) -> None:
-        """Ask for `count` lines, and return when all have come."""
+        """Request `count` lines, and return when all have arrived."""
 
 
 async def _measure(driver: Driver) -> float:

@@ -1,17 +1,17 @@
-"""A driver by hand for the robot of `bench.driver_robot`: what people write without URC.
+"""A hand-written driver for the robot of `bench.driver_robot`, as people write it without URC.
 
-It is tidy, and has what every driver of a real robot needs, as URC has:
+It is tidy, and has the parts that every driver of a real robot needs, as URC has:
 
-- a speed is clamped, and what is no number is refused: `max` and `min` would make it full speed;
-- readings are taken at any time, asked for or not, and the newest of every signal is kept; values
-  that are out of range or no finite numbers are none, and lines that are none are counted;
-- an answer is waited for with a time-out; one that comes too late is not taken for the next one's,
-  and one that never comes does not shift all that follow;
-- nothing grows without a bound: neither a line without an end, nor the requests that wait, nor what
-  is to be written;
-- when the line is lost, whoever waits is told at once.
+- A speed is clamped, and a value that is not a number is refused: `max` and `min` would turn it
+  into full speed.
+- Readings are accepted at any time, and the newest of every signal is stored. Values out of range
+  or not finite are dropped, and invalid lines are counted.
+- A request has a timeout. A late reply is not used for the next request, and a missing reply does
+  not shift all later ones.
+- Every buffer has a limit: unterminated lines, pending requests, and output.
+- When the connection is lost, all pending requests fail at once.
 
-What URC does beyond (states of the line, reconnecting, alarms, priorities) it does not.
+It lacks the other features of URC, such as link states, reconnecting, alarms and priorities.
 """
 
 import asyncio
@@ -25,18 +25,18 @@ __all__ = ["StreamDriver"]
 
 REPLY_S = 1.0
 LATE_S = 2 * REPLY_S
-"""After that an answer is not expected any more."""
+"""Time after which a reply is no longer expected, in seconds."""
 MOST_WAITING = 256
 MOST_LINE = 8192
 MOST_UNSENT = 262_144
 
 
 def read(line: bytes, now: float) -> list[Sample] | None:
-    """Return the samples of a line, or None for what is none."""
+    """Return the samples of a line, or None for an invalid line."""
     parts = line.split(b" ")
     kind = parts[0]
     if b"_" in line:
-        return None  # Python alone would take it for part of a number
+        return None  # Python would accept it as part of a number
     try:
         if kind == b"BAT":
             volts, percent = float(parts[1]), int(parts[2])
@@ -74,17 +74,17 @@ def read(line: bytes, now: float) -> list[Sample] | None:
 
 
 class _Robot:
-    """What both drivers know of the robot, and who waits for it."""
+    """The robot's values and the pending requests, shared by both drivers."""
 
     def __init__(self) -> None:
         self.latest: dict[str, Sample] = {}
         self.faults = 0
         self._waiting: deque[tuple[asyncio.Future[list[Sample]], float]] = deque()
-        """Who waits for an odometry line, and since when."""
+        """Futures that wait for an odometry line, with their start times."""
         self.done = asyncio.Event()
 
     def take(self, line: bytes, now: float) -> None:
-        """Keep the readings of a line, answer whoever waits."""
+        """Store the readings of a line, and complete a pending request."""
         samples = read(line, now)
         if samples is None:
             self.faults += 1
@@ -104,10 +104,10 @@ class _Robot:
                 answer.set_result(samples)
                 return
             if now - since < LATE_S:
-                return  # it has timed out, and this is its answer
+                return  # the reply to a request that has timed out
 
     def ask(self) -> asyncio.Future[list[Sample]]:
-        """Return what will be the next odometry line that nobody else waits for."""
+        """Return a future for the next odometry line."""
         if len(self._waiting) >= MOST_WAITING:
             raise ConnectionError("too many requests wait for their answers")
         answer: asyncio.Future[list[Sample]] = asyncio.get_running_loop().create_future()
@@ -115,7 +115,7 @@ class _Robot:
         return answer
 
     def lost(self) -> None:
-        """Tell whoever waits that the line is gone."""
+        """Fail all pending requests."""
         while self._waiting:
             answer, _ = self._waiting.popleft()
             if not answer.done():
@@ -124,7 +124,7 @@ class _Robot:
 
 
 def request(vx: float, wz: float) -> bytes:
-    """Return the frame of a speed, clamped; raise `ValueError` when it is no number."""
+    """Return the frame of a clamped speed; raise `ValueError` for an invalid number."""
     if not isfinite(vx + wz):
         raise ValueError("a speed must be a finite number")
     vx = max(-1.0, min(1.0, vx))
@@ -133,7 +133,7 @@ def request(vx: float, wz: float) -> bytes:
 
 
 class StreamDriver:
-    """On `StreamReader` and `StreamWriter`: what most people write, with a task that reads."""
+    """A driver on `StreamReader` and `StreamWriter` with a reader task, as most people write it."""
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._robot = _Robot()
@@ -153,16 +153,16 @@ class StreamDriver:
 
     @property
     def faults(self) -> int:
-        """Lines that were none."""
+        """Number of invalid lines."""
         return self._robot.faults
 
     async def _read(self) -> None:
-        """Keep the readings, answer whoever waits."""
+        """Store the readings, and complete pending requests."""
         try:
             while True:
                 try:
                     line = await self._reader.readline()
-                except ValueError:  # too long; the reader has dropped it
+                except ValueError:  # too long, and already dropped by the reader
                     self._robot.faults += 1
                     continue
                 if not line:
@@ -174,7 +174,7 @@ class StreamDriver:
             self._robot.lost()
 
     async def drive(self, vx: float, wz: float) -> dict[str, object]:
-        """Send a speed, return what the robot answers."""
+        """Send a speed, and return the robot's reply."""
         self._writer.write(request(vx, wz))
         answer = self._robot.ask()
         async with asyncio.timeout(REPLY_S):
@@ -183,7 +183,7 @@ class StreamDriver:
         return {sample.signal: sample.value for sample in samples}
 
     async def flood(self, count: int) -> None:
-        """Ask for `count` lines, and return when all have come."""
+        """Request `count` lines, and return when all have arrived."""
         self._robot.done.clear()
         self._writer.write(b"FLOOD %d\n" % count)
         async with asyncio.timeout(60):
@@ -191,6 +191,6 @@ class StreamDriver:
             await self._robot.done.wait()
 
     async def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._task.cancel()
         self._writer.close()

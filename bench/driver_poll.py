@@ -1,7 +1,7 @@
-"""What a request and its reply cost over a real socket, against a driver written by hand.
+"""Cost of a request and its reply over a real socket, against a hand-written driver.
 
-CPU time of this process: the robot is another one, the same for all. Each round connects anew, and
-asks `TIMES` times after a warm-up.
+It is the CPU time of this process; the robot is another process, the same for all. Each round opens
+a new connection, and sends `TIMES` requests after a warm-up.
 """
 
 import asyncio
@@ -22,10 +22,10 @@ ANSWER = {"x": 1.25, "y": -0.337, "heading": 90.5}
 
 
 class Driver(Protocol):
-    """What all of them can do."""
+    """The interface of all drivers."""
 
     async def drive(self, vx: float, wz: float) -> dict[str, object]:
-        """Send a speed, return what the robot answers."""
+        """Send a speed, and return the robot's reply."""
 
 
 async def _measure(driver: Driver) -> float:

@@ -1,7 +1,7 @@
-"""The robot of `driver_poll` and `driver_flood`: a process of its own, so its work is not measured.
+"""The robot of `driver_poll` and `driver_flood`, in a separate process that is not measured.
 
 ``python -m bench.driver_robot`` prints its port. It answers ``VEL …`` with an odometry line, and
-``FLOOD n`` with n lines of a mix and ``OK n`` behind them. It ends with its standard input.
+``FLOOD n`` with n mixed lines and ``OK n``. It ends with its standard input.
 """
 
 import os
@@ -25,12 +25,12 @@ ODOMETRY = LINES[1] + b"\n"
 
 @contextmanager
 def robot(*, is_beside: bool) -> Iterator[int]:
-    """Run the robot for as long as the context lasts; give its port.
+    """Run the robot during the context; yield its port.
 
     Args:
-        is_beside: it has the processor of whoever drives it, where the system has a say. On another
-            one, an answer comes now before and now after the driver goes to sleep; how often, and
-            what waking up costs on this machine, would decide the figure instead of the work.
+        is_beside: whether it shares the processor of the driver, if the system allows that. On
+            another processor, a reply sometimes arrives before and sometimes after the driver
+            sleeps. Then the cost of waking up would decide the figure, instead of the work.
     """
     allowed = (
         os.sched_getaffinity(0) if is_beside and hasattr(os, "sched_getaffinity") else set[int]()
@@ -81,7 +81,7 @@ def _main() -> None:
             threading.Thread(target=_serve, args=(line,), daemon=True).start()
 
     threading.Thread(target=accept, daemon=True).start()
-    sys.stdin.read()  # ends with whoever started this
+    sys.stdin.read()  # ends with the parent process
 
 
 if __name__ == "__main__":

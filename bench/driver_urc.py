@@ -1,4 +1,4 @@
-"""The same driver as in `bench.driver_hand`, declared, and run as URC runs it for an operator."""
+"""The driver of `bench.driver_hand` as a declaration, run as URC runs it for an operator."""
 
 import tempfile
 from collections.abc import AsyncIterator
@@ -58,7 +58,7 @@ commands:
 
 
 def profile() -> Profile:
-    """Return the profile, loaded from its document as any other."""
+    """Return the profile, loaded from its document."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bench.yaml"
         path.write_text(DOCUMENT, encoding="utf-8")
@@ -66,23 +66,23 @@ def profile() -> Profile:
 
 
 class DeclaredDriver:
-    """A session with the interface of the drivers by hand."""
+    """A session with the interface of the hand-written drivers."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
         self.hub = session.hub
 
     async def drive(self, vx: float, wz: float) -> dict[str, object]:
-        """Send a speed, return what the robot answers."""
+        """Send a speed, and return the robot's reply."""
         return dict((await self._session.command("drive", {"vx": vx, "wz": wz})).values)
 
     async def flood(self, count: int) -> None:
-        """Ask for `count` lines, and return when all have come."""
+        """Request `count` lines, and return when all have arrived."""
         await self._session.command("flood", {"count": count})
 
 
 @asynccontextmanager
 async def declared(loaded: Profile, port: int) -> AsyncIterator[DeclaredDriver]:
-    """Open a session on the robot at `port`; the first command waits for the line."""
+    """Open a session on the robot at `port`; the first command waits for the connection."""
     async with Session(loaded, {"port": port}, built_in_catalog().transports) as session:
         yield DeclaredDriver(session)

@@ -1,7 +1,7 @@
-"""What a binary frame costs: 24 bytes, 8 fields, CRC, against tidy code written by hand.
+"""Cost of a binary frame of 24 bytes, 8 fields and a CRC, against tidy hand-written code.
 
-Both take a frame from its bytes to a mapping of named, scaled values, and back. The declaration is
-the one a profile would have; the code by hand is what its author would have written instead, with
+Both convert a frame from its bytes to a mapping of named, scaled values, and back. The declaration
+is that of a normal profile. The hand-written code is what an author would write without URC. It has
 one precompiled `struct.Struct` and the CRC of the standard library, which is C.
 """
 
@@ -68,7 +68,7 @@ VALUES: Mapping[str, object] = {
     "fault": "over_voltage",
 }
 FRAMES = 10
-"""In one piece, as they come from a fast line."""
+"""Number of frames in one piece, as from a fast connection."""
 LAYOUT = Struct(">BhhihihIB")
 FAULTS = {0: "none", 1: "over_voltage", 2: "under_voltage"}
 FAULT_NUMBERS = {name: number for number, name in FAULTS.items()}
@@ -104,13 +104,13 @@ def driver_of(text: str) -> Driver:
 
 
 class ByHand:
-    """What takes the frames out of a stream by hand, and makes samples of each."""
+    """A hand-written decoder, from a stream to the samples of each frame."""
 
     def __init__(self) -> None:
         self._left = b""
 
     def receive(self, data: bytes, now: float) -> list[Sample]:
-        """Return the samples of the frames that are whole now."""
+        """Return the samples of the complete frames."""
         data = self._left + data if self._left else data
         samples: list[Sample] = []
         start = 0
@@ -167,7 +167,7 @@ def run(*, full: bool = False) -> Sequence[Result]:
             _seconds(decode, data),
         ),
         (
-            # From the bytes of the wire to the samples, framing included on both sides.
+            # From bytes to samples, with framing on both sides.
             Goal("engine_binary: bytes to samples, a frame at a time / by hand", 1.4),
             _seconds(lambda data: hand.receive(data, 1.0), data),
             _seconds(lambda data: engine.receive("wire", data, 1.0), data),
@@ -192,7 +192,7 @@ def run(*, full: bool = False) -> Sequence[Result]:
 def _seconds(
     function: Callable[..., object], argument: object, times: int = 20_000
 ) -> Callable[[], float]:
-    """Return what measures so many calls, in seconds of this process."""
+    """Return a function that measures so many calls, in seconds of this process."""
 
     def measure() -> float:
         began = time.process_time()

@@ -1,6 +1,6 @@
 """A bare loop of sends, the baseline of `fanout`: ``fan_plain.py CLIENTS SIZE FRAMES RATE``.
 
-It accepts the clients, answers each with a status of 101, and sends a frame to each at the rate. It
+It accepts the clients, answers each with status 101, and sends a frame to each at the rate. It
 knows no values. It prints its port, and at the end its processor time in seconds.
 """
 

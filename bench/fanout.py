@@ -1,8 +1,8 @@
-"""Two hundred values to 50 pages: URC beside a bare loop of sends.
+"""Two hundred values to 50 pages: URC against a bare loop of sends.
 
-The figure is the processor time of the server, the readings and their encoding included. The pages
-are another process, and so is the robot that wakes the server. The loop sends as many bytes to as
-many pages, and knows neither values nor WebSockets.
+The figure is the processor time of the server, with the readings and their encoding. The pages are
+in another process, and so is the robot that wakes the server. The loop sends the same number of
+bytes to the same number of pages, and knows neither values nor WebSockets.
 """
 
 import subprocess
@@ -29,7 +29,7 @@ CLIENTS = 50
 GOAL = 2.5
 FAN_S = 60
 
-# As cheap as a reading can be: what drivers spend on them, other benchmarks say.
+# The cheapest way to make a reading, because other benchmarks measure the drivers.
 _sample = partial(tuple.__new__, Sample)
 
 
@@ -48,7 +48,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 async def _urc(clients: int, ticks: int) -> tuple[float, int]:
-    """Return the processor time, and how many bytes a page got a tick."""
+    """Return the processor time, and the bytes per page and tick."""
     signals = {f"s{place}": Signal(f"s{place}") for place in range(CHANNELS)}
     robot = FakeRobot(dashboard_profile(signals=signals, uses=[]))
     app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, access=ACCESS)

@@ -1,7 +1,7 @@
-"""Pages that do not keep up, and what they cost the others: twenty, two of which read nothing.
+"""Cost of slow pages for the others: of twenty pages, two read nothing.
 
-One more reads a quarter of what comes. Beside URC stands a server that keeps a queue for each page,
-without a bound, and sends from it: what the slow page then reads is as old as its queue is long.
+One more page reads a quarter of its data. The baseline is a server with an unbounded queue for each
+page. The age of the data at its slow page grows with the queue.
 """
 
 import asyncio
@@ -33,7 +33,7 @@ CHANNELS, RATE_HZ = 600, 50
 HEALTHY, STOPPED = 17, 2
 SLOW_SHARE = 0.25
 FRAME_BYTES = 7000
-"""About what a frame of all channels is."""
+"""Approximate size of a frame of all channels."""
 LOOK_S, LOOK_IF_FULL_S = 15.0, 30.0
 WARM_S = 3.0
 MISSED_GOAL, GROWTH_MB, AGE_GOAL = 0.01, 2.0, 0.06
@@ -41,26 +41,26 @@ READY_S = 20.0
 
 
 class Look(NamedTuple):
-    """What was seen in one run."""
+    """Measurements of one run."""
 
     ticks: int
     healthy: int
-    """Frames of the healthy page that got fewest."""
+    """Frames of the healthy page with the fewest frames."""
     age_ms: float
-    """Of what the slow page read, in the last quarter."""
+    """Age of the data at the slow page in the last quarter, in milliseconds."""
     growth_mb: float
-    """Of the server's memory, after its start."""
+    """Growth of the server's memory after its start, in MB."""
 
 
 class Naive:
-    """A queue for each page, without a bound."""
+    """An unbounded queue for each page."""
 
     def __init__(self) -> None:
         self.queues: set[asyncio.Queue[str]] = set()
         self.app: ASGIApp = Starlette(routes=[WebSocketRoute("/ws", self.page)])
 
     async def page(self, line: WebSocket) -> None:
-        """Send one page all there is."""
+        """Send the queue of one page."""
         queue: asyncio.Queue[str] = asyncio.Queue()
         await line.accept()
         self.queues.add(queue)
@@ -68,12 +68,12 @@ class Naive:
             while text := await queue.get():
                 await line.send_text(text)
         except (WebSocketDisconnect, RuntimeError):
-            return  # it is gone, or was cut off
+            return  # the page has closed or was cut off
         finally:
             self.queues.discard(queue)
 
     def tick(self, number: int) -> None:
-        """Give every page all values."""
+        """Queue all values for every page."""
         values = {
             "t": "v",
             "n": round(time.monotonic() * 1000),
@@ -86,13 +86,13 @@ class Naive:
             queue.put_nowait(text)
 
     def end(self) -> None:
-        """Let all pages go."""
+        """Disconnect all pages."""
         for queue in self.queues:
             queue.put_nowait("")
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Compare the age at the slow page with that of queues without a bound."""
+    """Compare the age at the slow page with that of unbounded queues."""
     seconds = LOOK_IF_FULL_S if full else LOOK_S
     ours = asyncio.run(_urc(seconds))
     naive = Naive()
@@ -156,7 +156,7 @@ async def _look(
             said = await asyncio.wait_for(pages.stdout.readline(), READY_S)
             if said.strip() != b"ready":
                 raise SystemExit("bench: the pages did not come up")
-            await asyncio.sleep(0.2)  # what every page is told at first
+            await asyncio.sleep(0.2)  # the first state of every page
             ticks, growth_mb = await _play(tick, seconds)
             pages.stdin.close()
             told = json.loads(await _in_time(pages.stdout.readline()))
@@ -176,7 +176,7 @@ async def _in_time(reading: Awaitable[bytes]) -> bytes:
 
 
 async def _play(tick: Callable[[int], None], seconds: float) -> tuple[int, float]:
-    """Tell values; return how often, and by how much the memory grew after its start."""
+    """Send values; return the number of ticks, and the growth of the memory after its start."""
     began_s = time.monotonic()
     number, before = 0, 0.0
     while (passed_s := time.monotonic() - began_s) < seconds:

@@ -1,7 +1,7 @@
-"""Figures of a run: printed as JSON, one line each, and written into the documentation if wanted.
+"""Figures of a run: printed as JSON, one line each, and optionally written into the documentation.
 
-`./dev bench --full --write-docs` puts those of the motion benchmarks into docs/motion.md, between
-the marks that stand there.
+`./dev bench --full --write-docs` writes those of the motion benchmarks into docs/motion.md, between
+the marks there.
 """
 
 import json
@@ -17,17 +17,17 @@ BARS = 40
 """Longest bar of a histogram, in characters."""
 
 told: list[dict[str, object]] = []
-"""What was told in this run."""
+"""Figures of this run."""
 
 
 def tell(figures: Mapping[str, object]) -> None:
-    """Print figures, and keep them."""
+    """Print and store figures."""
     told.append(dict(figures))
     print(json.dumps(figures), flush=True)
 
 
 def distribution(times_ms: Sequence[float], bin_ms: float) -> dict[str, object]:
-    """Return the quantiles of times, and their histogram: from how many ms on → how many."""
+    """Return the quantiles of times, and their histogram: lower bound in ms → count."""
     times = sorted(one for one in times_ms if one < inf)
     if not times:
         return {}
@@ -46,7 +46,7 @@ def distribution(times_ms: Sequence[float], bin_ms: float) -> dict[str, object]:
 
 
 def write_docs(page: Path = PAGE) -> None:
-    """Put what was told into the page; what was not measured in this run stays as it was."""
+    """Write the figures of this run into the page; older figures of other benchmarks stay."""
     text = page.read_text("utf-8")
     for kind in sorted({str(one["figure"]) for one in told if "figure" in one}):
         rows = [one for one in told if one.get("figure") == kind]

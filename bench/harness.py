@@ -1,6 +1,6 @@
-"""How URC measures: baseline and subject in turn, the median of the ratios pair by pair.
+"""How URC measures: baseline and subject in turn, and the median of the ratios of each pair.
 
-Machines are noisy and drift; a ratio inside one run holds where a time does not.
+Machines are noisy and drift; a ratio inside one run is stable, unlike a time.
 """
 
 import json
@@ -18,7 +18,7 @@ PROCESS_TIMEOUT_S = 60
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What a benchmark is held to."""
+    """The goal of a benchmark."""
 
     name: str
     """Subject / baseline."""
@@ -27,7 +27,7 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """One ratio and what it came from."""
+    """One ratio and its measurements."""
 
     name: str
     ratio: float
@@ -36,7 +36,7 @@ class Result:
     baseline_ms: float
     subject_ms: float
     spread: float
-    """Slowest baseline round over its median: above 2 the machine was busy."""
+    """Slowest baseline round over its median; above 2, the machine was busy."""
     rounds: int
     versions: Mapping[str, str] = field(default_factory=dict)
 
@@ -50,9 +50,9 @@ def process_seconds(command: Sequence[str]) -> float:
     """Run a command to its end and return its wall time in seconds.
 
     Raises:
-        SystemExit: it failed, or took longer than `PROCESS_TIMEOUT_S`: there is nothing to compare.
+        SystemExit: it failed, or took longer than `PROCESS_TIMEOUT_S`.
     """
-    # Where this is set nothing is ever compiled for good, and what is timed is Python's compiler.
+    # With this variable, nothing stays compiled, and Python's compiler would be measured.
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     began = time.perf_counter()
     try:
@@ -107,7 +107,7 @@ def compare_all(
 
 
 def report(results: Sequence[Result]) -> int:
-    """Print a line per result as JSON; return 1 when a goal was missed."""
+    """Print each result as a line of JSON; return 1 after a missed goal."""
     for result in results:
         print(json.dumps({**asdict(result), "met": result.is_met}))
     return int(not all(result.is_met for result in results))

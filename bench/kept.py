@@ -1,7 +1,7 @@
-"""What a long run has counted so far, so that one that was broken off goes on where it was.
+"""Stored rows of a long run, so that an interrupted run can continue.
 
-One file a benchmark, in the user's cache; a run that is whole takes it away, so the next one begins
-with nothing. What was counted by other code does not count.
+Each benchmark has one file in the user's cache. A complete run deletes it. Rows of other code do
+not count.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ class Kept:
     """The rows of one benchmark."""
 
     def __init__(self, name: str) -> None:
-        """Take up what an earlier run of the same code has left."""
+        """Load the rows of an earlier run of the same code."""
         cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "urc-bench")
         cache.mkdir(parents=True, exist_ok=True)
         self._file = cache / f"{name}-{_code()}.jsonl"
@@ -28,19 +28,19 @@ class Kept:
         self.rows: list[Mapping[str, object]] = [json.loads(line) for line in lines]
 
     def add(self, row: Mapping[str, object]) -> None:
-        """Keep a row."""
+        """Store a row."""
         self.rows.append(row)
         with self._file.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
 
     def end(self) -> Sequence[Mapping[str, object]]:
-        """Return the rows of a run that is whole; the next one begins anew."""
+        """Return the rows of a complete run, and delete them from the cache."""
         self._file.unlink(missing_ok=True)
         return self.rows
 
 
 def _code() -> str:
-    """Return a name for the code that is measured."""
+    """Return a name for the measured code."""
     total = hashlib.sha256()
     for file in sorted((_ROOT / "urc").rglob("*.py")):
         total.update(file.read_bytes())

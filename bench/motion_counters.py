@@ -1,7 +1,7 @@
-"""Numbers of held motion over UDP, beside polls, a keepalive and another control.
+"""Counters of held motion over UDP, together with polls, a keepalive and another control.
 
-Gestures of 5 to 60 s, side by side; judged at the socket that receives: gapless, rising, and a stop
-last. A run that is broken off goes on where it was.
+Gestures of 5 to 60 s run in parallel. The receiving socket checks that the counters have no gap,
+only rise, and end with a stop. An interrupted run can continue.
 """
 
 import asyncio
@@ -22,7 +22,7 @@ SHORTEST_S, LONGEST_S, LONGEST_IF_FULL_S = 5.0, 10.0, 60.0
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Hold until as many gestures have counted as are wanted."""
+    """Run gestures until enough have counted."""
     wanted, lanes = (GESTURES_IF_FULL, LANES_IF_FULL) if full else (GESTURES, LANES)
     longest_s = LONGEST_IF_FULL_S if full else LONGEST_S
     dice = random.Random(5)  # noqa: S311 - the same gestures in every run

@@ -1,9 +1,9 @@
-"""What comes through when a robot's link was cut while it was driven: on every kind of line.
+"""Motion after a cut of a robot's link while it is driven, on every kind of transport.
 
-Real programs on both sides of a relay between two network namespaces: `urc serve` with its guards,
-and robots, brokers and log-in servers. Each robot's own link is cut, for times that are spread
-evenly over their logarithm, at different moments for each; every second control is let go within.
-Needs root and /dev/net/tun; otherwise left out, and told.
+Real programs run on both sides of a relay between two network namespaces: `urc serve` with its
+guards, and robots, brokers and login servers. The link of each robot is cut at different moments.
+The lengths of the cuts are spread evenly over their logarithm. Every second control is released
+during the cut. It needs root and /dev/net/tun; otherwise it is left out, with a message.
 """
 
 import json
@@ -24,14 +24,14 @@ __all__ = ["run"]
 
 EACH, EACH_IF_FULL = 8, 200
 LANES, LANES_IF_FULL = 2, 6
-"""Robots of each kind, all at once."""
+"""Number of robots of each kind, all in parallel."""
 SHORTEST_S = 0.2
 LONGEST_S, LONGEST_IF_FULL_S = 3.0, 60.0
 BIN_MS = 10
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Cut; the worst of each kind is held to its bounds."""
+    """Cut the links; compare the worst result of each kind with its bounds."""
     if not can_relay():
         print(json.dumps({"left_out": "motion_cuts: needs root and /dev/net/tun"}))
         return []
@@ -52,7 +52,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def _spread(count: int, longest_s: float, dice: random.Random) -> list[tuple[float, float]]:
-    """Return times in any order, each with the part of it after which a control is let go."""
+    """Return times in random order, each with the share after which a control is released."""
     ratio = longest_s / SHORTEST_S
     times = [SHORTEST_S * ratio ** (place / (count - 1)) for place in range(count)]
     dice.shuffle(times)
@@ -60,7 +60,7 @@ def _spread(count: int, longest_s: float, dice: random.Random) -> list[tuple[flo
 
 
 def _lane(rig: CutRig, lane: int, plan: list[tuple[float, float]]) -> list[Cut]:
-    """Do what is left of the plan, with others at it; a cut that says nothing is done again."""
+    """Run the rest of the plan, in parallel with others; repeat an invalid cut."""
     cuts: list[Cut] = []
     while True:
         try:
@@ -96,7 +96,7 @@ def _told(kind: str, cuts: Sequence[Cut], wanted: int) -> Result:
     is_whole = len(said) >= wanted and not any(one.fault for one in said)
     worst = max(oldest, slowest) if is_whole else inf
     return Result(
-        name=f"motion after cuts of {kind}: worst of {len(said)} / what is allowed",
+        name=f"motion after cuts of {kind}: worst of {len(said)} / limit",
         ratio=round(worst, 3),
         goal=1.0,
         baseline_ms=bounds.stop_ms,

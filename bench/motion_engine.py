@@ -1,7 +1,7 @@
-"""How soon robots stop when the server hangs or dies while they are driven.
+"""Time until robots stop after the server hangs or dies while they are driven.
 
-Stopped by a signal, killed, and held up by a pattern that backtracks: the guards have the leases,
-so the bound is the same as for an operator who vanishes.
+The server is stopped by a signal, killed, or blocked by a pattern that backtracks. The guards have
+the leases, so the bound is the same as for the loss of an operator.
 """
 
 import tempfile
@@ -21,11 +21,11 @@ LANES = 20
 EACH, EACH_IF_FULL = 40, 1000
 BIN_MS = 10
 MOST_BOUTS = 3
-"""Times as many bouts as would do, when the machine is too busy to say anything."""
+"""Limit of the bouts, relative to the needed ones, on a machine that is too busy."""
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Strike the server; the slowest stop is held to the bound."""
+    """Disturb the server; compare the slowest stop with the bound."""
     wanted = EACH_IF_FULL if full else EACH
     results: list[Result] = []
     with tempfile.TemporaryDirectory() as folder, EngineRig(Path(folder), lanes=LANES) as rig:
@@ -37,7 +37,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def repeated(bout: Callable[[], list[Trial]], wanted: int, lanes: int) -> list[Trial]:
-    """Let it happen until so many trials say something, or the machine is found too busy."""
+    """Repeat until enough trials are valid, or the machine is too busy."""
     trials: list[Trial] = []
     for _ in range(MOST_BOUTS * wanted // lanes):
         trials += bout()
@@ -47,7 +47,7 @@ def repeated(bout: Callable[[], list[Trial]], wanted: int, lanes: int) -> list[T
 
 
 def said(figure: str, death: str, trials: Sequence[Trial], wanted: int, bin_ms: float) -> Result:
-    """Tell what came of one death, and hold the slowest stop to the bound."""
+    """Print the result of one kind of death, and compare the slowest stop with the bound."""
     counted = [one for one in trials if not one.is_excused]
     figures = {
         "figure": figure,

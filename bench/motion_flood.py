@@ -1,9 +1,9 @@
-"""What one page that ticks a thousand times a second does to another that drives another robot.
+"""Effect of a page with a thousand ticks a second on another page that drives another robot.
 
-The other's way from its socket to its robot, in short windows that take turns: beside a page that
-drives as pages do; beside one that floods another server; and beside one that floods the same
-server. A flood takes its part of this machine wherever it goes, in the page itself and in the
-server that it meets; so the goal is for the last two, and the first is printed beside them.
+The way of the other page from its socket to its robot is measured in short windows. They alternate
+between a normal page, a page that floods another server, and a page that floods the same server.
+A flood uses processor time of this machine in any case, in its page and in its server. So the goal
+compares the last two, and the first is only printed.
 """
 
 import statistics
@@ -68,7 +68,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def _profiles(folder: Path, ports: Sequence[int]) -> tuple[list[Path], list[Path]]:
-    """Write the documents of the server that is measured, and of the other one."""
+    """Write the documents of the measured server, and of the other one."""
     path, *lanes = folder / "path.yaml", folder / "lane-1.yaml", folder / "lane-2.yaml"
     path.write_text(PROFILE.format(port=ports[0]), "utf-8")
     for number, lane in enumerate(lanes, 1):
@@ -81,7 +81,7 @@ def _result(taken: dict[str, list[list[float]]], rounds: int) -> Result:
     ratios = [after / before for before, after in zip(elsewhere, flood, strict=True)]
     middle = statistics.median(one for window in taken["quiet"] for one in window)
     return Result(
-        name="motion path p99 beside a page that floods its server / another server",
+        name="motion path p99 with a page that floods its server / another server",
         ratio=round(statistics.median(ratios), 3),
         goal=GOAL,
         baseline_ms=round(statistics.median(elsewhere), 3),

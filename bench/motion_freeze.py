@@ -1,8 +1,8 @@
-"""What arrives when the counterpart of a robot stood still for 5 s while the robot was driven.
+"""Data that arrives after the counterpart of a driven robot was frozen for 5 s.
 
-A stand-in for rosbridge is stopped and let go on by signals; its kernel goes on taking what is
-written. Several robots side by side, each with its own program, session and guard. A run that is
-broken off goes on where it was.
+A substitute for rosbridge is stopped and continued by signals; its kernel continues to accept data.
+Several robots run in parallel, each with its own program, session and guard. An interrupted run can
+continue.
 """
 
 import asyncio
@@ -23,12 +23,12 @@ BIN_MS = 10
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Freeze until as many trials have counted as are wanted."""
+    """Freeze until enough trials have counted."""
     wanted, lanes = (TRIALS_IF_FULL, LANES_IF_FULL) if full else (TRIALS, LANES)
     kept = Kept(f"motion_freeze-{wanted}")
     while (left := wanted - len(_counted(kept.rows))) > 0:
         if len(kept.rows) >= 2 * wanted:
-            break  # the machine is too busy to show anything
+            break  # the machine is too busy
         at_once = min(lanes, left)
         rounds = -(-left // at_once)
         asyncio.run(
@@ -70,7 +70,7 @@ def _told(rows: Sequence[Mapping[str, object]], wanted: int) -> Sequence[Result]
     worst = max(newest / HEARD_MS, stop / STOP_MS) if len(said) >= wanted and not bad else inf
     return [
         Result(
-            name=f"motion after {len(said)} freezes of the counterpart: worst / what is allowed",
+            name=f"motion after {len(said)} freezes of the counterpart: worst / limit",
             ratio=round(worst, 3),
             goal=1.0,
             baseline_ms=STOP_MS,

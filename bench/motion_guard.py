@@ -1,7 +1,6 @@
-"""How soon a robot is stopped when its guard is killed while it is driven.
+"""Time until a robot stops after its guard is killed while the robot is driven.
 
-Another guard takes its place within half a second, and stops the robot before it says anything
-else.
+Another guard replaces it within half a second, and sends the stop before anything else.
 """
 
 import tempfile
@@ -20,7 +19,7 @@ BIN_MS = 50
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Kill guards; the slowest stop is held to the bound."""
+    """Kill guards; compare the slowest stop with the bound."""
     wanted = KILLED_IF_FULL if full else KILLED
     with tempfile.TemporaryDirectory() as folder, EngineRig(Path(folder), lanes=LANES) as rig:
         rig.bout("close")

@@ -1,9 +1,9 @@
-"""Is a robot that was stopped left alone? On every kind of line, all at once.
+"""Silence after a stop, on every kind of transport in parallel.
 
-Each robot is driven once and let go, while its page keeps the controls and goes on being told
-beats. From when the stop has been said, as often as its line needs it, not one byte may come: zeros
-would fight whoever else drives. Real programs over a relay between two network namespaces; needs
-root and /dev/net/tun, otherwise left out, and told.
+Each robot is driven once and released, while its page keeps the controls and continues to get
+beats. After the stop and its repetitions, not one byte may arrive, because zeros would disturb
+another driver of the robot. Real programs run over a relay between two network namespaces. It needs
+root and /dev/net/tun; otherwise it is left out, with a message.
 """
 
 import json
@@ -23,12 +23,12 @@ __all__ = ["run"]
 
 LASTS_S, LASTS_IF_FULL_S = 20.0, 600.0
 SETTLED_S = STOP_FOR_S + 0.5
-"""After the first stop: its repeats have come, also over a broker."""
+"""Time after the first stop until its repetitions have arrived, also over a broker, in seconds."""
 SPARE_S = 120.0
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Listen."""
+    """Count the bytes after the stop."""
     if not can_relay():
         print(json.dumps({"left_out": "motion_idle: needs root and /dev/net/tun"}))
         return []

@@ -1,9 +1,9 @@
-"""How soon a robot hears the stop when a hand lets go, in each of the twelve ways of a page.
+"""Time until a robot gets the stop after a release, for each of the twelve ways of a page.
 
-A real Chromium, a real ``urc serve`` with its guard, and a robot that stamps what it hears. Time
-runs from when the page was told of the event to the first byte of the stop at the robot, all by the
-machine's monotonic clock. The lease is a second here: a stop that waited for it would be seen.
-A trial that is later than it should be by less than this machine was says nothing, and is repeated.
+A real Chromium drives through a real ``urc serve`` with its guard. The robot stamps received data.
+The time runs from the page's event to the first byte of the stop at the robot, on the machine's
+monotonic clock. The lease is one second here, so a stop by the lease would be visible. A late trial
+is repeated if this machine was late by the same time.
 """
 
 import asyncio
@@ -28,7 +28,7 @@ __all__ = ["run"]
 
 EACH, EACH_IF_FULL = 5, 50
 MOST_TIMES = 3
-"""Times as many trials as would do, on a machine that is too busy to say anything."""
+"""Limit of the trials, relative to the needed ones, on a machine that is too busy."""
 MOST_MS = 100.0
 WAIT_S = 15.0
 DOCUMENT = """\
@@ -67,8 +67,8 @@ EVENTS = {
     "context menu": "contextmenu",
     "pad lost": "gamepaddisconnected",
 }
-"""Way → the event that tells the page of it."""
-# Before any script of the page: its own listeners are asked after these.
+"""Way → the event that the page gets."""
+# Before any script of the page: its own listeners run after these.
 STAMP = f"""
 window.stamps = {{}};
 for (const kind of {list(EVENTS.values())}) {{
@@ -78,30 +78,30 @@ for (const kind of {list(EVENTS.values())}) {{
 
 
 class Trial(NamedTuple):
-    """One time of letting go."""
+    """One release."""
 
     stop_ms: float
-    """From the event to the stop; infinite when none came."""
+    """Time from the event to the stop, in milliseconds; infinite without a stop."""
     late_ms: float
-    """By how much this machine was late meanwhile."""
+    """Delay of this machine during the trial, in milliseconds."""
 
     @property
     def is_excused(self) -> bool:
-        """Whether it says nothing of URC."""
+        """Whether the delay of the machine makes the trial invalid."""
         return 0 < self.stop_ms - MOST_MS <= self.late_ms
 
 
 class Scene(NamedTuple):
-    """A page, its robot, and who says how late the machine is."""
+    """A page, its robot, and a witness of the machine's delays."""
 
     one: Opened
     robots: Robots
     witness: Robots
-    """Wakes for nothing, and watches whether the server, its guard and the browser are let run."""
+    """A program that measures how late it wakes, and watches server, guard and browser."""
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Let go, again and again."""
+    """Release the control again and again."""
     each = EACH_IF_FULL if full else EACH
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))

@@ -1,9 +1,9 @@
-"""How often a link that loses packets stops a robot that nobody let go of.
+"""Unwanted stops of a robot on a link that loses packets.
 
-Pages drive over a relay with 100 ms there and back, and with random loss in both directions; each
-that is stopped begins a new gesture. Once with one line alone, to compare, and once as URC's own
-page does it over such a link: with a second line. Needs root and /dev/net/tun; otherwise left out,
-and told.
+Pages drive over a relay with a round trip of 100 ms and random loss in both directions. After each
+stop, a page starts a new gesture. One run has a single connection, for comparison; the other has
+URC's second connection for such links. It needs root and /dev/net/tun; otherwise it is left out,
+with a message.
 """
 
 import json
@@ -25,11 +25,11 @@ DELAY_MS = 50
 LOOK_S = 0.25
 CALM_S = 20.0
 LATE_MS, LATE_WITHIN_NS = 50.0, 600_000_000
-"""A machine that was so late within this time before a stop may have brought it about."""
+"""Delay of the machine that may have caused a stop within this time after it."""
 MOST = {0: None, 1: 0.1, 3: 4.0}
-"""Loss in percent → stops a minute, at most; without any, what the machine itself brings about."""
+"""Loss in percent → largest number of stops a minute; None where only the machine causes stops."""
 LASTS_S, LASTS_IF_FULL_S = {0: 10, 1: 15, 3: 10}, {0: 60, 1: 180, 3: 60}
-"""Loss in percent → for how long all drive at once."""
+"""Loss in percent → duration of the run, in seconds, with all lanes in parallel."""
 
 
 def run(*, full: bool) -> Sequence[Result]:
@@ -60,7 +60,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def _calm(rig: Rig) -> None:
-    """Wait until the last pages are forgotten: their stops are not the next ones' stops."""
+    """Wait until the last pages are forgotten, so that their stops do not count later."""
     for lane in rig.lanes:
         rig.robots.wait_until(partial(_is_still, rig, lane), CALM_S, "a robot at rest")
     time.sleep(LOOK_S)
@@ -71,9 +71,9 @@ def _is_still(rig: Rig, lane: int) -> bool:
 
 
 def _drive(rig: Rig, seconds: float, *, has_spare: bool) -> tuple[float, int, int]:
-    """Let every lane be driven for so long; return the minutes of motion, and the stops.
+    """Drive every lane for so long; return the minutes of motion, and the stops.
 
-    Those before which the machine itself was late are the third number.
+    The third number counts the stops after a delay of the machine.
     """
     until_s = time.monotonic() + seconds
     pages = {lane: rig.drive(lane, has_spare=has_spare) for lane in rig.lanes}
@@ -100,7 +100,7 @@ def _drive(rig: Rig, seconds: float, *, has_spare: bool) -> tuple[float, int, in
 
 def _result(loss: int, rate: float, most: float, stops: int) -> Result:
     return Result(
-        name=f"motion: stops a minute at {loss} % loss and {2 * DELAY_MS} ms / what is allowed",
+        name=f"motion: stops a minute at {loss} % loss and {2 * DELAY_MS} ms / limit",
         ratio=round(rate / most, 3),
         goal=1.0,
         baseline_ms=0.0,

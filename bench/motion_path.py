@@ -1,8 +1,8 @@
 """Time of a tick from the page's socket to the robot's socket, against a bare relay in Python.
 
-Each tick is stamped just before the page's socket takes it, and just after the robot has read its
-line; both by one clock. Both ways run in turns in one run. URC's way includes the checks of the
-motion contract, the engine, and the pipe to the guard.
+Each tick is stamped before the page's socket accepts it, and after the robot has read its line, on
+one clock. Both ways alternate in one run. URC's way includes the checks of the motion contract, the
+engine, and the pipe to the guard.
 """
 
 import json
@@ -23,14 +23,14 @@ from bench.rig.programs import Program, Robots, Server
 __all__ = ["PROFILE", "TimedPage", "run", "ticks_of"]
 
 TIMES_RELAY = 1.5
-"""Goal, for the median and for the 99th percentile."""
+"""Goal for the median and for the 99th percentile."""
 TICKS, TICKS_IF_FULL = 150, 600
 ROUNDS, ROUNDS_IF_FULL = 3, 7
 TICK_NS = 20_000_000
-"""50 a second: faster than pages tick, slower than the profile lets through."""
+"""Interval of 50 ticks a second: faster than pages, slower than the limit of the profile."""
 SETTLE_NS = 100_000_000
 LEAST_SHARE = 0.5
-"""A busy machine thins some ticks out; below this share nothing is said."""
+"""Smallest valid share of arrived ticks, because a busy machine thins some out."""
 PROFILE = """\
 urc: 1
 kind: robot
@@ -50,10 +50,10 @@ Ticker = Callable[[int], int]
 
 
 class TimedPage(Page):
-    """A page that says when it gave a tick to its socket."""
+    """A page that stamps each tick."""
 
     def begin_anew(self) -> None:
-        """Do what a person does after a stop: let go, and take the controls for a new gesture."""
+        """Release, and take the controls for a new gesture, as a person does after a stop."""
         self.let_go()
         self.has_let_go = False
         self.say({"t": "drive", "verb": "leave"})
@@ -62,7 +62,7 @@ class TimedPage(Page):
         self.refusal = ""
 
     def tick_number(self, number: int) -> int:
-        """Send a tick with `number` as its value; return when, in nanoseconds."""
+        """Send a tick with `number` as its value; return its time, in nanoseconds."""
         self.hear()  # the newest beat
         self.sent += 1
         body = {
@@ -74,7 +74,7 @@ class TimedPage(Page):
             "arguments": {"value": number},
         }
         data = json.dumps(body, separators=(",", ":")).encode()
-        # A mask of zeros is a mask: it leaves the work of masking out of what is measured.
+        # A mask of zeros is valid, and keeps the cost of masking out of the measurement.
         frame = bytes([0x81, 0xFE]) + len(data).to_bytes(2, "big") + bytes(4) + data
         sent_ns = time.monotonic_ns()
         self.socket.sendall(frame)
@@ -123,8 +123,8 @@ def _urc(folder: Path, ticks: int) -> Iterator[Callable[[], list[float]]]:
         with Server([file], folder / "data") as server:
 
             def one_round() -> list[float]:
-                # A page of its own: one that waits for the others' rounds answers no ping, and is
-                # closed.
+                # The page gets a connection of its own: a page that waits for other rounds would
+                # answer no ping, and would be closed.
                 page = TimedPage(Plan(1, "127.0.0.1", server.port, "path", "", 0, key=server.key))
                 try:
                     page.take_controls()
@@ -137,7 +137,7 @@ def _urc(folder: Path, ticks: int) -> Iterator[Callable[[], list[float]]]:
 
 
 def ticks_of(page: TimedPage, robots: Robots, ticks: int) -> list[float]:
-    """Tick; return the time of each tick that came, in milliseconds."""
+    """Send ticks; return the time of each tick that arrived, in milliseconds."""
     first = len(robots.heard[0]) + 1
     sent: dict[int, int] = {}
     next_ns = time.monotonic_ns()
@@ -148,7 +148,7 @@ def ticks_of(page: TimedPage, robots: Robots, ticks: int) -> list[float]:
             next_ns = time.monotonic_ns()
         sent[number * 1000] = page.tick_number(number * 1000)
         next_ns += TICK_NS
-    page.wait(next_ns + SETTLE_NS)  # what was thinned out or waits for the line comes now
+    page.wait(next_ns + SETTLE_NS)  # delayed ticks arrive now
     page.let_go()
     page.has_let_go = False
     page.wait(time.monotonic_ns() + SETTLE_NS)
@@ -179,7 +179,7 @@ def _quantile(ordered: Sequence[float], share: float) -> float:
 def _result(
     name: str, relays: Sequence[Sequence[float]], ours: Sequence[Sequence[float]], share: float
 ) -> Result:
-    """Compare the quantile `share` round by round."""
+    """Compare a quantile round by round."""
     bases = [_quantile(times, share) for times in relays]
     subjects = [_quantile(times, share) for times in ours]
     pairs = zip(bases, subjects, strict=True)

@@ -1,8 +1,8 @@
-"""How soon a robot hears the stop when its operator vanishes: the distribution for each death.
+"""Time until a robot gets the stop after its operator vanishes, for each way to vanish.
 
-Real processes: pages, `urc serve` with its guards, robots that stamp what they hear. Time runs from
-the sending of the last tick that had an effect to the first byte of the stop. As root a relay
-between network namespaces adds the two deaths of the link; otherwise they are left out, and told.
+Real processes: pages, `urc serve` with its guards, and robots that stamp received data. The time
+runs from the last effective tick to the first byte of the stop. As root, a relay between network
+namespaces adds two failures of the link; otherwise they are left out, with a message.
 """
 
 import json
@@ -22,11 +22,11 @@ EACH, EACH_IF_FULL = 100, 1000
 LANES = 20
 BIN_MS = 10
 MOST_BOUTS = 3
-"""Times as many bouts as would do, when the machine is too busy to say anything."""
+"""Limit of the bouts, relative to the needed ones, on a machine that is too busy."""
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Let pages die in every way; the slowest stop is held to the bound."""
+    """Let pages vanish in every way; compare the slowest stop with the bound."""
     wanted = EACH_IF_FULL if full else EACH
     results: list[Result] = []
     has_relay = can_relay()
@@ -68,7 +68,7 @@ def _figures(death: str, trials: Sequence[Trial], excused: int) -> dict[str, obj
 
 
 def _result(death: str, trials: Sequence[Trial], wanted: int) -> Result:
-    """Return the slowest stop over the bound; one that broke the contract otherwise is infinite."""
+    """Return the slowest stop over the bound, or infinity after another violation."""
     is_whole = len(trials) >= wanted and not any(one.fault for one in trials)
     slowest = max((one.stop_ms for one in trials), default=inf) if is_whole else inf
     return Result(

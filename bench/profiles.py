@@ -1,4 +1,4 @@
-"""Profiles that differ, made for the benchmarks of `urc validate`: about 130 lines each."""
+"""Different generated profiles of about 130 lines each, for the benchmarks of `urc validate`."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The least that a relay in Python does: WebSocket in, robot's line out. See `motion_path`."""
+"""A minimal relay in Python, from a WebSocket to the robot's connection. See `motion_path`."""
 
 import asyncio
 import json
@@ -13,7 +13,7 @@ async def main() -> None:
     async def relay(page: ServerConnection) -> None:
         async for text in page:
             said = json.loads(text)
-            if "arguments" in said:  # letting go has none
+            if "arguments" in said:  # a release has none
                 writer.write(b"M %d\n" % said["arguments"]["value"])
                 await writer.drain()
 

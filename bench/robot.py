@@ -1,6 +1,7 @@
-"""Says something at a rate, and knows nothing: ``python -m bench.robot LINE TICKS RATE``.
+"""A robot that sends a fixed text at a rate: ``python -m bench.robot LINE TICKS RATE``.
 
-`LINE` is the number of a socket that it was given. It begins when something comes there, and closes
+`LINE` is the number of an inherited socket. The robot starts with the first received data, and
+closes the socket at the end.
 it at the end.
 """
 
@@ -10,7 +11,7 @@ import time
 
 
 def main() -> None:
-    """Speak, until all is said."""
+    """Send until the end."""
     number, ticks, rate_hz = sys.argv[1:]
     with socket.socket(fileno=int(number)) as line:
         line.recv(1)

@@ -1,8 +1,8 @@
-"""Plays pages of which some do not keep up: most read all, some nothing, one a little at a time.
+"""Pages for `fanout_stall`: most read all data, some read nothing, one reads slowly.
 
-``python -m bench.stalled PORT PATH HEALTHY STOPPED BYTES_PER_S`` prints ``ready``, and at the end
-of its input a JSON object: frames with values of each healthy page, and for each of the slow page's
-when it was read and how old it was then, both in milliseconds of the machine's monotonic clock.
+``python -m bench.stalled PORT PATH HEALTHY STOPPED BYTES_PER_S`` prints ``ready``. At the end of
+its input it prints a JSON object. It has the number of frames with values of each healthy page, and
+the times and ages of the slow page's frames. Both are in milliseconds of the monotonic clock.
 """
 
 import json
@@ -22,7 +22,7 @@ VALUES = b'{"t":"v",'
 
 
 class Page(Viewer):
-    """A page that takes frames apart, and answers pings."""
+    """A page that parses frames, and answers pings."""
 
     def __init__(self, port: int, path: str) -> None:
         super().__init__(port, path, [])
@@ -31,7 +31,7 @@ class Page(Viewer):
         self.is_open = True
 
     def read(self, most: int, *, is_aged: bool = False) -> int:
-        """Take at most so many bytes of what has come; return how many there were."""
+        """Read a limited number of bytes; return how many there were."""
         try:
             data = self.line.recv(most)
         except BlockingIOError:
@@ -62,13 +62,13 @@ class Page(Viewer):
 
 
 def main() -> None:
-    """Look until the input ends."""
+    """Read until the input ends."""
     port, path = int(sys.argv[1]), sys.argv[2]
     healthy_count, stopped_count, rate = map(int, sys.argv[3:6])
     healthy = [Page(port, path) for _ in range(healthy_count)]
     stopped = [Page(port, path) for _ in range(stopped_count)]
     slow = Page(port, path)
-    # Its line is what is slow: what it has received must not wait in front of it.
+    # The connection must be slow, so it needs a small receive buffer.
     slow.line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
     ready = selectors.DefaultSelector()
     for page in healthy:

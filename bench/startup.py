@@ -1,4 +1,4 @@
-"""What a command costs before it does anything: whole processes, against tools people know."""
+"""Cost of starting a command, as whole processes, against common tools."""
 
 import platform
 import shutil
@@ -61,7 +61,7 @@ def _run(profiles: list[str], *, full: bool) -> Sequence[Result]:
 
 
 def _beside(name: str) -> str:
-    """Return the program that belongs to this interpreter's environment."""
+    """Return the path of a program in this interpreter's environment."""
     place = Path(sys.executable).with_name(name)
     found = str(place) if place.exists() else shutil.which(name)
     if found is None:

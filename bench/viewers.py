@@ -1,8 +1,8 @@
-"""Plays pages that only look: opens WebSockets, says what it shows, counts what comes.
+"""Pages that only watch: they open WebSockets, select channels, and count received data.
 
-``python -m bench.viewers PORT PATH CLIENTS [SHOWN…]`` prints ``ready``, and at the end of its input
-a JSON list: messages and bytes of each client. Frames are counted, never decoded: what is measured
-is the other side.
+``python -m bench.viewers PORT PATH CLIENTS [SHOWN…]`` prints ``ready``. At the end of its input it
+prints a JSON list with messages and bytes of each client. Frames are counted and never decoded,
+because only the server is measured.
 """
 
 import json
@@ -38,7 +38,7 @@ class Viewer:
             raise SystemExit(f"no WebSocket: {head[:80]!r}")
         if shown:
             data = json.dumps({"t": "show", "signals": shown}).encode()
-            # A mask of zeros is a mask.
+            # A mask of zeros is valid.
             self.line.sendall(bytes([0x81, 0x80 | len(data)]) + bytes(4) + data)
         self.line.setblocking(False)
         self.messages = 0
@@ -46,7 +46,7 @@ class Viewer:
         self.skip = 0
 
     def take(self) -> bool:
-        """Count what has come; return whether there can be more."""
+        """Count received frames; return whether more can come."""
         data = self.line.recv(CHUNK)
         if not data:
             return False
@@ -67,7 +67,7 @@ class Viewer:
 
 
 def head_and_body(data: bytes) -> int | None:
-    """Return how long the frame is that begins here; None while its head is not whole."""
+    """Return the length of the frame at the start, or None for an incomplete header."""
     if len(data) < 2:
         return None
     size = data[1] & 0x7F
@@ -80,7 +80,7 @@ def head_and_body(data: bytes) -> int | None:
 
 
 def main() -> None:
-    """Look until the input ends."""
+    """Count until the input ends."""
     port, path, count, *shown = sys.argv[1:]
     viewers = [Viewer(int(port), path, shown) for _ in range(int(count))]
     ready = selectors.DefaultSelector()

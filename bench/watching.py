@@ -1,4 +1,4 @@
-"""A dashboard with pages that look at it: what one delivery costs the server, in processor time."""
+"""A dashboard with watching pages: processor time of the server for each delivery."""
 
 import asyncio
 import json
@@ -21,7 +21,7 @@ Tally = list[tuple[int, int]]
 
 @asynccontextmanager
 async def serving(app: ASGIApp) -> AsyncIterator[int]:
-    """Serve an application in this loop; give its port."""
+    """Serve an application in this loop; yield its port."""
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
     task = asyncio.create_task(serve(app, port=0, on_ready=ready.set_result))
     try:
@@ -35,7 +35,7 @@ async def serving(app: ASGIApp) -> AsyncIterator[int]:
 async def cost_s(
     app: ASGIApp, path: str, clients: int, shown: list[str], play: Callable[[], Awaitable[None]]
 ) -> tuple[float, Tally]:
-    """Return the processor time of `play` in this process, and what each page got of it."""
+    """Return the processor time of `play` in this process, and the received data of each page."""
     async with serving(app) as port:
         command = (sys.executable, "-m", "bench.viewers", str(port), path, str(clients), *shown)
         viewers = await asyncio.create_subprocess_exec(
@@ -47,7 +47,7 @@ async def cost_s(
             said = await asyncio.wait_for(viewers.stdout.readline(), READY_S)
             if said.strip() != b"ready":
                 raise SystemExit("bench: the pages did not come up")
-            await asyncio.sleep(0.2)  # what every page is told at first
+            await asyncio.sleep(0.2)  # the first state of every page
             began_s = time.process_time()
             await play()
             spent_s = time.process_time() - began_s
@@ -61,14 +61,14 @@ async def cost_s(
 
 
 class Robot:
-    """Another process that says something at a rate, as a robot does."""
+    """A process that sends data at a rate, as a robot does."""
 
     def __init__(self, line: socket.socket, ticks: int) -> None:
         self._line = line
         self._ticks = ticks
 
     async def heard(self, tell: Callable[[int], None]) -> None:
-        """Let it begin, and call `tell` whenever it has said something, until it is done."""
+        """Start it, and call `tell` after each received piece, until its end."""
         loop = asyncio.get_running_loop()
         done = loop.create_future()
         tick = 0
@@ -94,10 +94,10 @@ class Robot:
 
 @asynccontextmanager
 async def speaking(ticks: int, rate_hz: float) -> AsyncIterator[Robot]:
-    """Start a robot, which waits until somebody hears it.
+    """Start a robot, which waits for its first received data.
 
-    What wakes the server is then what wakes it in life, a line that has something to read: a timer
-    in this process would cost several times as much, and be the benchmark's.
+    It wakes the server as a real robot does, by a readable socket. A timer in this process would
+    cost several times as much, and its cost would be measured.
     """
     ours, theirs = socket.socketpair()
     with ours, theirs:

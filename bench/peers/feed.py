@@ -14,7 +14,7 @@ def is_whole(channel: int) -> bool:
 
 
 def channels(tick: int) -> dict[str, float]:
-    """Return all values; each is another number in each tick, from 0 to 100."""
+    """Return all values, from 0 to 100; each changes in each tick."""
     values = [(tick * 1.7 + each * 3.1) % 100 for each in range(CHANNELS)]
     return {
         f"s{each}": round(value) if is_whole(each) else round(value, 1)
@@ -23,12 +23,12 @@ def channels(tick: int) -> dict[str, float]:
 
 
 async def tell(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Send lines by a steady clock, until the client leaves."""
+    """Send lines at fixed times, until the client disconnects."""
     began_s = time.monotonic()
     tick = 0
     with contextlib.suppress(ConnectionError):
         while not writer.is_closing():
-            # A timer is not exact to a millisecond: overdue lines go together.
+            # A timer is not exact to a millisecond, so overdue lines are sent together.
             due = int((time.monotonic() - began_s) * CHANNELS_HZ)
             while tick <= due:
                 values = json.dumps(channels(tick), separators=(",", ":"))

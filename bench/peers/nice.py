@@ -1,4 +1,4 @@
-"""The same page by NiceGUI: ``python nice.py ROBOT_PORT PORT``."""
+"""The same page in NiceGUI: ``python nice.py ROBOT_PORT PORT``."""
 
 import asyncio
 import sys
@@ -8,7 +8,7 @@ from nicegui import app, ui
 robot_port, port = int(sys.argv[1]), int(sys.argv[2])
 labels: set[ui.label] = set()
 listening: list[asyncio.Task[None]] = []
-"""Kept here: a loop alone does not hold on to its tasks."""
+"""References to the tasks, because the loop alone does not keep them alive."""
 
 
 @ui.page("/")

@@ -1,6 +1,6 @@
-"""The page that somebody would write by hand for this one robot: ``python plain.py ROBOT_PORT``.
+"""A page written by hand for one robot: ``python plain.py ROBOT_PORT``.
 
-A line from the robot goes to the page's WebSocket at once; the page writes it in its next frame.
+A line from the robot goes to the page's WebSocket at once; the page shows it in its next frame.
 """
 
 import asyncio
@@ -25,7 +25,7 @@ new WebSocket(`ws://${location.host}/ws`).onmessage = ({ data }) => {
 
 
 def page(_: ServerConnection, request: Request) -> Response | None:
-    """Answer anything but the WebSocket with the page."""
+    """Answer every other request with the page."""
     if request.path == "/ws":
         return None
     headers = Headers({"Content-Type": "text/html", "Content-Length": str(len(PAGE))})
@@ -33,12 +33,12 @@ def page(_: ServerConnection, request: Request) -> Response | None:
 
 
 async def stay(line: ServerConnection) -> None:
-    """Keep the page's line open."""
+    """Keep the page's connection open."""
     await line.wait_closed()
 
 
 async def main() -> None:
-    """Relay for ever."""
+    """Relay without end."""
     reader, _ = await asyncio.open_connection("127.0.0.1", int(sys.argv[1]))
     async with serve(stay, "127.0.0.1", 0, process_request=page, compression=None) as server:
         print("ready", next(iter(server.sockets)).getsockname()[1], flush=True)

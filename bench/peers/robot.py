@@ -1,9 +1,9 @@
-"""A robot that says what time it is: ``python robot.py RATE_HZ``; prints its port.
+"""A robot that sends the time: ``python robot.py RATE_HZ``; it prints its port.
 
-Each line is the machine's monotonic clock in tenths of milliseconds, modulo `MODULUS` and `START`
-on top, so that it has ten digits and whoever shows it shows how old it is. At 50 lines a second
-there are five phases between robot and display, a fifth of a frame apart; each line is moved by up
-to half of that, the same way in each run, so that all phases come equally often.
+Each line is the machine's monotonic clock in tenths of milliseconds, modulo `MODULUS`, plus
+`START`. So it has ten digits, and a page that shows it shows its age. At 50 lines a second, there
+are five phases between robot and display, a fifth of a frame apart. Each line is shifted by up to
+half of that, the same way in each run, so that all phases are equally frequent.
 """
 
 import asyncio
@@ -18,7 +18,7 @@ GOLDEN = 0.6180339887
 
 
 async def tell(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Tell the time at the rate, by a steady clock, until the other side is gone."""
+    """Send the time at the rate, at fixed times, until the client disconnects."""
     period_s = 1 / float(sys.argv[1])
     began_s = time.monotonic()
     number = 0
@@ -33,7 +33,7 @@ async def tell(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> No
 
 
 async def main() -> None:
-    """Serve whoever comes."""
+    """Serve every client."""
     server = await asyncio.start_server(tell, "127.0.0.1", 0)
     print("ready", server.sockets[0].getsockname()[1], flush=True)
     await server.serve_forever()

@@ -1,8 +1,8 @@
-"""Robots that are driven over UDP beside polls, in frames that all carry one counter.
+"""Robots driven over UDP together with polls, in frames that all have one counter.
 
-Each robot is a socket of its own, which keeps what it receives in order and answers polls. The
-driver is a session with its guard; each gesture is one connection, held for seconds, with two
-controls at times, and let go or left to its lease.
+Each robot is a socket that stores received frames in order and answers polls. The driver is a
+session with its guard. Each gesture is one connection. It is held for seconds, sometimes with two
+controls, and then released or left to its lease.
 """
 
 import asyncio
@@ -58,19 +58,19 @@ polls:
 
 
 class Gesture(NamedTuple):
-    """What the robot received in one."""
+    """Frames that the robot received during one gesture."""
 
     lasted_s: float
     frames: int
     motions: int
     fault: str
-    """The first that was wrong; "" when nothing was."""
+    """First fault, or ""."""
 
 
 class _Robot(asyncio.DatagramProtocol):
     def __init__(self) -> None:
         self.heard: list[tuple[int, int, str]] = []
-        """Port of the sender, which each connection has of its own, number and words."""
+        """Source port (one for each connection), counter and words of each frame."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast("asyncio.DatagramTransport", transport)
@@ -89,7 +89,7 @@ async def gestures(
     seed: int = 1,
     told: Callable[[Gesture], None] | None = None,
 ) -> Sequence[Gesture]:
-    """Hold for each of these times, `lanes` robots side by side."""
+    """Hold for each of these times, with `lanes` robots in parallel."""
     dice = random.Random(seed)  # noqa: S311 - the same gestures in every run
     left, done = list(lasts_s), list[Gesture]()
 
@@ -129,7 +129,7 @@ def _profile(port: int) -> Profile:
 
 
 async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
-    """Hold one control all the time and another now and then; let go, or say nothing more."""
+    """Hold one control all the time and another sometimes; then release them, or fall silent."""
     desk, loop = MotionDesk(session.profile.driver), asyncio.get_running_loop()
     desk.join(Client("hand", "hand", "driver"))
     desk.attach(session.frames, session.movers)
@@ -151,7 +151,7 @@ async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
                 refused = refused or desk.tick("hand", command, value, given, now)
         if ticks % 60 == 0:
             desk.release("hand", "lift")
-        if refused:  # a machine that was too slow for the lease: a hand lets go, and begins anew
+        if refused:  # the machine was too slow for the lease: release, and start a new gesture
             desk.release("hand", "drive")
             desk.release("hand", "lift")
             desk.drive("hand", "leave", loop.time())
@@ -167,7 +167,7 @@ async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
 
 
 async def _follow(session: Session, desk: MotionDesk) -> None:
-    """Tell the desk of stops, for ever."""
+    """Report stops to the motion controller, without end."""
     assert session.movers is not None
     while True:
         for command, reason in await session.movers.stops():
@@ -175,11 +175,11 @@ async def _follow(session: Session, desk: MotionDesk) -> None:
 
 
 def _judged(lasts_s: float, heard: Sequence[tuple[int, int, str]], fault: str) -> Gesture:
-    """Find the first gap, and motion that no stop comes after."""
+    """Find the first gap, and motion without a later stop."""
     motions = [words for _, _, words in heard if words.startswith(("DRIVE", "LIFT"))]
     places: dict[int, int] = {}
     for port, number, words in heard:
-        place = places[port] = places.get(port, -1) + 1  # each connection begins with 0
+        place = places[port] = places.get(port, -1) + 1  # each connection starts at 0
         if number != place % NUMBERS and not fault:
             fault = f"{number} {words} in the place of {place % NUMBERS}"
     last = {words.split()[0]: words for words in motions}

@@ -1,8 +1,8 @@
-"""Cuts of the link between server and robots while somebody drives, and what comes through after.
+"""Cuts of the link between server and robots while the robots are driven.
 
-Each value of the motion is the time at which its tick was sent, so that the robot knows how old it
-is when it arrives. One rig has robots on every kind of line; the whole link is cut, or each robot's
-own, at its own times.
+Each value of the motion is the send time of its tick, so the robot knows its age at arrival. One
+rig has robots on every kind of transport. A cut affects the whole link, or the link of one robot at
+its own times.
 """
 
 import json
@@ -28,45 +28,45 @@ from bench.rig.programs import Heard, Operators, Relay, Robots, Server
 __all__ = ["LATE_MS", "Cut", "CutRig"]
 
 LATE_MS = 300.0
-"""Motion that is older is late."""
+"""Age above which motion is late."""
 BURST_MS = 100.0
-"""Where motion may come late at all, the stop follows within this."""
+"""Limit of the time from late motion to the stop, where late motion is allowed."""
 LEAD_S = 0.2
 WATCH_S = 1.0
 READY_S = 25.0
 ATTEMPTS = 3
-"""To have a robot driven at all."""
+"""Attempts to start driving a robot."""
 
 
 class NotDrivenError(AssertionError):
-    """A page has not moved its robot: the next one may, or something is wrong."""
+    """A page that has not moved its robot; a single case is tolerated."""
 
 
 class Cut(NamedTuple):
-    """What one cut did to one robot."""
+    """Result of one cut for one robot."""
 
     kind: str
     lasted_s: float
     was_held: bool
-    """Whether the control was held all the time, or let go during the cut."""
+    """Whether the control was held all the time, instead of being released during the cut."""
     oldest_ms: float
-    """Age of the oldest motion that came after it; 0 when none came."""
+    """Age of the oldest motion that arrived after the cut; 0 without any."""
     stop_ms: float
-    """From the link's being back to the stop; infinite when none came."""
+    """Time from the end of the cut to the stop; infinite without a stop."""
     fault: str
     late_ms: float
-    """By how much this machine was late meanwhile."""
+    """Delay of this machine during the trial."""
     was_moving: bool = True
     """Whether the robot moved when the link was cut; a busy machine may have stopped it before."""
 
     @property
     def bounds(self) -> Bounds:
-        """What is required."""
+        """Bounds for this kind of transport."""
         return bounds_of(self.kind)
 
     @property
     def is_stop_needed(self) -> bool:
-        """Whether the robot must hear a stop."""
+        """Whether the robot must get a stop."""
         if not self.bounds.is_told:
             return False
         return not self.was_held or self.lasted_s >= self.bounds.unnoticed_s
@@ -80,7 +80,7 @@ class Cut(NamedTuple):
 
     @property
     def is_excused(self) -> bool:
-        """Whether this machine itself was later than the trial was: it says nothing then."""
+        """Whether the machine's own delay makes the trial invalid."""
         if not self.was_moving:
             return not self.fault
         late = self.oldest_ms - self.bounds.oldest_ms
@@ -90,14 +90,14 @@ class Cut(NamedTuple):
 
 
 class CutRig:
-    """Some robots behind a relay, and a server with pages on this side of it. Needs root."""
+    """Robots behind a relay, and a server with pages on this side of it. Needs root."""
 
     def __init__(self, folder: Path, kinds: Sequence[str]) -> None:
         """Start everything; the robots' documents and the server's data go into `folder`.
 
         Args:
-            folder: an empty one.
-            kinds: of line, one for each robot.
+            folder: an empty folder.
+            kinds: kind of transport of each robot.
         """
         self.kinds = tuple(kinds)
         self._dice = random.Random(11)  # noqa: S311 - the same moments in every run
@@ -131,7 +131,7 @@ class CutRig:
         self._witness = enter(Robots([]))
 
     def __enter__(self) -> Self:
-        """Return it; everything ends with the block."""
+        """Return self; everything ends with the block."""
         return self
 
     def __exit__(
@@ -145,30 +145,30 @@ class CutRig:
 
     @property
     def lanes(self) -> range:
-        """Numbers of the robots."""
+        """Indexes of the robots."""
         return range(len(self.kinds))
 
     def port(self, lane: int) -> int:
-        """Return the port by which a robot's link is cut."""
+        """Return the port for cuts of one robot's link."""
         first = FIRST_PORT.get(self.kinds[lane])
         return self.robots.ports[lane] if first is None else first + lane
 
     def cut(self, seconds: float, order: str = "cut") -> list[Cut]:
-        """Cut the link of all while each robot is driven; return what came of it.
+        """Cut the link while each robot is driven; return the results.
 
         Args:
-            seconds: for how long.
+            seconds: length of the cut.
             order: ``cut``, or ``cut a`` or ``cut b`` for one direction, or ``down a``.
         """
         return self._trial(self.lanes, seconds, order, self._share())
 
     def cut_one(self, lane: int, seconds: float, share: float) -> Cut:
-        """Cut the link of one robot; from a thread of its own, if you like.
+        """Cut the link of one robot; safe to call from its own thread.
 
         Args:
-            lane: which.
-            seconds: for how long.
-            share: after which part of it a control is let go, where it is: every second time.
+            lane: index of the robot.
+            seconds: length of the cut.
+            share: share of the cut after which the control is released, in every second cut.
         """
         for _ in range(ATTEMPTS - 1):
             try:
@@ -178,7 +178,7 @@ class CutRig:
         return self._trial((lane,), seconds, f"cut {self.port(lane)}", share)[0]
 
     def drive_once(self, lane: int, life_s: float) -> None:
-        """Let a page drive a robot and let go of it; it lives on, and keeps the controls."""
+        """Let a page drive a robot and release it; the page lives on, and keeps the controls."""
         began_ns = time.monotonic_ns()
         number = self._drive(lane, life_s)
         self._await_motion(lane, began_ns)
@@ -218,7 +218,7 @@ class CutRig:
         return cuts
 
     def _drive(self, lane: int, life_s: float = 120.0) -> int:
-        """Let a page drive a robot; return its number."""
+        """Let a page drive a robot; return the page's number."""
         with self._lock:
             self._numbers += 1
             number = self._numbers
@@ -249,7 +249,7 @@ class CutRig:
         self, pages: Sequence[int] | dict[int, int], released: dict[int, int],
         cut_ns: int, healed_ns: int,
     ) -> None:  # fmt: skip
-        """Wait for the stops that must come, and then for anything that must not."""
+        """Wait for the required stops, and then for forbidden events."""
         for lane in pages:
             bounds = bounds_of(self.kinds[lane])
             is_short = (healed_ns - cut_ns) / 1e9 < bounds.unnoticed_s
@@ -263,7 +263,7 @@ class CutRig:
                     "a stop",
                 )
             except AssertionError:
-                continue  # judged later
+                continue  # checked later
         time.sleep(WATCH_S)
 
     def _stops(self, lane: int, cut_ns: int) -> bool:
@@ -276,7 +276,7 @@ class CutRig:
         ages_ms = [
             (one.time_ns - int(one.text[2:]) * 1000) / 1e6 for one in heard if one.text != "M 0"
         ]
-        # A stop may also have come before or within a cut of one direction.
+        # After a cut of one direction, the stop may also have come before the end of the cut.
         before = [one for one in all_heard if one.time_ns <= healed_ns]
         if not stops and before and before[-1].text == "M 0":
             stop_ms = 0.0
@@ -306,7 +306,7 @@ def _fault(
     was_held: bool,
     burst_ms: float,
 ) -> str:
-    """Return what must not happen after a cut, and did."""
+    """Return the violation after a cut, or ""."""
     texts = [one.text for one in heard]
     moved = [text for text in texts if text != "M 0"]
     stop = texts.index("M 0") if "M 0" in texts else len(texts)
@@ -318,12 +318,12 @@ def _fault(
     if bounds.most_late is not None and late > bounds.most_late:
         return f"{late} late motions came"
     if not bounds.is_repeated and len(texts) - stop > 2:
-        return f"{len(texts) - stop} stops came"  # but one in the kernel, and one on the new line
+        return f"{len(texts) - stop} stops came"  # one may be in the kernel, one on the new link
     if not was_held and len(moved) > (bounds.most_late or 0):
         return "motion came that had been let go" if is_noticed else ""
     if is_noticed and bounds.is_told and stop > (bounds.most_late or 0):
         return "motion came before the stop"
-    is_last = late == stop < len(texts)  # nothing fresh came between
+    is_last = late == stop < len(texts)  # no fresh motion in between
     if late and is_last and heard[stop].time_ns - heard[0].time_ns > burst_ms * 1e6:
         return "the stop came long after late motion"
     return ""

@@ -1,7 +1,7 @@
-"""The eight ways in which an operator vanishes, many times over, and how soon the robot hears it.
+"""The eight ways in which an operator vanishes, each many times, with the time until the stop.
 
-A *bout* lets one page drive each of the rig's robots, all at once, and die. What the robots heard
-then tells everything: each value of the motion is the time at which its tick was sent.
+In a *bout*, one page drives each of the robots, all in parallel, and vanishes. Each value of the
+motion is the send time of its tick, so the robots' logs contain all results.
 """
 
 import random
@@ -20,18 +20,18 @@ __all__ = ["BOUND_MS", "DEATHS", "LEASE_MS", "LINK_DEATHS", "Rig", "Trial", "lan
 
 LEASE_MS = 250.0
 BOUND_MS = LEASE_MS + 50.0
-"""The first stop byte is to reach the robot within this time of the last accepted tick."""
+"""Limit of the time from the last accepted tick to the first byte of the stop."""
 LINK_DEATHS = ("black-hole", "interface-down")
-"""Those that need the relay."""
+"""Ways that need the relay."""
 DEATHS = ("close", "kill", "freeze", "block", "reset", "kick", *LINK_DEATHS)
 HEALED_S = 0.4
-"""How long it is looked whether a healed link brings motion back."""
+"""Time to watch for motion after the link is healed, in seconds."""
 STOP_WITHIN_S = 3.0
 LIFE_S = 600.0
 LOOK_NS = 25_000_000
-"""How much later it is known that a process was kept from running."""
+"""Delay until the wait of a process for a processor is known, in nanoseconds."""
 WITNESSES = 2
-"""Idle programs that say when they are not woken in time, as the server's then are not either."""
+"""Idle programs that measure late wake-ups of the machine, which also affect the server."""
 
 _PROFILE = """\
 urc: 1
@@ -56,19 +56,19 @@ def lane_profile(lane: int, host: str, port: int, kind: str = "tcp") -> str:
 
 
 class Trial(NamedTuple):
-    """One death."""
+    """Result of one vanished operator."""
 
     death: str
     stop_ms: float
-    """From the sending of the last tick that had an effect, to the first byte of the stop."""
+    """Time from the last effective tick to the first byte of the stop."""
     fault: str
-    """What must not happen, and did; "" when nothing."""
+    """Violation, or ""."""
     late_ms: float
-    """By how much idle programs, and the robots' own, were not woken in time, or how long the
-    server or a guard was kept from running: a busy machine."""
+    """Delay of the busy machine: late wake-ups of idle programs and robots, or the time in which
+    the server or a guard could not run."""
     bound_ms: float = BOUND_MS
     has_moved: bool = True
-    """Whether the robot moved before: one that never did shows nothing of how it stops."""
+    """Whether the robot moved before; otherwise the trial shows nothing."""
 
     @property
     def is_good(self) -> bool:
@@ -77,17 +77,17 @@ class Trial(NamedTuple):
 
     @property
     def is_excused(self) -> bool:
-        """Whether this machine itself was later than the trial was: it says nothing then."""
+        """Whether the machine's own delay makes the trial invalid."""
         if not self.has_moved:
             return True
         return not self.fault and 0 < self.stop_ms - self.bound_ms <= self.late_ms
 
 
 class Rig:
-    """Some robots, a real server, and pages that die; with a relay between them where one is."""
+    """Robots, a real server, and pages that vanish, with an optional relay between them."""
 
     can_hang = False
-    """Whether the server can be held up, see `bench.rig.programs.Server`."""
+    """Whether the server can be blocked, see `bench.rig.programs.Server`."""
 
     def __init__(
         self,
@@ -101,11 +101,11 @@ class Rig:
         """Start everything.
 
         Args:
-            folder: for the documents and the server's data.
-            lanes: robots, and pages at once.
-            has_relay: put a link between pages and server that can be cut; needs root.
-            options: of ``urc serve``.
-            inside: what starts the server elsewhere, beside the relay.
+            folder: folder for the documents and the server's data.
+            lanes: number of robots, and of pages in parallel.
+            has_relay: whether a link that can be cut is between pages and server; needs root.
+            options: further options of ``urc serve``.
+            inside: command prefix that starts the server in another namespace.
         """
         self._dice = random.Random(5)  # noqa: S311 - the same phases in every run
         self._numbers = 0
@@ -134,11 +134,11 @@ class Rig:
             raise
 
     def _watch(self) -> None:
-        """Watch whether the server and its guards are let run."""
+        """Watch whether the server and its guards get a processor."""
         self._watcher = self._programs.enter_context(Robots([f"pid:{self.server.pid}"]))
 
     def __enter__(self) -> Self:
-        """Return it; everything ends with the block."""
+        """Return self; everything ends with the block."""
         return self
 
     def __exit__(
@@ -151,7 +151,7 @@ class Rig:
         self._programs.close()
 
     def bout(self, death: str) -> list[Trial]:
-        """Let one page on each robot die; return what came of it."""
+        """Let one page on each robot vanish; return the results."""
         began_ns = time.monotonic_ns()
         pages = self._begin(death)
         self._let_die(death, pages)
@@ -166,7 +166,7 @@ class Rig:
 
     @property
     def lanes(self) -> range:
-        """Numbers of the robots."""
+        """Indexes of the robots."""
         return range(len(self.robots.heard))
 
     def weather(self, *orders: str) -> None:
@@ -176,7 +176,7 @@ class Rig:
     def drive(
         self, lane: int, death: str = "outside", drive_s: float = 0.0, *, has_spare: bool = False
     ) -> int:
-        """Let a page drive a robot until it dies; return its number."""
+        """Let a page drive a robot until it vanishes; return the page's number."""
         self._numbers += 1
         plan = Plan(
             self._numbers, self.host, self.server.port, f"lane-{lane}", death, drive_s,
@@ -198,7 +198,7 @@ class Rig:
             self._link().do("down a")
 
     def _heal(self, death: str, pages: Mapping[int, int]) -> None:
-        """Bring the link back: what the pages' kernels kept arrives now, and must move nothing."""
+        """Restore the link; the pages' queued data arrives now, and must move nothing."""
         if death == "black-hole":
             self._link().do(*(f"heal {self.operators.news['port', one]}" for one in pages.values()))
         elif death == "interface-down":
@@ -212,7 +212,7 @@ class Rig:
         return self.relay
 
     def _await_stop(self, lane: int, began_ns: int) -> int:
-        """Wait until a robot has heard motion, and then a stop; return how many lines that was."""
+        """Wait until a robot has received motion, and then a stop; return the number of lines."""
 
         def is_still() -> bool:
             texts = [one.text for one in self.robots.since(lane, began_ns)]
@@ -240,13 +240,13 @@ class Rig:
         return Trial(death, (stop.time_ns - sent_ns) / 1e6, fault or _order(heard), late_ms)
 
     def late_ms(self, from_ns: int, until_ns: int) -> float:
-        """Return how late the robots were at worst, and whoever else had to be woken for a stop."""
+        """Return the largest delay of the robots and of other processes needed for a stop."""
         others = max(one.latest_ms(from_ns, until_ns) for one in self._witnesses)
         kept_ms = self._watcher.waited_ms(from_ns, until_ns + LOOK_NS)
         return self.robots.latest_ms(from_ns, until_ns) + max(others, kept_ms)
 
 
 def _order(heard: Sequence[Heard]) -> str:
-    """Return "" when no value came that is older than one before it."""
+    """Return "" if no value is older than one before it."""
     sent = [int(one.text[2:]) for one in heard if one.text != "M 0"]
     return "" if sent == sorted(sent) else "an older value came after a newer one"

@@ -1,4 +1,4 @@
-"""What becomes of the robots when the server hangs or dies, or one of its guards is killed."""
+"""Stops after the server hangs or dies, or after one of its guards is killed."""
 
 import os
 import signal
@@ -10,24 +10,24 @@ __all__ = ["ENGINE_DEATHS", "RESTART_MS", "EngineRig"]
 
 ENGINE_DEATHS = ("engine-stopped", "engine-killed", "engine-blocked")
 RESTART_MS = 500.0
-"""A guard that was killed is replaced within this time, and the new one stops first."""
+"""Limit for the replacement of a killed guard, whose first action is a stop, in ms."""
 OPEN_MS = 100.0
-"""What it may take beside that to connect to the robot, and to be heard there."""
+"""Additional time to connect to the robot and to reach it, in ms."""
 AGAIN_S = 10.0
 BLOCKED_S = 30.0
 
 
 class EngineRig(Rig):
-    """Robots that are driven while something happens to the server."""
+    """Driven robots during a failure of the server."""
 
     can_hang = True
 
     def engine_bout(self, death: str) -> list[Trial]:
-        """Drive every robot, let the engine die or hang; return what came of it."""
+        """Drive every robot, and kill or block the engine; return the results."""
         began_ns = time.monotonic_ns()
         pages = dict(self._begin("outside"))
         for number in pages.values():
-            self.operators.await_told("dying", number)  # it has driven for a while, and drives on
+            self.operators.await_told("dying", number)  # it has driven, and continues
         told = len(self.server.lines)
         self._strike(death)
         heard = {lane: self._await_stop(lane, began_ns) for lane in pages}
@@ -59,7 +59,7 @@ class EngineRig(Rig):
             self._watch()
 
     def guard_bout(self) -> list[Trial]:
-        """Drive every robot, kill their guards one after the other; return what came of it."""
+        """Drive every robot, and kill the guards one after the other; return the results."""
         began_ns = time.monotonic_ns()
         pages = dict(self._begin("outside"))
         for number in pages.values():
@@ -72,14 +72,14 @@ class EngineRig(Rig):
         return trials
 
     def _kill(self, guard: int) -> list[Trial]:
-        """Return one trial; none when its robot stood still already, on a machine that is busy."""
+        """Return one trial; none if the robot already stood still because of a busy machine."""
         killed_ns = time.monotonic_ns()
         os.kill(guard, signal.SIGKILL)
         robots = self.robots
         lanes = range(len(robots.visits))
 
         def again() -> list[tuple[int, int]]:
-            """Return the lanes that were connected anew, and when."""
+            """Return the lanes that were reconnected, and when."""
             return [
                 (lane, at)
                 for lane in lanes

@@ -1,4 +1,4 @@
-"""Robots behind a counterpart that stands still for seconds, while they are driven.
+"""Driven robots behind a counterpart that is frozen for seconds.
 
 The counterpart is a separate program (`bench.rig.robot_process`). Signals suspend and resume it,
 while its kernel still accepts bytes. The driver is a session with its guard. Each motion frame
@@ -29,9 +29,9 @@ from urc.runtime.session import Session
 __all__ = ["HEARD_MS", "STOP_MS", "Freeze", "freeze"]
 
 HEARD_MS: Final = 500.0
-"""Nothing arrives that was sent later than this after the counterpart has come to a stand."""
+"""Limit of the send time of arriving motion, after the start of the freeze."""
 STOP_MS: Final = 200.0
-"""The stop arrives within this time of the counterpart's going on."""
+"""Limit of the time from the end of the freeze to the stop."""
 _TICK_S: Final = 0.05
 _AFTERWARDS_S: Final = 1.2
 _READY_S: Final = 10.0
@@ -50,21 +50,21 @@ commands:
 
 
 class Freeze(NamedTuple):
-    """What came of one."""
+    """Result of one freeze."""
 
     lasted_s: float
     newest_ms: float
-    """How long after the counterpart had come to a stand the newest motion was sent that arrived;
-    below 0: none that was sent since."""
+    """Send time of the newest motion that arrived, after the start of the freeze; negative for
+    motion from before it."""
     stop_ms: float
-    """From the counterpart's going on to the stop; `inf`: it did not come."""
+    """Time from the end of the freeze to the stop; `inf` without a stop."""
     is_last: bool
     """Whether nothing came after the stop."""
     late_ms: float
-    """By how much the machine itself was late."""
+    """Delay of the machine."""
     was_moving: bool = True
-    """Whether the robot moved when the counterpart came to a stand. A machine that was too slow for
-    the lease has stopped it before."""
+    """Whether the robot moved at the start of the freeze. A machine that was too slow for the lease
+    may have stopped it before."""
 
     @property
     def is_good(self) -> bool:
@@ -73,7 +73,7 @@ class Freeze(NamedTuple):
 
     @property
     def is_excused(self) -> bool:
-        """Whether the machine was so slow that nothing is shown."""
+        """Whether the machine was so slow that the trial is invalid."""
         is_late = not self.is_good and self.is_last and self.late_ms > STOP_MS / 2
         return is_late or not self.was_moving
 
@@ -86,7 +86,7 @@ async def freeze(
     seed: int = 1,
     told: Callable[[Freeze], None] | None = None,
 ) -> Sequence[Freeze]:
-    """Let each of `lanes` robots stand still for `lasts_s`, `rounds` times."""
+    """Freeze each of `lanes` robots for `lasts_s`, `rounds` times."""
     dice = random.Random(seed)  # noqa: S311 - the same moments in every run
     moments = [[0.4 + dice.random() for _ in range(rounds)] for _ in range(lanes)]
     done: list[Freeze] = []
@@ -123,7 +123,7 @@ def _profile(port: int) -> Profile:
 
 
 async def _one(session: Session, robots: Robots, moment_s: float, lasts_s: float) -> Freeze:
-    """Drive, let the counterpart stand still and go on, and look at what it heard."""
+    """Drive, freeze and resume the counterpart, and check the data that it received."""
     movers = session.movers
     assert movers is not None
     ends_s = time.monotonic() + _READY_S
@@ -149,11 +149,11 @@ async def _one(session: Session, robots: Robots, moment_s: float, lasts_s: float
 
 
 async def _hold(session: Session) -> None:
-    """Tick as a hand does that notices nothing, for ever."""
+    """Send ticks without end, as a hand that notices nothing."""
     assert session.movers is not None
     while True:
         now_ns = time.monotonic_ns()
-        with suppress(UrcError):  # the line is not open: a hand goes on all the same
+        with suppress(UrcError):  # the connection is closed, but the hand continues
             session.movers.tick("go", session.frames.motion_frame("go", {"t": now_ns // 1000}, 0.0))
         await asyncio.sleep(_TICK_S)
 

@@ -1,8 +1,8 @@
-"""The kinds of line that robots of the rig have, and the programs that stand between: real ones.
+"""The kinds of transport of the rig's robots, with real programs in between.
 
-For each kind: the robot's place (see `bench.rig.robot_process`), its document, and what is required
-of it after a cut. Where a line is opened afresh at once, no motion older than 300 ms may come, and
-the stop within 100 ms. Where that is dear, or cannot be noticed, other bounds hold.
+Each kind has the robot's place (see `bench.rig.robot_process`), its document, and the bounds after
+a cut. For a connection that reopens at once, no motion older than 300 ms may arrive, and the stop
+must come within 100 ms. Slow or undetected reconnects have other bounds.
 """
 
 import shutil
@@ -35,33 +35,33 @@ KINDS: Final = (
 )
 _AT_ONCE: Final = ("tcp", "telnet", "websocket", "http")
 FIRST_PORT: Final = {"ssh": 2200, "mqtt": 18830}
-"""Of programs of others, in a namespace where nobody else listens; one a robot."""
+"""First port of third-party programs, one for each robot, in a namespace of their own."""
 
 
 class Bounds(NamedTuple):
-    """What is required after a cut."""
+    """Bounds after a cut."""
 
     oldest_ms: float
-    """No motion that is older may reach the robot."""
+    """Largest age of motion that may reach the robot, in ms."""
     most_late: int | None
-    """Motions older than 300 ms that may come at most."""
+    """Largest number of motions older than 300 ms."""
     stop_ms: float
-    """The stop is to come within this time of the robot's being reachable."""
+    """Limit of the time from the restored link to the stop."""
     unnoticed_s: float
-    """A cut that is shorter may pass unnoticed by a control that is held all the time."""
+    """Length of a cut that a held control may not notice."""
     is_told: bool = True
-    """Whether URC can know that something is lost; where it cannot, a stop may be lost, too."""
+    """Whether URC can detect the loss of data; otherwise a stop may be lost too."""
     is_repeated: bool = False
-    """Whether a stop is written several times."""
+    """Whether a stop is sent several times."""
 
 
 def bounds_of(kind: str) -> Bounds:
-    """Return what is required of a kind."""
+    """Return the bounds of a kind."""
     if kind in _AT_ONCE:
         return Bounds(300.0, 0, 100.0, 0.45)
     if kind == "udp":
         return Bounds(300.0, 0, 100.0, float("inf"), is_told=False, is_repeated=True)
-    # At most one, no older than a second, and a line that is opened anew as fast as it can be.
+    # At most one late motion, no older than a second, and the fastest possible reconnect.
     return Bounds(1000.0, 1, 1000.0, 1.3, is_repeated=kind != "ssh")
 
 
@@ -104,19 +104,19 @@ _ASIDE: Final = {
     "mqtt": "{ publish: { topic: aside, text: here } }",
     "ros": "{ publish: { topic: /aside, type: std_msgs/String, json: { data: here } } }",
 }
-"""What is no motion, on lines where motion waits for it, too; these robots do not hear it."""
+"""A request other than motion that delays motion on the same connection."""
 
 
 class Counterpart(Program):
-    """A program of others that a robot needs; ends when told to, or with whoever started it."""
+    """A third-party program that a robot needs; it ends on request, or with its parent."""
 
     def __init__(self, command: list[str], *, inside: tuple[str, ...], port: int) -> None:
-        """Run `command`, which listens at `port`."""
+        """Run `command`, which listens on `port`."""
         self.port = port
         self.options: dict[str, str] = {}
-        """What the document says of it."""
+        """Values for the document."""
         script = '"$@" & child=$!; cat > /dev/null; kill -9 $child; wait $child'
-        # By force: unshare lets itself be told nothing else.
+        # Killed by force, because unshare ignores other signals.
         super().__init__(["sh", "-c", script, "sh", *command], inside=inside)
 
 
@@ -132,7 +132,7 @@ def place_of(kind: str, lane: int) -> str:
 
 
 def document(kind: str, lane: int, port: int, other: Counterpart | None) -> str:
-    """Return the document of a robot; `port` is its own, `other` what stands before it."""
+    """Return the document of a robot with its `port`, and the program between, if any."""
     options = _OPTIONS[kind].replace("HOST", SERVER_ADDRESS).replace("PORT", str(port))
     if other is not None:
         options = options.replace("OTHER", str(other.port))
@@ -147,7 +147,7 @@ def document(kind: str, lane: int, port: int, other: Counterpart | None) -> str:
 def start_counterpart(
     kind: str, lane: int, folder: Path, inside: tuple[str, ...]
 ) -> Counterpart | None:
-    """Start what a robot of this kind needs beside itself; None when that is nothing."""
+    """Start the program that a robot of this kind needs, or return None."""
     if kind == "mqtt":
         return _broker(FIRST_PORT[kind] + lane, folder / f"broker-{lane}.conf", inside)
     if kind == "ssh":
@@ -171,7 +171,7 @@ _ENTER: Final = (
 
 
 def _login(port: int, folder: Path, inside: tuple[str, ...]) -> Counterpart:
-    """Start OpenSSH's server, with a user of its own: nothing is changed on the machine."""
+    """Start OpenSSH's server with a user of its own, without changes to the machine."""
     folder.mkdir(mode=0o755)
     for name in ("host", "user"):
         make = ["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(folder / name)]

@@ -1,18 +1,18 @@
-"""People at screens, and how they vanish: a separate program, which imports nothing of URC.
+"""Operators at pages, and ways to vanish: a separate program, which imports nothing of URC.
 
-Reads one plan a line from standard input, as JSON, and forks a process for each: a page that takes
-the controls, ticks every 50 ms, and dies in the way that the plan says. What it does is told on
-standard output, one line each, with times of the monotonic clock in nanoseconds::
+It reads plans from standard input, one JSON object a line, and forks a process for each. The
+process is a page that takes the controls, ticks every 50 ms, and vanishes as planned. It prints one
+line for each event, with times of the monotonic clock in nanoseconds::
 
     pid NUMBER PID          the process of plan NUMBER
-    port NUMBER PORT        the port from which it is connected: what a relay may cut
+    port NUMBER PORT        its source port, for cuts by a relay
     driving NUMBER TIME     the first tick was sent
-    dying NUMBER TIME TEXT  now; and what the server refused last, if anything
+    dying NUMBER TIME TEXT  it vanishes now; TEXT is the server's last refusal, if any
     failed NUMBER TEXT      it could not drive
     ended NUMBER TIME       it was killed by order, a plan ``{"kill": NUMBER}``
 
-The value of every tick is the time at which it was sent, in microseconds: a robot that hears it
-knows how old it is. Ends when its standard input does, and ends every process that it forked.
+The value of every tick is its send time, in microseconds, so a robot knows its age. The program
+ends with its standard input, and ends every forked process.
 """
 
 import base64
@@ -33,33 +33,33 @@ FLOOD_NS = 1_000_000
 ANSWER_S = 20.0
 _PR_SET_PDEATHSIG = 1
 FLOOD = 400
-"""Messages at once for which a server throws a page out."""
+"""Number of messages at once for which a server disconnects a page."""
 
 
 class Plan(NamedTuple):
-    """What one page is to do."""
+    """The plan of one page."""
 
     number: int
     host: str
     port: int
     robot: str
     death: str
-    """``close``, ``kill``, ``freeze``, ``block``, ``reset``, ``kick``, or ``outside``: it drives on
-    while somebody else cuts a line. ``flood``: it ticks a thousand times a second."""
+    """``close``, ``kill``, ``freeze``, ``block``, ``reset`` or ``kick``. ``outside``: it continues
+    to drive while another program cuts the link. ``flood``: a thousand ticks a second."""
     drive_s: float
-    """How long it drives before."""
+    """Time of driving before it vanishes, in seconds."""
     life_s: float = 120.0
-    """How long it lives after that at most, where nobody ends it."""
+    """Limit of its life after that, in seconds."""
     command: str = "go"
     argument: str = "t"
     key: str = ""
-    """Of the server, which it printed; "" comes as a stranger."""
+    """Start key of the server; "" for an unknown visitor."""
     has_spare: bool = False
-    """Whether it says everything about held controls on a second line, too."""
+    """Whether it sends held controls on a second connection too."""
 
 
 class Page:
-    """A WebSocket client that does what the dashboard's own page does."""
+    """A WebSocket client that acts like the dashboard's own page."""
 
     def __init__(self, plan: Plan, path: str = "/ws") -> None:
         self.plan = plan
@@ -72,7 +72,7 @@ class Page:
         self.is_mine = False
         self.is_latched = False
         self.is_live = False
-        """Whether the robot is connected: a page's controls are off before."""
+        """Whether the robot is connected; before that, the page's controls are off."""
         self.holder = ""
         self.refusal = ""
         self.has_let_go = False
@@ -104,14 +104,14 @@ class Page:
         if b" 101 " not in first.split(b"\r\n")[0]:
             raise ConnectionError(first.split(b"\r\n")[0].decode("latin-1"))
         self.socket.setblocking(False)
-        self._sort()  # the first messages may have come along
+        self._sort()  # the first messages may have arrived with the handshake
 
     def say(self, message: dict[str, Any]) -> bool:
-        """Send a message if the line takes it at once; return whether it did."""
+        """Send a message if that needs no waiting; return whether it was sent."""
         return self._frame(1, json.dumps(message).encode())
 
     def close(self) -> None:
-        """Say good-bye and go, as a closed tab does."""
+        """Send a close message and disconnect, as a closed tab does."""
         self._frame(8, struct.pack("!H", 1001))
         self.socket.close()
 
@@ -131,7 +131,7 @@ class Page:
         return True
 
     def wait(self, until_ns: int) -> None:
-        """Take what comes until then."""
+        """Handle messages until then."""
         while not self.is_closed:
             left_s = (until_ns - time.monotonic_ns()) / 1e9
             lines = [one for one in (self, self.spare) if one is not None and not one.is_closed]
@@ -145,7 +145,7 @@ class Page:
         time.sleep(max(0.0, (until_ns - time.monotonic_ns()) / 1e9))
 
     def hear(self) -> None:
-        """Take what has come."""
+        """Handle received messages."""
         try:
             data = self.socket.recv(65536)
         except BlockingIOError:
@@ -185,7 +185,7 @@ class Page:
             self.refusal = message.get("message", "")
 
     def tick(self) -> int:
-        """Send a sample of what is held, which is the time in microseconds; return it."""
+        """Send a sample of the held control, the time in microseconds; return it."""
         self.sent += 1
         value = time.monotonic_ns() // 1000
         self._say_twice(
@@ -206,19 +206,19 @@ class Page:
             self.spare.say(message)
 
     def double(self) -> None:
-        """Make a second line."""
+        """Open a second connection."""
         self.spare = Page(self.plan, "/ws/spare")
         self.spare.say({"t": "spare", "key": self.key})
 
     def let_go(self) -> None:
-        """Hold nothing any more."""
+        """Release all controls."""
         self.has_let_go = True
         self.sent += 1
         message = {"t": "release", "command": self.plan.command, "number": self.sent}
         self._say_twice(message)
 
     def take_controls(self) -> None:
-        """Have the lease, a beat and a robot; raise `TimeoutError` when that takes too long."""
+        """Wait for the lease, a beat and a robot; raise `TimeoutError` at the limit."""
         until_ns = time.monotonic_ns() + int(ANSWER_S * 1e9)
         asked_ns = 0
         while not (self.is_mine and self.is_live and self.beat >= 0):
@@ -226,7 +226,7 @@ class Page:
             if now_ns > until_ns or self.is_closed:
                 state = f"live {self.is_live}, mine {self.is_mine}, beat {self.beat}"
                 raise TimeoutError(f"no controls ({state}): {self.refusal or 'no answer'}")
-            # Whoever had them before is going just now: asked again until they are free.
+            # The last operator is leaving, so repeat the request until the controls are free.
             if self.you and not self.is_mine and now_ns - asked_ns > TICK_NS:
                 verb = "reset" if self.is_latched else "take"
                 self.say({"t": "drive", "verb": verb})
@@ -235,7 +235,7 @@ class Page:
 
 
 def _frame_of(data: bytes) -> tuple[int, bytes, bytes] | None:
-    """Return kind, body and what follows of the first whole frame; None while it is not whole."""
+    """Return kind, body and rest of the first frame, or None for an incomplete one."""
     if len(data) < 2:
         return None
     head, size = 2, data[1] & 0x7F
@@ -251,12 +251,12 @@ def _frame_of(data: bytes) -> tuple[int, bytes, bytes] | None:
 
 
 def tell(*words: object) -> None:
-    """Write one line in one piece: the processes share the pipe."""
+    """Write one line at once, because the processes share the pipe."""
     os.write(1, (" ".join(map(str, words)) + "\n").encode())
 
 
 def live(plan: Plan) -> None:
-    """Be one page from its first byte to its end."""
+    """Act as one page from its first byte to its end."""
     page = Page(plan)
     signal.signal(signal.SIGUSR1, lambda *_: page.let_go())
     tell("port", plan.number, page.socket.getsockname()[1])
@@ -271,7 +271,7 @@ def live(plan: Plan) -> None:
 
 
 def _drive(page: Page, next_ns: int, until_ns: int, every_ns: int = TICK_NS) -> None:
-    """Tick on a grid until then."""
+    """Send ticks at fixed times until then."""
     while next_ns < until_ns:
         page.wait(next_ns)
         if not page.has_let_go:
@@ -296,7 +296,7 @@ def _die(page: Page, plan: Plan) -> None:
             page.say({"t": "ping", "c": 0})
         page.wait(end_ns)
     elif death == "block":
-        page.wait(end_ns)  # the socket lives, the page's thread samples nothing
+        page.wait(end_ns)  # the socket lives, but the page's thread samples nothing
     else:
         every_ns = FLOOD_NS if death == "flood" else TICK_NS
         _drive(page, time.monotonic_ns(), end_ns, every_ns)
@@ -319,13 +319,13 @@ def start(plan: Plan) -> int:
 
 
 def _end_with_parent() -> None:
-    """Let the kernel end this process with its parent: a frozen one cannot end itself."""
+    """Let the kernel end this process with its parent, because a frozen one cannot end itself."""
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _reap(children: dict[int, int]) -> None:
-    """Forget those that have ended: their ids may be somebody else's soon."""
+    """Forget ended processes, because their ids may be reused soon."""
     for number, child in list(children.items()):
         if os.waitpid(child, os.WNOHANG)[0]:
             del children[number]
@@ -334,7 +334,7 @@ def _reap(children: dict[int, int]) -> None:
 def _kill(children: dict[int, int], number: int) -> None:
     child = children.pop(number, None)
     if child is not None:
-        os.kill(child, signal.SIGKILL)  # not reaped, so that the id is still its own
+        os.kill(child, signal.SIGKILL)  # not reaped before, so the id is still valid
         os.waitpid(child, 0)
     tell("ended", number, time.monotonic_ns())
 
@@ -342,7 +342,7 @@ def _kill(children: dict[int, int], number: int) -> None:
 def main() -> None:
     """Fork a page for every plan, until standard input ends; ``{"kill": NUMBER}`` ends one.
 
-    ``{"let_go": NUMBER}`` lets it hold nothing any more, and live on.
+    ``{"let_go": NUMBER}`` lets a page release its controls and live on.
     """
     children: dict[int, int] = {}
     try:

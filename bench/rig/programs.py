@@ -34,26 +34,26 @@ __all__ = [
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 SERVER_ADDRESS = "10.77.0.2"
-"""Of side ``b`` of the relay, see `bench.rig.relay_process`."""
+"""Address of side ``b`` of the relay, see `bench.rig.relay_process`."""
 READY_S = 40.0
 ANSWER_S = 10.0
 END_S = 5.0
 PATIENCE_S = 25.0
-"""For a page to have the controls and to drive; it gives up by itself before."""
+"""Time for a page to get the controls and to drive, in seconds; it gives up earlier itself."""
 
 
 class Program:
-    """One process that is told orders by lines, and tells what happens by lines."""
+    """A process that receives orders as lines, and reports events as lines."""
 
     def __init__(self, arguments: Sequence[str], *, inside: Sequence[str] = ()) -> None:
         """Start it.
 
         Args:
-            arguments: what to run.
-            inside: what starts it elsewhere, as `Relay.inside` returns it.
+            arguments: command line.
+            inside: command prefix for another namespace, from `Relay.inside`.
         """
         self.lines: list[str] = []
-        """All that it said, standard error included."""
+        """All its output, with standard error."""
         self.changed = threading.Condition()
         self._has_ended = False
         self._ordering = threading.Lock()
@@ -74,7 +74,7 @@ class Program:
         self._reader.start()
 
     def __enter__(self) -> Self:
-        """Return it; it ends with the block."""
+        """Return self; it ends with the block."""
         return self
 
     def __exit__(
@@ -88,22 +88,22 @@ class Program:
 
     @property
     def pid(self) -> int:
-        """Its process id, while it runs."""
+        """Process id, while it runs."""
         return self._process.pid
 
     @property
     def is_running(self) -> bool:
-        """Whether it has not ended yet."""
+        """Whether it still runs."""
         return self._process.poll() is None
 
     def order(self, text: str) -> None:
-        """Write one line to it; from any thread."""
+        """Write one line to it, from any thread."""
         with self._ordering:
             self._orders.write(text + "\n")
             self._orders.flush()
 
     def wait_until(self, is_so: Callable[[], bool], timeout_s: float, what: str) -> None:
-        """Wait until something that it says makes `is_so` true; fail when time runs out."""
+        """Wait until its output makes `is_so` true; fail at the limit."""
         with self.changed:
             self.changed.wait_for(lambda: is_so() or self._has_ended, timeout_s)
             if not is_so():
@@ -125,8 +125,8 @@ class Program:
         self._process.send_signal(number)
 
     def close(self) -> None:
-        """End it, by force when it does not end by itself. May be called twice."""
-        with contextlib.suppress(BrokenPipeError):  # it has ended already
+        """End it, by force if necessary. May be called twice."""
+        with contextlib.suppress(BrokenPipeError):  # it has already ended
             self._orders.close()
         self._end()
         self._reader.join(END_S)
@@ -150,39 +150,39 @@ class Program:
             self.changed.notify_all()
 
     def take(self, line: str) -> None:
-        """Take note of a line, in the reader's thread; for those who know what it means."""
+        """Handle a line, in the reader's thread; for subclasses."""
 
 
 def _script(name: str, *arguments: str) -> list[str]:
-    # -P: else its own folder comes first on the path, where names of the standard library stand.
+    # -P: else its own folder is first on the path, with names of the standard library.
     return [sys.executable, "-PSE", str(HERE / name), *arguments]
 
 
 class Heard(NamedTuple):
-    """A line that a robot heard."""
+    """A line that a robot received."""
 
     time_ns: int
-    """When its first byte came."""
+    """Time of its first byte."""
     text: str
 
 
 class Robots(Program):
-    """Some robots in one process, see `bench.rig.robot_process`."""
+    """Robots in one process, see `bench.rig.robot_process`."""
 
     def __init__(self, places: Sequence[str], *, inside: Sequence[str] = ()) -> None:
         self.heard: list[list[Heard]] = [[] for _ in places]
-        """Of each robot."""
+        """Received lines of each robot."""
         self.late: list[tuple[int, float]] = []
-        """When the robots' own process was not woken in time, and by how many milliseconds."""
+        """Times of late wake-ups of the robots' process, with the delay in milliseconds."""
         self.waits: dict[int, list[tuple[int, float]]] = {}
-        """Of each process that is watched: until when it waited for a processor, how many ms."""
+        """Process id → ends and lengths of its waits for a processor, in milliseconds."""
         self.visits: list[list[tuple[int, bool]]] = [[] for _ in places]
-        """Of each robot: when, and whether a connection was made or ended."""
+        """Times of the connects (true) and disconnects (false) of each robot."""
         super().__init__(_script("robot_process.py", *places), inside=inside)
         self.ports = [int(port) for port in self.wait_for("ready")[1:]]
 
     def take(self, line: str) -> None:
-        """Sort what they tell."""
+        """Sort a report."""
         words = line.split(" ", 3)
         if words[0] == "line":
             self.heard[int(words[1])].append(Heard(int(words[2]), words[3]))
@@ -195,18 +195,18 @@ class Robots(Program):
             self.visits[int(words[1])].append((int(words[2]), words[0] == "open"))
 
     def since(self, robot: int, time_ns: int) -> list[Heard]:
-        """Return what a robot heard from then on."""
+        """Return the lines that a robot received from then on."""
         with self.changed:
             return [one for one in self.heard[robot] if one.time_ns >= time_ns]
 
     def latest_ms(self, from_ns: int, until_ns: int) -> float:
-        """Return by how much their process was late at worst between two times."""
+        """Return the largest delay of their process between two times, in milliseconds."""
         with self.changed:
             found = [late for time_ns, late in self.late if from_ns <= time_ns <= until_ns]
         return max(found, default=0.0)
 
     def waited_ms(self, from_ns: int, until_ns: int) -> float:
-        """Return how long the one that waited most was kept from running between two times."""
+        """Return the longest wait of a watched process between two times, in milliseconds."""
         with self.changed:
             sums = [
                 sum(ms for at, ms in waits if from_ns <= at <= until_ns)
@@ -216,7 +216,7 @@ class Robots(Program):
 
 
 class Operators(Program):
-    """Pages and their ends, see `bench.rig.operator_process`."""
+    """Pages that vanish, see `bench.rig.operator_process`."""
 
     def __init__(self, *, inside: Sequence[str] = ()) -> None:
         self.news: dict[tuple[str, int], str] = {}
@@ -224,18 +224,18 @@ class Operators(Program):
         super().__init__(_script("operator_process.py"), inside=inside)
 
     def take(self, line: str) -> None:
-        """Sort what they tell."""
+        """Sort a report."""
         word, _, rest = line.partition(" ")
         number, _, rest = rest.partition(" ")
         if number.isdigit():
             self.news[word, int(number)] = rest
 
     def start(self, plan: Mapping[str, object]) -> None:
-        """Let a page live by a plan, whose fields are those of `operator_process.Plan`."""
+        """Start a page by a plan with the fields of `operator_process.Plan`."""
         self.order(json.dumps(plan))
 
     def await_told(self, word: str, number: int, timeout_s: float = PATIENCE_S) -> str:
-        """Return what was told with `word` about a plan; fail when it failed."""
+        """Return the report `word` about a plan; fail if the plan failed."""
 
         def is_told() -> bool:
             return (word, number) in self.news or ("failed", number) in self.news
@@ -246,7 +246,7 @@ class Operators(Program):
         return self.news[word, number]
 
     def kill(self, number: int) -> None:
-        """End the page of a plan, and wait until it has ended."""
+        """End the page of a plan, and wait for its end."""
         self.order(json.dumps({"kill": number}))
         self.wait_until(lambda: ("ended", number) in self.news, ANSWER_S, f"end of {number}")
 
@@ -268,15 +268,15 @@ class Relay(Program):
         self._descriptors = dict(zip("ab", found, strict=True))
 
     def take(self, line: str) -> None:
-        """Count the orders that were carried out."""
+        """Count the executed orders."""
         self._done += line.startswith("done")
 
     def inside(self, side: str) -> tuple[str, ...]:
-        """Return what starts a program at side ``a`` or ``b``."""
+        """Return the command prefix for a program at side ``a`` or ``b``."""
         return ("nsenter", f"--net=/proc/{self.pid}/fd/{self._descriptors[side]}", "--")
 
     def do(self, *orders: str) -> int:
-        """Carry out orders such as ``cut a``; return when the last was, in nanoseconds."""
+        """Execute orders such as ``cut a``; return the time of the last, in nanoseconds."""
         with self._doing:
             wanted = self._done + len(orders)
             self.order("\n".join(orders))
@@ -300,11 +300,11 @@ class Server(Program):
 
         Args:
             profiles: the robots' documents.
-            data: its folder.
-            options: more of ``urc serve``.
-            host: where it listens.
+            data: its data folder.
+            options: further options of ``urc serve``.
+            host: address to listen on.
             inside: as of `Program`.
-            can_hang: let it be held up by a signal, see `bench.rig.server_process`.
+            can_hang: whether a signal can block it, see `bench.rig.server_process`.
         """
         script = ["-P", str(HERE / "server_process.py")] if can_hang else ["-m", "urc.cli.main"]
         command = [sys.executable, *script, "serve", *map(str, profiles)]
@@ -324,7 +324,7 @@ class Server(Program):
     def _end(self) -> None:
         if self.is_running:
             self._process.send_signal(signal.SIGCONT)
-            self._process.terminate()  # it listens to no standard input
+            self._process.terminate()  # it does not end with its standard input
         super()._end()
 
 
@@ -337,5 +337,5 @@ def _is_guard(process: str) -> bool:
 
 
 def now_ns() -> int:
-    """Return the time of the one clock."""
+    """Return the time of the monotonic clock."""
     return time.monotonic_ns()

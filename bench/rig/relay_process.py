@@ -1,23 +1,23 @@
 """A link between two network namespaces that can be slow, lossy, or cut: a separate program.
 
-Linux and root only; it needs /dev/net/tun and nothing of URC. ``python relay_process.py`` makes two
-namespaces, a TUN device in each, and moves packets between them: side ``a`` is 10.77.0.1, side
-``b`` 10.77.0.2, and each has a loopback of its own. Other programs enter by
-``nsenter --net=/proc/PID/fd/FD``. Told on standard output::
+Linux and root only; it needs /dev/net/tun and nothing of URC. ``python relay_process.py`` creates
+two namespaces with a TUN device in each, and moves packets between them. Side ``a`` is 10.77.0.1,
+side ``b`` 10.77.0.2, and each has its own loopback. Other programs enter by
+``nsenter --net=/proc/PID/fd/FD``. Reports on standard output::
 
     ready FD_A FD_B         descriptors of the two namespaces in this process
-    done TIME               the order before was carried out, monotonic nanoseconds
+    done TIME               the last order was executed, monotonic nanoseconds
 
-Orders, one a line of standard input, times in milliseconds::
+Orders on standard input, one a line, times in milliseconds::
 
     delay MS | jitter MS | loss PERCENT
     cut | heal              the whole link
-    cut a | cut b           only what comes from that side
+    cut a | cut b           only packets from that side
     cut PORT | heal PORT    only packets from or to that TCP or UDP port
-    cut PORT a              of these only those from that side; healed all the same
+    cut PORT a              the same, only from that side; `heal PORT` ends it too
     down a | up a           the network interface of a side
 
-Ends when its standard input does; the namespaces end with the last program inside.
+It ends with its standard input; the namespaces end with the last program inside.
 """
 
 import ctypes
@@ -41,7 +41,7 @@ SIDES = ("a", "b")
 ADDRESSES = {"a": "10.77.0.1", "b": "10.77.0.2"}
 DEVICE = b"tun0"
 MOST_WAITING = 4096
-"""Packets under way; more are lost, as on any link."""
+"""Limit of packets in transit; further ones are lost, as on any link."""
 
 
 @dataclass
@@ -53,20 +53,20 @@ class Side:
     """Descriptor of its network namespace."""
     tun: int
     control: socket.socket
-    """A socket inside, by which its interfaces are set."""
+    """A socket inside, for settings of its interfaces."""
 
 
 @dataclass
 class Weather:
-    """What the link is like."""
+    """Quality of the link."""
 
     delay_ns: int = 0
     jitter_ns: int = 0
     loss: float = 0.0
     is_cut: dict[str, bool] = field(default_factory=lambda: {"a": False, "b": False})
-    """Side → whether what comes from it is lost."""
+    """Side → whether packets from it are lost."""
     ports: dict[str, set[int]] = field(default_factory=lambda: {"a": set(), "b": set()})
-    """Side → ports; what comes from it, from or to one of them, is lost."""
+    """Side → ports; packets from this side, from or to one of them, are lost."""
 
 
 def made(name: str) -> Side:
@@ -98,7 +98,7 @@ def switch(side: Side, device: bytes, *, is_up: bool) -> None:
 
 
 def ports_of(packet: bytes) -> tuple[int, int]:
-    """Return the two ports of a TCP or UDP packet over IPv4; zeros for any other."""
+    """Return the two ports of a TCP or UDP packet over IPv4, or zeros."""
     if packet[0] >> 4 != 4 or packet[9] not in (socket.IPPROTO_TCP, socket.IPPROTO_UDP):
         return 0, 0
     head = (packet[0] & 0x0F) * 4
@@ -141,7 +141,7 @@ class Relay:
         for _ in range(64):
             try:
                 packet = os.read(side.tun, 65536)
-            except OSError:  # nothing more, or the interface is down
+            except OSError:  # no more packets, or the interface is down
                 return
             weather = self.weather
             lost = weather.is_cut[side.name] or len(self._waiting) >= MOST_WAITING
@@ -162,7 +162,7 @@ class Relay:
             try:
                 os.write(self._sides[name].tun, packet)
             except OSError:
-                continue  # its interface is down: lost
+                continue  # the interface is down, so the packet is lost
 
     def _obey(self) -> bool:
         data = os.read(0, 65536)
@@ -190,7 +190,7 @@ class Relay:
         else:
             for side in [what] if what else SIDES:
                 weather.is_cut[side] = verb == "cut"
-            if verb == "cut":  # what is under way is lost, too
+            if verb == "cut":  # packets in transit are lost too
                 self._waiting = [one for one in self._waiting if not weather.is_cut[_from(one)]]
                 heapq.heapify(self._waiting)
 

@@ -1,4 +1,4 @@
-"""Robots that stamp every line they receive: a separate program, which imports nothing of URC.
+"""Robots that stamp every received line: a separate program, which imports nothing of URC.
 
 ``python robot_process.py tcp:127.0.0.1:0 udp:127.0.0.1:0 …`` plays one robot for each argument.
 ``ws`` is a WebSocket whose messages are the lines. ``bridge`` speaks the protocol of rosbridge, and
@@ -7,14 +7,14 @@ a request for ``/go?t=NUMBER``. ``mqtt:HOST:PORT`` subscribes to the topic ``go`
 It prints one line for each event, with times of the monotonic clock in nanoseconds::
 
     ready 40001 40002 …     their ports, once
-    open ROBOT TIME         a connection was made; a broker has taken the subscription
-    line ROBOT TIME TEXT    a line was heard; TIME is that of its first byte
+    open ROBOT TIME         a connection opened, or a broker accepted the subscription
+    line ROBOT TIME TEXT    a line was received; TIME is that of its first byte
     gone ROBOT TIME         a connection ended
-    late TIME MICROSECONDS  this program itself was not woken in time: the machine is busy
-    waited TIME PID MICROSECONDS  another one that could run was not let: ``pid:NUMBER`` among the
-                            arguments is watched, with its children
+    late TIME MICROSECONDS  this program itself was woken late: the machine is busy
+    waited TIME PID MICROSECONDS  another runnable process had to wait: the argument
+                            ``pid:NUMBER`` watches a process and its children
 
-Ends when its standard input does, so that it never outlives whoever started it.
+It ends with its standard input, and so with its parent.
 """
 
 import base64
@@ -29,32 +29,32 @@ import time
 from dataclasses import dataclass
 
 BEAT_NS = 5_000_000
-"""How often it looks whether it is woken in time."""
+"""Interval of checks for a late wake-up, in nanoseconds."""
 LOOK_NS = 20_000_000
-"""How often it looks whether others wait."""
+"""Interval of checks for waiting processes, in nanoseconds."""
 WAITED_NS = 2_000_000
-"""Waiting that is worth a line."""
+"""Shortest reported wait, in nanoseconds."""
 LATE_NS = 5_000_000
-"""Lateness that is worth a line."""
+"""Shortest reported delay, in nanoseconds."""
 LONGEST_LINE = 65536
 BROKER_S = 20.0
-"""How long a broker may take to start."""
+"""Time for a broker to start, in seconds."""
 _GUID = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 
 
 class Ear:
-    """Takes lines out of what comes over one connection."""
+    """A decoder of lines from one connection."""
 
     opening = b""
-    """What is said first."""
+    """First bytes to send."""
 
     def __init__(self) -> None:
         self.rest = b""
-        """Bytes of a line whose end has not come yet."""
+        """Bytes of an incomplete line."""
         self.reply = b""
-        """What is to be answered."""
+        """Reply to send."""
         self.is_ready = True
-        """Whether the connection can carry lines; else it is told as open later."""
+        """Whether the connection can carry lines; otherwise it is reported as open later."""
 
     def take(self, data: bytes) -> list[str]:
         """Return the lines that end in `data`."""
@@ -64,14 +64,14 @@ class Ear:
 
 
 class WebEar(Ear):
-    """The messages of a WebSocket."""
+    """A decoder of WebSocket messages."""
 
     def __init__(self) -> None:
         super().__init__()
         self.is_ready = False
 
     def take(self, data: bytes) -> list[str]:
-        """Shake hands, then return each message."""
+        """Answer the handshake, then return each message."""
         self.rest += data
         if not self.is_ready:
             head, end, self.rest = self.rest.partition(b"\r\n\r\n")
@@ -96,7 +96,7 @@ class WebEar(Ear):
         return found
 
     def _frame(self) -> tuple[int, bytes] | None:
-        """Take the first whole frame; None while there is none."""
+        """Remove and return the first complete frame, or return None."""
         data = self.rest
         if len(data) < 6:
             return None
@@ -117,20 +117,20 @@ class WebEar(Ear):
 
 
 class BridgeEar(WebEar):
-    """What is published through a rosbridge."""
+    """A decoder of messages published through a rosbridge."""
 
     def read(self, body: bytes) -> list[str]:
-        """Return a line for what is published on the topic of motion, nothing for all else."""
+        """Return a line for a message on the topic of motion, otherwise nothing."""
         said = json.loads(body)
         is_motion = said["op"] == "publish" and said["topic"] == "/go"
         return [f"M {said['msg']['data']}"] if is_motion else []
 
 
 class HttpEar(Ear):
-    """Requests without a body, as ``GET /go?t=5``; each is answered, and the connection is kept."""
+    """A decoder of requests without a body, such as ``GET /go?t=5``; connections are persistent."""
 
     def take(self, data: bytes) -> list[str]:
-        """Return ``M 5`` for each whole request."""
+        """Return ``M 5`` for each complete request."""
         *heads, self.rest = (self.rest + data).split(b"\r\n\r\n")
         self.reply += b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nok" * len(heads)
         return [f"M {head.split(b' ')[1].decode().rpartition('=')[2]}" for head in heads]
@@ -146,7 +146,7 @@ class BrokerEar(Ear):
         self.is_ready = False
 
     def take(self, data: bytes) -> list[str]:
-        """Subscribe when the log-in is granted, then return what is published."""
+        """Subscribe after the login, then return published messages."""
         self.rest += data
         found: list[str] = []
         while len(self.rest) >= 2 and len(self.rest) >= 2 + self.rest[1]:
@@ -168,7 +168,7 @@ EARS = {
 
 @dataclass
 class Door:
-    """Where one robot listens."""
+    """The listening socket of one robot."""
 
     robot: int
     socket: socket.socket
@@ -183,7 +183,7 @@ class Visit:
     socket: socket.socket
     ear: Ear
     began_ns: int = 0
-    """When the first byte of an unfinished line came."""
+    """Time of the first byte of an incomplete line."""
     is_told: bool = False
 
 
@@ -206,7 +206,7 @@ def opened(place: str, robot: int) -> Door | Visit:
 
 
 def dialled(host: str, port: int) -> socket.socket:
-    """Connect to somebody who may just be starting."""
+    """Connect to a server that may still be starting."""
     until_ns = time.monotonic_ns() + int(BROKER_S * 1e9)
     while True:
         try:
@@ -218,16 +218,16 @@ def dialled(host: str, port: int) -> socket.socket:
 
 
 class Others:
-    """A process and its children: how long each could have run and was not let."""
+    """A process and its children, with the waits of each for a processor."""
 
     def __init__(self, process: str) -> None:
         self._process = process
         self._waited: dict[str, int] = {}
 
     def look(self) -> list[tuple[str, int]]:
-        """Return who has waited since the last look, and for how many nanoseconds."""
+        """Return the processes that waited since the last check, with nanoseconds."""
         found: list[tuple[str, int]] = []
-        with contextlib.suppress(OSError):  # it has ended
+        with contextlib.suppress(OSError):  # the process has ended
             with open(f"/proc/{self._process}/task/{self._process}/children") as children:
                 everybody = [self._process, *children.read().split()]
             for one in everybody:
@@ -256,7 +256,7 @@ class Robots:
         self._tell("ready", *ports)
 
     def run(self) -> None:
-        """Listen until standard input ends."""
+        """Run until standard input ends."""
         look_ns = due_ns = time.monotonic_ns() + BEAT_NS
         while True:
             self._flush()
@@ -313,13 +313,13 @@ class Robots:
             began_ns = now_ns
         visit.began_ns = began_ns
         if ear.reply:
-            with contextlib.suppress(OSError):  # gone again: told by the next look at it
+            with contextlib.suppress(OSError):  # disconnected; the next check reports it
                 visit.socket.sendall(ear.reply)
             ear.reply = b""
         self._look(visit, now_ns)
 
     def _look(self, visit: Visit, now_ns: int) -> None:
-        """Tell once that a connection can carry lines."""
+        """Report once that a connection can carry lines."""
         if visit.ear.is_ready and not visit.is_told:
             visit.is_told = True
             self._tell("open", visit.robot, now_ns)

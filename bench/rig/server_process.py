@@ -15,12 +15,12 @@ from types import FrameType
 from urc.cli.main import main
 
 HELD_UP_NS = 800_000_000
-"""Longer than any lease that the rig uses, and than the oldest input that is still taken."""
+"""Longer than any lease in the rig, and than the oldest accepted input."""
 FIRST_LETTERS = 20
 
 
 def backtrack(number: int, frame: FrameType | None) -> None:
-    """Hold everything up."""
+    """Block the process."""
     began_ns = time.monotonic_ns()
     letters = FIRST_LETTERS
     while time.monotonic_ns() - began_ns < HELD_UP_NS:
