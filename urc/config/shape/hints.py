@@ -86,7 +86,8 @@ def _place_hint(value: object, known: Mapping[str, Any]) -> str:
     written = [f"host: {found['host']}"]
     written += [f"port: {found['port']}"] if found["port"] else []
     written += [f"path: {found['path']}"] if found["path"] and "path" in known else []
-    return f"write {', '.join(written)}"
+    # The quoted names keep a missing 'host' from being reported a second time.
+    return f"write 'host' and 'port': {', '.join(written)}"
 
 
 def word_hint(word: str, words: Sequence[str]) -> str:

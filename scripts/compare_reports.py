@@ -1,0 +1,223 @@
+"""Compares what two commits say of the same documents, through the table of renames.
+
+    python -m scripts.compare_reports COMMIT            that commit and this tree
+    python -m scripts.compare_reports COMMIT --list     every difference, not the first of each kind
+
+Two comparisons:
+
+- reports: file, line, column, severity and code of every problem of the broken documents. The
+  documents of the commit are migrated in memory, which moves the columns behind a renamed key;
+- resolved profiles: `urc resolve` of each robot of the commit, migrated, and of this tree.
+
+The exit code is 1 when anything differs that no rename explains. A document that was changed
+otherwise since the commit, such as its comments, is listed and left out.
+"""
+
+import argparse
+import io
+import json
+import os
+import subprocess
+import sys
+import tarfile
+import tempfile
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from urc.config.migrate import Migrated, migrate
+from urc.config.renames import CODES
+from urc.problems import ProblemsError
+
+ROOT = Path(__file__).resolve().parents[1]
+BROKEN = "tests/broken"
+FOLDERS = ("urc", "schemas", "robots", "widgets", "templates", BROKEN, "pyproject.toml")
+
+RECORD = """
+import importlib, json, os, sys
+from pathlib import Path
+
+def found(*places):
+    for place in places:
+        module, name = place.split(":")
+        try:
+            return getattr(importlib.import_module(module), name)
+        except (ImportError, AttributeError):
+            pass
+    raise SystemExit(f"none of {places} is there")
+
+from urc.config.load import check
+from urc.config.resolve import resolve
+widgets = found("urc.config.parse.widget:WidgetFolder", "urc.config.load:Shelf",
+                "urc.config.parse.widget:Shelf")
+known = found("urc.runtime.catalog:built_in_catalog", "urc.runtime.registries:built_in_registries",
+              "urc.runtime.registries:built_in_catalog")()
+root = Path.cwd()
+os.chdir(root / "tests/broken")
+reports = {}
+for path in sorted(Path().rglob("*.yaml")):
+    name = path.as_posix()
+    if name.startswith(("parts/", "shelf/")):
+        continue
+    problems = check(name, known, widgets(Path("shelf").absolute())).problems
+    reports[name] = [[one.file, one.line, one.column, one.severity, one.code] for one in problems]
+os.chdir(root)
+resolved = {}
+for path in sorted(Path("robots").glob("*.yaml")):
+    shelf = widgets(root / "widgets")
+    profile = check(path.as_posix(), known, shelf).profile
+    resolved[path.name] = resolve(path.as_posix(), shelf, profile).text
+print(json.dumps({"reports": reports, "resolved": resolved}))
+"""
+"""Runs in the tree of a commit, on the code of that commit."""
+
+Problem = tuple[str, int, int, str, str]
+"""File, line, column, severity and code."""
+
+
+def main() -> int:
+    """Compare; return 1 when anything differs that no rename explains."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("commit", help="the commit before the renames")
+    parser.add_argument("--list", action="store_true", help="list every difference")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        old = Path(folder)
+        unpack(arguments.commit, old)
+        before, after = recorded(old), recorded(ROOT)
+        differences = Comparison(old, ROOT, print if arguments.list else None)
+        differences.compare_reports(before["reports"], after["reports"])
+        differences.compare_resolved(before["resolved"], after["resolved"])
+    for name, count in differences.counts.items():
+        print(f"{count:6}  {name}")
+    return int(differences.is_different)
+
+
+def unpack(commit: str, folder: Path) -> None:
+    """Write what the comparison needs of a commit into a folder."""
+    packed = subprocess.run(
+        ["git", "archive", commit, *FOLDERS], cwd=ROOT, check=True, capture_output=True
+    )
+    with tarfile.open(fileobj=io.BytesIO(packed.stdout)) as files:
+        files.extractall(folder, filter="data")
+
+
+def recorded(root: Path) -> dict[str, Any]:
+    """Return the reports and the resolved profiles of a tree, by its own code."""
+    done = subprocess.run(
+        [sys.executable, "-c", RECORD],
+        cwd=root,
+        env=os.environ | {"PYTHONPATH": str(root)},
+        check=True,
+        stdout=subprocess.PIPE,
+    )
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
+def without_title(text: str) -> str:
+    """Return a resolved profile without its first line, a comment for people."""
+    return text.partition("\n")[2]
+
+
+class Comparison:
+    """The differences between two trees, counted."""
+
+    def __init__(self, old: Path, new: Path, tell: Callable[[str], None] | None) -> None:
+        self.old = old
+        self.new = new
+        self.tell = tell or (lambda _: None)
+        self.counts: Counter[str] = Counter()
+        self.is_different = False
+        self._migrated: dict[str, Migrated | None] = {}
+
+    def compare_reports(self, before: dict[str, Any], after: dict[str, Any]) -> None:
+        """Compare the reports of the broken documents."""
+        self.counts["broken documents before"] = len(before)
+        self.counts["broken documents after"] = len(after)
+        for name, old in before.items():
+            if name not in after:
+                self.differs(f"{name}: removed", "removed documents")
+                continue
+            files = sorted({name, *(one[0] for one in old)})
+            changed = [file for file in files if not self.is_only_migrated(file)]
+            if changed:
+                self.counts["documents that were changed otherwise: left out"] += 1
+                print(f"left out: {name}: {', '.join(changed)} changed otherwise")
+                continue
+            moved = Counter(self.moved(tuple(one)) for one in old)
+            found = Counter(tuple(one) for one in after[name])
+            self.counts["problems compared"] += moved.total()
+            self.counts["of them under a new code"] += sum(one[4] in CODES for one in old)
+            self.counts["of them in a new column"] += sum(
+                self.moved(tuple(one))[2] != one[2] for one in old
+            )
+            for one in moved - found:
+                self.differs(f"{name}: only before: {one}", "problems only before")
+            for one in found - moved:
+                self.differs(f"{name}: only after: {one}", "problems only after")
+            self.counts["reports equal"] += moved == found
+
+    def compare_resolved(self, before: dict[str, str], after: dict[str, str]) -> None:
+        """Compare the resolved profiles of the robots."""
+        for name, text in before.items():
+            with tempfile.NamedTemporaryFile("w", suffix=".yaml", encoding="utf-8") as file:
+                file.write(text)
+                file.flush()
+                old = without_title(migrate(file.name).content.decode())
+            new = without_title(after.get(name, ""))
+            self.counts["resolved robots"] += 1
+            if old == new:
+                self.counts["resolved robots equal"] += 1
+                continue
+            self.differs(f"{name}: resolves otherwise", "resolved robots that differ")
+            for one, other in zip(old.splitlines(), new.splitlines(), strict=False):
+                if one != other:
+                    print(f"  - {one}\n  + {other}")
+                    break
+
+    def differs(self, text: str, kind: str) -> None:
+        """Count a difference; show the first of each kind, or all of them."""
+        self.is_different = True
+        self.counts[kind] += 1
+        if self.counts[kind] == 1:
+            print(text)
+        else:
+            self.tell(text)
+
+    def is_only_migrated(self, file: str) -> bool:
+        """Return whether a broken document is the old one under new names."""
+        path, now = self.old / BROKEN / file, self.new / BROKEN / file
+        if not path.is_file() or not now.is_file():
+            return path.is_file() == now.is_file()
+        migrated = self.migrated(file)
+        content = path.read_bytes() if migrated is None else migrated.content
+        return content == now.read_bytes()
+
+    def migrated(self, file: str) -> Migrated | None:
+        """Return a broken document of the old tree, migrated; None where it is no document."""
+        if file not in self._migrated:
+            try:
+                self._migrated[file] = migrate(str(self.old / BROKEN / file))
+            except ProblemsError:
+                self._migrated[file] = None
+        return self._migrated[file]
+
+    def moved(self, problem: Problem) -> Problem:
+        """Return a problem of the old tree where it should be now: no rename changes a line."""
+        file, line, column, severity, code = problem
+        migrated = self.migrated(file) if (self.old / BROKEN / file).is_file() else None
+        changes = migrated.changes if migrated is not None else ()
+        shift = sum(
+            len(one.new) - len(one.old)
+            for one in changes
+            if one.line == line and one.column < column
+        )
+        return file, line, column + shift, severity, CODES.get(code, code)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
