@@ -1,8 +1,9 @@
 """Sixty widgets that receive ten thousand values a second: the number of frames.
 
 Real widgets show values of a real server, also with the page's processor slowed six times, as on an
-old phone. When a frame is too short for all sixty, widgets take turns (``static/widgets/pace.js``).
-Each is drawn with its newest value in every twentieth frame or more often.
+old phone. When a frame is too short for all sixty, widgets take turns
+(``static/widgets/draw_scheduler.js``). Each is drawn with its newest value in every twentieth frame
+or more often.
 """
 
 import asyncio

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from urc.config.load import load_profile
 from urc.model.profile import Profile
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
 
 __all__ = ["DeclaredDriver", "declared", "profile"]

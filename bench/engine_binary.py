@@ -13,16 +13,16 @@ from struct import Struct
 from typing import Any
 
 from bench.harness import Goal, Result, compare
+from urc.config.node import Node, Problems
 from urc.config.parse.driver import parse_driver
-from urc.config.part import Findings, Part
 from urc.model.driver import Driver
-from urc.model.framing import ChecksumSpec, CrcSpec, FrameLayout, Window
+from urc.model.framing import ByteRange, ChecksumSpec, CrcSpec, FrameLayout
 from urc.model.values import Sample
-from urc.protocol.codec import Frame
 from urc.protocol.engine import Engine
 from urc.protocol.events import Samples
-from urc.protocol.frame import Seal
-from urc.runtime.catalog import built_in_catalog
+from urc.protocol.framing.frame import FrameCodec
+from urc.protocol.values.payload import Frame
+from urc.runtime.registries import built_in_catalog
 from urc.source import parse_document
 from urc.testing.struct import reader, writer
 
@@ -56,7 +56,7 @@ signals:
   fault: { type: string }
 messages:
   values:""" + DECLARED.replace("\n", "\n    ")
-CHECKSUM = ChecksumSpec(CrcSpec(16, 0x1021), 16, Window(0, -2), -2)
+CHECKSUM = ChecksumSpec(CrcSpec(16, 0x1021), 16, ByteRange(0, -2), -2)
 VALUES: Mapping[str, object] = {
     "temp_fet": 25.1,
     "temp_motor": -3.2,
@@ -97,8 +97,8 @@ def decode_by_hand(frame: bytes) -> Mapping[str, object] | None:
 
 def driver_of(text: str) -> Driver:
     document = parse_document(text, "bench.yaml")
-    findings = Findings()
-    driver = parse_driver(Part(document, (), document.data), findings, built_in_catalog())
+    findings = Problems()
+    driver = parse_driver(Node(document, (), document.data), findings, built_in_catalog())
     assert not findings.problems, findings.problems
     return driver
 
@@ -139,7 +139,7 @@ def encode_by_hand(values: Mapping[str, Any]) -> bytes:
 
 def run(*, full: bool = False) -> Sequence[Result]:
     """Measure reading, alone and through the whole engine, and writing."""
-    seal = Seal(FrameLayout(tail=2, size=24, checksum=CHECKSUM))
+    seal = FrameCodec(FrameLayout(tail=2, size=24, checksum=CHECKSUM))
     open_frame, read, write = seal.open, reader(DECLARED).read, writer(DECLARED).write
     data = seal.close(encode_by_hand(VALUES))
     one = Frame(b"", "utf-8")

@@ -13,7 +13,7 @@ from itertools import repeat
 
 from bench.harness import Goal, Result, compare
 from bench.watching import cost_s, speaking
-from urc._loop import run as run_loop
+from urc._event_loop import run as run_loop
 from urc.model.values import Sample, Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS

@@ -17,7 +17,7 @@ from bench.harness import Result
 from bench.rig.cuts import CutRig
 from bench.rig.kinds import KINDS
 from bench.rig.programs import can_relay
-from urc.motion.hold import STOP_FOR_S
+from urc.motion.hold_to_run import STOP_FOR_S
 
 __all__ = ["run"]
 

@@ -40,7 +40,7 @@ class Mutant:
     """One small change of one function."""
 
     def __init__(self, folder: Path, module: str, name: str, status: str) -> None:
-        """Name it as mutmut does: ``urc.guard.reins.xǁReinsǁtick__mutmut_3``."""
+        """Name it as mutmut does: ``urc.guard.motion_scheduler.xǁReinsǁtick__mutmut_3``."""
         self._folder = folder
         self.module = module
         self.name = name
@@ -48,7 +48,7 @@ class Mutant:
 
     @property
     def function(self) -> str:
-        """Where it is: ``urc.guard.reins.Reins.tick``."""
+        """Where it is: ``urc.guard.motion_scheduler.MotionScheduler.tick``."""
         inner = self.name.removeprefix(f"{self.module}.").partition("__mutmut_")[0]
         plain = inner.replace("ǁ", ".").removeprefix("x.").removeprefix("x_")
         return f"{self.module}.{plain.removesuffix(PLAIN)}"

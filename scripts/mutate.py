@@ -51,7 +51,12 @@ def _options() -> argparse.Namespace:
     said = (__doc__ or "").partition("\n")[0]
     parser = argparse.ArgumentParser(prog="./dev mutate", description=said)
     add = parser.add_argument
-    add("names", nargs="*", metavar="NAME", help="try these again, such as 'urc.guard.reins.*'")
+    add(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help="try these again, such as 'urc.guard.motion_scheduler.*'",
+    )
     add("--minutes", type=float, metavar="N", help="stop then; the next run goes on from there")
     add("--workers", type=int, default=2, metavar="N", help="so many at a time; 2 unless told")
     add("--timeouts", action="store_true", help="try those again that did not end in time")

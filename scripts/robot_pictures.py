@@ -23,8 +23,8 @@ from tests.e2e.browser import LOCALE, running_browser
 from tests.e2e.keys import enter
 from tests.e2e.processes import UrcProcess
 from urc.config.load import load_profile
-from urc.runtime.catalog import built_in_catalog
 from urc.runtime.manual import manual
+from urc.runtime.registries import built_in_catalog
 from urc.shipped import shipped
 
 __all__ = ["with_picture"]

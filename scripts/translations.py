@@ -44,8 +44,8 @@ def sources() -> Iterator[tuple[str, Path]]:
         ("widgets/*/*.js", "javascript"),
         ("urc/web/static/**/*.js", "javascript"),
         ("urc/web/**/*.py", "python"),
-        ("urc/runtime/look.py", "python"),
-        ("urc/runtime/look.py", "python"),
+        ("urc/runtime/package_preview.py", "python"),
+        ("urc/runtime/package_preview.py", "python"),
         ("urc/packages/*.py", "python"),
     ):
         for path in sorted(ROOT.glob(pattern)):

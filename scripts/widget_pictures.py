@@ -16,7 +16,7 @@ from playwright.async_api import Browser, Page
 from tests.e2e.browser import LOCALE, running_browser
 from tests.e2e.dashboards import running_dashboard
 from tests.e2e.keys import known_here
-from urc.config.parse.widget import Shelf
+from urc.config.parse.widget import WidgetFolder
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
@@ -74,7 +74,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Take them."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("names", nargs="*", metavar="NAME")
-    known = Shelf(shipped("widgets")).names()
+    known = WidgetFolder(shipped("widgets")).names()
     wanted = parser.parse_args(arguments).names or known
     if unknown := sorted(set(wanted) - set(known)):
         print(f"there is no widget {unknown[0]!r}", file=sys.stderr)

@@ -13,15 +13,15 @@ from urc.protocol.events import (
     Close,
     Event,
     Failed,
-    Fault,
     Open,
     Replied,
     Request,
     Samples,
     Send,
+    Violation,
 )
-from urc.registry import Catalog, Table
-from urc.runtime.catalog import built_in_catalog
+from urc.registry import Registries, Table
+from urc.runtime.registries import built_in_catalog
 
 __all__ = ["Dialogue", "driver_of"]
 
@@ -56,7 +56,7 @@ def driver_of(text: str) -> Driver:
         path.write_text(head + rest, "utf-8")
         catalog = built_in_catalog()
         lines_to = Table("urc.transports", {"tcp": "x:x", "pigeon": "x:x"})
-        checked = check(os.fspath(path), Catalog(lines_to, catalog.framings))
+        checked = check(os.fspath(path), Registries(lines_to, catalog.framings))
     if checked.profile is None:
         raise AssertionError("\n".join(map(to_text, checked.problems)))
     return checked.profile.driver
@@ -135,7 +135,7 @@ class Dialogue:
                 case Failed(number, _, code, message):
                     self._end(number, code)
                     self.messages.append(message)
-                case Fault(_, code, message):
+                case Violation(_, code, message):
                     self.faults.append(code)
                     self.messages.append(message)
                 case Open(name):

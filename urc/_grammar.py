@@ -5,7 +5,7 @@ template designer documentation). A parser of our own gives the column of every 
 ms for importing a template engine. `tests/unit/test_expressions.py` compares it with Jinja.
 
 WARNING: the result is passed to eval. The Python source may contain only the `repr()` of constants,
-the text that `resolve` returns, and names of `urc._filters.SCOPE`.
+the text that `resolve` returns, and names of `urc.filters.table.SCOPE`.
 """
 
 import math
@@ -13,12 +13,12 @@ import re
 from collections.abc import Callable
 from typing import Final
 
-from urc import _filters
-from urc._lists import compiled
-from urc._tokens import Refused, Token, float_of, integer_of, string_of, tokens_of
+from urc._tokens import ExpressionSyntaxError, Token, float_of, integer_of, string_of, tokens_of
+from urc.filters import table
+from urc.filters.lists import compiled
 from urc.problems import UrcError
 
-__all__ = ["COUNTERS", "MAX_DEPTH", "NONCE", "Refused", "translate"]
+__all__ = ["COUNTERS", "MAX_DEPTH", "NONCE", "ExpressionSyntaxError", "translate"]
 
 MAX_DEPTH: Final = 40
 """Largest nesting depth, and largest number of consecutive operators of one kind."""
@@ -75,7 +75,7 @@ def translate(
     parser.expect_end()
     if not allows_bytes and _NONCE_ALONE.fullmatch(python.removeprefix(resolve(NONCE))):
         text = "nonce() gives bytes: write nonce() | b64encode, or send it by 'hex:' or 'bytes:'"
-        raise Refused(text, 0)
+        raise ExpressionSyntaxError(text, 0)
     return python
 
 
@@ -102,12 +102,12 @@ class _Parser:
         """Parse ``a if test else b``, and everything with tighter precedence."""
         self._depth += 1
         if self._depth > MAX_DEPTH:
-            raise Refused("the expression is nested too deeply", self._next.offset)
+            raise ExpressionSyntaxError("the expression is nested too deeply", self._next.offset)
         value = self._or()
         if self._take("if"):
             test = self._or()
             if not self._take("else"):
-                raise Refused("'… if …' needs an 'else'", self._next.offset)
+                raise ExpressionSyntaxError("'… if …' needs an 'else'", self._next.offset)
             value = f"({value} if {test} else {self.expression()})"
         self._depth -= 1
         return value
@@ -137,11 +137,11 @@ class _Parser:
         if not self._take(text):
             raise self._surprise(f"; {text!r} is expected")
 
-    def _surprise(self, expected: str = "") -> Refused:
+    def _surprise(self, expected: str = "") -> ExpressionSyntaxError:
         token = self._next
         if token.kind == "end":
-            return Refused(f"the expression ends too early{expected}", token.offset)
-        return Refused(f"{token.text!r} is not expected here{expected}", token.offset)
+            return ExpressionSyntaxError(f"the expression ends too early{expected}", token.offset)
+        return ExpressionSyntaxError(f"{token.text!r} is not expected here{expected}", token.offset)
 
     def _or(self) -> str:
         value = self._and()
@@ -197,7 +197,7 @@ class _Parser:
         while self._next.kind == "operator" and self._next.text in operators:
             levels += 1
             if levels > MAX_DEPTH:
-                raise Refused("the expression is too long", self._next.offset)
+                raise ExpressionSyntaxError("the expression is too long", self._next.offset)
             function = operators[self._advance().text]
             value = f"{function}({value}, {tighter()})"
         return value
@@ -208,7 +208,7 @@ class _Parser:
     def _signed(self) -> str:
         self._depth += 1
         if self._depth > MAX_DEPTH:
-            raise Refused("the expression is nested too deeply", self._next.offset)
+            raise ExpressionSyntaxError("the expression is nested too deeply", self._next.offset)
         if self._take("-"):
             value = f"_sub(0, {self._signed()})"
         elif self._take("+"):
@@ -228,7 +228,7 @@ class _Parser:
                 value = self._subscript(value, is_settings)
             elif self._next.text == "(" and self._next.kind == "operator":
                 text = "calls are not part of the language, only filters, seq() and nonce()"
-                raise Refused(text, self._next.offset)
+                raise ExpressionSyntaxError(text, self._next.offset)
             else:
                 return value
             is_settings = False
@@ -238,7 +238,7 @@ class _Parser:
         if token.kind == "integer":
             return integer_of(token)
         if token.kind != "name":
-            raise Refused("a name is expected after the dot", token.offset)
+            raise ExpressionSyntaxError("a name is expected after the dot", token.offset)
         if is_settings:
             self._settings.add(token.text)
         return repr(token.text)
@@ -250,7 +250,9 @@ class _Parser:
         if self._take(":"):
             stop = "None" if self._next.text == "]" else self.expression()
             if self._next.text == ":":
-                raise Refused("a slice has a start and an end, but no step", self._next.offset)
+                raise ExpressionSyntaxError(
+                    "a slice has a start and an end, but no step", self._next.offset
+                )
             self._expect("]")
             return f"_slice({value}, {key}, {stop})"
         if is_settings and token.kind == "string" and self._next.text == "]":
@@ -289,15 +291,19 @@ class _Parser:
         name, low, high = self._next, None, None
         self._place += 1
         if name.kind != "string" or not _COUNTER.fullmatch(string_of(name)):
-            raise Refused("'seq' takes a name in quotes first, such as 'id'", name.offset)
+            raise ExpressionSyntaxError(
+                "'seq' takes a name in quotes first, such as 'id'", name.offset
+            )
         if self._take(","):
             low = self._whole()
         if low is not None and self._take(","):
             high = self._whole()
         if low is None or high is None or not self._take(")"):
-            raise Refused("write seq('name', lowest, highest) with whole numbers", token.offset)
+            raise ExpressionSyntaxError(
+                "write seq('name', lowest, highest) with whole numbers", token.offset
+            )
         if not 0 <= low < high < 1 << 64:
-            raise Refused(f"a counter cannot run from {low} to {high}", token.offset)
+            raise ExpressionSyntaxError(f"a counter cannot run from {low} to {high}", token.offset)
         self._names.add(COUNTERS)
         return f"{self._resolve(COUNTERS)}({string_of(name)!r}, {low}, {high})"
 
@@ -305,9 +311,13 @@ class _Parser:
         """Parse ``nonce()`` or ``nonce(8)``: that many nonce bytes, 16 by default."""
         size = 16 if self._next.text == ")" else self._whole()
         if size is None or not self._take(")"):
-            raise Refused("write nonce(), or nonce(8) with a number of bytes", token.offset)
+            raise ExpressionSyntaxError(
+                "write nonce(), or nonce(8) with a number of bytes", token.offset
+            )
         if not 1 <= size <= _MOST_NONCE:
-            raise Refused(f"a nonce has 1 to {_MOST_NONCE} bytes, not {size}", token.offset)
+            raise ExpressionSyntaxError(
+                f"a nonce has 1 to {_MOST_NONCE} bytes, not {size}", token.offset
+            )
         self._names.add(NONCE)
         return f"{self._resolve(NONCE)}({size})"
 
@@ -342,33 +352,35 @@ class _Parser:
         self._expect("(")
         token = self._advance()
         if token.kind != "string":
-            raise Refused(f"{test.text!r} takes a pattern in quotes", token.offset)
+            raise ExpressionSyntaxError(f"{test.text!r} takes a pattern in quotes", token.offset)
         source = token.text[1:-1]  # unchanged: a backslash belongs to the pattern
         self._expect(")")
         try:
             compiled(source, test.text)
         except UrcError as error:
-            raise Refused(str(error), token.offset) from None
+            raise ExpressionSyntaxError(str(error), token.offset) from None
         return source
 
     def _filter(self, subject: str) -> str:
         token = self._advance()
-        if token.kind != "name" or token.text not in _filters.FILTERS:
-            known = _filters.filter_names()
-            raise Refused(f"there is no filter {token.text!r}; there are: {known}", token.offset)
+        if token.kind != "name" or token.text not in table.FILTERS:
+            known = table.filter_names()
+            raise ExpressionSyntaxError(
+                f"there is no filter {token.text!r}; there are: {known}", token.offset
+            )
         has_arguments = self._take("(")
         first = self._next
         arguments = self._items(")") if has_arguments else []
         self._check_word(token.text, first, arguments)
-        least, most = _filters.FILTERS[token.text].arity
+        least, most = table.FILTERS[token.text].arity
         if not least <= len(arguments) <= most:
             expected = str(least) if least == most else f"{least} to {most}"
             text = f"filter {token.text!r} takes {expected} arguments, found {len(arguments)}"
-            raise Refused(text, token.offset)
+            raise ExpressionSyntaxError(text, token.offset)
         is_last = self._next.text != "|"
-        if _filters.FILTERS[token.text].gives_bytes and is_last and not self.allows_bytes:
+        if table.FILTERS[token.text].gives_bytes and is_last and not self.allows_bytes:
             text = f"{token.text!r} gives bytes, which only 'hex:' and 'bytes:' can send"
-            raise Refused(text, token.offset)
+            raise ExpressionSyntaxError(text, token.offset)
         if token.text == "default":
             # The only filter with a possibly missing name, so it evaluates its subject itself.
             subject = f"lambda: {subject}"
@@ -376,20 +388,22 @@ class _Parser:
 
     def _check_word(self, name: str, first: Token, arguments: list[str]) -> None:
         """Raise an error for a constant that the filter `name` does not accept."""
-        refuses = _filters.FILTERS[name].refuses
+        refuses = table.FILTERS[name].refuses
         if refuses is None or first.kind != "string" or not arguments:
             return
         word = string_of(first)
         wrong = refuses(word) if arguments[0] == repr(word) else ""
         if wrong:
-            raise Refused(f"{name!r}: {wrong}", first.offset)
+            raise ExpressionSyntaxError(f"{name!r}: {wrong}", first.offset)
 
     def _test(self, subject: str) -> str:
         is_negated = self._take("not")
         token = self._advance()
         if token.kind != "name" or token.text not in _TESTS:
             known = ", ".join(_TESTS)
-            raise Refused(f"there is no test {token.text!r}; there are: {known}", token.offset)
+            raise ExpressionSyntaxError(
+                f"there is no test {token.text!r}; there are: {known}", token.offset
+            )
         if token.text in ("defined", "undefined"):
             python = f"_is_defined(lambda: {subject})"
             is_negated ^= token.text == "undefined"

@@ -5,7 +5,7 @@ Private to `urc.source`.
 
 from typing import Any, NamedTuple
 
-__all__ = ["Mark", "Span", "Written"]
+__all__ = ["Mark", "Span", "UnfilledText"]
 
 
 class Span(NamedTuple):
@@ -32,7 +32,7 @@ class Mark:
         self.children = {} if children is None else children
         self.origin: Any = None
         """Document that contains this value and its children; None: that of the parent."""
-        self.written: Written | None = None
+        self.written: UnfilledText | None = None
         """Original text, when the value was made from it."""
 
     def copy(self, children: "dict[str | int, Mark] | None" = None) -> "Mark":
@@ -42,7 +42,7 @@ class Mark:
         return mark
 
 
-class Written(NamedTuple):
+class UnfilledText(NamedTuple):
     """A text before its names were filled in."""
 
     text: str

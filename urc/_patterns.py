@@ -1,6 +1,6 @@
 r"""Regular expressions of documents: matched in linear time, or refused.
 
-Private to `urc.patterns` and `urc._lists`. The dialect is that of RE2: no look-around, no
+Private to `urc.patterns` and `urc.filters.lists`. The dialect is that of RE2: no look-around, no
 back-references, ``$`` is the very end, ``\d`` is ASCII. A pattern that `_is_linear` proves harmless
 runs on `re`, ten times faster on short lines; all others run on RE2. Without an installed RE2,
 unproven patterns are refused.

@@ -1,8 +1,8 @@
 """Conversion of a quaternion to roll, pitch and yaw, in radians.
 
-Private to `urc._filters`. A quaternion is [x, y, z, w] or {x, y, z, w}, of any length but zero. The
-angles are about x, then y, then z in its axis convention (REP-103). Without an orientation the
-angles are not-a-number, which any arithmetic preserves and which means "not available".
+Private to `urc.filters.table`. A quaternion is [x, y, z, w] or {x, y, z, w}, of any length but
+zero. The angles are about x, then y, then z in its axis convention (REP-103). Without an
+orientation the angles are not-a-number, which any arithmetic preserves and which means "not available".
 """
 
 import math

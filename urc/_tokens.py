@@ -6,7 +6,7 @@ Private to `urc._grammar`.
 import re
 from typing import Final, NamedTuple
 
-__all__ = ["Refused", "Token", "float_of", "integer_of", "string_of", "tokens_of"]
+__all__ = ["ExpressionSyntaxError", "Token", "float_of", "integer_of", "string_of", "tokens_of"]
 
 _TOKEN = re.compile(
     r"""(?P<space>\s+)
@@ -22,7 +22,7 @@ _ESCAPES = {"n": "\n", "r": "\r", "t": "\t", "0": "\0", "\\": "\\", "'": "'", '"
 _MAX_DIGITS: Final = 400
 
 
-class Refused(Exception):
+class ExpressionSyntaxError(Exception):
     """An invalid expression, with the 0-based character of the error."""
 
     def __init__(self, message: str, offset: int) -> None:
@@ -42,7 +42,7 @@ def tokens_of(text: str) -> list[Token]:
     while position < len(text):
         found = _TOKEN.match(text, position)
         if found is None or found.lastgroup is None:
-            raise Refused(_unreadable(text[position]), position)
+            raise ExpressionSyntaxError(_unreadable(text[position]), position)
         if found.lastgroup != "space":
             tokens.append(Token(found.lastgroup, found[0], position))
         position = found.end()
@@ -60,21 +60,21 @@ def _unreadable(character: str) -> str:
 def integer_of(token: Token) -> str:
     text = token.text
     if len(text) > _MAX_DIGITS:
-        raise Refused("the number is too large", token.offset)
+        raise ExpressionSyntaxError("the number is too large", token.offset)
     try:
         # "010" means ten in some languages and eight in others; here it is an error.
         return repr(int(text, 0))
     except ValueError:
-        raise Refused(f"{text!r} is not a number", token.offset) from None
+        raise ExpressionSyntaxError(f"{text!r} is not a number", token.offset) from None
 
 
 def float_of(token: Token) -> str:
     try:
         value = float(token.text)
     except ValueError:
-        raise Refused(f"{token.text!r} is not a number", token.offset) from None
+        raise ExpressionSyntaxError(f"{token.text!r} is not a number", token.offset) from None
     if value == float("inf"):
-        raise Refused("the number is too large", token.offset)
+        raise ExpressionSyntaxError("the number is too large", token.offset)
     return repr(value)
 
 
@@ -85,7 +85,7 @@ def string_of(token: Token) -> str:
             return chr(int(code, 16))
         if found[3] not in _ESCAPES:
             text = f"'\\{found[3]}' is not an escape in an expression"
-            raise Refused(text, token.offset + 1 + found.start())
+            raise ExpressionSyntaxError(text, token.offset + 1 + found.start())
         return _ESCAPES[found[3]]
 
     return _ESCAPE.sub(character, token.text[1:-1])

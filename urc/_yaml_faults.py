@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 import yaml
 
-__all__ = ["UNQUOTED_TEMPLATE", "Fault", "advice", "explain"]
+__all__ = ["UNQUOTED_TEMPLATE", "SyntaxFault", "advice", "explain"]
 
 _QUOTED_VALUE = re.compile(r"""^(?:[^'"]*?[:\-,{\[]\s+|\s*)(?P<value>'[^']*'|"[^"]*")\s*\S""")
 _LAST_ALIAS = re.compile(r"(?:^|[\s:,\[{])(?P<alias>\*[\w-]+)\s*$")
@@ -19,7 +19,7 @@ _RESERVED: Final = "%@`"
 _SIGN: Final = "{!r} at the start of a value is a sign of YAML, not text"
 
 
-class Fault(NamedTuple):
+class SyntaxFault(NamedTuple):
     """One syntax error; `line` and `column` are 0-based, as in the parser."""
 
     line: int
@@ -52,7 +52,7 @@ class _Clue(NamedTuple):
         return self.lines[number] if number < len(self.lines) else ""
 
 
-def explain(error: yaml.YAMLError, lines: Sequence[str]) -> Fault:
+def explain(error: yaml.YAMLError, lines: Sequence[str]) -> SyntaxFault:
     """Return the syntax error that `error` means, at the most useful place."""
     mark = getattr(error, "problem_mark", None)
     opened = getattr(error, "context_mark", None) or mark
@@ -65,14 +65,14 @@ def explain(error: yaml.YAMLError, lines: Sequence[str]) -> Fault:
         fault = rule(clue)
         if fault is not None:
             return fault
-    return Fault(clue.line, clue.column, "not-yaml", f"this is not YAML: {said}")
+    return SyntaxFault(clue.line, clue.column, "not-yaml", f"this is not YAML: {said}")
 
 
-def _tab(at: _Clue) -> Fault | None:
+def _tab(at: _Clue) -> SyntaxFault | None:
     indent = at.text[: len(at.text) - len(at.text.lstrip())]
     if "\t" not in indent or at.column > len(indent) or "quoted" in at.context:
         return None
-    return Fault(
+    return SyntaxFault(
         at.line,
         indent.index("\t"),
         "tab",
@@ -81,12 +81,12 @@ def _tab(at: _Clue) -> Fault | None:
     )
 
 
-def _directive(at: _Clue) -> Fault | None:
+def _directive(at: _Clue) -> SyntaxFault | None:
     first = next((n for n, line in enumerate(at.lines) if line.startswith("%")), None)
     words = ("directive", "document start", "incompatible YAML", "duplicate %YAML")
     if first is None or not any(word in at.said or word in at.context for word in words):
         return None
-    return Fault(
+    return SyntaxFault(
         first,
         0,
         "unquoted",
@@ -95,15 +95,17 @@ def _directive(at: _Clue) -> Fault | None:
     )
 
 
-def _reserved(at: _Clue) -> Fault | None:
+def _reserved(at: _Clue) -> SyntaxFault | None:
     if "cannot start any token" not in at.said:
         return None
     char = at.text[at.column : at.column + 1]
     if char == "\t":
-        return Fault(at.line, at.column, "tab", "a tab where YAML needs a space", "use spaces")
+        return SyntaxFault(
+            at.line, at.column, "tab", "a tab where YAML needs a space", "use spaces"
+        )
     if char not in _RESERVED:
         return None
-    return Fault(
+    return SyntaxFault(
         at.line,
         at.column,
         "unquoted",
@@ -112,13 +114,13 @@ def _reserved(at: _Clue) -> Fault | None:
     )
 
 
-def _escape(at: _Clue) -> Fault | None:
+def _escape(at: _Clue) -> SyntaxFault | None:
     words = ("escape", "hexdecimal", "Unicode", "hexadecimal")
     if "quoted scalar" not in at.context or not any(word in at.said for word in words):
         return None
     column = max(at.text.rfind("\\", 0, at.column + 1), 0)  # the pure parser points behind it
     shown = at.text[column : column + 2]
-    return Fault(
+    return SyntaxFault(
         at.line,
         column,
         "bad-escape",
@@ -128,7 +130,7 @@ def _escape(at: _Clue) -> Fault | None:
     )
 
 
-def _open_quote(at: _Clue) -> Fault | None:
+def _open_quote(at: _Clue) -> SyntaxFault | None:
     if "quoted scalar" not in at.context:
         return None
     quote = at.opened_text[at.opened_column : at.opened_column + 1]
@@ -136,15 +138,15 @@ def _open_quote(at: _Clue) -> Fault | None:
     hint = f"end the text with {quote}"
     if quote == "'" and at.opened_text.count("'") > 1:
         hint += "; a quote inside single quotes is written twice: ''"
-    return Fault(
+    return SyntaxFault(
         at.opened_line, at.opened_column, "open-quote", f"this {name} quote is never closed", hint
     )
 
 
-def _indicator(at: _Clue) -> Fault | None:
+def _indicator(at: _Clue) -> SyntaxFault | None:
     for word, char in (("alias", "*"), ("anchor", "&"), ("tag", "!")):
         if re.search(rf"an? {word}\b", at.context) or f"{word} handle" in at.said:
-            return Fault(
+            return SyntaxFault(
                 at.opened_line,
                 at.opened_column,
                 "unquoted",
@@ -156,10 +158,10 @@ def _indicator(at: _Clue) -> Fault | None:
     if found is None:
         return None
     start = found.start("alias")
-    return Fault(at.line, start, "unquoted", _SIGN.format("*"), advice(at.text, start))
+    return SyntaxFault(at.line, start, "unquoted", _SIGN.format("*"), advice(at.text, start))
 
 
-def _after_quote(at: _Clue) -> Fault | None:
+def _after_quote(at: _Clue) -> SyntaxFault | None:
     if not any(word in at.said for word in ("expected key", "block end", "',' or")):
         return None
     found = _QUOTED_VALUE.match(at.text[: at.column + 1])
@@ -170,16 +172,16 @@ def _after_quote(at: _Clue) -> Fault | None:
         if found["value"][0] == "'"
         else 'a quote inside double quotes is written \\"'
     )
-    return Fault(at.line, at.column, "after-quote", "text after the closing quote", hint)
+    return SyntaxFault(at.line, at.column, "after-quote", "text after the closing quote", hint)
 
 
-def _flow(at: _Clue) -> Fault | None:
+def _flow(at: _Clue) -> SyntaxFault | None:
     if "flow mapping" not in at.context and "flow sequence" not in at.context:
         return None
     column = at.opened_column
     for start in (column - 1, column):
         if start >= 0 and at.opened_text[start : start + 2] == "{{":
-            return Fault(
+            return SyntaxFault(
                 at.opened_line,
                 start,
                 "unquoted-template",
@@ -190,7 +192,7 @@ def _flow(at: _Clue) -> Fault | None:
     rest = [at.text[at.column :], *at.lines[at.line + 1 :]]
     is_end = not any(line.strip() for line in rest)  # the two parsers count the end differently
     place = "the end" if is_end else f"line {at.line + 1}, column {at.column + 1}"
-    return Fault(
+    return SyntaxFault(
         at.opened_line,
         column,
         "open-bracket",
@@ -199,21 +201,21 @@ def _flow(at: _Clue) -> Fault | None:
     )
 
 
-def _block(at: _Clue) -> Fault | None:
+def _block(at: _Clue) -> SyntaxFault | None:
     said, place = at.said, (at.line, at.column)
     if "mapping values are not allowed" in said:
         return _second_colon(at)
     if "sequence entries are not allowed" in said:
-        return Fault(
+        return SyntaxFault(
             *place,
             "not-yaml",
             "a list cannot start on the line of its key",
             "write the first '- ' on a line of its own, or use [a, b]",
         )
     if "mapping keys are not allowed" in said:
-        return Fault(*place, "unquoted", _SIGN.format("?"), advice(at.text, at.column))
+        return SyntaxFault(*place, "unquoted", _SIGN.format("?"), advice(at.text, at.column))
     if "could not find expected ':'" in said:
-        return Fault(
+        return SyntaxFault(
             at.opened_line,
             at.opened_column,
             "no-colon",
@@ -221,14 +223,14 @@ def _block(at: _Clue) -> Fault | None:
             "write 'key: value'",
         )
     if "expected key" in said or "block end" in said or "'-' indicator" in said:
-        return Fault(
+        return SyntaxFault(
             *place,
             "indentation",
             "this does not belong to the block that it stands in",
             "indent it like the other lines of its block; quote values with special characters",
         )
     if "<document start>" in said:
-        return Fault(
+        return SyntaxFault(
             *place,
             "indentation",
             "this does not belong to the lines above",
@@ -237,10 +239,10 @@ def _block(at: _Clue) -> Fault | None:
     return None
 
 
-def _second_colon(at: _Clue) -> Fault:
+def _second_colon(at: _Clue) -> SyntaxFault:
     before = re.search(r": +\S", at.text[: at.column])
     if before is not None:
-        return Fault(
+        return SyntaxFault(
             at.line,
             at.column,
             "unquoted",
@@ -250,14 +252,14 @@ def _second_colon(at: _Clue) -> Fault:
     above = at.lines[at.line - 1] if at.line else ""
     is_text = above.strip() and not above.lstrip().startswith("#")
     if is_text and not re.search(r":(\s|$)", above):
-        return Fault(
+        return SyntaxFault(
             at.line - 1,
             len(above) - len(above.lstrip()),
             "no-colon",
             "a line without ': ' between key and value",
             "write 'key: value', with a space after the colon",
         )
-    return Fault(
+    return SyntaxFault(
         at.line,
         len(at.text) - len(at.text.lstrip()),
         "indentation",
@@ -266,19 +268,19 @@ def _second_colon(at: _Clue) -> Fault:
     )
 
 
-def _rest(at: _Clue) -> Fault | None:
+def _rest(at: _Clue) -> SyntaxFault | None:
     place = (at.line, at.column)
     if "node content" in at.said:
         char = at.text[at.column : at.column + 1]
         if not char:
-            return Fault(
+            return SyntaxFault(
                 *place, "not-yaml", "a value is expected here", "close the open brackets and quotes"
             )
-        return Fault(
+        return SyntaxFault(
             *place, "not-yaml", f"{char!r} where a value is expected", "quote it, if it is text"
         )
     if "block scalar" in at.context:
-        return Fault(
+        return SyntaxFault(
             *place,
             "not-yaml",
             "only '+', '-' or a digit may follow '|' or '>' on this line",
@@ -287,7 +289,7 @@ def _rest(at: _Clue) -> Fault | None:
     return None
 
 
-_RULES: tuple[Callable[[_Clue], Fault | None], ...] = (
+_RULES: tuple[Callable[[_Clue], SyntaxFault | None], ...] = (
     _tab,
     _directive,
     _reserved,

@@ -15,7 +15,7 @@ from urc._marks import Mark, Span
 from urc._yaml_scalars import DIGITS_MAX, resolve_plain
 from urc.problems import Problem, Severity
 
-__all__ = ["Limits", "StoppedError", "TreeReader"]
+__all__ = ["DocumentLimits", "StoppedError", "TreeReader"]
 
 _TAGS: Final = "tag:yaml.org,2002:"
 _PATH_SHOWN: Final = 12
@@ -25,7 +25,7 @@ long."""
 _CUT_COMMENT = re.compile(r" #[^\s#!]")
 
 
-class Limits(NamedTuple):
+class DocumentLimits(NamedTuple):
     """Bounds of a document."""
 
     size_bytes: int = 1 << 20
@@ -49,7 +49,7 @@ class _Built(NamedTuple):
 class TreeReader:
     """Reads one document from the events of a parser; `problems` has the problems found."""
 
-    def __init__(self, parser: Any, lines: list[str], file: str, limits: Limits) -> None:
+    def __init__(self, parser: Any, lines: list[str], file: str, limits: DocumentLimits) -> None:
         self.problems: list[Problem] = []
         self._next: Callable[[], Any] = parser.get_event
         self._lines = lines

@@ -2,9 +2,9 @@
 
 `urc._grammar` defines the supported subset. Expressions are a sandbox: no attributes of Python
 objects, no loops, and no operator that expands a short text. The only calls are the filters of
-`urc._filters`. Literal text is preserved to the byte, whereas Jinja converts CR to LF and drops a
-final newline. Where Jinja hides an error (``'abc' | int`` is 0), URC raises: a reading must not
-become zero by accident.
+`urc.filters.table`. Literal text is preserved to the byte, whereas Jinja converts CR to LF and
+drops a final newline. Where Jinja hides an error (``'abc' | int`` is 0), URC raises: a reading must
+not become zero by accident.
 
 A template of exactly one ``{{ expression }}`` keeps the type of the expression.
 """
@@ -14,9 +14,9 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
-from urc import _filters
-from urc._grammar import COUNTERS, NONCE, Refused, translate
-from urc._spelling import quoted, spelt
+from urc._formatting import quoted, spelt
+from urc._grammar import COUNTERS, NONCE, ExpressionSyntaxError, translate
+from urc.filters import table
 from urc.problems import UrcError
 
 __all__ = [
@@ -173,7 +173,7 @@ def _function(python: str) -> Callable[[Mapping[str, object]], Any]:
         # Brackets of many long sums can exceed the nesting limit of the Python parser.
         raise ExpressionError("the expression is nested too deeply") from None
     # `python` contains only constants and names of SCOPE: see the warning in `urc._grammar`.
-    function: Callable[[Mapping[str, object]], Any] = eval(code, _filters.SCOPE)  # noqa: S307
+    function: Callable[[Mapping[str, object]], Any] = eval(code, table.SCOPE)  # noqa: S307
     return function
 
 
@@ -237,7 +237,7 @@ def _translate(
     """Return the Python for one expression; add its names to `names` and `settings`."""
     try:
         return translate(text, "ns[{!r}]".format, names, settings, allows_bytes=allows_bytes)
-    except Refused as error:
+    except ExpressionSyntaxError as error:
         shown = text.strip()
         raise ExpressionError(f"in {shown!r}: {error}", offset + error.offset) from None
 
@@ -304,4 +304,4 @@ def is_nonce(template: Template) -> bool:
 
 def is_byte_filter(name: str) -> bool:
     """Return whether a filter returns bytes."""
-    return name in _filters.FILTERS and _filters.FILTERS[name].gives_bytes
+    return name in table.FILTERS and table.FILTERS[name].gives_bytes

@@ -1,8 +1,8 @@
 """Tables from words of documents to their implementations.
 
 A row names its factory as text, which is imported on first use: a robot on TCP never loads SSH. The
-top layer passes all tables down as one `Catalog`, so that modules of one layer need not import each
-other. Third parties add rows through the entry-point groups ``urc.transports`` and
+top layer passes all tables down as one `Registries`, so that modules of one layer need not import
+each other. Third parties add rows through the entry-point groups ``urc.transports`` and
 ``urc.framings``.
 """
 
@@ -11,10 +11,10 @@ from importlib import import_module
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-__all__ = ["Catalog", "Row", "Table"]
+__all__ = ["Registries", "RegistryEntry", "Table"]
 
 
-class Row:
+class RegistryEntry:
     """One entry: a word of documents, and the place of its code."""
 
     __slots__ = ("factory", "name")
@@ -35,20 +35,20 @@ class Table:
 
     def __init__(self, group: str, rows: Mapping[str, str]) -> None:
         self.group = group
-        self._rows = {name: Row(name, factory) for name, factory in rows.items()}
+        self._rows = {name: RegistryEntry(name, factory) for name, factory in rows.items()}
         self._is_complete = False
 
     def __iter__(self) -> Iterator[str]:
         self._read_entry_points()
         return iter(self._rows)
 
-    def get(self, name: str) -> Row | None:
+    def get(self, name: str) -> RegistryEntry | None:
         """Return the row, or None. Entry points are read only when no built-in row has the name."""
         if name not in self._rows:
             self._read_entry_points()
         return self._rows.get(name)
 
-    def __getitem__(self, name: str) -> Row:
+    def __getitem__(self, name: str) -> RegistryEntry:
         row = self.get(name)
         if row is None:
             raise KeyError(f"{self.group} has no {name!r}; it has {', '.join(sorted(self._rows))}")
@@ -61,10 +61,10 @@ class Table:
         from importlib.metadata import entry_points  # 20 ms: only when a name is not built in
 
         for point in entry_points(group=self.group):
-            self._rows.setdefault(point.name, Row(point.name, point.value))
+            self._rows.setdefault(point.name, RegistryEntry(point.name, point.value))
 
 
-class Catalog(NamedTuple):
+class Registries(NamedTuple):
     """All tables of one running URC."""
 
     transports: Table

@@ -11,17 +11,17 @@ from typing import Any, Final
 import yaml
 
 from urc._files import read_bytes, refused, similar_file, too_large
-from urc._marks import Mark, Span, Written
-from urc._yaml_tree import Limits, StoppedError, TreeReader, path_text
+from urc._marks import Mark, Span, UnfilledText
+from urc._yaml_tree import DocumentLimits, StoppedError, TreeReader, path_text
 from urc.problems import Problem, ProblemsError, Severity, has_errors
 
 __all__ = [
     "Document",
-    "Limits",
+    "DocumentLimits",
     "Mark",
     "Path",
     "Span",
-    "Written",
+    "UnfilledText",
     "parse_document",
     "read_document",
     "similar_file",
@@ -30,7 +30,7 @@ __all__ = [
 Path = tuple[str | int, ...]
 """Keys and list indices from the root of a document to a value."""
 
-_LIMITS: Final = Limits()
+_LIMITS: Final = DocumentLimits()
 # Line ends as in the YAML reader, so that marks count the same lines. The Unicode patterns take
 # milliseconds to compile, so only texts that need them do so.
 _LINE_END = re.compile("\r\n|[\r\n]")
@@ -176,7 +176,7 @@ def _span(mark: Mark, *, key: bool, is_inside: bool) -> Span:
     return mark.span._replace(end_line=0) if mark.style == "{" else mark.span
 
 
-def read_document(path: str, limits: Limits = _LIMITS) -> Document:
+def read_document(path: str, limits: DocumentLimits = _LIMITS) -> Document:
     """Read a file.
 
     Raises:
@@ -185,7 +185,7 @@ def read_document(path: str, limits: Limits = _LIMITS) -> Document:
     return parse_document(read_bytes(path, limits.size_bytes), path, limits)
 
 
-def parse_document(content: bytes | str, file: str, limits: Limits = _LIMITS) -> Document:
+def parse_document(content: bytes | str, file: str, limits: DocumentLimits = _LIMITS) -> Document:
     """Parse text; `file` is its name in messages.
 
     Raises:

@@ -15,11 +15,11 @@ from typing import Final, NamedTuple, cast
 
 from urc.config.load import load_profile
 from urc.model.profile import Profile
-from urc.motion.fresh import Input
-from urc.motion.lease import Client
+from urc.motion.freshness import ControlInput
+from urc.motion.lease import Operator
 from urc.problems import UrcError
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.motion import MotionDesk
+from urc.runtime.motion_controller import MotionController
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
 
 __all__ = ["NUMBERS", "Gesture", "gestures"]
@@ -130,8 +130,8 @@ def _profile(port: int) -> Profile:
 
 async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
     """Hold one control all the time and another sometimes; then release them, or fall silent."""
-    desk, loop = MotionDesk(session.profile.driver), asyncio.get_running_loop()
-    desk.join(Client("hand", "hand", "driver"))
+    desk, loop = MotionController(session.profile.driver), asyncio.get_running_loop()
+    desk.join(Operator("hand", "hand", "driver"))
     desk.attach(session.frames, session.movers)
     ready_s = loop.time() + _READY_S
     while not session.frames.is_ready("drive"):
@@ -145,7 +145,7 @@ async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
         refused = ""
         for command in ("drive", "lift") if ticks % 60 > 30 else ("drive",):
             ticks, now = ticks + 1, loop.time()
-            given = Input(desk.lease.state.epoch, ticks, desk.beat("hand", now))
+            given = ControlInput(desk.lease.state.epoch, ticks, desk.beat("hand", now))
             with suppress(UrcError):
                 value = {"v": dice.randrange(1, 99)}
                 refused = refused or desk.tick("hand", command, value, given, now)
@@ -166,7 +166,7 @@ async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
     return ""
 
 
-async def _follow(session: Session, desk: MotionDesk) -> None:
+async def _follow(session: Session, desk: MotionController) -> None:
     """Report stops to the motion controller, without end."""
     assert session.movers is not None
     while True:

@@ -20,10 +20,10 @@ from typing import Final, NamedTuple
 from bench.rig.programs import Robots
 from urc.config.load import load_profile
 from urc.model.profile import Profile
-from urc.motion.hold import Terms
+from urc.motion.hold_to_run import HoldTerms
 from urc.problems import UrcError
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.held import is_lossy
+from urc.runtime.held_commands import is_lossy
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
 
 __all__ = ["HEARD_MS", "STOP_MS", "Freeze", "freeze"]
@@ -133,7 +133,7 @@ async def _one(session: Session, robots: Robots, moment_s: float, lasts_s: float
         await asyncio.sleep(0.02)
     await asyncio.sleep(_AFTERWARDS_S)
     stop, lossy = session.frames.stop_frame("go"), is_lossy(session.profile.driver, "wire")
-    movers.arm("go", Terms(b"", period_s=_TICK_S, is_lossy=lossy).stopped_by(stop))
+    movers.arm("go", HoldTerms(b"", period_s=_TICK_S, is_lossy=lossy).stopped_by(stop))
     holding = asyncio.create_task(_hold(session))
     try:
         await asyncio.sleep(moment_s)

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from urc.config.messaging import MESSAGING
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext, parse_write
-from urc.config.part import Findings, Part
 from urc.config.schemas import read_schema
 from urc.problems import to_text
 from urc.source import parse_document
@@ -28,8 +28,8 @@ def test_struct_of_the_page_can_be_used(block: str) -> None:
 def test_send_of_the_page_can_be_used(block: str) -> None:
     """Without a finding."""
     document = parse_document(block, "page.yaml")
-    findings = Findings()
-    spec = parse_write(Part(document, (), document.data).must("send"), findings, FormContext())
+    findings = Problems()
+    spec = parse_write(Node(document, (), document.data).must("send"), findings, FormContext())
     assert [to_text(one) for one in findings] == []
     assert spec.names
 

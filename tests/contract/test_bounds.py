@@ -4,15 +4,15 @@ from pathlib import Path
 
 import pytest
 
-from urc.config.parse.widget import Shelf
-from urc.runtime import apart
-from urc.runtime.apart import look_apart
+from urc.config.parse.widget import WidgetFolder
+from urc.runtime import isolation
+from urc.runtime.isolation import look_apart
 from urc.shipped import shipped
-from urc.web.load.foreign import OURS
-from urc.web.show import markup_apart
+from urc.web.load.widget_trust import OURS
+from urc.web.show import isolated_markup
 from urc.web.show.cells import WidgetContext, widget_context
 from urc.web.show.demos import demo_states
-from urc.web.show.markup_apart import markup_of
+from urc.web.show.isolated_markup import markup_of
 from urc.web.show.sandbox import TEMPLATE
 
 ROBOTS = sorted(shipped("robots").glob("*.yaml"))
@@ -24,10 +24,10 @@ def test_every_robot_is_looked_at_with_half_of_the_memory_and_time(
     document: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     half = (
-        "from urc.runtime import apart;"
-        "apart.PROCESSOR_S //= 2; apart.MEMORY_BYTES //= 2; apart._main()"
+        "from urc.runtime import isolation;"
+        "apart.PROCESSOR_S //= 2; isolation.MEMORY_BYTES //= 2; isolation._main()"
     )
-    monkeypatch.setattr(apart, "COMMAND", ("-P", "-c", half))
+    monkeypatch.setattr(isolation, "COMMAND", ("-P", "-c", half))
     assert look_apart(document, TOP, []).permissions
 
 
@@ -36,12 +36,12 @@ def test_every_template_of_ours_is_rendered_with_half_of_the_length(
 ) -> None:
     """In all states of its demo, by the one process that a page has for all of them."""
     half = (
-        "from urc.web.show import markup_apart;"
-        "markup_apart.MOST_CHARACTERS //= 2; markup_apart._main()"
+        "from urc.web.show import isolated_markup;"
+        "markup_apart.MOST_CHARACTERS //= 2; isolated_markup._main()"
     )
-    monkeypatch.setattr(markup_apart, "_COMMAND", ("-P", "-c", half))
-    monkeypatch.setattr(markup_apart, "_KEPT", 10_000)
-    shelf = Shelf(shipped("widgets"))
+    monkeypatch.setattr(isolated_markup, "_COMMAND", ("-P", "-c", half))
+    monkeypatch.setattr(isolated_markup, "_KEPT", 10_000)
+    shelf = WidgetFolder(shipped("widgets"))
     wanted = []
     for name in sorted(OURS):
         widget = shelf.get(name)

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from urc.config.load import Shelf, check
+from urc.config.load import WidgetFolder, check
 from urc.problems import to_text
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 
 BROKEN = Path(__file__).parents[1] / "broken"
 SUPPORT = ("parts", "shelf")
@@ -26,7 +26,7 @@ DOCUMENTS = sorted(
 
 def report(document: str) -> str:
     """Return what `urc validate` prints about a document, from the folder of broken documents."""
-    checked = check(document, built_in_catalog(), Shelf(BROKEN / "shelf"))
+    checked = check(document, built_in_catalog(), WidgetFolder(BROKEN / "shelf"))
     return "".join(f"{to_text(problem)}\n" for problem in checked.problems)
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from urc.cli.main import main
-from urc.config.codes import Page, pages
-from urc.config.load import Shelf, check
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.selftest import exercise
+from urc.config.codes import CodePage, pages
+from urc.config.load import WidgetFolder, check
+from urc.runtime.document_tests import exercise
+from urc.runtime.registries import built_in_catalog
 
 ROOT = Path(__file__).resolve().parents[2]
 BROKEN = ROOT / "tests" / "broken"
@@ -104,7 +104,7 @@ def test_pages_are_in_the_order_of_the_alphabet() -> None:
 
 
 @pytest.mark.parametrize("page", PAGES.values(), ids=list(PAGES))
-def test_page_has_all_four_parts(page: Page) -> None:
+def test_page_has_all_four_parts(page: CodePage) -> None:
     """What, Why, Example, Use instead; the first two are sentences on one line."""
     assert CODE.fullmatch(page.code)
     for text in (page.what, page.why):
@@ -159,14 +159,14 @@ def findings(example: str, folder: Path) -> dict[str, str]:
         file = folder / "lamp" / "widget.yaml"
         file.parent.mkdir(exist_ok=True)
     file.write_text(text, "utf-8")
-    checked = check(file, built_in_catalog(), Shelf(BROKEN / "shelf"))
+    checked = check(file, built_in_catalog(), WidgetFolder(BROKEN / "shelf"))
     problems = list(checked.problems)
     if checked.profile is not None:
         problems += exercise(checked.profile).problems
     return {problem.code: problem.severity for problem in problems}
 
 
-def is_document(page: Page, text: str) -> bool:
+def is_document(page: CodePage, text: str) -> bool:
     """Return whether a part of a page is code: in the file it stands in a fence."""
     source = (ROOT / "urc" / "config" / "codes.md").read_text("utf-8")
     return f"```yaml\n{text}\n```" in source

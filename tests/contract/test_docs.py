@@ -13,11 +13,11 @@ import yaml
 from tests.documentation import BLOCKS, DOCUMENTS, ROOT, YAML, Block, answers, is_piece, write_files
 from urc.cli.arguments import parse
 from urc.cli.main import VERBS, main
-from urc.config.load import Shelf, check
-from urc.model.values import Limits, Signal
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.selftest import exercise
-from urc.runtime.shelves import shelf_of
+from urc.config.load import WidgetFolder, check
+from urc.model.values import AlarmLimits, Signal
+from urc.runtime.document_tests import exercise
+from urc.runtime.registries import built_in_catalog
+from urc.runtime.widget_registry import shelf_of
 from urc.web.show.cells import WidgetContext, render_widget
 
 COMMANDS = [
@@ -138,13 +138,13 @@ def test_the_widget_of_the_page_renders_in_each_state(folder: Path) -> None:
     lamp = folder / "widgets" / "lamp"
     needed = {"widget.yaml", "template.html.j2", "widget.js", "widget.css", "demo.yaml"}
     assert {path.name for path in lamp.iterdir()} == needed
-    shelf = Shelf(lamp.parent)
+    shelf = WidgetFolder(lamp.parent)
     widget = shelf.get("lamp")
     assert widget is not None
     assert shelf.problems == []
     demo = yaml.safe_load((lamp / "demo.yaml").read_text("utf-8"))
     signals = {
-        name: Signal(name, **{**given, "limits": Limits(**given.get("limits", {}))})
+        name: Signal(name, **{**given, "limits": AlarmLimits(**given.get("limits", {}))})
         for name, given in demo["signals"].items()
     }
     for state in demo["states"].values():

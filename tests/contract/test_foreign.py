@@ -9,13 +9,13 @@ from typing import NoReturn
 import pytest
 from starlette.testclient import TestClient
 
-from urc.config.load import Shelf
+from urc.config.load import WidgetFolder
 from urc.model.interface import WidgetUse
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile, plain_widget
 from urc.testing.entry import ACCESS, HERE
 from urc.web.app import Robot, build_app
-from urc.web.load.foreign import OURS, Border
+from urc.web.load.widget_trust import OURS, WidgetTrust
 
 CODE = " ".join(
     f"http://localhost:8080{ACCESS.frame_code}/{folder}/"
@@ -56,8 +56,10 @@ def client(robot: FakeRobot, host: str = "localhost:8080", *trusted: str) -> Tes
 
 def test_each_widget_that_ships_is_named() -> None:
     """A folder that somebody puts beside them is not taken for one of them."""
-    names = Shelf(shipped("widgets")).names()
-    assert sorted(OURS) == names, "name the widgets that ship with URC in urc/web/load/foreign.py"
+    names = WidgetFolder(shipped("widgets")).names()
+    assert sorted(OURS) == names, (
+        "name the widgets that ship with URC in urc/web/load/widget_trust.py"
+    )
 
 
 def test_a_widget_of_another_folder_is_foreign_whatever_its_name(tmp_path: Path) -> None:
@@ -65,9 +67,9 @@ def test_a_widget_of_another_folder_is_foreign_whatever_its_name(tmp_path: Path)
     ours = plain_widget("battery", ["level"])
     named_so = plain_widget("battery", ["level"], tmp_path / "battery")
     beside = plain_widget("lamp", ["level"], shipped("widgets") / "lamp")
-    border = Border()
+    border = WidgetTrust()
     assert [border.is_foreign(one) for one in (ours, named_so, beside)] == [False, True, True]
-    assert not Border.of(["lamp"]).is_foreign(beside)
+    assert not WidgetTrust.of(["lamp"]).is_foreign(beside)
 
 
 def test_the_page_holds_a_foreign_widget_as_text_and_loads_nothing_of_it(tmp_path: Path) -> None:

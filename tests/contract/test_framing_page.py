@@ -10,7 +10,7 @@ import yaml
 from tests.unit.protocol.framing_samples import framing
 from urc.config.schemas import read_schema
 from urc.model.framing import FOLDED, PLAIN_CHECKSUMS
-from urc.protocol.framing import FRAMINGS
+from urc.protocol.framing.table import FRAMINGS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "language" / "framing.md").read_text("utf-8")
 BLOCKS = re.findall(r"^```yaml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)

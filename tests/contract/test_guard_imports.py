@@ -40,6 +40,6 @@ def modules_with(kind: str) -> list[str]:
 def test_guard_has_no_template_pattern_or_parser(kind: str) -> None:
     """Whatever the robot's lines are."""
     loaded = modules_with(kind)
-    assert "urc.guard.host" in loaded
+    assert "urc.guard.server" in loaded
     found = [one for one in loaded if any(f"{one}.".startswith(f"{bad}.") for bad in FORBIDDEN)]
     assert found == []

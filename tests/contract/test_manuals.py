@@ -7,8 +7,8 @@ import pytest
 from scripts.robot_pictures import with_picture
 from urc.cli.main import main
 from urc.config.load import load_profile
-from urc.runtime.catalog import built_in_catalog
 from urc.runtime.manual import manual
+from urc.runtime.registries import built_in_catalog
 
 ROOT = Path(__file__).resolve().parents[2]
 ROBOTS = sorted(path.stem for path in (ROOT / "robots").glob("*.yaml"))

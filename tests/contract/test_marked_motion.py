@@ -9,8 +9,8 @@ import yaml
 
 from tests.documentation import ROOT, Block, blocks
 from urc.config.rules.unmarked import why_it_moves
-from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command
+from urc.model.payload import WriteSpec
 
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
 CODES = ROOT / "urc" / "config" / "codes.md"

@@ -9,7 +9,7 @@ from urc.config.load import check
 from urc.config.messaging import MESSAGING
 from urc.config.schemas import read_schema
 from urc.problems import to_text
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 
 PAGE = (Path(__file__).parents[2] / "docs" / "language" / "messages.md").read_text("utf-8")
 BLOCKS = re.findall(r"^```yaml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)

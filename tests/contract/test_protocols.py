@@ -19,17 +19,17 @@ from urc.protocol.events import (
     Close,
     Event,
     Failed,
-    Fault,
     Open,
     Replied,
     Request,
     Samples,
     Send,
+    Violation,
 )
-from urc.runtime.catalog import built_in_catalog
 from urc.runtime.coverage import measure
-from urc.runtime.selftest import exercise, sample_settings
-from urc.simulator.twin import Twin, TwinLine
+from urc.runtime.document_tests import exercise, sample_settings
+from urc.runtime.registries import built_in_catalog
+from urc.simulator.emulated_robot import EmulatedConnection, EmulatedRobot
 
 FILES = sorted((Path(__file__).parents[1] / "protocols").glob("*.yaml"))
 SHORTEST_S, LONGEST_S = 2.0, 30.0
@@ -73,8 +73,8 @@ class Conversation:
         self.profile = profile
         self.now = 0.0
         self.engine = Engine(profile.driver, settings)
-        self.twin = Twin(profile, settings)
-        self.lines: dict[str, TwinLine] = {}
+        self.twin = EmulatedRobot(profile, settings)
+        self.lines: dict[str, EmulatedConnection] = {}
         self.read: set[str] = set()
         """Signals that had a value."""
         self.faults: list[str] = []
@@ -113,7 +113,7 @@ class Conversation:
                     self.read |= {one.signal for one in samples if one.value is not None}
                 case Replied(_, command, _):
                     self.done.append(command)
-                case Fault(_, code, message) | Failed(_, _, code, message):
+                case Violation(_, code, message) | Failed(_, _, code, message):
                     self.faults.append(f"{code}: {message}")
             if not pending and self.said:
                 transport, answer = self.said.popleft()

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from urc.config.load import check, load_profile
-from urc.config.parse.widget import Shelf
+from urc.config.parse.widget import WidgetFolder
 from urc.config.resolve import resolve
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.shipped import shipped
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "language" / "reuse.md"
@@ -59,4 +59,4 @@ def test_documents_of_the_page_become_what_it_says() -> None:
 def test_what_the_page_shows_of_urc_resolve_is_what_is_printed() -> None:
     """Line by line, with file and line of every key."""
     (shown,) = re.findall(r"^```text\n(.*?)^```$", PAGE.read_text("utf-8"), re.M | re.S)
-    assert shown in resolve("gripper.yaml", Shelf(shipped("widgets"))).text
+    assert shown in resolve("gripper.yaml", WidgetFolder(shipped("widgets"))).text

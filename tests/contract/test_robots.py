@@ -8,12 +8,12 @@ import pytest
 from starlette.testclient import TestClient
 
 from tests.contract.test_protocols import Conversation
-from urc.config.load import Shelf, check
+from urc.config.load import WidgetFolder, check
 from urc.model.profile import Profile
 from urc.problems import to_text
-from urc.runtime.catalog import built_in_catalog
 from urc.runtime.coverage import measure
-from urc.runtime.selftest import exercise, sample_settings
+from urc.runtime.document_tests import exercise, sample_settings
+from urc.runtime.registries import built_in_catalog
 from urc.testing.dashboard import FakeRobot
 from urc.testing.entry import ACCESS, HERE
 from urc.web.app import build_app
@@ -38,7 +38,7 @@ def file(request: pytest.FixtureRequest) -> Path:
 def test_every_shipped_document_has_no_finding() -> None:
     """What ships is an example, so not even a warning is left in it."""
     files = [*FOLDER.glob("**/*.yaml"), *WIDGETS.glob("*/widget.yaml")]
-    shelf = Shelf(WIDGETS)
+    shelf = WidgetFolder(WIDGETS)
     found = {os.fspath(file): check(file, built_in_catalog(), shelf).problems for file in files}
     assert len(found) >= 2
     assert {name: problems for name, problems in found.items() if problems} == {}

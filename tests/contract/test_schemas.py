@@ -14,19 +14,19 @@ from referencing.jsonschema import DRAFT202012
 
 from tests.effort import examples
 from urc.config.gather import gather
-from urc.config.load import Shelf, check
-from urc.config.part import Part
+from urc.config.load import WidgetFolder, check
+from urc.config.node import Node
 from urc.config.schemas import KINDS, QuickCheck, read_schema
 from urc.problems import ProblemsError, to_text
-from urc.protocol.framing import FRAMINGS
-from urc.registry import Catalog, Table
+from urc.protocol.framing.table import FRAMINGS
+from urc.registry import Registries, Table
 from urc.source import read_document
 from urc.transports.table import TRANSPORTS
 
 ROOT = Path(__file__).resolve().parents[2]
 EVERY_KEY = ROOT / "tests" / "contract" / "every_key"
 FILES = [f"{kind}.schema.json" for kind in KINDS]
-CATALOG = Catalog(
+CATALOG = Registries(
     transports=Table("urc.transports", dict.fromkeys((*TRANSPORTS, "pigeon"), "x:x")),
     framings=Table("urc.framings", dict.fromkeys((*FRAMINGS, "knots"), "x:x")),
 )
@@ -223,13 +223,13 @@ class Reads:
             self._record(monkeypatch, method)
 
     def _record(self, monkeypatch: pytest.MonkeyPatch, method: str) -> None:
-        original = getattr(Part, method)
+        original = getattr(Node, method)
 
-        def recording(part: Part, key: str) -> Any:
+        def recording(part: Node, key: str) -> Any:
             self.asked.add((part.document.file, part.path, key))
             return original(part, key)
 
-        monkeypatch.setattr(Part, method, recording)
+        monkeypatch.setattr(Node, method, recording)
 
 
 DOCUMENTS = sorted(path.relative_to(EVERY_KEY).as_posix() for path in EVERY_KEY.rglob("*.yaml"))
@@ -239,7 +239,7 @@ DOCUMENTS = sorted(path.relative_to(EVERY_KEY).as_posix() for path in EVERY_KEY.
 def test_document_with_every_key_has_no_finding(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """It shows that every key can be used as its description says."""
     monkeypatch.chdir(EVERY_KEY)
-    checked = check(name, CATALOG, Shelf(EVERY_KEY / "shelf"))
+    checked = check(name, CATALOG, WidgetFolder(EVERY_KEY / "shelf"))
     told = [to_text(one) for one in checked.problems if one.code not in ("never-set",)]
     assert told == []
 
@@ -254,7 +254,7 @@ def test_loader_reads_every_key_of_the_schemas_and_no_other(
     known: dict[tuple[str, tuple[str | int, ...]], set[str]] = {}
     present: set[tuple[str, tuple[str | int, ...], str]] = set()
     for name in DOCUMENTS:
-        check(name, CATALOG, Shelf(EVERY_KEY / "shelf"))
+        check(name, CATALOG, WidgetFolder(EVERY_KEY / "shelf"))
         data = read_document(name).data
         assert isinstance(data, dict)
         schema = f"{data['kind']}.schema.json"

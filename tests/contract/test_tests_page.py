@@ -9,9 +9,9 @@ import yaml
 from urc.config.load import check
 from urc.config.schemas import read_schema
 from urc.problems import to_text
-from urc.runtime.catalog import built_in_catalog
 from urc.runtime.coverage import measure
-from urc.runtime.selftest import exercise
+from urc.runtime.document_tests import exercise
+from urc.runtime.registries import built_in_catalog
 
 PAGE = (Path(__file__).parents[2] / "docs" / "language" / "tests.md").read_text("utf-8")
 BLOCKS = re.findall(r"^```yaml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)

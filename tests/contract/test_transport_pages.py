@@ -7,10 +7,10 @@ import pytest
 import yaml
 
 from tests.documentation import Block, blocks
-from urc.config.load import Shelf, check
+from urc.config.load import WidgetFolder, check
 from urc.config.schemas import read_schema
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.selftest import exercise
+from urc.runtime.document_tests import exercise
+from urc.runtime.registries import built_in_catalog
 from urc.transports.table import TRANSPORTS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,7 +42,7 @@ def test_robot_of_a_page_is_without_a_finding(block: Block, tmp_path: Path) -> N
     """Not even a warning, and its tests pass."""
     path = tmp_path / f"{yaml.safe_load(block.text)['name']}.yaml"
     path.write_text(block.text, "utf-8")
-    checked = check(str(path), built_in_catalog(), Shelf(tmp_path / "widgets"))
+    checked = check(str(path), built_in_catalog(), WidgetFolder(tmp_path / "widgets"))
     assert [str(problem) for problem in checked.problems] == []
     assert checked.profile is not None
     assert checked.profile.tests

@@ -7,16 +7,16 @@ from typing import Any
 import pytest
 
 from tests.documentation import blocks
-from urc.config.load import Shelf, check
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.selftest import exercise
+from urc.config.load import WidgetFolder, check
+from urc.runtime.document_tests import exercise
+from urc.runtime.registries import built_in_catalog
 from urc.shipped import shipped
 from urc.source import read_document
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "docs" / "widgets"
 NAMES = sorted(path.name for path in shipped("widgets").iterdir() if path.is_dir())
-SHELF = Shelf(shipped("widgets"))
+SHELF = WidgetFolder(shipped("widgets"))
 WIDGETS = pytest.mark.parametrize("name", NAMES)
 
 _ROW = re.compile(r"^\| `([\w-]+)`(?: to `([\w-]+)`)? \| (.*?) \|", re.MULTILINE)

@@ -8,20 +8,20 @@ from typing import Any
 
 import pytest
 
-from urc.config.parse.widget import Shelf
+from urc.config.parse.widget import WidgetFolder
 from urc.model.widget import Widget
 from urc.shipped import shipped
 from urc.source import read_document
 from urc.testing.dashboard import option_defaults
 from urc.web.show.cells import WidgetContext, render_widget, widget_context
-from urc.web.show.demos import DemoState, demo_states
+from urc.web.show.demos import WidgetState, demo_states
 
 FOLDERS = sorted(path for path in shipped("widgets").iterdir() if path.is_dir())
 FILES = {"widget.yaml", "template.html.j2", "widget.js", "widget.css", "demo.yaml"}
 MORE = {".js", ".json", ".svg", ".png", ".jpg", ".urdf", ".stl"}
 """What else a widget may bring: modules and small assets."""
 MOST_BYTES = 256 * 1024
-SHELF = Shelf(shipped("widgets"))
+SHELF = WidgetFolder(shipped("widgets"))
 TYPES = {
     "string": str,
     "integer": int,
@@ -58,7 +58,7 @@ def widget_of(folder: Path) -> Widget:
     return widget
 
 
-def contexts(widget: Widget) -> dict[str, tuple[DemoState, WidgetContext]]:
+def contexts(widget: Widget) -> dict[str, tuple[WidgetState, WidgetContext]]:
     """Return what the template is rendered with in each state of the demo."""
     found = {}
     for state in demo_states(widget):

@@ -11,9 +11,9 @@ from urc.config.load import check
 from urc.config.schemas import read_schema
 from urc.model.world import INPUTS, READINGS
 from urc.problems import to_text
-from urc.runtime.catalog import built_in_catalog
 from urc.runtime.coverage import measure
-from urc.runtime.selftest import exercise
+from urc.runtime.document_tests import exercise
+from urc.runtime.registries import built_in_catalog
 from urc.simulator.faults import FAULTS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "language" / "world.md").read_text("utf-8")

@@ -10,8 +10,8 @@ from tests.contract.test_protocols import Conversation
 from urc.config.load import load_profile
 from urc.model.profile import Profile
 from urc.protocol.events import Request
-from urc.runtime.catalog import built_in_catalog
-from urc.simulator.embodied import Embodied
+from urc.runtime.registries import built_in_catalog
+from urc.simulator.simulated_body import SimulatedBody
 from urc.simulator.world.world import World
 
 FOLDER = Path(__file__).parents[2] / "robots"
@@ -58,7 +58,7 @@ def command(talk: Conversation, name: str, arguments: Mapping[str, object]) -> N
     assert talk.faults[before:] == []
 
 
-def body_of(talk: Conversation) -> Embodied:
+def body_of(talk: Conversation) -> SimulatedBody:
     """Return what moves."""
     body = talk.twin.body
     assert body is not None

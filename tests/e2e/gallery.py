@@ -8,9 +8,9 @@ from typing import Any
 
 from playwright.async_api import Page
 
-from urc.config.parse.widget import Shelf
+from urc.config.parse.widget import WidgetFolder
 from urc.shipped import shipped
-from urc.web.show.demos import DemoState, demo_states
+from urc.web.show.demos import WidgetState, demo_states
 
 __all__ = [
     *("CELLS", "CELL_SIZES", "EXHIBITS", "HIGH", "MOST_DIFFERENT", "ONLY", "PICTURES", "THEMES"),
@@ -32,13 +32,13 @@ SETTLE_MS = 500
 
 def groups() -> list[str]:
     """Return the widgets there are, some to a page, as the gallery takes them in its address."""
-    names = Shelf(shipped("widgets")).names()
+    names = WidgetFolder(shipped("widgets")).names()
     return ["+".join(names[start : start + GROUP]) for start in range(0, len(names), GROUP)]
 
 
-def states_of(group: str) -> dict[tuple[str, str], DemoState]:
+def states_of(group: str) -> dict[tuple[str, str], WidgetState]:
     """Return (widget, state) → the state, of all widgets of a group."""
-    shelf = Shelf(shipped("widgets"))
+    shelf = WidgetFolder(shipped("widgets"))
     found = {}
     for name in group.split("+"):
         widget = shelf.get(name)

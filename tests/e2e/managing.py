@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from tests.e2e.processes import UrcProcess
 from tests.unit.packages.made import keep_settings, write_package
-from urc.cli.dashboard import Place, workshop_of
+from urc.cli.dashboard import DashboardAddress, workshop_of
 from urc.model.profile import Profile
 from urc.packages.install import plan_wish
 from urc.packages.names import parse_wish
@@ -19,7 +19,7 @@ from urc.packages.repositories import Repositories
 from urc.packages.store import Store
 from urc.testing.entry import ACCESS
 from urc.web.app import build_app, serve
-from urc.web.fleet.garage import Garage
+from urc.web.fleet.robot_factory import RobotFactory
 
 __all__ = [
     "GONE",
@@ -154,9 +154,9 @@ async def running_managed(
     data: Path, profiles: Sequence[Profile] = (), *, is_dev: bool = False
 ) -> AsyncIterator[str]:
     """Serve what `urc serve --data-dir DATA` would; give the address, and end cleanly."""
-    place = Place("127.0.0.1", 0, data=data, shows_installed=not profiles)
+    place = DashboardAddress("127.0.0.1", 0, data=data, shows_installed=not profiles)
     workshop = workshop_of(place)
-    garage = Garage(workshop)
+    garage = RobotFactory(workshop)
     robots = {one.name: garage.robot(one.name, one) for one in profiles}
     remake = {name: partial(garage.robot, name) for name in robots} if is_dev else None
     app = build_app(

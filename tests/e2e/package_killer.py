@@ -16,16 +16,16 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from tests.unit.packages.made import assert_whole, install, package
-from urc.packages import disk
-from urc.packages.head import HEAD, read_head
+from urc.packages import atomic_files
 from urc.packages.index import INDEX, read_index
-from urc.packages.intake import take
-from urc.packages.keeper import make_index
+from urc.packages.index_builder import make_index
+from urc.packages.index_head import HEAD, read_head
 from urc.packages.names import PackageError, parse_wish
 from urc.packages.package import Package, sha256
 from urc.packages.signature import Signature, new_signer
 from urc.packages.sources import FileSource
 from urc.packages.store import Store
+from urc.packages.submission import take
 from urc.packages.update import plan_update
 
 DIAL = package("widget", "dial", "1.0.0")
@@ -123,8 +123,8 @@ def _work(work: Callable[[], None]) -> NoReturn:
 
 def die_at(store: Store, act: str, changes: int) -> None:
     deadly = DeadlyOs(changes)
-    disk.os = deadly  # type: ignore[attr-defined,assignment]
-    disk.mkdtemp = deadly.deadly(disk.mkdtemp)
+    atomic_files.os = deadly  # type: ignore[attr-defined,assignment]
+    atomic_files.mkdtemp = deadly.deadly(atomic_files.mkdtemp)
     ACTS[act](store)
 
 
@@ -203,8 +203,8 @@ def put(lab: Path, made: Package) -> bool:
 
 def put_and_die(lab: Path, changes: int) -> None:
     deadly = DeadlyOs(changes)
-    disk.os = deadly  # type: ignore[attr-defined,assignment]
-    disk.mkdtemp = deadly.deadly(disk.mkdtemp)
+    atomic_files.os = deadly  # type: ignore[attr-defined,assignment]
+    atomic_files.mkdtemp = deadly.deadly(atomic_files.mkdtemp)
     put(lab, DIAL_2)
 
 
@@ -227,7 +227,7 @@ def whole(lab: Path, is_new: bool) -> list[str]:
 
 if __name__ == "__main__":
     home, how, *more = sys.argv[1:]
-    disk.os = DeadlyOs(-1)  # type: ignore[attr-defined,assignment]
+    atomic_files.os = DeadlyOs(-1)  # type: ignore[attr-defined,assignment]
     if how == "publish":
         anna = new_signer("Anna", Path(home) / "anna.pem")
         SIGNED[DIAL_2.digest] = anna.sign(DIAL_2.manifest.key, "2.0.0", DIAL_2.digest)

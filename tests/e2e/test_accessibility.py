@@ -14,10 +14,10 @@ from tests.e2e.dev_pages import served
 from tests.e2e.gallery import THEMES, groups
 from tests.e2e.motion.driving import CALM_LEASE_S, USES, Wire, commands
 from tests.e2e.processes import UrcProcess
-from urc.model.codec import WriteSpec
 from urc.model.driver import Command
-from urc.model.flow import Confirm
-from urc.model.interface import Grid, Interface, Slot, Tab, WidgetUse
+from urc.model.exchange import Confirm
+from urc.model.interface import Interface, Layout, Slot, Tab, WidgetUse
+from urc.model.payload import WriteSpec
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = [pytest.mark.anyio, pytest.mark.needs("axe")]
@@ -97,9 +97,9 @@ MOVING = """
 """
 
 
-def row(*names: str) -> Grid:
+def row(*names: str) -> Layout:
     """Return a grid of one row."""
-    return Grid(1, len(names), tuple(Slot(name, 0, place) for place, name in enumerate(names)))
+    return Layout(1, len(names), tuple(Slot(name, 0, place) for place, name in enumerate(names)))
 
 
 def asking() -> Wire:

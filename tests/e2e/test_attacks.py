@@ -20,10 +20,10 @@ from tests.e2e.dashboards import WAIT_S, until, until_closed
 from tests.e2e.keys import headers_for
 from tests.e2e.ports import free_port
 from tests.e2e.processes import UrcProcess
-from urc.config.load import Shelf, check
+from urc.config.load import WidgetFolder, check
 from urc.problems import ProblemsError
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.opened import open_document
+from urc.runtime.open_profile import open_document
+from urc.runtime.registries import built_in_catalog
 
 pytestmark = pytest.mark.anyio
 
@@ -135,7 +135,7 @@ def without_headers(attack: str) -> str:
 async def test_its_headers_are_refused_before_anything_is_connected(attack: str) -> None:
     """By `urc validate`, at install and at the start alike."""
     file = ATTACKS / attack / "driver.yaml"
-    found = check(str(file), built_in_catalog(), Shelf(ATTACKS))
+    found = check(str(file), built_in_catalog(), WidgetFolder(ATTACKS))
     assert [problem.code for problem in found.problems] == ["reserved-header"]
     with pytest.raises(ProblemsError):
         open_document(str(file))

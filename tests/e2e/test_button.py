@@ -14,15 +14,15 @@ from websockets.typing import Origin
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_attribute, until_text
 from tests.e2e.processes import UrcProcess
-from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import Command, Reply
-from urc.model.flow import Hold
+from urc.model.exchange import Hold
 from urc.model.interface import WidgetUse
+from urc.model.payload import ReadSpec, WriteSpec
 from urc.model.values import Signal, Value
 from urc.runtime.session import CommandFailed
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import BEARER
-from urc.web.drive.once import HELD
+from urc.web.drive.one_shot_commands import HELD
 
 pytestmark = pytest.mark.anyio
 

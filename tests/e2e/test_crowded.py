@@ -8,10 +8,10 @@ from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_attribute
 from tests.e2e.keys import known_here
 from tests.e2e.motion.driving import CALM_LEASE_S, driven, held, number
-from urc.model.codec import WriteSpec
 from urc.model.driver import Command
-from urc.model.flow import Confirm
-from urc.model.interface import Grid, Interface, Slot, WidgetUse
+from urc.model.exchange import Confirm
+from urc.model.interface import Interface, Layout, Slot, WidgetUse
+from urc.model.payload import WriteSpec
 from urc.model.values import Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
@@ -122,7 +122,7 @@ async def test_a_question_is_whole_in_the_lowest_cells(new_page: PageMaker) -> N
     uses = [WidgetUse(name, "button", {}, {"press": name}, title=name) for name in commands]
     values = [WidgetUse(f"v{place}", "value", {"value": "at"}) for place in range(6)]
     slots = ["first", *(use.slot for use in values), "last"]
-    grid = Grid(4, 2, tuple(Slot(name, *divmod(place, 2)) for place, name in enumerate(slots)))
+    grid = Layout(4, 2, tuple(Slot(name, *divmod(place, 2)) for place, name in enumerate(slots)))
     profile = dashboard_profile(
         signals={"at": Signal("at")}, uses=[*uses, *values], commands=commands
     )

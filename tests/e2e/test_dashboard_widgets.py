@@ -7,7 +7,7 @@ import pytest
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_text
 from urc.model.interface import WidgetUse
-from urc.model.values import Limits, Signal
+from urc.model.values import AlarmLimits, Signal
 from urc.testing.dashboard import BATTERY, FakeRobot, dashboard_profile, plain_widget
 
 pytestmark = pytest.mark.anyio
@@ -273,7 +273,7 @@ VOLTAGE = Signal(
     "number",
     unit="V",
     precision=2,
-    limits=Limits(low=11, high=13, hihi=40),
+    limits=AlarmLimits(low=11, high=13, hihi=40),
     stale_after_s=3,
 )
 

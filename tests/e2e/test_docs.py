@@ -17,9 +17,9 @@ from tests.e2e.processes import UrcProcess
 from urc.config.load import load_profile
 from urc.model.interface import WidgetUse
 from urc.model.values import Signal, Value
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import CommandFailed
-from urc.runtime.shelves import TwoShelves
+from urc.runtime.widget_registry import WidgetRegistry
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
@@ -66,7 +66,7 @@ async def test_the_widget_of_the_page_lives_in_a_browser(
     tmp_path: Path, new_page: PageMaker
 ) -> None:
     """Each state of its demo shows its texts, with the module that the page shows."""
-    shelf = TwoShelves(shipped("widgets"), write_files(tmp_path))
+    shelf = WidgetRegistry(shipped("widgets"), write_files(tmp_path))
     lamp = shelf.get("lamp")
     assert lamp is not None
     demo = yaml.safe_load((lamp.folder / "demo.yaml").read_text("utf-8"))
@@ -101,7 +101,7 @@ async def test_the_button_of_the_page_gives_its_command(
     tmp_path: Path, new_page: PageMaker
 ) -> None:
     """The profile of the page with its widget: what the button does, and what it says when not."""
-    shelf = TwoShelves(shipped("widgets"), write_files(tmp_path))
+    shelf = WidgetRegistry(shipped("widgets"), write_files(tmp_path))
     profile = load_profile(tmp_path / "desk-lamp.yaml", built_in_catalog(), shelf)
     robot = FakeRobot(profile)
     async with running_dashboard(robot) as address:

@@ -19,7 +19,7 @@ from tests.e2e.dashboards import until
 from tests.e2e.keys import headers_for
 from tests.e2e.ports import free_port
 from tests.e2e.processes import UrcProcess
-from urc.runtime.servers import servers
+from urc.runtime.running_servers import servers
 
 pytestmark = pytest.mark.anyio
 

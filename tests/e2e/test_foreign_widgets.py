@@ -10,9 +10,9 @@ from playwright.async_api import Browser, FrameLocator, Page, expect
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_text
 from tests.e2e.motion.driving import CALM_LEASE_S, STOP, Wire, commands, moved, push
-from urc.model.codec import WriteSpec
 from urc.model.driver import Command
-from urc.model.interface import Given, WidgetUse
+from urc.model.interface import OutputBinding, WidgetUse
+from urc.model.payload import WriteSpec
 from urc.model.values import Signal
 from urc.model.widget import Widget
 from urc.shipped import shipped
@@ -277,7 +277,7 @@ def zoo(folder: Path, *names: str) -> tuple[Zoo, list[WidgetUse]]:
     widgets = [plain_widget("other-stick", [], stick)]
     widgets += [made(folder, name, BAD[name]) for name in names]
     plain = {"axes": "x", "expo": 0.0, "dead_zone": 0.0}
-    given = {"moved": Given({"speed": "x"})}
+    given = {"moved": OutputBinding({"speed": "x"})}
     uses = [
         WidgetUse("left", "joystick", {}, {"moved": "drive"}, plain, given=given),
         WidgetUse("level", "battery", {"level": "battery"}),

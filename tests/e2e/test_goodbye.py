@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from urc.config.load import load_profile
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
 
 pytestmark = pytest.mark.anyio

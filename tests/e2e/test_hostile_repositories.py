@@ -19,12 +19,12 @@ from tests.e2e.command_line import TIMEOUT_S
 from tests.e2e.package_people import Person
 from tests.unit.packages.made import package
 from tests.unit.packages.test_archive import HOSTILE as ARCHIVES
-from urc.packages import remote, repositories
+from urc.packages import http_repository, repositories
 from urc.packages.archive import PACKAGE
-from urc.packages.index import Entry, Index, entry_of
+from urc.packages.http_repository import ask, fetch_archive
+from urc.packages.index import Index, IndexEntry, entry_of
 from urc.packages.names import PackageError
 from urc.packages.package import sha256
-from urc.packages.remote import ask, fetch_archive
 
 Answer = Callable[[BaseHTTPRequestHandler], None]
 
@@ -111,7 +111,7 @@ def test_an_archive_that_tries_to_escape_is_refused(person: Person, tmp_path: Pa
     told = {name: text for name, (_, text) in ARCHIVES.items()}
     names = {f"evil-{number}": name for number, name in enumerate(made)}
     entries = tuple(
-        Entry(
+        IndexEntry(
             "widget", word, "1.0.0", sha256(made[name]), min(len(made[name]), PACKAGE.archive_bytes)
         )
         for word, name in names.items()
@@ -167,9 +167,9 @@ def test_a_server_that_stalls_is_given_up(person: Person, monkeypatch: pytest.Mo
         says(DIAL.data[:100], content_length=str(len(DIAL.data)))(handler)
         ended.wait(TIMEOUT_S)
 
-    def impatient(url: str, entry: Entry) -> bytes:
+    def impatient(url: str, entry: IndexEntry) -> bytes:
         with monkeypatch.context() as patch:  # for the archive alone: a busy machine answers late
-            patch.setattr(remote, "_READ_S", 0.3)
+            patch.setattr(http_repository, "_READ_S", 0.3)
             return fetch_archive(url, entry)
 
     monkeypatch.setattr(repositories, "fetch_archive", impatient)
@@ -229,7 +229,7 @@ def test_an_index_that_is_none_is_not_added(index: bytes, person: Person) -> Non
 def test_a_package_that_says_less_than_its_index_is_refused(person: Person) -> None:
     """The index names another version of it than it is."""
     false = entry_of(package("widget", "dial", "9.0.0"))
-    entry = Entry("widget", "dial", false.version, DIAL.digest, len(DIAL.data))
+    entry = IndexEntry("widget", "dial", false.version, DIAL.digest, len(DIAL.data))
     with server(evil(says(DIAL.data), Index(1, "evil", (entry,)).to_bytes())) as url:
         person.does("repo", "add", url)
         told = person.refuses("install", "dial", "--yes")

@@ -5,8 +5,8 @@ from playwright.async_api import expect
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until
-from urc.model.codec import WriteSpec
 from urc.model.driver import Command, Hold
+from urc.model.payload import WriteSpec
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio

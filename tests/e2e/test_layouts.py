@@ -23,14 +23,14 @@ from tests.e2e.motion.driving import (
     push,
 )
 from tests.e2e.processes import UrcProcess
-from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command
-from urc.model.flow import Confirm
-from urc.model.interface import Grid, Interface, Slot, Tab, WidgetUse
+from urc.model.exchange import Confirm
+from urc.model.interface import Interface, Layout, Slot, Tab, WidgetUse
+from urc.model.payload import WriteSpec
 from urc.model.values import Signal, Value
 from urc.runtime.session import CommandFailed
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.testing.movers import FakeMovers
+from urc.testing.movers import FakeMotionBackend
 
 pytestmark = pytest.mark.anyio
 
@@ -38,14 +38,14 @@ PHONE, PHONE_LYING, TABLET, DESKTOP = (390, 844), (844, 390), (820, 1180), (1440
 A, B, C = "[data-cell='0']", "[data-cell='1']", "[data-cell='2']"
 
 
-def row(*names: str) -> Grid:
+def row(*names: str) -> Layout:
     """Return a grid of one row."""
-    return Grid(1, len(names), tuple(Slot(name, 0, place) for place, name in enumerate(names)))
+    return Layout(1, len(names), tuple(Slot(name, 0, place) for place, name in enumerate(names)))
 
 
-def column(*names: str) -> Grid:
+def column(*names: str) -> Layout:
     """Return a grid of one column."""
-    return Grid(len(names), 1, tuple(Slot(name, place, 0) for place, name in enumerate(names)))
+    return Layout(len(names), 1, tuple(Slot(name, place, 0) for place, name in enumerate(names)))
 
 
 def gauged(*interfaces: Interface) -> FakeRobot:
@@ -280,7 +280,7 @@ async def test_the_background_fills_the_stage_and_controls_lie_above_it(
     new_page: PageMaker,
 ) -> None:
     """On each screen; STOP is never covered."""
-    grid = Grid(2, 3, (Slot("a", 0, 0), Slot("b", 1, 2)))
+    grid = Layout(2, 3, (Slot("a", 0, 0), Slot("b", 1, 2)))
     async with running_dashboard(
         gauged(Interface("x", "X", {"landscape": grid}, background="c"))
     ) as address:
@@ -306,7 +306,7 @@ async def test_the_cameras_of_the_background_are_chosen_by_mouse_and_touch(
         *(WidgetUse(f"v{place}", "value", {"value": "a"}) for place in range(6)),
         WidgetUse("c", "camera", lists={"images": ("front", "rear")}),
     ]
-    grid = Grid(3, 2, tuple(Slot(f"v{place}", *divmod(place, 2)) for place in range(6)))
+    grid = Layout(3, 2, tuple(Slot(f"v{place}", *divmod(place, 2)) for place in range(6)))
     profile = dashboard_profile(signals=signals, uses=uses)
     interface = Interface("x", "X", {"landscape": grid}, background="c")
     robot = FakeRobot(profile._replace(interfaces={"x": interface}))
@@ -418,7 +418,7 @@ async def held_by_its_form(page: Page, robot: FakeRobot) -> None:
     await page.mouse.move(x, y)
     await page.mouse.down()
     line = robot.movers
-    assert isinstance(line, FakeMovers)
+    assert isinstance(line, FakeMotionBackend)
     await until(lambda: any("rate=0.5" in text for text in line.texts))
     await page.mouse.up()
     await until(lambda: line.texts[-1].startswith("lift stop"))

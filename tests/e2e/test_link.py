@@ -16,7 +16,7 @@ from tests.e2e.ports import free_port
 from urc.model.driver import Backoff, Timeouts
 from urc.model.profile import Profile
 from urc.problems import UrcError
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import CommandFailed, Session
 from urc.simulator.server import serve
 from urc.testing.profile import line_profile

@@ -28,11 +28,11 @@ from tests.e2e.motion.driving import calmly_driven, opened, push
 from tests.e2e.processes import UrcProcess
 from tests.e2e.test_languages import check
 from tests.unit.packages.made import DOCUMENTS
-from urc.packages.keeper import make_index
+from urc.packages.index_builder import make_index
 from urc.packages.repositories import Repositories
 from urc.packages.store import Store
-from urc.runtime.kept import KeptFile
-from urc.runtime.opened import open_document
+from urc.runtime.open_profile import open_document
+from urc.runtime.settings_store import SettingsStore
 from urc.web.words import LANGUAGES
 
 pytestmark = pytest.mark.anyio
@@ -255,7 +255,7 @@ async def test_connect_to_a_robot_and_disconnect(new_page: PageMaker, has: dict[
         await expect(wire).to_contain_text("nothing listens on 127.0.0.1:1")
         await expect(wire).to_contain_text("check the port")
         await expect(page.locator("[data-said]")).to_contain_text("not saved")
-        assert KeptFile(data / "robots", "rover").load().settings == {}
+        assert SettingsStore(data / "robots", "rover").load().settings == {}
         await page.get_by_label("Port").fill(str(port))
         await page.get_by_role("button", name="Test & save").click()
         await expect(wire).to_have_attribute("data-verdict", "answers")

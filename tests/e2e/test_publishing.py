@@ -12,7 +12,7 @@ from tests.e2e.command_line import TIMEOUT_S
 from tests.e2e.package_people import Person
 from tests.e2e.processes import UrcProcess
 from tests.unit.packages.made import DOCUMENTS, package, write_package
-from urc.runtime.examine import examine, examine_apart
+from urc.runtime.package_check import examine, examine_apart
 
 LOOK = "widgets:\n  battery: { use: dial, bind: { level: battery } }\n"
 TEST = 'tests:\n  - { name: it is heard, feed: { wire: "42\\n" }, expect: { battery: 42 } }\n'

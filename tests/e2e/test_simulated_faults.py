@@ -15,10 +15,10 @@ import pytest
 
 from tests.e2e.dashboards import until
 from urc.config.load import load_profile
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.selftest import sample_settings
+from urc.runtime.document_tests import sample_settings
+from urc.runtime.registries import built_in_catalog
+from urc.simulator.emulated_robot import EmulatedRobot
 from urc.simulator.server import serve
-from urc.simulator.twin import Twin
 
 ROOT = Path(__file__).parents[2]
 PUPPET = str(ROOT / "robots" / "puppet.yaml")
@@ -114,7 +114,7 @@ async def test_a_camera_shows_the_world_and_fails_on_demand() -> None:
     """Two pictures of its stream differ, for the board turns; then there is none, and 503."""
     profile = load_profile(ROOT / "robots" / "esp32-cam.yaml", built_in_catalog())
     settings = sample_settings(profile.settings)
-    twin = Twin(profile, settings)
+    twin = EmulatedRobot(profile, settings)
     async with (
         serve(profile, settings, is_anywhere=True, twin=twin) as places,
         httpx2.AsyncClient(timeout=WAIT_S) as client,

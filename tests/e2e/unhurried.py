@@ -23,8 +23,8 @@ BEATS = 4000
 def unhurried() -> Iterator[None]:
     """Give servers in this process all the time there is."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("urc.motion.hold.LONGEST_LEASE_S", LONGEST_S)
-        patched.setattr("urc.motion.fresh.OLDEST_S", LONGEST_S)
-        patched.setattr("urc.motion.fresh._KEPT", BEATS)
-        patched.setattr("urc.web.drive.controls.TOO_LATE_S", LONGEST_S)
+        patched.setattr("urc.motion.hold_to_run.LONGEST_LEASE_S", LONGEST_S)
+        patched.setattr("urc.motion.freshness.OLDEST_S", LONGEST_S)
+        patched.setattr("urc.motion.freshness._KEPT", BEATS)
+        patched.setattr("urc.web.drive.control_service.TOO_LATE_S", LONGEST_S)
         yield

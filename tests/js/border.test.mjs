@@ -2,7 +2,7 @@
 /** What a foreign widget's frame may say, and what it is told. */
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { heard, MOST_MESSAGES, Rate, tellable } from "../../urc/web/static/frame/border.js";
+import { heard, MOST_MESSAGES, Rate, tellable } from "../../urc/web/static/frame/frame_protocol.js";
 
 const BOUND = {
   command: "go", names: {}, fixed: {}, ranges: {}, neutral: {}, line: "wire", refusal: "",

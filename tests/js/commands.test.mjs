@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { boundsOf, keyed, snapped } from "../../urc/web/static/widgets/giving.js";
+import { boundsOf, keyed, snapped } from "../../urc/web/static/widgets/command_kit.js";
 import { Book } from "../../widgets/alerts/book.js";
 import { Pull, angleOf, arc, ray, shareAt } from "../../widgets/knob/dial.js";
 import { quality, Trips } from "../../widgets/link/trips.js";

@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
   Pipeline, arrow, bounded, deadZone, expo, gate, settingsOf, slew, snapped, speedsOf, tilted,
-} from "../../urc/web/static/widgets/curve.js";
+} from "../../urc/web/static/widgets/response_curve.js";
 
 /** Shares from -1 to 1, the ends and the middle among them. */
 const SHARES = Array.from({ length: 41 }, (_, step) => (step - 20) / 20);

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { digitsIn, format } from "../../urc/web/static/widgets/kit.js";
-import { textOf } from "../../urc/web/static/core/texts.js";
+import { textOf } from "../../urc/web/static/core/formatting.js";
 import { Store } from "../../urc/web/static/live/store.js";
 
 /**

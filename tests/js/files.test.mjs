@@ -2,7 +2,7 @@
 /** Files that a document names for a foreign widget: the page hands over those, and no others. */
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { filesOf } from "../../urc/web/static/frame/warden_files.js";
+import { filesOf } from "../../urc/web/static/frame/frame_files.js";
 
 /** @type {string[]} */
 const asked = [];

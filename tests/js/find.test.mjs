@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { fits } from "../../urc/web/static/manage/find.js";
+import { fits } from "../../urc/web/static/manage/search.js";
 
 const ROBOT = "generic-ros2 Any base with ROS 2 A mobile base through rosbridge. Café, hall B.";
 

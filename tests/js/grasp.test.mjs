@@ -1,7 +1,7 @@
 // One pointer that has hold of an element: `node --import ./tests/js/page.mjs --test tests/js/`.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { grasp } from "urc/giving";
+import { grasp } from "urc/command_kit";
 
 /** An element that gets the events of pointers, as far as `grasp` looks at them. */
 class Element extends EventTarget {

@@ -14,7 +14,7 @@ Object.assign(globalThis, {
 });
 performance.now = () => nowMs;
 const { Input } = await import("../../urc/web/static/control/input.js");
-const { Control } = await import("../../urc/web/static/control/grip.js");
+const { Control } = await import("../../urc/web/static/control/held_control.js");
 
 /** A control that a hand holds, and what was told of it. */
 function held() {

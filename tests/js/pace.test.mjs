@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { tell } from "../../urc/web/static/widgets/kit.js";
-import { FEW, LONGEST_TURN, Pace, SHARE_MS, SHARE_OF_TWO_MS } from "../../urc/web/static/widgets/pace.js";
+import { FEW, LONGEST_TURN, Pace, SHARE_MS, SHARE_OF_TWO_MS } from "../../urc/web/static/widgets/draw_scheduler.js";
 
 const COUNT = 60;
 

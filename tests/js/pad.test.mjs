@@ -11,8 +11,8 @@ Object.assign(globalThis, {
   },
   localStorage: { getItem: () => null, setItem() {}, removeItem() {} },
 });
-const { Pads } = await import("../../urc/web/static/control/pad.js");
-const { STANDARD, withAxis } = await import("../../urc/web/static/widgets/padmap.js");
+const { Pads } = await import("../../urc/web/static/control/gamepad.js");
+const { STANDARD, withAxis } = await import("../../urc/web/static/widgets/gamepad_map.js");
 
 const ENABLE = STANDARD.left[0] ?? 0;
 

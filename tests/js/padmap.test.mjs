@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import {
   STANDARD, movedAxis, parsed, sticksOf, withAxis, withButton,
-} from "../../urc/web/static/widgets/padmap.js";
+} from "../../urc/web/static/widgets/gamepad_map.js";
 
 test("what was stored comes back the same", () => {
   const mine = withButton(withAxis(STANDARD, 1, 5, true), "left", 9);

@@ -3,11 +3,11 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Budget } from "../../urc/web/static/widgets/budget.js";
-import { Alerts, Follows, Log } from "../../urc/web/static/live/follow.js";
+import { Budget } from "../../urc/web/static/widgets/render_budget.js";
+import { Alerts, Follows, Log } from "../../urc/web/static/live/page_topics.js";
 import { frameOf } from "../../urc/web/static/live/frames.js";
 import { DASH, clamp, format, many, number, numbers, t } from "../../urc/web/static/widgets/kit.js";
-import { Decoder } from "../../urc/web/static/widgets/picture.js";
+import { Decoder } from "../../urc/web/static/widgets/image_decoder.js";
 import { Store } from "../../urc/web/static/live/store.js";
 import { Units, converted } from "../../urc/web/static/core/units.js";
 

@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { afterEach, test } from "node:test";
 
 import { board } from "../../urc/web/static/widgets/kit.js";
-import { Sheet } from "../../urc/web/static/widgets/sheet.js";
+import { Sheet } from "../../urc/web/static/widgets/offscreen_canvas.js";
 
 /** A pen that writes down what is drawn. */
 class Pen {

@@ -5,7 +5,7 @@ import test from "node:test";
 
 Object.assign(globalThis, { addEventListener() {}, window: globalThis });
 const { StopButton } = await import("../../urc/web/static/control/stop.js");
-const { Giver } = await import("../../urc/web/static/widgets/giver.js");
+const { Giver } = await import("../../urc/web/static/widgets/command_state.js");
 
 /** A button of which it can be said what is known of STOP. */
 function scene() {

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Alerts, watched } from "../../urc/web/static/live/follow.js";
+import { Alerts, watched } from "../../urc/web/static/live/page_topics.js";
 import { Store } from "../../urc/web/static/live/store.js";
 
 /** @param {Store} store @param {...object} signals */

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { cutTo, distance, fitted, lengthOf, polar, simplified } from "../../urc/web/static/widgets/stroke.js";
+import { cutTo, distance, fitted, lengthOf, polar, simplified } from "../../urc/web/static/widgets/path_simplify.js";
 
 test("a line is simplified within its tolerance, and keeps its ends", () => {
   const wave = Array.from({ length: 200 }, (_, step) => [step / 20, Math.sin(step / 20)]);

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { deflateSync } from "node:zlib";
-import { colour, palette, pixel } from "../../urc/web/static/widgets/palette.js";
+import { colour, palette, pixel } from "../../urc/web/static/widgets/colour_map.js";
 import { Rate, ageText, fileName, lookOf, place } from "../../widgets/camera/frame.js";
 import { arrayField, paint, pixelAt, probe, rawField, readField } from "../../widgets/depth/field.js";
 import {

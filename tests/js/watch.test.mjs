@@ -2,7 +2,7 @@
 /** Frames that do not answer: who is blamed, and who comes back. */
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { TICK_MS, Watch } from "../../urc/web/static/frame/watch.js";
+import { TICK_MS, Watch } from "../../urc/web/static/frame/frame_watchdog.js";
 
 /** Plays a page with frames. */
 class Page {

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Wish } from "../../urc/web/static/widgets/wish.js";
+import { Wish } from "../../urc/web/static/widgets/pending_value.js";
 
 const WITHIN_MS = 3000;
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from urc.config.parse.widget import Shelf
+from urc.config.parse.widget import WidgetFolder
 from urc.model.widget import Widget
 from urc.shipped import shipped
 from urc.web.load import file_routes
@@ -42,10 +42,10 @@ def never_wait_for_the_disk() -> Iterator[None]:
 
 def read_shipped_widgets_once() -> None:
     """Keep each good manifest that ships; every robot's default look asks for a dozen of them."""
-    read, folder = Shelf._read, shipped("widgets")
+    read, folder = WidgetFolder._read, shipped("widgets")
     known: dict[tuple[str, Path], Widget | None] = {}
 
-    def once(self: Shelf, name: str) -> Widget | None:
+    def once(self: WidgetFolder, name: str) -> Widget | None:
         place = (name, Path.cwd())  # findings name the file as seen from here
         if self.folder != folder:
             return read(self, name)
@@ -57,7 +57,7 @@ def read_shipped_widgets_once() -> None:
             known[place] = widget
         return known[place]
 
-    Shelf._read = once  # type: ignore[method-assign]
+    WidgetFolder._read = once  # type: ignore[method-assign]
 
 
 read_shipped_widgets_once()

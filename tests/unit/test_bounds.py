@@ -11,7 +11,7 @@ import pytest
 from urc.expressions import ExpressionError, Template, compile_expression
 from urc.patterns import PatternError, compile_pattern
 from urc.problems import ProblemsError
-from urc.runtime.opened import open_document
+from urc.runtime.open_profile import open_document
 
 ATTACKS = Path(__file__).parents[1] / "attacks" / "drivers"
 LONG = ",".join("x" * 32768)

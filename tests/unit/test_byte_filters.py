@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urc._bytes import BYTE_FILTERS
-from urc._numbers import NUMBER_NAMES, number_of
+from urc._number_types import NUMBER_NAMES, number_of
 from urc.expressions import ExpressionError, compile_expression, compile_template
+from urc.filters.binary import BYTE_FILTERS
 
 VALUES = [
     ("x | u8", b"\x05"),

@@ -7,8 +7,8 @@ from PIL import Image
 
 from urc.images import MAX_PIXELS, media_type, picture_size, pixels
 from urc.model.values import Signal
-from urc.protocol.convert import BadValue
-from urc.protocol.decode import build_converter
+from urc.protocol.values.convert import BadValue
+from urc.protocol.values.decode import build_converter
 
 FORMATS = [
     ("PNG", {}),

@@ -20,7 +20,7 @@ from scripts.mutation_copy import (
 ROOT = Path(__file__).resolve().parents[2]
 SETTINGS = Settings(("urc/guard/*",), ("urc/guard/double.py",), ("urc", "tests"))
 SOURCE = '''\
-class Reins:
+class MotionScheduler:
     @property
     def owes(self) -> bool:
         """Whether a stop is owed."""
@@ -34,21 +34,21 @@ class Reins:
         self.moves = True
 '''
 MUTATED = """\
-class Reins:
-    def xǁReinsǁtick__mutmut_orig(self) -> None:
+class MotionScheduler:
+    def xǁMotionSchedulerǁtick__mutmut_orig(self) -> None:
         self.moves = True
-    def xǁReinsǁtick__mutmut_1(self) -> None:
+    def xǁMotionSchedulerǁtick__mutmut_1(self) -> None:
         self.moves = False
-    def xǁReinsǁtick__mutmut_2(self) -> None:
+    def xǁMotionSchedulerǁtick__mutmut_2(self) -> None:
         self.moves = None
 """
-TICK = "urc.guard.reins.xǁReinsǁtick__mutmut_"
+TICK = "urc.guard.motion_scheduler.xǁMotionSchedulerǁtick__mutmut_"
 
 
 @pytest.fixture
 def tree(tmp_path: Path) -> Path:
     """A tree with one module that is mutated, and one that is not."""
-    for name, text in {"urc/guard/reins.py": SOURCE, "urc/other.py": SOURCE}.items():
+    for name, text in {"urc/guard/motion_scheduler.py": SOURCE, "urc/other.py": SOURCE}.items():
         path = tmp_path / "tree" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, "utf-8")
@@ -57,11 +57,11 @@ def tree(tmp_path: Path) -> Path:
 
 def ran(copy: Path, **codes: int | None) -> Path:
     """Leave what a run leaves: its mutants, and how they ended."""
-    path = copy / "mutants" / "urc" / "guard" / "reins.py"
+    path = copy / "mutants" / "urc" / "guard" / "motion_scheduler.py"
     path.parent.mkdir(parents=True)
     path.write_text(MUTATED, "utf-8")
     spans = {"orig": [2, 3], "1": [4, 5], "2": [6, 7]}
-    named = {f"xǁReinsǁtick__mutmut_{name}": span for name, span in spans.items()}
+    named = {f"xǁMotionSchedulerǁtick__mutmut_{name}": span for name, span in spans.items()}
     Path(f"{path}.spans").write_text(json.dumps({"version": 1, "spans": named}), "utf-8")
     meta = {"exit_code_by_key": {f"{TICK}{name[1:]}": code for name, code in codes.items()}}
     Path(f"{path}.meta").write_text(json.dumps(meta), "utf-8")
@@ -79,11 +79,11 @@ def test_a_property_is_a_method_that_can_be_mutated() -> None:
     plain = with_plain_properties(SOURCE)
     names: dict[str, type] = {}
     exec(plain, names)  # noqa: S102 - our own text
-    reins = names["Reins"]()
-    reins.debts = ["drive"]
-    assert reins.owes is True
-    assert reins.owes_as_method() is True
-    assert reins.other() == 1
+    motion_scheduler = names["MotionScheduler"]()
+    motion_scheduler.debts = ["drive"]
+    assert motion_scheduler.owes is True
+    assert motion_scheduler.owes_as_method() is True
+    assert motion_scheduler.other() == 1
     assert plain.count("@") == 1
 
 
@@ -103,15 +103,15 @@ def test_the_copy_follows_the_tree(tree: Path, tmp_path: Path) -> None:
     """What did not change keeps its time, so that its mutants stand; what is gone goes."""
     copy = tmp_path / "copy"
     assert bring_up_to_date(tree, copy, SETTINGS)
-    assert "owes_as_method" in (copy / "urc" / "guard" / "reins.py").read_text("utf-8")
+    assert "owes_as_method" in (copy / "urc" / "guard" / "motion_scheduler.py").read_text("utf-8")
     assert (copy / "urc" / "other.py").read_text("utf-8") == SOURCE
     os.utime(copy / "urc" / "other.py", (1, 1))
     assert not bring_up_to_date(tree, copy, SETTINGS)
-    (tree / "urc" / "guard" / "reins.py").unlink()
+    (tree / "urc" / "guard" / "motion_scheduler.py").unlink()
     ran(copy, _1=1)
     assert bring_up_to_date(tree, copy, SETTINGS)
     assert (copy / "urc" / "other.py").stat().st_mtime == 1
-    left = [path.name for path in copy.rglob("reins*")]
+    left = [path.name for path in copy.rglob("motion_scheduler*")]
     assert left == []
 
 
@@ -143,17 +143,23 @@ def test_how_a_run_ended(tmp_path: Path, code: int, status: str) -> None:
 def test_a_mutant_says_where_it_is_and_what_it_changes(tmp_path: Path) -> None:
     ran(tmp_path, _1=0, _2=0)
     first, _ = mutants_in(tmp_path, SETTINGS)
-    assert first.function == "urc.guard.reins.Reins.tick"
+    assert first.function == "urc.guard.motion_scheduler.MotionScheduler.tick"
     assert first.change == ("self.moves = True", "self.moves = False")
-    plain = "urc.guard.reins.xǁReinsǁowes_as_method__mutmut_1"
-    assert Mutant(tmp_path, "urc.guard.reins", plain, "").function == "urc.guard.reins.Reins.owes"
-    alone = "urc.guard.reins.x_look__mutmut_7"
-    assert Mutant(tmp_path, "urc.guard.reins", alone, "").function == "urc.guard.reins.look"
+    plain = "urc.guard.motion_scheduler.xǁMotionSchedulerǁowes_as_method__mutmut_1"
+    assert (
+        Mutant(tmp_path, "urc.guard.motion_scheduler", plain, "").function
+        == "urc.guard.motion_scheduler.MotionScheduler.owes"
+    )
+    alone = "urc.guard.motion_scheduler.x_look__mutmut_7"
+    assert (
+        Mutant(tmp_path, "urc.guard.motion_scheduler", alone, "").function
+        == "urc.guard.motion_scheduler.look"
+    )
 
 
 EXPLAINED = """
 [[mutant]]
-function = "urc.guard.reins.Reins.tick"
+function = "urc.guard.motion_scheduler.MotionScheduler.tick"
 why = "nobody looks"
 changes = [["self.moves = True", "self.moves = False"]]
 
@@ -198,7 +204,10 @@ def test_an_explanation_that_is_not_needed_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     code, said = summary(tmp_path, capsys, EXPLAINED, _1=1, _2=36)
-    assert "mutants.toml: no mutant that lives is so any more: urc.guard.reins.Reins.tick" in said
+    assert (
+        "mutants.toml: no mutant that lives is so any more: urc.guard.motion_scheduler.MotionScheduler.tick"
+        in said
+    )
     assert code == 0
 
 
@@ -222,7 +231,18 @@ def test_the_table_has_a_line_for_each_module(tmp_path: Path) -> None:
     mutants = mutants_in(tmp_path, SETTINGS)
     head, module, all_of_them = table(mutants, Explained({}))
     assert head.split()[:4] == ["killed", "timeout", "survived", "explained"]
-    assert module.split() == ["urc.guard.reins", "1", "0", "1", "0", "0", "0", "1", "3", "50.0"]
+    assert module.split() == [
+        "urc.guard.motion_scheduler",
+        "1",
+        "0",
+        "1",
+        "0",
+        "0",
+        "0",
+        "1",
+        "3",
+        "50.0",
+    ]
     assert all_of_them.split()[0] == "all"
 
 

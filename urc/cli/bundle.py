@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from urc.packages.plan import Plan
+    from urc.packages.install_plan import InstallPlan
     from urc.packages.signature import Signature
     from urc.packages.store import Store
 
@@ -32,9 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the bundle; the same packages give the same bytes."""
-    from urc.cli.failures import Misuse
+    from urc.cli.error_report import Misuse
     from urc.cli.packages import open_store
-    from urc.packages.disk import put_file
+    from urc.packages.atomic_files import put_file
     from urc.packages.sources import make_bundle
 
     store = open_store()
@@ -53,21 +53,23 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _planned(word: str, store: "Store") -> "Plan":
+def _planned(word: str, store: "Store") -> "InstallPlan":
     """Return the packages; installed versions come first, because they are tested."""
     from urc.cli.packages import is_path, planned
+    from urc.packages.install_plan import InstallPlan
     from urc.packages.names import parse_wish
-    from urc.packages.plan import Plan
 
     lock = None if is_path(word) else store.find(parse_wish(word))
     if lock is None:
         return planned(word)
     digests = [pin.sha256 for pin in lock.packages.values()]
     found = {digest: store.signature(digest) for digest in digests}
-    return Plan(lock, {}, {}, {digest: one for digest, one in found.items() if one is not None})
+    return InstallPlan(
+        lock, {}, {}, {digest: one for digest, one in found.items() if one is not None}
+    )
 
 
-def _signatures(plan: "Plan", arguments: argparse.Namespace) -> "dict[str, Signature]":
+def _signatures(plan: "InstallPlan", arguments: argparse.Namespace) -> "dict[str, Signature]":
     """Return the signatures; packages from a folder get the user's own signature."""
     from urc.cli.packages import signer
     from urc.packages.names import parse_key

@@ -9,26 +9,26 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from urc.cli.entrance import Entrance, access_for, announce
-from urc.cli.failures import Misuse
-from urc.cli.faults import Faulty
+from urc.cli.data_folder import own_folder
+from urc.cli.error_report import Misuse
+from urc.cli.event_loop import run_loop
+from urc.cli.fault_injection import FaultInjector
 from urc.cli.output import complain
-from urc.cli.own_data import own_folder
-from urc.cli.running import run_loop
+from urc.cli.start_addresses import ReadyDashboard, access_for, announce
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.kept import Kept
-from urc.runtime.selftest import sample_settings
+from urc.runtime.document_tests import sample_settings
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Motion, Session
-from urc.simulator.stand_in import stand_in
-from urc.simulator.twin import Twin
+from urc.runtime.settings_store import StoredSettings
+from urc.simulator.emulated_profile import stand_in
+from urc.simulator.emulated_robot import EmulatedRobot
 from urc.web.app import Robot, build_app, serve
-from urc.web.fleet.garage import Garage, Workshop
+from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
 from urc.web.fleet.robots import Glimpse
 
-__all__ = ["Place", "SettingsOf", "run_dashboard", "workshop_of"]
+__all__ = ["DashboardAddress", "SettingsOf", "run_dashboard", "workshop_of"]
 
 SettingsOf = Callable[[Profile], Mapping[str, Value]]
 """Return the settings of a profile from the command line; raise `UrcError` for invalid ones."""
@@ -42,7 +42,7 @@ def _nothing(_: Profile) -> Mapping[str, Value]:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class DashboardAddress:
     """Address and folders of the dashboard."""
 
     host: str
@@ -66,10 +66,10 @@ class Place:
 
 def run_dashboard(
     profiles: Sequence[Profile],
-    place: Place,
+    place: DashboardAddress,
     *,
     is_simulated: bool,
-    on_ready: Callable[[Entrance], None],
+    on_ready: Callable[[ReadyDashboard], None],
     given: SettingsOf = _nothing,
     is_dev: bool = False,
     faults: Sequence[str] = (),
@@ -92,16 +92,16 @@ def run_dashboard(
     for name in names:
         if names.count(name) > 1:
             raise Misuse(f"two robots are named {name!r}; a name must be unique")
-    faulty = Faulty() if is_simulated else None
+    faulty = FaultInjector() if is_simulated else None
     work = _serve(profiles, place, faulty, on_ready, given, is_dev, faults)
     return run_loop(work, code_when_ended=0, is_fast=True)
 
 
 async def _serve(
     profiles: Sequence[Profile],
-    place: Place,
-    faulty: Faulty | None,
-    on_ready: Callable[[Entrance], None],
+    place: DashboardAddress,
+    faulty: FaultInjector | None,
+    on_ready: Callable[[ReadyDashboard], None],
     given: SettingsOf,
     is_dev: bool,
     faults: Sequence[str],
@@ -111,17 +111,17 @@ async def _serve(
         access = access_for(place.host, place.token)
 
         def ready(url: str) -> None:
-            entrance = Entrance(url, access)
+            entrance = ReadyDashboard(url, access)
             announce(stack, workshop.data, place.host, entrance)
             on_ready(entrance)
 
-        garage = Garage(workshop)
+        garage = RobotFactory(workshop)
         robots: dict[str, Robot] = {}
         for profile in profiles:
             robot = _first(garage, profile)
             if faulty is not None:
                 # Emulated from the start, even without a viewer.
-                twin = Twin(robot.profile, robot.settings)
+                twin = EmulatedRobot(robot.profile, robot.settings)
                 stack.enter_context(faulty.watch(profile.name, twin))
                 redirected = await stack.enter_async_context(
                     stand_in(robot.profile, robot.settings, twin)
@@ -150,7 +150,7 @@ async def _serve(
 
 
 @asynccontextmanager
-async def _listening(faulty: Faulty) -> AsyncIterator[None]:
+async def _listening(faulty: FaultInjector) -> AsyncIterator[None]:
     """Execute typed fault commands during the context."""
     task = asyncio.create_task(faulty.listen())
     try:
@@ -161,10 +161,10 @@ async def _listening(faulty: Faulty) -> AsyncIterator[None]:
 
 
 def workshop_of(
-    place: Place, given: SettingsOf = _nothing, faulty: Faulty | None = None
-) -> Workshop:
+    place: DashboardAddress, given: SettingsOf = _nothing, faulty: FaultInjector | None = None
+) -> RobotOptions:
     """Return the robot factory of a dashboard; with `faulty`, its robots are emulated."""
-    return Workshop(
+    return RobotOptions(
         own_folder(place.data),
         make=partial(_robot, place, faulty),
         tried=partial(_session, "none", None, faulty),
@@ -173,21 +173,24 @@ def workshop_of(
     )
 
 
-def _motion(place: Place) -> Motion:
+def _motion(place: DashboardAddress) -> Motion:
     return "guarded" if place.has_guard else "here"
 
 
-def _first(garage: Garage, profile: Profile) -> Robot:
+def _first(garage: RobotFactory, profile: Profile) -> Robot:
     """Return a robot that exists from the start, with its stored settings if they are valid."""
     try:
         return garage.robot(profile.name, profile)
     except UrcError as error:
         complain(f"urc: {error}; the stored settings of {profile.name} are ignored")
-        return garage.robot(profile.name, profile, Kept())
+        return garage.robot(profile.name, profile, StoredSettings())
 
 
 def _robot(
-    place: Place, faulty: Faulty | None, profile: Profile, values: Mapping[str, Value]
+    place: DashboardAddress,
+    faulty: FaultInjector | None,
+    profile: Profile,
+    values: Mapping[str, Value],
 ) -> Robot:
     """Return a robot whose session opens with its first page."""
     settings = values if faulty is None else _complete(profile, values)
@@ -195,7 +198,7 @@ def _robot(
     return Robot(profile, settings, opened, is_emulated=faulty is not None)
 
 
-def _seen(twin: Twin) -> Glimpse:
+def _seen(twin: EmulatedRobot) -> Glimpse:
     """Return the preview of an emulated robot: its camera, a view from above, or readings."""
     now_s = time.time()
     return twin.camera(now_s) or twin.top_view(*_LOOK, now_s) or twin.readings(now_s)
@@ -205,7 +208,7 @@ def _seen(twin: Twin) -> Glimpse:
 async def _session(
     motion: Motion,
     recordings: Path | None,
-    faulty: Faulty | None,
+    faulty: FaultInjector | None,
     profile: Profile,
     values: Mapping[str, Value],
 ) -> AsyncIterator[Session]:
@@ -215,7 +218,7 @@ async def _session(
         settings = values
         if faulty is not None:
             settings = _complete(profile, values)
-            twin = Twin(profile, settings)
+            twin = EmulatedRobot(profile, settings)
             stack.enter_context(faulty.watch(profile.name, twin))
             profile = await stack.enter_async_context(stand_in(profile, settings, twin))
         session = Session(profile, settings, transports, motion=motion)

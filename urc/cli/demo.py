@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from contextlib import suppress
 
 from urc.cli.arguments import add_dev, add_host, add_port, is_loopback
-from urc.cli.entrance import Entrance
-from urc.cli.failures import Misuse
-from urc.cli.faults import add_faults
+from urc.cli.error_report import Misuse
+from urc.cli.fault_injection import add_faults
+from urc.cli.start_addresses import ReadyDashboard
 from urc.problems import UrcError
 from urc.shipped import shipped
 
@@ -32,9 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Serve the demo until Ctrl-C or SIGTERM."""
-    from urc.cli.dashboard import Place, run_dashboard
+    from urc.cli.dashboard import DashboardAddress, run_dashboard
     from urc.config.load import load_profile
-    from urc.runtime.catalog import built_in_catalog
+    from urc.runtime.registries import built_in_catalog
 
     if arguments.dev and not is_loopback(arguments.host):
         raise Misuse(f"--dev shows all traffic and is for this machine only, not {arguments.host}")
@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not profiles:
         raise UrcError(f"there are no robots in {shipped('robots')}")
 
-    def announce(entrance: Entrance) -> None:
+    def announce(entrance: ReadyDashboard) -> None:
         first, *others = entrance.lines()
         print("\n".join((f"{first}   (Ctrl-C ends it)", *others)), flush=True)
         if not arguments.no_browser and has_screen(sys.platform, os.environ):
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     return run_dashboard(
         profiles,
-        Place(arguments.host, _port(arguments)),
+        DashboardAddress(arguments.host, _port(arguments)),
         is_simulated=True,
         on_ready=announce,
         is_dev=arguments.dev,

@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Search; return 1 without a result."""
-    from urc.cli.running import run_loop
+    from urc.cli.event_loop import run_loop
     from urc.cli.settings import complete_settings, settings_given
 
     if arguments.profile is None:
@@ -167,7 +167,7 @@ def _places(
 ) -> Iterator[tuple[str, tuple[str, int]]]:
     """Yield type, host and port of the transports of a robot with complete settings."""
     from urc.runtime.settings import options_of
-    from urc.transports.rosbridge import DEFAULT_PORT
+    from urc.transports.ros.rosbridge import DEFAULT_PORT
 
     for spec in profile.driver.transports.values():
         if spec.type not in ("tcp", "ros", "mqtt", "telnet", "ssh") or spec.tunnel:
@@ -183,9 +183,9 @@ def _places(
 
 
 async def _topics(profile: "Profile", settings: Mapping[str, "Value"]) -> tuple[list[Row], str]:
-    from urc.runtime.catalog import built_in_catalog
     from urc.runtime.discover import RosTopic, ros_topics, snippet
-    from urc.runtime.lines import make_transports
+    from urc.runtime.registries import built_in_catalog
+    from urc.runtime.transport_chain import make_transports
 
     rows: list[Row] = []
     parts: list[str] = []

@@ -103,7 +103,7 @@ def _attempt(name: str, check: Callable[[], str], *, is_required: bool = True) -
 
 
 def _precedence() -> _Finding:
-    from urc.guard.precedence import why_not
+    from urc.guard.real_time_priority import why_not
 
     refusal = why_not()
     text = "the guard has a higher priority than ordinary programs"
@@ -114,7 +114,7 @@ def _precedence() -> _Finding:
 
 def _load_robots() -> str:
     from urc.config.load import load_profile
-    from urc.runtime.catalog import built_in_catalog
+    from urc.runtime.registries import built_in_catalog
 
     files = sorted(shipped("robots").glob("*.yaml"))
     for file in files:

@@ -3,7 +3,7 @@
 import argparse
 from difflib import get_close_matches
 
-from urc.cli.failures import Misuse
+from urc.cli.error_report import Misuse
 from urc.config.codes import pages
 from urc.config.renames import CODES
 

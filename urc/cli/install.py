@@ -4,17 +4,17 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from urc.cli.failures import Misuse
+from urc.cli.error_report import Misuse
 from urc.cli.output import complain
 from urc.cli.packages import add_risks
 from urc.cli.update import difference_lines
 
 if TYPE_CHECKING:
+    from urc.packages.install_plan import InstallPlan
     from urc.packages.lock import Lock
-    from urc.packages.plan import Plan
     from urc.packages.store import Store
-    from urc.packages.update import Difference
-    from urc.runtime.apart import Looks
+    from urc.packages.update import UpdateDiff
+    from urc.runtime.isolation import PreviewWorker
 
 EXAMPLE = "urc install drivers/puppet@^1.0"
 
@@ -54,9 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Show the permissions, ask, install."""
     from urc.cli.packages import is_agreed_to, is_path, keep_in_use, open_store, planned, used_lock
-    from urc.packages.disk import put_file
+    from urc.packages.atomic_files import put_file
     from urc.packages.install import origin_lines
-    from urc.runtime.apart import Looks
+    from urc.runtime.isolation import PreviewWorker
 
     lock_file: Path | None = arguments.lock
     pinned = _pinned(lock_file)
@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.signed_by is not None:
             _check_signer(plan, arguments.signed_by)
         used = used_lock(store, plan.lock.key)
-        look = Looks()
+        look = PreviewWorker()
         risks = _show(plan, folder, origin_lines(plan, store), look)
         difference = _compare(used, plan, store, folder, look, risks)
         if difference is not None:
@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _check_signer(plan: "Plan", fingerprint: str) -> None:
+def _check_signer(plan: "InstallPlan", fingerprint: str) -> None:
     """Raise `PackageError` unless the key with this fingerprint signed the package."""
     from urc.packages.names import PackageError
 
@@ -109,14 +109,14 @@ def _pinned(file: Path | None) -> "Lock | None":
 
 def _compare(
     used: "Lock | None",
-    plan: "Plan",
+    plan: "InstallPlan",
     store: "Store",
     folder: Path,
-    look: "Looks",
+    look: "PreviewWorker",
     risks: list[str],
-) -> "Difference | None":
+) -> "UpdateDiff | None":
     """Print and return the changes in another version; None without a version to compare."""
-    from urc.packages.update import Difference, staged_difference
+    from urc.packages.update import UpdateDiff, staged_difference
     from urc.problems import UrcError, printable
 
     if used is None or used.key != plan.lock.key or used == plan.lock:
@@ -127,14 +127,16 @@ def _compare(
         line = str(error).strip().partition("\n")[0]
         complain(f"urc install: the changes are unknown: {used} cannot be read: {line}")
         # Unknown changes count as new permissions.
-        return Difference([], ["whatever stands above"], [], risks, [])
+        return UpdateDiff([], ["whatever stands above"], [], risks, [])
     print(f"{used} is in use; this changes:")
     for line in difference_lines(found):
         print(printable(line))
     return found
 
 
-def _show(plan: "Plan", folder: Path, origins: list[str], look: "Looks") -> list[str]:
+def _show(
+    plan: "InstallPlan", folder: Path, origins: list[str], look: "PreviewWorker"
+) -> list[str]:
     """Print the permissions of a package; return the resources of this machine that it names."""
     from urc.packages.store import kinds_in
     from urc.problems import printable

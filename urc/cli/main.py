@@ -55,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         code = 0  # the reader has enough, as in `urc watch … | head`
     except Exception as error:  # supervisor: the last resort
-        from urc.cli.failures import explain
+        from urc.cli.error_report import explain
 
         code = explain(error, f"urc {words[0]}" if words and words[0] in VERBS else "urc")
     return _flush(code)

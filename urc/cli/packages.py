@@ -8,19 +8,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from urc._folders import data_folder
-from urc.cli.failures import Misuse
+from urc.cli.data_folder import own_folder
+from urc.cli.error_report import Misuse
 from urc.cli.output import complain
-from urc.cli.own_data import own_folder
 
 if TYPE_CHECKING:
-    from urc.packages.index import Entry
+    from urc.packages.index import IndexEntry
+    from urc.packages.install_plan import InstallPlan
     from urc.packages.lock import Lock
-    from urc.packages.names import Key
-    from urc.packages.plan import Plan
+    from urc.packages.names import PackageId
     from urc.packages.repositories import Repositories, Repository
     from urc.packages.signature import Signer
     from urc.packages.store import Store
-    from urc.packages.update import Difference
+    from urc.packages.update import UpdateDiff
 
 __all__ = [
     "add_risks",
@@ -68,7 +68,7 @@ def known_repositories() -> "list[Repository]":
 def installed_document(word: str) -> Path | None:
     """Return the document of an installed robot or driver by name, or None.
 
-    Without a version, it is the version in use; see `urc.runtime.kept.in_use`.
+    Without a version, it is the version in use; see `urc.runtime.settings_store.in_use`.
     """
     if not (data_folder() / "packages" / "state.json").is_file():
         return None
@@ -78,7 +78,7 @@ def installed_document(word: str) -> Path | None:
         wish = parse_wish(word)
     except PackageError:
         return None  # a path, for example
-    from urc.runtime.kept import in_use
+    from urc.runtime.settings_store import in_use
 
     store = open_store()
     used = in_use(data_folder() / "robots", wish.name, store.installed())
@@ -97,7 +97,9 @@ def is_path(word: str) -> bool:
     return is_told or (path / "package.yaml").is_file()
 
 
-def planned(word: str, pinned: "Lock | None" = None, *, takes_withdrawn: bool = False) -> "Plan":
+def planned(
+    word: str, pinned: "Lock | None" = None, *, takes_withdrawn: bool = False
+) -> "InstallPlan":
     """Return the install plan of a package's name, file or folder, with all archives fetched."""
     from urc.packages.install import plan_file, plan_wish
     from urc.packages.names import parse_wish
@@ -114,7 +116,7 @@ def planned(word: str, pinned: "Lock | None" = None, *, takes_withdrawn: bool = 
     )
 
 
-def known_entries() -> "list[Entry]":
+def known_entries() -> "list[IndexEntry]":
     """Return the stored indexes of the repositories, without a request."""
     from urc.packages.names import PackageError
 
@@ -149,7 +151,7 @@ def is_agreed(question: str) -> bool:
 
 
 def is_agreed_to(
-    difference: "Difference | None",
+    difference: "UpdateDiff | None",
     risks: Sequence[str],
     arguments: argparse.Namespace,
     question: str,
@@ -188,9 +190,9 @@ def _is_yes_enough(gains: bool, has_risks: bool, arguments: argparse.Namespace) 
     return not lacks
 
 
-def used_lock(store: "Store", key: "Key") -> "Lock | None":
+def used_lock(store: "Store", key: "PackageId") -> "Lock | None":
     """Return the version of a package in use; a robot or driver in use may have another key."""
-    from urc.runtime.kept import DRIVEN, in_use
+    from urc.runtime.settings_store import DRIVEN, in_use
 
     installed = store.installed()
     if key.kind in DRIVEN:
@@ -201,7 +203,7 @@ def used_lock(store: "Store", key: "Key") -> "Lock | None":
 
 def keep_in_use(lock: "Lock") -> None:
     """Pin a version for dashboards, independent of other installed versions."""
-    from urc.runtime.kept import DRIVEN, pin
+    from urc.runtime.settings_store import DRIVEN, pin
 
     if lock.key.kind in DRIVEN:
         pin(data_folder() / "robots", lock)

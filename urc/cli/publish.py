@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from urc.packages.notes import Provenance
     from urc.packages.sources import FileSource
+    from urc.packages.version_notes import Provenance
     from urc.problems import Problem
 
 _TOLD_MOST = 5
@@ -45,10 +45,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Upload each package; stop at the first refusal, with its reason."""
-    from urc.cli.failures import Misuse
+    from urc.cli.error_report import Misuse
     from urc.cli.packages import signer
+    from urc.packages.http_repository import repository_url
     from urc.packages.publish import is_overheard, publish
-    from urc.packages.remote import repository_url
     from urc.packages.sources import open_source
     from urc.packages.tokens import read_token
 
@@ -79,9 +79,9 @@ def _provenance(arguments: argparse.Namespace) -> "Provenance | None":
     import msgspec
 
     from urc import __version__
-    from urc.cli.failures import Misuse
+    from urc.cli.error_report import Misuse
     from urc.packages.names import PackageError
-    from urc.packages.notes import Provenance
+    from urc.packages.version_notes import Provenance
 
     if not arguments.source:
         if arguments.commit:
@@ -104,7 +104,7 @@ def _look(source: "FileSource", document: Path, arguments: argparse.Namespace) -
     """
     from urc.packages.names import PackageError
     from urc.problems import has_errors
-    from urc.runtime.examine import findings
+    from urc.runtime.package_check import findings
 
     if not source.is_folder:
         return
@@ -122,10 +122,10 @@ def _look(source: "FileSource", document: Path, arguments: argparse.Namespace) -
 
 def _of_files(manifest: Path) -> "list[Problem]":
     """Return the problems of the files next to a widget's manifest."""
-    from urc.config.load import Shelf, check
-    from urc.runtime.catalog import built_in_catalog
+    from urc.config.load import WidgetFolder, check
+    from urc.runtime.registries import built_in_catalog
     from urc.shipped import shipped
     from urc.web.show.widget_check import check_widget
 
-    widget = check(manifest, built_in_catalog(), Shelf(shipped("widgets"))).widget
+    widget = check(manifest, built_in_catalog(), WidgetFolder(shipped("widgets"))).widget
     return [] if widget is None else check_widget(widget, with_demo=False)

@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Record until the time is over or a signal arrives; return 1 when nothing was received."""
-    from urc.cli.running import run_loop
+    from urc.cli.event_loop import run_loop
     from urc.cli.settings import complete_settings
 
     profile = load(arguments.profile)
@@ -48,8 +48,8 @@ def run(arguments: argparse.Namespace) -> int:
 async def _record(
     profile: "Profile", settings: Mapping[str, "Value"], arguments: argparse.Namespace
 ) -> int:
-    from urc.runtime.catalog import built_in_catalog
     from urc.runtime.recording.recorder import check_installed, named, recorded
+    from urc.runtime.registries import built_in_catalog
     from urc.runtime.session import Session
 
     session = Session(profile, settings, built_in_catalog().transports)

@@ -22,7 +22,7 @@ def run(arguments: argparse.Namespace) -> int:
     from urc._folders import data_folder
     from urc.cli.packages import open_store
     from urc.packages.names import parse_wish
-    from urc.runtime.kept import KeptFile, names_kept
+    from urc.runtime.settings_store import SettingsStore, names_kept
 
     store, folder = open_store(), data_folder() / "robots"
     with store.changing() as change:
@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not gone:
         print("removed; another package needs it, so its files stay")
     for name in names_kept(folder, removed, store.installed()):
-        file = KeptFile(folder, name)
+        file = SettingsStore(folder, name)
         if arguments.keep_settings:
             print(f"kept the settings of {name}: {file.file}")
         else:

@@ -6,9 +6,9 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from urc.cli.arguments import add_host, add_port, duration, load
-from urc.cli.entrance import Entrance, access_for, print_entrance
-from urc.cli.failures import Misuse
+from urc.cli.error_report import Misuse
 from urc.cli.output import complain
+from urc.cli.start_addresses import ReadyDashboard, access_for, print_entrance
 from urc.problems import ProblemsError, UrcError
 
 if TYPE_CHECKING:
@@ -50,10 +50,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM."""
-    from urc.cli.running import run_loop
+    from urc.cli.event_loop import run_loop
+    from urc.runtime.document_tests import sample_settings
     from urc.runtime.recording.player import Player
     from urc.runtime.recording.reader import open_recording
-    from urc.runtime.selftest import sample_settings
 
     recording = open_recording(arguments.recording, has_profile=bool(arguments.profile))
     start_s, length_s = arguments.start_s, recording.length_s
@@ -84,7 +84,7 @@ async def _serve(player: "Player", host: str, port: int) -> int:
     access = access_for(host)
     app = build_app({profile.name: robot}, access=access)
     await serve(
-        app, host=host, port=port, on_ready=lambda url: print_entrance(Entrance(url, access))
+        app, host=host, port=port, on_ready=lambda url: print_entrance(ReadyDashboard(url, access))
     )
     return 0
 

@@ -7,22 +7,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from urc.cli.arguments import add_host, is_loopback, port
-from urc.cli.failures import Misuse
+from urc.cli.error_report import Misuse
 from urc.cli.output import complain
 
 if TYPE_CHECKING:
-    from urc.packages.head import Seal
-    from urc.packages.tokens import Tokens
+    from urc.packages.index_head import IndexSigner
+    from urc.packages.tokens import UploadTokens
 
 
 def token(arguments: argparse.Namespace) -> int:
     """Add, list or remove tokens of a repository."""
-    from urc.packages.tokens import Tokens
+    from urc.packages.tokens import UploadTokens
     from urc.problems import printable
 
     if arguments.tokens is None:
         raise Misuse("'urc repo token' needs --tokens FILE, the same file as for 'urc repo serve'")
-    tokens = Tokens(arguments.tokens)
+    tokens = UploadTokens(arguments.tokens)
     match arguments.words:
         case ["add", name]:
             if not arguments.may:
@@ -190,8 +190,8 @@ def _search(arguments: argparse.Namespace) -> int:
 
 def _index(arguments: argparse.Namespace) -> int:
     """Write the index of a folder, for any static web server; return 1 for a skipped package."""
-    from urc.packages.keeper import make_index
-    from urc.runtime.examine import examine
+    from urc.packages.index_builder import make_index
+    from urc.runtime.package_check import examine
 
     folder, seal = Path(_one(arguments, "DIR")), _seal(arguments)
     listing = make_index(folder, _name(arguments, folder), examine, seal)
@@ -204,13 +204,13 @@ def _index(arguments: argparse.Namespace) -> int:
     return 1 if listing.faults else 0
 
 
-def _seal(arguments: argparse.Namespace) -> "Seal | None":
+def _seal(arguments: argparse.Namespace) -> "IndexSigner | None":
     """Return the signature settings of the index; None without a key."""
     from urc.cli.packages import signer
-    from urc.packages.head import Seal
+    from urc.packages.index_head import IndexSigner
 
     key = signer(arguments.key)
-    return Seal(key, arguments.valid * 86400.0) if key is not None else None
+    return IndexSigner(key, arguments.valid * 86400.0) if key is not None else None
 
 
 def _withdraw(arguments: argparse.Namespace) -> int:
@@ -226,7 +226,7 @@ def _restore(arguments: argparse.Namespace) -> int:
 
 
 def _note(arguments: argparse.Namespace, why: str) -> int:
-    from urc.packages.keeper import withdraw
+    from urc.packages.index_builder import withdraw
     from urc.packages.names import parse_key
 
     if len(arguments.words) != 3:
@@ -239,9 +239,9 @@ def _note(arguments: argparse.Namespace, why: str) -> int:
 
 def _serve(arguments: argparse.Namespace) -> int:
     """Write the index of a folder, and serve it until Ctrl-C or SIGTERM."""
-    from urc.cli.running import run_loop
+    from urc.cli.event_loop import run_loop
     from urc.packages.server import repository_app
-    from urc.runtime.examine import examine_apart
+    from urc.runtime.package_check import examine_apart
     from urc.web.serve.connection import REQUEST_S
     from urc.web.serve.server import serve
 
@@ -268,9 +268,9 @@ def _serve(arguments: argparse.Namespace) -> int:
     return run_loop(work(), code_when_ended=0)
 
 
-async def _renewing(folder: Path, seal: "Seal | None") -> None:
+async def _renewing(folder: Path, seal: "IndexSigner | None") -> None:
     """Sign the index again before it expires, as long as it is served."""
-    from urc.packages.keeper import renew
+    from urc.packages.index_builder import renew
     from urc.packages.names import PackageError
 
     while seal is not None:
@@ -281,17 +281,17 @@ async def _renewing(folder: Path, seal: "Seal | None") -> None:
             complain(f"urc repo: the signature of the index is not renewed: {error}")
 
 
-def _tokens(arguments: argparse.Namespace, folder: Path) -> "Tokens | None":
+def _tokens(arguments: argparse.Namespace, folder: Path) -> "UploadTokens | None":
     """Return the tokens that may publish, or None."""
-    from urc.packages.tokens import Tokens
+    from urc.packages.tokens import UploadTokens
 
     file: Path | None = arguments.tokens
     if file is None:
         return None
     if file.resolve().is_relative_to(folder.resolve()):
         raise Misuse(f"{file}: it is inside the repository, which web servers publish; move it")
-    Tokens(file).all()  # report mistakes now, not at the first upload
-    return Tokens(file)
+    UploadTokens(file).all()  # report mistakes now, not at the first upload
+    return UploadTokens(file)
 
 
 def _print_url(url: str) -> None:

@@ -19,8 +19,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the document."""
     from urc.config.load import check
     from urc.config.resolve import resolve
-    from urc.runtime.catalog import built_in_catalog
-    from urc.runtime.shelves import shelf_of
+    from urc.runtime.registries import built_in_catalog
+    from urc.runtime.widget_registry import shelf_of
 
     path = profile_path(arguments.profile)
     shelf = shelf_of(path)

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from urc.cli.failures import Misuse
+from urc.cli.error_report import Misuse
 from urc.shipped import shipped
 
 EXAMPLE = "urc schema robot > robot.schema.json"

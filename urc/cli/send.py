@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from urc.cli.arguments import add_profile, duration, load, what_it_has
-from urc.cli.failures import Misuse
+from urc.cli.error_report import Misuse
 from urc.cli.output import json_text
 from urc.problems import UrcError
 
@@ -30,8 +30,8 @@ from http.client import HTTPConnection, HTTPException
 from urllib.parse import quote, urlsplit
 
 from urc.problems import printable
-from urc.runtime.latch import LatchFile
-from urc.runtime.servers import Server, headers, servers
+from urc.runtime.latch import LatchStore
+from urc.runtime.running_servers import RunningServer, headers, servers
 
 _ANSWER_S = 2.0
 """Timeout of a server's reply in seconds; after it, the state of the server is unknown."""
@@ -40,7 +40,7 @@ _ASK_S = 0.5
 _MOST_BYTES = 4096
 
 
-class Hindrance:
+class MotionInterlock:
     """Interlocks of a robot: the stored latch, and the servers on the same data folder."""
 
     def __init__(self, data: Path, robot: str, clock: Callable[[], float]) -> None:
@@ -55,7 +55,7 @@ class Hindrance:
         self._robot = robot
         self._clock = clock
         self._file = data / "latches" / f"{robot}.latch.json"
-        self._latch = LatchFile(data / "latches", robot)
+        self._latch = LatchStore(data / "latches", robot)
         self._seen: tuple[int, int] | None = None
         self._latched = ""
         self._ask_s = float("-inf")
@@ -103,7 +103,7 @@ class Hindrance:
                 return why
         return ""
 
-    def _answer(self, file: Path, server: Server) -> str:
+    def _answer(self, file: Path, server: RunningServer) -> str:
         url = server.address
         place = urlsplit(url)
         line = HTTPConnection(place.hostname or "", place.port, timeout=_ANSWER_S)
@@ -168,7 +168,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command and print its reply; return 1 when it failed."""
-    from urc.cli.running import run_loop
+    from urc.cli.event_loop import run_loop
     from urc.cli.settings import complete_settings
 
     profile = load(arguments.profile)
@@ -190,7 +190,7 @@ def _check_hold(command: "Command", hold_s: float | None) -> None:
             f"{command.name} moves the robot while it is held: give a time, such as --hold 1s"
         )
     if hold_s is not None:
-        from urc.runtime.holding import LONGEST_HOLD_S
+        from urc.runtime.scripted_hold import LONGEST_HOLD_S
 
         if hold_s > LONGEST_HOLD_S:
             raise Misuse(f"--hold is {LONGEST_HOLD_S:g}s at most; drive longer on a dashboard")
@@ -253,7 +253,7 @@ async def _send(
     values: Mapping[str, "Reading"],
     arguments: argparse.Namespace,
 ) -> int:
-    from urc.runtime.catalog import built_in_catalog
+    from urc.runtime.registries import built_in_catalog
     from urc.runtime.session import CommandFailed, Session
 
     transports = built_in_catalog().transports
@@ -278,13 +278,13 @@ async def _given(
     command: "Command",
     values: Mapping[str, "Reading"],
     hold_s: float | None,
-    hindrance: "Hindrance | None",
+    hindrance: "MotionInterlock | None",
 ) -> dict[str, "Reading"]:
     """Give the command, or hold it; return the values of its reply."""
     if hold_s is None:
         return dict((await session.command(command.name, values)).values)
-    from urc.protocol.encode import BadArgument, check_arguments
-    from urc.runtime.holding import hold
+    from urc.protocol.requests.encode import BadArgument, check_arguments
+    from urc.runtime.scripted_hold import hold
     from urc.runtime.session import CommandFailed
 
     try:
@@ -299,7 +299,7 @@ async def _given(
 @asynccontextmanager
 async def _heeding(
     session: "Session", command: "Command", arguments: argparse.Namespace
-) -> AsyncIterator["Hindrance | None"]:
+) -> AsyncIterator["MotionInterlock | None"]:
     """Obey STOP and operators during the context, unless the arguments say otherwise."""
     may_move = command.moves or command.hold is not None
     if arguments.despite_stop or not may_move:
@@ -309,7 +309,7 @@ async def _heeding(
 
     clock = asyncio.get_running_loop().time
     data = arguments.data or data_folder()
-    hindrance = Hindrance(data, session.profile.name, clock)
+    hindrance = MotionInterlock(data, session.profile.name, clock)
 
     def tell(why: str) -> None:
         session.latch(f"{why}; --despite-stop overrides this" if why else "")
@@ -345,7 +345,7 @@ async def _known(session: "Session", command: "Command") -> None:
 
 def _why(session: "Session", command: "Command", failed: "CommandFailed") -> str:
     """Return the reason, with the state of the links when the robot is not connected."""
-    from urc.protocol.bounds import lines_of
+    from urc.protocol.requests.bounds import lines_of
 
     if failed.code != "disconnected":
         return failed.message

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from urc.cli.arguments import add_dev, add_host, add_port, add_settings, is_loopback, load
-from urc.cli.failures import Misuse
-from urc.cli.faults import add_faults
+from urc.cli.error_report import Misuse
+from urc.cli.fault_injection import add_faults
 from urc.cli.output import complain
 
 if TYPE_CHECKING:
@@ -78,11 +78,11 @@ def _add_names(parser: argparse.ArgumentParser, flag: str, text: str) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM."""
-    from urc.cli.dashboard import Place, run_dashboard
-    from urc.cli.entrance import print_entrance, token_in
+    from urc.cli.dashboard import DashboardAddress, run_dashboard
     from urc.cli.settings import settings_given
+    from urc.cli.start_addresses import print_entrance, token_in
     from urc.runtime.settings import resolve_settings
-    from urc.runtime.shelves import hidden_beside
+    from urc.runtime.widget_registry import hidden_beside
 
     _check(arguments)
     profiles = [load(word) for word in arguments.profiles]
@@ -111,7 +111,7 @@ def run(arguments: argparse.Namespace) -> int:
         complain("urc serve: no guard: a moving robot is not stopped when this process hangs")
     return run_dashboard(
         profiles,
-        Place(
+        DashboardAddress(
             arguments.host,
             arguments.port,
             tuple(arguments.allow_host),

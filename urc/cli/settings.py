@@ -4,7 +4,7 @@ import argparse
 import os
 from collections.abc import Iterator, Sequence
 
-from urc.cli.failures import Misuse
+from urc.cli.error_report import Misuse
 from urc.cli.output import complain
 from urc.model.profile import Profile
 from urc.model.values import Value

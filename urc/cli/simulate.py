@@ -8,17 +8,17 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Final
 
 from urc.cli.arguments import add_host, add_profile, load
-from urc.cli.faults import Faulty, add_faults
+from urc.cli.fault_injection import FaultInjector, add_faults
 from urc.cli.output import complain
 
 if TYPE_CHECKING:
     from urc.model.profile import Profile
     from urc.model.values import Value
-    from urc.simulator.twin import Twin
+    from urc.simulator.emulated_robot import EmulatedRobot
 
 EXAMPLE = "urc simulate puppet --set port=6789"
 
-_SOURCE: Final = "urc.simulator.twin"
+_SOURCE: Final = "urc.simulator.emulated_robot"
 """Name of the logger for frames that an emulated robot cannot answer."""
 _AGAIN_S: Final = 10.0
 """Time in seconds after which the same warning appears again, with a count."""
@@ -38,17 +38,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Emulate the robot until Ctrl-C or SIGTERM."""
-    from urc.cli.running import run_loop
+    from urc.cli.event_loop import run_loop
     from urc.cli.settings import settings_given
-    from urc.runtime.selftest import sample_settings
-    from urc.simulator.twin import Twin
+    from urc.runtime.document_tests import sample_settings
+    from urc.simulator.emulated_robot import EmulatedRobot
 
     profile = load(arguments.profile)
     ((values, missing),) = settings_given([profile], arguments, allows_any_port=True)
     # Samples replace the values that only a real robot needs.
     settings = sample_settings(profile.settings) | values
     settings |= {name: 0 for name in missing if profile.settings[name].type == "port"}
-    twin, faulty = Twin(profile, settings), Faulty()
+    twin, faulty = EmulatedRobot(profile, settings), FaultInjector()
     with faulty.watch(profile.name, twin):
         faulty.begin(arguments.faults)
         work = _simulate(profile, settings, arguments.host, twin, faulty)
@@ -56,11 +56,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 async def _simulate(
-    profile: "Profile", settings: Mapping[str, "Value"], host: str, twin: "Twin", faulty: Faulty
+    profile: "Profile",
+    settings: Mapping[str, "Value"],
+    host: str,
+    twin: "EmulatedRobot",
+    faulty: FaultInjector,
 ) -> int:
     from urc.simulator.server import serve
 
-    log, complaints = logging.getLogger(_SOURCE), Complaints(complain)
+    log, complaints = logging.getLogger(_SOURCE), UnansweredLog(complain)
     before = log.level, log.propagate
     log.setLevel(logging.INFO)
     log.propagate = False
@@ -78,7 +82,7 @@ async def _simulate(
     return 0
 
 
-class Complaints(logging.Handler):
+class UnansweredLog(logging.Handler):
     """A reporter of frames that an emulated robot could not answer: one line each, with a count.
 
     Args:

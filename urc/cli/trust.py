@@ -5,14 +5,14 @@ import sys
 from typing import TYPE_CHECKING
 
 from urc.cli.arguments import add_profile, load, what_it_has
-from urc.cli.failures import Misuse
+from urc.cli.error_report import Misuse
 from urc.problems import UrcError
 
 if TYPE_CHECKING:
     from urc.model.profile import Profile
     from urc.model.values import Value
     from urc.transports.ssh import SshTransport
-    from urc.transports.ssh_dial import Offer
+    from urc.transports.ssh_dial import OfferedHostKey
 
 EXAMPLE = "urc trust my-robot.yaml --set host=192.168.1.20"
 
@@ -31,14 +31,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Show the key and store it on consent; return 1 when it is not stored."""
-    from urc.cli.running import run_loop
+    from urc.cli.event_loop import run_loop
 
     profile = load(arguments.profile)
     name = _transport(profile, arguments.transport)
     line = _line(profile, name, _settings(profile, name, arguments))
     if line.target.keys.is_pinned:
         raise Misuse(f"transports.{name}: the document already gives the key as host_key")
-    offers: list[Offer] = []
+    offers: list[OfferedHostKey] = []
 
     async def look() -> int:
         offers.append(await line.look_at_key(profile.driver.transports[name].timeouts.connect_s))
@@ -77,8 +77,8 @@ def _settings(profile: "Profile", name: str, arguments: argparse.Namespace) -> d
 
 
 def _line(profile: "Profile", name: str, settings: dict[str, "Value"]) -> "SshTransport":
-    from urc.runtime.catalog import built_in_catalog
-    from urc.runtime.lines import make_transports
+    from urc.runtime.registries import built_in_catalog
+    from urc.runtime.transport_chain import make_transports
     from urc.transports.ssh import SshTransport
 
     line = make_transports(profile.driver, settings, built_in_catalog().transports)[name]
@@ -87,7 +87,7 @@ def _line(profile: "Profile", name: str, settings: dict[str, "Value"]) -> "SshTr
     return line
 
 
-def _decide(line: "SshTransport", offer: "Offer", yes: str | None) -> int:
+def _decide(line: "SshTransport", offer: "OfferedHostKey", yes: str | None) -> int:
     from urc.transports.known_hosts import remember
 
     address = line.target.address

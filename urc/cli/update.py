@@ -3,15 +3,15 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from urc.cli.failures import Misuse
+from urc.cli.error_report import Misuse
 from urc.cli.output import complain
 from urc.cli.packages import add_risks
 
 if TYPE_CHECKING:
+    from urc.packages.install_plan import InstallPlan
     from urc.packages.lock import Lock
-    from urc.packages.plan import Plan
     from urc.packages.store import Store
-    from urc.packages.update import Difference
+    from urc.packages.update import UpdateDiff
 
 EXAMPLE = "urc update drivers/puppet"
 
@@ -78,13 +78,15 @@ def _all(store: "Store") -> "list[tuple[Lock, str]]":
     return [(lock, "*") for lock in newest.values()]
 
 
-def _update(old: "Lock", plan: "Plan", store: "Store", arguments: argparse.Namespace) -> bool:
+def _update(
+    old: "Lock", plan: "InstallPlan", store: "Store", arguments: argparse.Namespace
+) -> bool:
     """Show the changes, ask, and update; return whether it was done."""
     from urc.cli.packages import is_agreed_to
     from urc.packages.install import origin_lines
     from urc.packages.update import staged_difference
     from urc.problems import printable
-    from urc.runtime.apart import look_apart
+    from urc.runtime.isolation import look_apart
 
     with store.changing() as change:
         staged = change.stage(plan)
@@ -99,7 +101,9 @@ def _update(old: "Lock", plan: "Plan", store: "Store", arguments: argparse.Names
     return True
 
 
-def _told(old: "Lock", plan: "Plan", difference: "Difference", origins: list[str]) -> list[str]:
+def _told(
+    old: "Lock", plan: "InstallPlan", difference: "UpdateDiff", origins: list[str]
+) -> list[str]:
     """Return the changes, for people."""
     from urc.packages.update import headline
 
@@ -109,7 +113,7 @@ def _told(old: "Lock", plan: "Plan", difference: "Difference", origins: list[str
     return lines + difference_lines(difference)
 
 
-def difference_lines(difference: "Difference") -> list[str]:
+def difference_lines(difference: "UpdateDiff") -> list[str]:
     """Return the differences in permissions and sent bytes between two versions, for people."""
     lines = [f"  may from now on: {line}" for line in difference.gained]
     lines += [f"  may no longer: {line}" for line in difference.lost]

@@ -13,7 +13,7 @@ from urc.cli.output import complain, json_text
 from urc.problems import Problem, UrcError, has_errors, to_json, to_text
 
 if TYPE_CHECKING:
-    from urc.config.load import Shelf
+    from urc.config.load import WidgetFolder
     from urc.model.profile import Profile
     from urc.model.widget import Widget
     from urc.runtime.coverage import Coverage
@@ -82,12 +82,12 @@ def _exit_code(report: _Report, arguments: argparse.Namespace) -> int:
 
 def _watch(paths: list[str], arguments: argparse.Namespace) -> int:
     """Check now and after every change; Ctrl-C ends it with the code of the last check."""
-    from urc.runtime.changes import Watched, wait_for_change
+    from urc.runtime.file_watch import FileWatcher, wait_for_change
 
     code = 0
     try:
         while True:
-            watched = Watched(paths)  # created before reading, so that no change is missed
+            watched = FileWatcher(paths)  # created before reading, so that no change is missed
             report = _examine(paths, with_tests=not arguments.no_tests)
             watched.add(report.looked_at)
             code = _exit_code(report, arguments)
@@ -102,13 +102,13 @@ def _watch(paths: list[str], arguments: argparse.Namespace) -> int:
 
 
 def _examine(paths: list[str], *, with_tests: bool) -> _Report:
-    from urc.config.load import Shelf, check
-    from urc.runtime.catalog import built_in_catalog
+    from urc.config.load import WidgetFolder, check
     from urc.runtime.coverage import measure
-    from urc.runtime.selftest import exercise
+    from urc.runtime.document_tests import exercise
+    from urc.runtime.registries import built_in_catalog
     from urc.shipped import shipped
 
-    report, catalog, shelf = _Report(), built_in_catalog(), Shelf(shipped("widgets"))
+    report, catalog, shelf = _Report(), built_in_catalog(), WidgetFolder(shipped("widgets"))
     for path in paths:
         report.files += 1
         checked = check(path, catalog, _shelf_of_package(path) or shelf)
@@ -163,13 +163,13 @@ def _document_in(path: str) -> str:
     return path
 
 
-def _shelf_of_package(path: str) -> "Shelf | None":
+def _shelf_of_package(path: str) -> "WidgetFolder | None":
     """Return the widgets in the folder or package of a document, or None."""
     home = os.path.dirname(path)
     is_package = os.path.isfile(os.path.join(home, "package.yaml"))
     if not is_package and not os.path.isdir(os.path.join(home, "widgets")):
         return None
-    from urc.runtime.shelves import shelf_of
+    from urc.runtime.widget_registry import shelf_of
 
     return shelf_of(path)
 
@@ -181,13 +181,13 @@ def _print(report: _Report, arguments: argparse.Namespace, indent: int | None = 
     elif arguments.format == "sarif":
         from urc import __version__
         from urc.config.codes import summaries
-        from urc.config.formats import to_sarif
+        from urc.config.report_formats import to_sarif
 
         log = to_sarif(report.problems, __version__, summaries())
         print(json_text(log, indent), flush=True)
     else:
         if arguments.format == "github":
-            from urc.config.formats import to_github as tell
+            from urc.config.report_formats import to_github as tell
         else:
             tell = to_text
         for problem in report.problems:

@@ -10,15 +10,15 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from urc.cli.arguments import add_profile, duration, load, what_it_has
-from urc.cli.failures import Misuse
+from urc.cli.error_report import Misuse
 from urc.cli.output import json_text
 from urc.problems import UrcError, printable
 
 if TYPE_CHECKING:
-    from urc.cli.running import LineWriter
+    from urc.cli.event_loop import LineWriter
     from urc.model.profile import Profile
     from urc.model.values import Sample, Value
-    from urc.runtime.hub import Hub, Note, Tap, Tapped, Traffic
+    from urc.runtime.hub import EventTap, Hub, LogEntry, Tapped, Traffic
 
 EXAMPLE = "urc watch puppet battery --for 5s"
 
@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Watch until the time is over or a signal arrives; return 1 when nothing was received."""
-    from urc.cli.running import run_loop
+    from urc.cli.event_loop import run_loop
     from urc.cli.settings import complete_settings
 
     profile = load(arguments.profile)
@@ -64,8 +64,8 @@ def _check_signals(profile: "Profile", names: list[str]) -> None:
 async def _watch(
     profile: "Profile", settings: Mapping[str, "Value"], arguments: argparse.Namespace
 ) -> int:
-    from urc.cli.running import LineWriter
-    from urc.runtime.catalog import built_in_catalog
+    from urc.cli.event_loop import LineWriter
+    from urc.runtime.registries import built_in_catalog
     from urc.runtime.session import Session
 
     async with Session(profile, settings, built_in_catalog().transports) as session:
@@ -77,7 +77,7 @@ async def _watch(
     return 0
 
 
-async def _follow(tap: "Tap", printer: "_Printer", seconds: float | None) -> None:
+async def _follow(tap: "EventTap", printer: "_Printer", seconds: float | None) -> None:
     """Print the events of the tap until the time is over."""
     now = asyncio.get_running_loop().time
     ends = math.inf if seconds is None else now() + seconds
@@ -118,13 +118,13 @@ class _Printer:
     async def tell(self, events: "Iterable[Tapped]") -> None:
         """Print the events."""
         from urc.model.values import Sample
-        from urc.runtime.hub import Note, Traffic
+        from urc.runtime.hub import LogEntry, Traffic
 
         output: list[str] = []
         notes: list[str] = []
         for event in events:
             match event:
-                case Note():
+                case LogEntry():
                     notes.append(_note_line(event))
                 case Traffic():
                     self.received += event.direction == "received"
@@ -168,5 +168,5 @@ class _Printer:
         )
 
 
-def _note_line(note: "Note") -> str:
+def _note_line(note: "LogEntry") -> str:
     return printable(f"{note.level}: {note.source}: {note.text}")

@@ -6,13 +6,13 @@ Every page has the same four parts, and an example is an indented code block.
 from pathlib import Path
 from typing import NamedTuple
 
-__all__ = ["Page", "pages", "summaries"]
+__all__ = ["CodePage", "pages", "summaries"]
 
 _FILE = Path(__file__).with_name("codes.md")
 _PARTS = ("What", "Why", "Example", "Use instead")
 
 
-class Page(NamedTuple):
+class CodePage(NamedTuple):
     """The explanation of one code."""
 
     code: str
@@ -30,7 +30,7 @@ class Page(NamedTuple):
         return "\n\n".join((self.code, *(_shown(*part) for part in parts)))
 
 
-def pages() -> dict[str, Page]:
+def pages() -> dict[str, CodePage]:
     """Return every page by its code, in the order of the file."""
     _, *texts = _FILE.read_text("utf-8").split("\n## ")
     found = [_page(text) for text in texts]
@@ -42,13 +42,13 @@ def summaries() -> dict[str, str]:
     return {page.code: page.what for page in pages().values()}
 
 
-def _page(text: str) -> Page:
+def _page(text: str) -> CodePage:
     code, _, rest = text.partition("\n")
     parts = []
     for name, after in zip(_PARTS, (*_PARTS[1:], ""), strict=True):
         _, _, rest = rest.partition(f"**{name}.**")
         parts.append(rest.partition(f"\n**{after}.**")[0] if after else rest)
-    return Page(code.strip().strip("`"), *(part.strip("\n ") for part in map(_unfenced, parts)))
+    return CodePage(code.strip().strip("`"), *(part.strip("\n ") for part in map(_unfenced, parts)))
 
 
 def _unfenced(text: str) -> str:

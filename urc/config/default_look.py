@@ -10,10 +10,10 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from urc.config.link.look import misfit
-from urc.config.parse.widget import Shelf
+from urc.config.link.interface import misfit
+from urc.config.parse.widget import WidgetFolder
 from urc.model.driver import Argument, Command, Driver
-from urc.model.interface import Given, Grid, Interface, Slot, WidgetUse
+from urc.model.interface import Interface, Layout, OutputBinding, Slot, WidgetUse
 from urc.model.units import are_apart
 from urc.model.values import Signal
 from urc.model.widget import Widget
@@ -61,7 +61,7 @@ _STEERED: Final = 2
 """Rank of controls that steer."""
 
 
-def automatic_slots(driver: Driver, shelf: Shelf) -> dict[str, WidgetUse]:
+def automatic_slots(driver: Driver, shelf: WidgetFolder) -> dict[str, WidgetUse]:
     """Return the widget of each slot: views of signals first, then controls."""
     slots: dict[str, WidgetUse] = {}
     left = dict(driver.signals)
@@ -92,7 +92,7 @@ def _put(slots: dict[str, WidgetUse], use: WidgetUse) -> None:
 # ---- signals
 
 
-def _grouped(left: dict[str, Signal], shelf: Shelf) -> Iterator[WidgetUse]:
+def _grouped(left: dict[str, Signal], shelf: WidgetFolder) -> Iterator[WidgetUse]:
     """Yield the widgets that take several signals, and remove those signals from `left`."""
     for widget_name, inputs, needed in _GROUPS:
         widget = shelf.get(widget_name)
@@ -125,7 +125,7 @@ def _stems(
     return stems
 
 
-def _shown(signal: Signal, shelf: Shelf) -> WidgetUse | None:
+def _shown(signal: Signal, shelf: WidgetFolder) -> WidgetUse | None:
     """Return the first widget that fits a signal, from the most specific to the simplest."""
     for name in _candidates(signal):
         use = _one_input(shelf.get(name), signal)
@@ -163,7 +163,7 @@ def _one_input(widget: Widget | None, signal: Signal) -> WidgetUse | None:
     return _use(widget, signal.name, {fitting[0]: signal.name}, signal.title)
 
 
-def _table(signals: list[Signal], shelf: Shelf) -> WidgetUse | None:
+def _table(signals: list[Signal], shelf: WidgetFolder) -> WidgetUse | None:
     widget = shelf.get("table")
     port = (
         next((one for one in widget.inputs.values() if one.is_multiple), None) if widget else None
@@ -179,7 +179,7 @@ def _table(signals: list[Signal], shelf: Shelf) -> WidgetUse | None:
 # ---- commands
 
 
-def _given(command: Command, driver: Driver, shelf: Shelf) -> WidgetUse | None:
+def _given(command: Command, driver: Driver, shelf: WidgetFolder) -> WidgetUse | None:
     """Return the control of a command; None when no widget has enough values."""
     if command.hold is not None:
         held = _held(command, shelf)
@@ -207,7 +207,7 @@ def _inputs_for(argument: Argument) -> tuple[str, ...]:
     return ("text",) if argument.type == "string" else ()
 
 
-def _held(command: Command, shelf: Shelf) -> WidgetUse | None:
+def _held(command: Command, shelf: WidgetFolder) -> WidgetUse | None:
     axes = [
         one.name
         for one in command.arguments.values()
@@ -245,13 +245,15 @@ def _output(widget: Widget | None, command: Command, names: Mapping[str, str]) -
     is_held = command.hold is not None
     for port in widget.outputs.values():
         if port.is_held is is_held and set(names.values()) <= set(port.arguments):
-            given = {port.name: Given(dict(names))}
+            given = {port.name: OutputBinding(dict(names))}
             use = _use(widget, command.name, {}, command.title)
             return use._replace(outputs={port.name: command.name}, given=given)
     return None
 
 
-def _with_state(use: WidgetUse, argument: Argument, driver: Driver, shelf: Shelf) -> WidgetUse:
+def _with_state(
+    use: WidgetUse, argument: Argument, driver: Driver, shelf: WidgetFolder
+) -> WidgetUse:
     """Show the robot's value, if a signal has the name of the argument or command."""
     widget = shelf.get(use.widget)
     port = widget.inputs.get("state") if widget is not None else None
@@ -288,7 +290,7 @@ def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
     )
 
 
-def _grid(slots: Mapping[str, WidgetUse], screen: str) -> Grid:
+def _grid(slots: Mapping[str, WidgetUse], screen: str) -> Layout:
     is_low = screen == "phone_landscape"
     sizes = {name: 2 if use.widget in _BIG else 1 for name, use in slots.items()}
     area = sum(size * size for size in sizes.values())
@@ -309,7 +311,7 @@ def _grid(slots: Mapping[str, WidgetUse], screen: str) -> Grid:
         taken |= _cells(row, column, sizes[name])
         placed[name] = Slot(name, row, column, sizes[name], sizes[name])
     rows = max((row for row, _ in taken), default=0) + 1
-    return Grid(rows, columns, tuple(placed.values()))
+    return Layout(rows, columns, tuple(placed.values()))
 
 
 def _rank(use: WidgetUse) -> int:

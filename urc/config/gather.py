@@ -12,17 +12,17 @@ from urc.config.compose.each import expand
 from urc.config.compose.inherit import compose, override
 from urc.config.compose.library import Library
 from urc.config.compose.params import fill_params
-from urc.config.part import Findings, Part
+from urc.config.node import Node, Problems
 from urc.config.schemas import kind_of, read_schema
 from urc.config.shape.check import check_shape, check_source
 from urc.config.sources import Sources
 from urc.problems import Problem, ProblemsError, has_errors
 from urc.source import Document
 
-__all__ = ["Gathered", "gather"]
+__all__ = ["LoadedSources", "gather"]
 
 
-class Gathered(NamedTuple):
+class LoadedSources(NamedTuple):
     """The result of the passes over documents."""
 
     sources: Sources | None
@@ -33,20 +33,20 @@ class Gathered(NamedTuple):
     """Every requested file, existing or not."""
 
 
-def gather(path: str) -> Gathered:
+def gather(path: str) -> LoadedSources:
     """Return the parts of a document and of its references, or the errors."""
     library = Library()
     try:
         document = library.read(path)
     except ProblemsError as error:
-        return Gathered(None, list(error.problems), "", tuple(library.files))
+        return LoadedSources(None, list(error.problems), "", tuple(library.files))
     kind = kind_of(document)
     findings = library.findings
     findings.problems += document.findings
     root = _prepared(document, library)
     sources = None
     if root is not None and not _is_part(root):
-        sources = Sources(Part(root, (), root.data), kind)
+        sources = Sources(Node(root, (), root.data), kind)
         if kind == "robot":
             _gather_robot(sources, library)
         elif kind == "driver":
@@ -54,7 +54,9 @@ def gather(path: str) -> Gathered:
     if has_errors(findings):
         sources = None
     problems = list(dict.fromkeys(findings))
-    return Gathered(sources, problems, "" if has_errors(problems) else kind, tuple(library.files))
+    return LoadedSources(
+        sources, problems, "" if has_errors(problems) else kind, tuple(library.files)
+    )
 
 
 def _is_part(document: Document) -> bool:
@@ -62,7 +64,7 @@ def _is_part(document: Document) -> bool:
 
 
 def _prepared(
-    document: Document, library: Library, given: Part | None = None, use: Part | None = None
+    document: Document, library: Library, given: Node | None = None, use: Node | None = None
 ) -> Document | None:
     """Return a document after the passes compose, expand and shape, or None.
 
@@ -117,7 +119,7 @@ def _gather_robot(sources: Sources, library: Library) -> None:
             sources.interfaces[name] = inner
 
 
-def _check_placement(root: Part, findings: Findings) -> None:
+def _check_placement(root: Node, findings: Problems) -> None:
     """Report keys of a driver in a robot that names its driver."""
     for key in read_schema("robot.schema.json")["$defs"]["inlineDriver"]["properties"]:
         if key in root.data:
@@ -131,7 +133,7 @@ def _check_placement(root: Part, findings: Findings) -> None:
             )
 
 
-def _driver(part: Part, sources: Sources, library: Library) -> Part:
+def _driver(part: Node, sources: Sources, library: Library) -> Node:
     """Return the driver at `part`: declared there, or named."""
     reference, given = part, None
     if isinstance(part.data, dict):
@@ -145,7 +147,7 @@ def _driver(part: Part, sources: Sources, library: Library) -> Part:
     return followed
 
 
-def _follow(reference: Part, kind: str, library: Library, given: Part | None = None) -> Part | None:
+def _follow(reference: Node, kind: str, library: Library, given: Node | None = None) -> Node | None:
     """Return the prepared document that `reference` names, or None."""
     document = library.follow(reference, (kind,))
     if document is None:
@@ -161,4 +163,4 @@ def _follow(reference: Part, kind: str, library: Library, given: Part | None = N
             hint="name a document that includes or extends it",
         )
         return None
-    return Part(prepared, (), prepared.data)
+    return Node(prepared, (), prepared.data)

@@ -11,15 +11,15 @@ from typing import NamedTuple
 from urc.config.default_look import automatic_slots, default_interface
 from urc.config.gather import gather
 from urc.config.link.driver import link_driver, link_simulator
-from urc.config.link.look import link_interface, link_slots
+from urc.config.link.interface import link_interface, link_slots
 from urc.config.link.tests import link_test
+from urc.config.node import Problems
 from urc.config.parse.driver import parse_driver, spoken_name
 from urc.config.parse.interface import check_names, parse_interface
 from urc.config.parse.profile import parse_setting
-from urc.config.parse.simulator import Simulated, parse_simulator
+from urc.config.parse.simulator import SimulatorSpec, parse_simulator
 from urc.config.parse.test import parse_test
-from urc.config.parse.widget import Shelf, parse_widget
-from urc.config.part import Findings
+from urc.config.parse.widget import WidgetFolder, parse_widget
 from urc.config.rules.profile import check_profile
 from urc.config.sources import Sources
 from urc.model.driver import Driver
@@ -27,13 +27,13 @@ from urc.model.interface import Interface, WidgetUse
 from urc.model.profile import DocumentTest, Profile, Setting
 from urc.model.widget import Widget
 from urc.problems import Problem, ProblemsError, has_errors
-from urc.registry import Catalog
+from urc.registry import Registries
 from urc.shipped import shipped
 
-__all__ = ["Checked", "Shelf", "check", "load_profile"]
+__all__ = ["CheckResult", "WidgetFolder", "check", "load_profile"]
 
 
-class Checked(NamedTuple):
+class CheckResult(NamedTuple):
     """The result for one document."""
 
     profile: Profile | None
@@ -52,7 +52,7 @@ class Checked(NamedTuple):
 
 
 def load_profile(
-    path: str | PathLike[str], catalog: Catalog, shelf: Shelf | None = None
+    path: str | PathLike[str], catalog: Registries, shelf: WidgetFolder | None = None
 ) -> Profile:
     """Return the profile in a robot's or driver's document.
 
@@ -79,7 +79,9 @@ def load_profile(
     raise ProblemsError(errors)
 
 
-def check(path: str | PathLike[str], catalog: Catalog, shelf: Shelf | None = None) -> Checked:
+def check(
+    path: str | PathLike[str], catalog: Registries, shelf: WidgetFolder | None = None
+) -> CheckResult:
     """Return every problem of a document of any kind, and of its references.
 
     Args:
@@ -92,9 +94,9 @@ def check(path: str | PathLike[str], catalog: Catalog, shelf: Shelf | None = Non
     sources, problems, kind, files = gather(path)
     if sources is None:
         is_short = any(one.severity == "error" and one.code != "no-such-file" for one in problems)
-        return Checked(None, tuple(_told_once(problems)), kind, files, is_cut_short=is_short)
-    shelf = shelf or Shelf(shipped("widgets"))
-    findings = Findings()
+        return CheckResult(None, tuple(_told_once(problems)), kind, files, is_cut_short=is_short)
+    shelf = shelf or WidgetFolder(shipped("widgets"))
+    findings = Problems()
     profile: Profile | None = None
     widget: Widget | None = None
     uses: list[WidgetUse] = []
@@ -117,7 +119,9 @@ def check(path: str | PathLike[str], catalog: Catalog, shelf: Shelf | None = Non
     if is_short:
         profile, widget = None, None
     every = (*files, *shelf.files)
-    return Checked(profile, tuple(problems), sources.kind, every, _pages(uses), widget, is_short)
+    return CheckResult(
+        profile, tuple(problems), sources.kind, every, _pages(uses), widget, is_short
+    )
 
 
 def _pages(uses: Iterable[WidgetUse]) -> tuple[str, ...]:
@@ -144,11 +148,11 @@ class _Parsed(NamedTuple):
     settings: dict[str, Setting]
     interfaces: dict[str, Interface]
     tests: list[DocumentTest]
-    simulated: Simulated
+    simulated: SimulatorSpec
 
 
 def _profile(
-    sources: Sources, catalog: Catalog, shelf: Shelf, findings: Findings
+    sources: Sources, catalog: Registries, shelf: WidgetFolder, findings: Problems
 ) -> Profile | None:
     driver = parse_driver(sources.driver, findings, catalog)
     if sources.kind == "robot":
@@ -163,7 +167,7 @@ def _profile(
         simulated=(
             parse_simulator(sources, driver, catalog, findings)
             if sources.simulator or sources.rules
-            else Simulated()
+            else SimulatorSpec()
         ),
     )
     if has_errors(findings):
@@ -171,7 +175,9 @@ def _profile(
     return _link(sources, parsed, shelf, findings)
 
 
-def _link(sources: Sources, parsed: _Parsed, shelf: Shelf, findings: Findings) -> Profile | None:
+def _link(
+    sources: Sources, parsed: _Parsed, shelf: WidgetFolder, findings: Problems
+) -> Profile | None:
     driver = parsed.driver
     uses = link_driver(sources.driver, driver, parsed.settings, findings)
     simulated = parsed.simulated

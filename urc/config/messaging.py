@@ -5,10 +5,10 @@ Transports of packages are not listed here and have no such limits.
 
 from typing import Final, NamedTuple
 
-__all__ = ["BYTE_LINES", "CARRIERS", "MESSAGING", "Messaging"]
+__all__ = ["BYTE_LINES", "CARRIERS", "MESSAGING", "MessageTransportRules"]
 
 
-class Messaging(NamedTuple):
+class MessageTransportRules(NamedTuple):
     """The allowed forms of one transport type."""
 
     verbs: tuple[str, ...]
@@ -18,11 +18,11 @@ class Messaging(NamedTuple):
 
 
 MESSAGING: Final = {
-    "ros": Messaging(
+    "ros": MessageTransportRules(
         ("publish", "call", "goal", "cancel"), ("type", "throttle", "queue_length", "compression")
     ),
-    "mqtt": Messaging(("publish",), ("qos",)),
-    "http": Messaging(("request",), ("stream", "every")),
+    "mqtt": MessageTransportRules(("publish",), ("qos",)),
+    "http": MessageTransportRules(("request",), ("stream", "every")),
 }
 BYTE_LINES: Final = frozenset(("tcp", "udp", "serial", "ssh", "telnet", "websocket"))
 CARRIERS: Final = frozenset(("ssh",))

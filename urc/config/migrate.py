@@ -8,7 +8,7 @@ from urc._files import read_bytes
 from urc.config.renames import KEYS, VALUES, Content
 from urc.config.schemas import kind_of
 from urc.problems import ProblemsError
-from urc.source import Document, Limits, Path, Span, parse_document
+from urc.source import Document, DocumentLimits, Path, Span, parse_document
 
 __all__ = ["Change", "Migrated", "migrate"]
 
@@ -46,7 +46,7 @@ def migrate(path: str) -> Migrated:
     Raises:
         ProblemsError: the file cannot be read, is no document, or has a key under both names.
     """
-    content = read_bytes(path, Limits().size_bytes)
+    content = read_bytes(path, DocumentLimits().size_bytes)
     document = parse_document(content, path)
     found = {span: names for part in _parts(document) for span, names in _renames(document, *part)}
     edits = sorted(found.items())

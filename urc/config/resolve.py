@@ -11,16 +11,16 @@ from typing import Final, NamedTuple
 
 from urc.config.compose.merge import Tree, merge
 from urc.config.gather import gather
-from urc.config.parse.widget import Shelf
-from urc.config.part import Part
+from urc.config.node import Node
+from urc.config.parse.widget import WidgetFolder
 from urc.config.schemas import read_schema
 from urc.config.sources import RESERVED, Sources
-from urc.model.interface import Grid, Interface, WidgetUse
+from urc.model.interface import Interface, Layout, WidgetUse
 from urc.model.profile import Profile
 from urc.problems import Problem, has_errors, printable
 from urc.source import Document, Mark
 
-__all__ = ["Resolved", "resolve", "written"]
+__all__ = ["ResolvedProfile", "resolve", "written"]
 
 _HEADER: Final = ("urc", "kind", "name", "title", "summary", "licence", "author")
 _BUILDING: Final = ("extends", "include", "partial", "params", "driver", "interfaces")
@@ -33,7 +33,7 @@ _BLOCK: Final = re.compile(r"(?:[!-~](?:[ -~]*[!-~])?\n){2,}")
 _INLINE_MOST: Final = 60
 
 
-class Resolved(NamedTuple):
+class ResolvedProfile(NamedTuple):
     """The result of `resolve`."""
 
     text: str
@@ -41,7 +41,7 @@ class Resolved(NamedTuple):
     problems: tuple[Problem, ...]
 
 
-def resolve(path: str, shelf: Shelf, profile: Profile | None = None) -> Resolved:
+def resolve(path: str, shelf: WidgetFolder, profile: Profile | None = None) -> ResolvedProfile:
     """Return the document at `path` merged with all its sources.
 
     Args:
@@ -54,7 +54,7 @@ def resolve(path: str, shelf: Shelf, profile: Profile | None = None) -> Resolved
         if not has_errors(problems):
             text = "this is a partial document: resolve a document that includes or extends it"
             problems.append(Problem("partial-document", text, path))
-        return Resolved("", tuple(problems))
+        return ResolvedProfile("", tuple(problems))
     lines = [f"# {path}, merged by 'urc resolve'."]
     made = _default_look(sources, profile)
     if made:
@@ -62,10 +62,10 @@ def resolve(path: str, shelf: Shelf, profile: Profile | None = None) -> Resolved
         lines.append(f"# URC made {told}: the document declares no interface.")
     for key, node in (*_sections(sources, shelf), *made.items()):
         lines += _entry(key, node, 0)
-    return Resolved("\n".join(lines) + "\n", tuple(problems))
+    return ResolvedProfile("\n".join(lines) + "\n", tuple(problems))
 
 
-def _sections(sources: Sources, shelf: Shelf) -> Iterator[tuple[str, object]]:
+def _sections(sources: Sources, shelf: WidgetFolder) -> Iterator[tuple[str, object]]:
     root = sources.root
     if sources.kind not in ("robot", "driver"):
         yield from ((key, part) for key, part in root.entries().items() if key not in _BUILDING)
@@ -91,13 +91,13 @@ def _sections(sources: Sources, shelf: Shelf) -> Iterator[tuple[str, object]]:
         yield "simulator", inner | ({"rules": rest} if rest else {})
 
 
-def _layout(part: Part) -> Mapping[str, Part]:
+def _layout(part: Node) -> Mapping[str, Node]:
     """Return the keys of an interface that a robot's document may have."""
     keys = read_schema("interface.schema.json")["$defs"]["inlineInterface"]["properties"]
     return {key: inner for key, inner in part.entries().items() if key in keys}
 
 
-def _slot(parts: list[Part], shelf: Shelf) -> Part:
+def _slot(parts: list[Node], shelf: WidgetFolder) -> Node:
     """Return the widget of a slot, a later part over an earlier one."""
     tree = _tree(parts[0])
     for part in parts[1:]:
@@ -107,15 +107,15 @@ def _slot(parts: list[Part], shelf: Shelf) -> Part:
         tree = merge(tree, over)
     home = tree.home
     document = Document(home.file, home.text, home.lines, tree.value, tree.mark)
-    return Part(document, (), tree.value)
+    return Node(document, (), tree.value)
 
 
-def _tree(part: Part) -> Tree:
+def _tree(part: Node) -> Tree:
     mark = part.document.at(part.path) or Mark(part.document.mark.span, "{")
     return Tree(part.data, mark, part.document.source_of(part.path))
 
 
-def _for_widget(tree: Tree, name: str, shelf: Shelf) -> Tree:
+def _for_widget(tree: Tree, name: str, shelf: WidgetFolder) -> Tree:
     """Return the keys that another widget keeps: bindings of the same names, no options."""
     widget = shelf.get(name)
     ports = {**widget.inputs, **widget.outputs} if widget is not None else {}
@@ -141,9 +141,9 @@ def _entry(key: str, node: object, depth: int) -> Iterator[str]:
 
 def _value(head: str, node: object, depth: int, place: str) -> Iterator[str]:
     """Yield the lines of a value after `head`, its indented key."""
-    value = node.data if isinstance(node, Part) else node
+    value = node.data if isinstance(node, Node) else node
     if isinstance(value, Mapping):
-        entries = node.entries() if isinstance(node, Part) else value
+        entries = node.entries() if isinstance(node, Node) else value
         yield f"{head}{'' if entries else ' {}'}{place}"
         for key, inner in entries.items():
             yield from _entry(key, inner, depth + 1)
@@ -164,26 +164,26 @@ def _list(head: str, node: object, value: list[object], depth: int, place: str) 
             yield f"{head} {inline}{place}"
             return
     yield f"{head}{place}"
-    items = node.items() if isinstance(node, Part) else value
+    items = node.items() if isinstance(node, Node) else value
     pad = "  " * (depth + 1)
     for item in items:
         inside = _data(item)
         if not isinstance(inside, Mapping) or not inside:
             yield from _value(f"{pad}-", item, depth + 1, _place(item))
             continue
-        entries = item.entries() if isinstance(item, Part) else inside
+        entries = item.entries() if isinstance(item, Node) else inside
         lines = [line for key, one in entries.items() for line in _entry(key, one, depth + 2)]
         yield f"{pad}- {lines[0].lstrip()}"
         yield from lines[1:]
 
 
 def _data(node: object) -> object:
-    return node.data if isinstance(node, Part) else node
+    return node.data if isinstance(node, Node) else node
 
 
 def _place(node: object) -> str:
     """Return the place of a value's key, as a comment."""
-    if not isinstance(node, Part):
+    if not isinstance(node, Node):
         return ""
     mark = node.document.at(node.path)
     if mark is None:
@@ -243,7 +243,7 @@ def _interface(interface: Interface) -> dict[str, object]:
     return {"title": interface.title, "layouts": layouts}
 
 
-def _picture(grid: Grid) -> str:
+def _picture(grid: Layout) -> str:
     rows = [["."] * grid.columns for _ in range(grid.rows)]
     for slot in grid.slots:
         for row in range(slot.row, slot.row + slot.row_span):

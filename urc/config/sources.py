@@ -6,7 +6,7 @@ A robot may have its driver and its interfaces in separate documents.
 from typing import Final
 
 from urc.config.compose.merge import Tree, merge
-from urc.config.part import Part
+from urc.config.node import Node
 from urc.source import Document
 
 __all__ = ["RESERVED", "Sources"]
@@ -20,22 +20,22 @@ RESERVED: Final = (*_EMULATED, "rules")
 class Sources:
     """The parts of a profile, each with its place."""
 
-    def __init__(self, root: Part, kind: str) -> None:
+    def __init__(self, root: Node, kind: str) -> None:
         self.root = root
         self.kind = kind
         self.driver = root
         """The mapping with transports, signals, messages, commands and polls."""
-        self.settings: dict[str, Part] = {}
-        self.slots: dict[str, list[Part]] = {}
+        self.settings: dict[str, Node] = {}
+        self.slots: dict[str, list[Node]] = {}
         """Slot → its widgets; a later widget changes an earlier one."""
-        self.interfaces: dict[str, Part] = {}
-        self.tests: list[Part] = []
-        self.simulator: dict[str, Part] = {}
+        self.interfaces: dict[str, Node] = {}
+        self.tests: list[Node] = []
+        self.simulator: dict[str, Node] = {}
         """Initial values and world of the emulated robot."""
-        self.rules: dict[str, Part] = {}
+        self.rules: dict[str, Node] = {}
         """Rules of the emulated robot by transport."""
 
-    def add(self, part: Part) -> None:
+    def add(self, part: Node) -> None:
         """Add the settings, widgets, tests and simulator of `part`, over those of earlier parts."""
         self.settings |= part.named("settings")
         for slot, use in part.named("widgets").items():
@@ -53,7 +53,7 @@ class Sources:
             self.rules[name] = _over(self.rules.get(name), inner)
 
 
-def _over(below: Part | None, part: Part) -> Part:
+def _over(below: Node | None, part: Node) -> Node:
     """Return a part of a simulator, merged over the same part of the driver."""
     if below is None:
         return part
@@ -62,10 +62,10 @@ def _over(below: Part | None, part: Part) -> Part:
     for key in reversed(part.path):
         value, mark = {key: value}, mark.copy({key: mark})
     document = Document(home.file, home.text, home.lines, value, mark)
-    return Part(document, part.path, merged.value)
+    return Node(document, part.path, merged.value)
 
 
-def _tree(part: Part) -> Tree:
+def _tree(part: Node) -> Tree:
     mark = part.document.at(part.path)
     assert mark is not None, part.path  # noqa: S101  # what stands there has a mark
     return Tree(part.data, mark, part.document.source_of(part.path))

@@ -2,8 +2,8 @@
 
 from typing import Any, Final
 
-from urc.config.part import Findings, Part
-from urc.config.suggest import did_you_mean
+from urc.config.node import Node, Problems
+from urc.config.spelling_suggestions import did_you_mean
 from urc.model.driver import Argument, Command
 from urc.model.values import Reading, Value
 
@@ -83,7 +83,7 @@ def fit_argument(value: Any, kind: str, of: str, size: int | None) -> tuple[Valu
     return tuple(fit(one, of) for one in value)
 
 
-def element_of(part: Part, kind: str, findings: Findings) -> str:
+def element_of(part: Node, kind: str, findings: Problems) -> str:
     """Return the type of the elements of an argument; of an array, its ``items``."""
     if kind == "array":
         return part.text("items", "number")
@@ -110,7 +110,7 @@ def fit_hint(value: Value, kind: str) -> str:
     return ""
 
 
-def check_range(part: Part, kind: str, findings: Findings) -> tuple[float | None, float | None]:
+def check_range(part: Node, kind: str, findings: Problems) -> tuple[float | None, float | None]:
     """Return ``min`` and ``max`` of a signal, argument or setting of type `kind`."""
     low, high = part.number("min"), part.number("max")
     if kind not in ("integer", "number"):
@@ -132,7 +132,7 @@ def check_range(part: Part, kind: str, findings: Findings) -> tuple[float | None
 
 
 def check_within(
-    value: Value, low: float | None, high: float | None, part: Part, findings: Findings
+    value: Value, low: float | None, high: float | None, part: Node, findings: Problems
 ) -> None:
     """Report a number at `part` that is outside ``min`` and ``max``."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -144,7 +144,7 @@ def check_within(
 
 
 def known_argument(
-    name: str, part: Part, command: Command, findings: Findings, *, key: bool = True
+    name: str, part: Node, command: Command, findings: Problems, *, key: bool = True
 ) -> Argument | None:
     """Return the argument with this name, or report its absence at `part` or its key."""
     argument = command.arguments.get(name)

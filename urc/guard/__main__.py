@@ -12,13 +12,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
-from urc._loop import run
-from urc.guard import wire
-from urc.guard.host import FINISH_S, Host
+from urc._event_loop import run
+from urc.guard import messages
 from urc.guard.pipe import Pipe
-from urc.guard.precedence import Precedence
 from urc.guard.process import DOOR
-from urc.transports.own_doors import OWN_DOORS
+from urc.guard.real_time_priority import RealTimePriority
+from urc.guard.server import FINISH_S, GuardServer
+from urc.transports.own_listeners import OWN_DOORS
 
 __all__ = ["BEAT_S", "main"]
 
@@ -42,21 +42,21 @@ class _Clock:
         return self._loop.call_later(max(0.0, time_s - time.monotonic()), action)
 
 
-async def _guard(line: socket.socket, precedence: Precedence) -> None:
+async def _guard(line: socket.socket, precedence: RealTimePriority) -> None:
     loop = asyncio.get_running_loop()
     over = asyncio.Event()
     for name in ("SIGTERM", "SIGHUP"):
         with suppress(AttributeError, NotImplementedError):  # Windows: the pipe's end says it there
             loop.add_signal_handler(getattr(signal, name), over.set)
 
-    def emit(said: wire.FromGuard) -> int:
+    def emit(said: messages.FromGuard) -> int:
         return pipe.post(said)
 
-    host = Host(emit, _Clock(loop))
+    host = GuardServer(emit, _Clock(loop))
     pipe = Pipe(
         line,
-        wire.encoder(),
-        wire.decoder_of_guard(),
+        messages.encoder(),
+        messages.decoder_of_guard(),
         take=host.take,
         settle=host.settle,
         gone=over.set,
@@ -68,7 +68,7 @@ async def _guard(line: socket.socket, precedence: Precedence) -> None:
         precedence.look()
         late_s = loop.time() - due_s
         if not pipe.is_backed_up:
-            pipe.post(wire.Beat(late_s))
+            pipe.post(messages.Heartbeat(late_s))
         due_s = loop.time() + BEAT_S
         loop.call_at(due_s, beat)
 
@@ -101,7 +101,7 @@ def main() -> None:
     OWN_DOORS.learn(sys.argv[2:])
     gc.collect()
     gc.freeze()  # what is loaded by now stays: no need to look through it again
-    precedence = Precedence()
+    precedence = RealTimePriority()
     precedence.ask()  # where it is refused, the guard is a process like others: see `urc doctor`
     run(_guard(line, precedence))
 

@@ -7,16 +7,16 @@ guard in this process. Neither knows which controls are armed: the client has th
 from collections.abc import Iterable
 from typing import NamedTuple, Protocol
 
-from urc.guard import wire
+from urc.guard import messages
 from urc.transports.base import Transport
 
-__all__ = ["Channel", "ChannelListener", "LineSpec"]
+__all__ = ["Channel", "ChannelListener", "GuardedLineSpec"]
 
 
-class LineSpec(NamedTuple):
+class GuardedLineSpec(NamedTuple):
     """One line of the robot."""
 
-    make: wire.Make
+    make: messages.MakeTransport
     transport: Transport
     """The transport of `make` in this process. Only a guard in this process opens it."""
 
@@ -28,13 +28,13 @@ class ChannelListener(Protocol):
     def may_move(self) -> bool:
         """Whether a control may be moving."""
 
-    def briefing(self) -> Iterable[wire.ToGuard]:
+    def briefing(self) -> Iterable[messages.ToGuard]:
         """Return everything a new guard must know, in the order of telling.
 
         Asked for once for each new guard: an owed stop counts as told from then on.
         """
 
-    def take(self, message: wire.FromGuard, size: int) -> None:
+    def take(self, message: messages.FromGuard, size: int) -> None:
         """Handle a message of the guard; `size` is its size in bytes for flow control."""
 
     def lost(self, reason: str) -> None:
@@ -50,7 +50,7 @@ class Channel(Protocol):
     async def finish(self) -> None:
         """Let the guard stop everything and close every line, then end it."""
 
-    def post(self, message: wire.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
+    def post(self, message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
         """Send a message to the guard. Without a guard it is dropped: the next one is briefed.
 
         Args:

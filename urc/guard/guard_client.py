@@ -16,11 +16,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from urc.guard import wire
-from urc.guard.channel import Channel, ChannelListener, LineSpec
+from urc.guard import messages
+from urc.guard.channel import Channel, ChannelListener, GuardedLineSpec
 from urc.guard.proxy import GuardedTransport, Stands
-from urc.model.codec import Count, Counted, Numbered, Payload, Series
-from urc.motion.hold import STOP_FOR_S, Mover, Reason, Terms
+from urc.model.payload import Count, CountedFrame, FrameVariants, Numbered, Payload
+from urc.motion.hold_to_run import STOP_FOR_S, HoldTerms, HoldToRun, Reason
 from urc.problems import UrcError
 
 __all__ = ["GuardClient", "HeldSpec"]
@@ -35,7 +35,7 @@ class HeldSpec(NamedTuple):
     """One held command of the robot."""
 
     line: str
-    terms: Terms
+    terms: HoldTerms
     """Terms without a stop frame, for a stop before the first arming."""
 
 
@@ -44,13 +44,13 @@ class _Control:
     """A held command that was armed or stopped."""
 
     line: str
-    terms: Terms
+    terms: HoldTerms
     is_armed: bool = False
     number: int = 0
     """Number of the newest tick, as the present guard counts them."""
     at_s: float = 0.0
     """Time of the newest tick."""
-    counted: Counted | None = None
+    counted: CountedFrame | None = None
     """Frame of the newest tick while it is held, when it carries counters."""
     may_move: bool = False
     stopped_s: float = float("-inf")
@@ -60,12 +60,12 @@ class _Control:
 class GuardClient:
     """The lines of one robot behind a guard, and its held commands.
 
-    It is `urc.runtime.motion.Movers`, and the `ChannelListener` of its channel.
+    It is `urc.runtime.motion_controller.MotionBackend`, and the `ChannelListener` of its channel.
     """
 
     def __init__(
         self,
-        lines: Sequence[LineSpec],
+        lines: Sequence[GuardedLineSpec],
         held: Mapping[str, HeldSpec],
         channel_to: Callable[[ChannelListener], Channel],
     ) -> None:
@@ -105,24 +105,24 @@ class GuardClient:
         """Stop everything that may be moving, close every line, and end the guard."""
         await self.channel.finish()
 
-    # -- held commands: `urc.runtime.motion.Movers`
+    # -- held commands: `urc.runtime.motion_controller.MotionBackend`
 
-    def arm(self, command: str, terms: Terms) -> None:
+    def arm(self, command: str, terms: HoldTerms) -> None:
         """Accept ticks of `command` from now on.
 
         Raises:
             UrcError: nothing would ever stop it under these terms.
         """
         try:
-            Mover(terms)
+            HoldToRun(terms)
         except ValueError as fault:
             raise UrcError(f"{command}: {fault}") from fault
         control = self._control(command)
         control.terms = terms
         control.is_armed = True
-        self.channel.post(wire.Arm(control.line, command, terms))
+        self.channel.post(messages.ArmControl(control.line, command, terms))
 
-    def tick(self, command: str, data: Payload | Counted) -> None:
+    def tick(self, command: str, data: Payload | CountedFrame) -> None:
         """Renew the lease of `command`; `data` is its newest frame. Never waits."""
         control = self._controls.get(command)
         if control is None:
@@ -130,31 +130,31 @@ class GuardClient:
         control.number += 1
         control.at_s = self.channel.now()
         control.may_move = True
-        control.counted = data if isinstance(data, Counted) else None
-        numbered = data.numbered if isinstance(data, Counted) else Numbered(data, _UNCOUNTED)
+        control.counted = data if isinstance(data, CountedFrame) else None
+        numbered = data.numbered if isinstance(data, CountedFrame) else Numbered(data, _UNCOUNTED)
         self._post_tick(command, control, numbered)
 
     def _post_tick(self, command: str, control: _Control, numbered: Numbered) -> None:
         count = numbered.takes if numbered.takes.after else None
-        tick = wire.Tick(command, control.number, numbered.data, control.at_s, count)
+        tick = messages.RenewLease(command, control.number, numbered.data, control.at_s, count)
         self.channel.post(tick, slot=command)
 
-    def renew(self, command: str, stop: Payload | Series) -> None:
+    def renew(self, command: str, stop: Payload | FrameVariants) -> None:
         """Replace the stop frame of `command` from now on; it arms nothing."""
         control = self._controls.get(command)
         if control is not None:
             control.terms = terms = control.terms.stopped_by(stop)
-            renewal = wire.Renew(command, terms.stop, terms.stops)
+            renewal = messages.ReplaceStop(command, terms.stop, terms.stops)
             self.channel.post(renewal, slot=f"{command} stop")
 
     def release(self, command: str) -> None:
         """Stop `command`, which was let go."""
         self._discard_tick(command)
-        self.channel.post(wire.Release(command))
+        self.channel.post(messages.ReleaseControl(command))
 
-    def stop(self, stops: Mapping[str, Payload | Series]) -> None:
+    def stop(self, stops: Mapping[str, Payload | FrameVariants]) -> None:
         """Stop these commands at once, moving or not; the values are their stop frames."""
-        told: list[tuple[str, str, Terms]] = []
+        told: list[tuple[str, str, HoldTerms]] = []
         for command, frame in stops.items():
             control = self._control(command)
             control.terms = control.terms.stopped_by(frame)
@@ -163,23 +163,23 @@ class GuardClient:
             self._discard_tick(command)
             told.append((control.line, command, control.terms))
         if told:
-            self.channel.post(wire.Stop(told), is_urgent=True)
+            self.channel.post(messages.StopMotion(told), is_urgent=True)
 
-    def stop_all(self, stop_frame: Callable[[str], Payload | Series]) -> None:
+    def stop_all(self, stop_frame: Callable[[str], Payload | FrameVariants]) -> None:
         """Stop everything that may be moving.
 
         Args:
             stop_frame: renders the stop frame of a command as it is now. When it raises `UrcError`,
                 the last stop frame of the command is used.
         """
-        stops: dict[str, Payload | Series] = {}
+        stops: dict[str, Payload | FrameVariants] = {}
         for command, control in self._controls.items():
             if self.is_stopping(command):
                 try:
                     stops[command] = stop_frame(command)
                 except UrcError:
                     terms = control.terms
-                    stops[command] = Series(terms.stops) if terms.stops else terms.stop
+                    stops[command] = FrameVariants(terms.stops) if terms.stops else terms.stop
         self.stop(stops)
 
     def is_stopping(self, command: str) -> bool:
@@ -223,7 +223,7 @@ class GuardClient:
         """Whether a control may be moving."""
         return any(control.may_move for control in self._controls.values())
 
-    def briefing(self) -> Iterator[wire.ToGuard]:
+    def briefing(self) -> Iterator[messages.ToGuard]:
         """Yield everything a new guard must know; owed stops go before everything armed."""
         for spec in self.lines:
             yield spec.make
@@ -231,17 +231,17 @@ class GuardClient:
             if control.may_move:
                 control.is_armed = False
                 control.number = 0
-                yield wire.Owe(control.line, command, control.terms)
+                yield messages.RecoverStop(control.line, command, control.terms)
             elif control.is_armed:
-                yield wire.Arm(control.line, command, control.terms)
+                yield messages.ArmControl(control.line, command, control.terms)
 
-    def take(self, message: wire.FromGuard, size: int) -> None:
+    def take(self, message: messages.FromGuard, size: int) -> None:
         """Handle a message of the guard; `size` is its size in bytes for flow control."""
-        if isinstance(message, wire.Stopped):
+        if isinstance(message, messages.StopWritten):
             self._note(message)
-        elif not isinstance(message, wire.Beat):
+        elif not isinstance(message, messages.Heartbeat):
             self.transports[message.line].take(message, size)
-            if isinstance(message, wire.Counted):
+            if isinstance(message, messages.CountersAdvanced):
                 self._tick_again(message)
 
     def lost(self, reason: str) -> None:
@@ -252,7 +252,7 @@ class GuardClient:
     def _stands(self, line: str, stand: Mapping[str, int], is_settled: bool) -> None:
         self.on_stand(line, stand, is_settled)
 
-    def _tick_again(self, counted: wire.Counted) -> None:
+    def _tick_again(self, counted: messages.CountersAdvanced) -> None:
         """Render ticks again whose numbers were used up. They keep their age."""
         for command, number in counted.stale:
             control = self._controls.get(command)
@@ -262,7 +262,7 @@ class GuardClient:
             if numbered is not None:
                 self._post_tick(command, control, numbered)
 
-    def _note(self, stopped: wire.Stopped) -> None:
+    def _note(self, stopped: messages.StopWritten) -> None:
         control = self._controls.get(stopped.control)
         if control is not None:
             control.stopped_s = self.channel.now()

@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from urc.guard import wire
-from urc.guard.channel import ChannelListener, LineSpec
-from urc.guard.host import Host
-from urc.guard.lane import Clock
-from urc.model.codec import size_of
+from urc.guard import messages
+from urc.guard.channel import ChannelListener, GuardedLineSpec
+from urc.guard.send_queue import LaneClock
+from urc.guard.server import GuardServer
+from urc.model.payload import size_of
 
 __all__ = ["LocalChannel"]
 
@@ -18,7 +18,7 @@ class LocalChannel:
     """The channel to a guard in this process, which stops nothing when this process hangs."""
 
     def __init__(
-        self, listener: ChannelListener, *, lines: Sequence[LineSpec], clock: Clock
+        self, listener: ChannelListener, *, lines: Sequence[GuardedLineSpec], clock: LaneClock
     ) -> None:
         """Prepare; nothing runs before `start`.
 
@@ -30,7 +30,7 @@ class LocalChannel:
         self._listener = listener
         self._lines = tuple(lines)
         self._clock = clock
-        self._host = Host(self._emit, clock)
+        self._host = GuardServer(self._emit, clock)
 
     def start(self) -> None:
         """Give the guard its lines."""
@@ -41,7 +41,7 @@ class LocalChannel:
         """Stop everything and close every line."""
         await self._host.finish()
 
-    def post(self, message: wire.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
+    def post(self, message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
         """Send a message, which the guard handles at once: none is ever unsent."""
         self._host.take(message)
         self._host.settle()
@@ -56,7 +56,11 @@ class LocalChannel:
         """Return the time of the clock."""
         return self._clock.now()
 
-    def _emit(self, message: wire.FromGuard) -> int:
-        size = size_of(message.data) + _OVERHEAD_BYTES if isinstance(message, wire.Received) else 0
+    def _emit(self, message: messages.FromGuard) -> int:
+        size = (
+            size_of(message.data) + _OVERHEAD_BYTES
+            if isinstance(message, messages.BytesReceived)
+            else 0
+        )
         self._listener.take(message, size)
         return size

@@ -15,10 +15,10 @@ import time
 from contextlib import suppress
 from typing import Final
 
-from urc.guard import wire
+from urc.guard import messages
 from urc.guard.channel import ChannelListener
 from urc.guard.pipe import Pipe
-from urc.guard.process import CAN_INHERIT, Door, Standing, launch, reap, standing
+from urc.guard.process import CAN_INHERIT, GuardAcceptor, ProcessState, launch, reap, standing
 
 __all__ = ["CAN_GUARD", "PipeChannel"]
 
@@ -53,10 +53,10 @@ class PipeChannel:
         """
         self._listener = listener
         self._is_inherited = is_inherited
-        self._door: Door | None = None
+        self._door: GuardAcceptor | None = None
         self._entering: asyncio.Task[None] | None = None
-        self._encoder = wire.encoder()
-        self._decoder = wire.decoder_of_server()
+        self._encoder = messages.encoder()
+        self._decoder = messages.decoder_of_server()
         self._pipe: Pipe | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._is_up = asyncio.Event()
@@ -65,7 +65,7 @@ class PipeChannel:
         self._look: asyncio.TimerHandle | None = None
         self._look_s = 0.0
         self._silent_looks = self._kept_looks = 0
-        self._standing = Standing()
+        self._standing = ProcessState()
         self._was_heard = self._has_served = False
         self._started_s = 0.0
         self._short_lives = 0
@@ -78,7 +78,7 @@ class PipeChannel:
 
     # -- messages
 
-    def post(self, message: wire.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
+    def post(self, message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
         """Send a message; dropped without a guard. See `urc.guard.channel.Channel`."""
         if self._pipe is not None:
             self._pipe.post(message, slot=slot, is_urgent=is_urgent)
@@ -96,10 +96,10 @@ class PipeChannel:
         """Return this machine's monotonic time, which the guard's process reads, too."""
         return time.monotonic()
 
-    def _hear(self, message: wire.FromGuard) -> None:
+    def _hear(self, message: messages.FromGuard) -> None:
         self._silent_looks = self._kept_looks = 0
         self._was_heard = True
-        self._has_served |= isinstance(message, wire.Opened)
+        self._has_served |= isinstance(message, messages.LineOpened)
         self._listener.take(message, 0 if self._pipe is None else self._pipe.taken_bytes)
 
     # -- from start to end
@@ -117,14 +117,14 @@ class PipeChannel:
             return
         self._was_heard = self._has_served = False
         self._silent_looks = self._kept_looks = 0
-        if isinstance(line, Door):
+        if isinstance(line, GuardAcceptor):
             self._is_up.clear()
             self._door = line
             self._entering = loop.create_task(self._admit(line))
         else:
             self._begin(line)
 
-    async def _admit(self, door: Door) -> None:
+    async def _admit(self, door: GuardAcceptor) -> None:
         try:
             line = await door.admitted()
         except (OSError, TimeoutError) as fault:

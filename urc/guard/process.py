@@ -10,9 +10,9 @@ import sys
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from urc.transports.own_doors import OWN_DOORS
+from urc.transports.own_listeners import OWN_DOORS
 
-__all__ = ["CAN_INHERIT", "DOOR", "Door", "launch", "reap", "standing"]
+__all__ = ["CAN_INHERIT", "DOOR", "GuardAcceptor", "launch", "reap", "standing"]
 
 CAN_INHERIT: Final = os.name == "posix"
 """Whether this system can hand an open pipe to another process."""
@@ -24,7 +24,7 @@ _ADMIT_S: Final = 10.0
 _SAY_S: Final = 1.0
 
 
-class Door:
+class GuardAcceptor:
     """Where the guard of a system without inherited pipes comes in: a port of this machine's own.
 
     Anybody on this machine may knock. Who does not say the word that the guard alone was told, on
@@ -79,7 +79,7 @@ class Door:
 
 def launch(
     *, is_inherited: bool = CAN_INHERIT
-) -> tuple["subprocess.Popen[bytes]", socket.socket | Door]:
+) -> tuple["subprocess.Popen[bytes]", socket.socket | GuardAcceptor]:
     """Start the process; return it, and our end of the pipe or the door that it will come to."""
     return _heir() if is_inherited else _visitor()
 
@@ -97,8 +97,8 @@ def _heir() -> tuple["subprocess.Popen[bytes]", socket.socket]:
     return process, ours
 
 
-def _visitor() -> tuple["subprocess.Popen[bytes]", Door]:
-    door = Door()
+def _visitor() -> tuple["subprocess.Popen[bytes]", GuardAcceptor]:
+    door = GuardAcceptor()
     try:
         process = _started(f"{DOOR}{door.port}", stdin=subprocess.PIPE)
         assert process.stdin is not None  # noqa: S101 - it was asked for
@@ -121,7 +121,7 @@ def _started(place: str, **more: Any) -> "subprocess.Popen[bytes]":
     return subprocess.Popen(command, **more)  # noqa: S603 - our own interpreter and module
 
 
-class Standing(NamedTuple):
+class ProcessState(NamedTuple):
     """How a process stands with the system."""
 
     wants_to_run: bool = False
@@ -130,15 +130,15 @@ class Standing(NamedTuple):
     """How much of a processor's time its first thread has had."""
 
 
-def standing(process: int, proc: Path = Path("/proc")) -> Standing:
+def standing(process: int, proc: Path = Path("/proc")) -> ProcessState:
     """Return how a process stands, in files of Linux; elsewhere nothing is known of it."""
     try:
         # The name before the state may hold anything, brackets and spaces too.
         state = (proc / str(process) / "stat").read_text("latin-1").rpartition(")")[2].split()[0]
         ran_ns = (proc / str(process) / "schedstat").read_text("ascii").split()[0]
-        return Standing(state in "RD", int(ran_ns) / 1e9)
+        return ProcessState(state in "RD", int(ran_ns) / 1e9)
     except (OSError, ValueError, IndexError):
-        return Standing()
+        return ProcessState()
 
 
 async def reap(process: "subprocess.Popen[bytes]") -> None:

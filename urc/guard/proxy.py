@@ -10,10 +10,10 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from urc.guard import wire
-from urc.guard.line import WINDOW_BYTES
+from urc.guard import messages
+from urc.guard.guarded_connection import WINDOW_BYTES
 from urc.guard.pipe import UNFIT
-from urc.model.codec import Counted, Numbered, Payload, size_of
+from urc.model.payload import CountedFrame, Numbered, Payload, size_of
 from urc.transports.base import ConnectFailed, PeerClosed, TransportError
 
 __all__ = ["GuardedTransport"]
@@ -28,7 +28,7 @@ _CLOGGED_BYTES: Final = 4096
 
 log = logging.getLogger(__name__)
 
-Post = Callable[[wire.ToGuard], object]
+Post = Callable[[messages.ToGuard], object]
 Stands = Callable[[str, Mapping[str, int], bool], None]
 
 
@@ -41,7 +41,7 @@ class _Sent:
     data: Payload
     taken: asyncio.Future[None] | None
     """Who waits for it."""
-    counted: Counted | None
+    counted: CountedFrame | None
     left: Callable[[Payload], None] | None
     """Told what was handed over."""
 
@@ -109,7 +109,7 @@ class GuardedTransport:
             async with asyncio.timeout(timeout_s + _OPEN_GRACE_S):
                 await self._ready()
                 self._is_known = True
-                self._post(wire.Open(self._name, self._turn, timeout_s))
+                self._post(messages.OpenLine(self._name, self._turn, timeout_s))
                 fault = await self._opening
         except TimeoutError as late:
             text = f"no answer from {self._address} within {timeout_s:g} s"
@@ -118,7 +118,7 @@ class GuardedTransport:
             self._opening = None
             if not self._is_open:
                 self._is_known = False
-                self._post(wire.Close(self._name, self._turn))
+                self._post(messages.CloseLine(self._name, self._turn))
         if fault:
             raise ConnectFailed(fault)
 
@@ -150,7 +150,7 @@ class GuardedTransport:
             return
         self._is_known = False
         self._closing = closing = asyncio.get_running_loop().create_future()
-        self._post(wire.Close(self._name, self._turn))
+        self._post(messages.CloseLine(self._name, self._turn))
         await asyncio.wait({closing}, timeout=_CLOSE_S)
 
     # -- a `Prompt`
@@ -162,7 +162,7 @@ class GuardedTransport:
         self._put(data, None)
         return True
 
-    def offer_counted(self, counted: Counted, left: Callable[[Payload], None]) -> bool:
+    def offer_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> bool:
         """Pass a frame with counters on, which is made again until its numbers are the next ones.
 
         Returns:
@@ -173,7 +173,7 @@ class GuardedTransport:
         self._put(counted.numbered.data, None, counted, left)
         return True
 
-    async def send_counted(self, counted: Counted, left: Callable[[Payload], None]) -> None:
+    async def send_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> None:
         """Do the same, waiting while the line is full; raise `TransportError` if it broke."""
         if not self._is_open:
             raise PeerClosed(self._ended)
@@ -200,29 +200,31 @@ class GuardedTransport:
             self._opening.set_result(reason)
         self._closed()
 
-    def take(self, said: wire.FromGuard, size: int) -> None:
+    def take(self, said: messages.FromGuard, size: int) -> None:
         """Take what is said of this line; it counts for `size` bytes, here and in the guard."""
         match said:
-            case wire.Received(turn=turn, data=data) if turn == self._turn and self._is_open:
+            case messages.BytesReceived(turn=turn, data=data) if (
+                turn == self._turn and self._is_open
+            ):
                 self._received(data, size)
-            case wire.Sent(turn=turn, number=number) if turn == self._turn:
+            case messages.SendDone(turn=turn, number=number) if turn == self._turn:
                 self._sent(number)
-            case wire.Counted(turn=turn) if turn == self._turn:
+            case messages.CountersAdvanced(turn=turn) if turn == self._turn:
                 self._counted(said)
-            case wire.Stale(turn=turn) if turn == self._turn:
+            case messages.SendStale(turn=turn) if turn == self._turn:
                 self._send_again(said)
-            case wire.Opened(turn=turn) if turn == self._turn and self._opening is not None:
+            case messages.LineOpened(turn=turn) if turn == self._turn and self._opening is not None:
                 self._opened(said.address)
                 self._stands(self._name, said.stand, True)
-            case wire.OpenFailed(turn=turn) if turn == self._turn and self._opening is not None:
+            case messages.OpenFailed(turn=turn) if turn == self._turn and self._opening is not None:
                 if not self._opening.done():
                     self._opening.set_result(said.message)
-            case wire.Refused(turn=turn) if turn == self._turn:
+            case messages.SendRefused(turn=turn) if turn == self._turn:
                 kind = PeerClosed if said.is_closed else TransportError
                 self._sent(said.number, kind(said.message))
-            case wire.Lost(turn=turn, message=message) if turn == self._turn:
+            case messages.LineLost(turn=turn, message=message) if turn == self._turn:
                 self._end(message)
-            case wire.Closed(turn=turn) if turn == self._turn:
+            case messages.LineClosed(turn=turn) if turn == self._turn:
                 self._closed()
 
     def _opened(self, address: str) -> None:
@@ -256,13 +258,13 @@ class GuardedTransport:
         self._taken_bytes += size
         if self._taken_bytes >= _CREDIT_BYTES and self._is_open:
             amount, self._taken_bytes = self._taken_bytes, 0
-            self._post(wire.Credit(self._name, self._turn, amount))
+            self._post(messages.FlowCredit(self._name, self._turn, amount))
 
     def _put(
         self,
         data: Payload,
         taken: asyncio.Future[None] | None,
-        counted: Counted | None = None,
+        counted: CountedFrame | None = None,
         left: Callable[[Payload], None] | None = None,
     ) -> None:
         self._number += 1
@@ -280,14 +282,16 @@ class GuardedTransport:
         if numbered is not None:
             sent.data = numbered.data
         count = None if numbered is None else numbered.takes
-        self._post(wire.Send(self._name, self._turn, sent.number, sent.data, count, self._round))
+        self._post(
+            messages.SendBytes(self._name, self._turn, sent.number, sent.data, count, self._round)
+        )
 
-    def _counted(self, said: wire.Counted) -> None:
+    def _counted(self, said: messages.CountersAdvanced) -> None:
         under_way = (one for one in self._under_way if one.counted is not None)
         is_settled = all(one.number <= said.sent for one in under_way)
         self._stands(self._name, said.stand, is_settled)
 
-    def _send_again(self, said: wire.Stale) -> None:
+    def _send_again(self, said: messages.SendStale) -> None:
         """Make what was not sent again, with the numbers that are next now, in the same order."""
         self._round += 1
         self._stands(self._name, said.stand, True)

@@ -8,7 +8,7 @@ items that give the sizes of others.
 from collections.abc import Iterator, Mapping
 from typing import Final, Literal, NamedTuple
 
-from urc._numbers import Number, number_of, width_of
+from urc._number_types import Number, number_of, width_of
 from urc.expressions import COUNTERS, Template
 
 __all__ = [

@@ -4,13 +4,13 @@ The check of a binding and the page share this function, so that they agree.
 """
 
 from urc.model.driver import Command
-from urc.model.interface import Given
-from urc.model.widget import Port
+from urc.model.interface import OutputBinding
+from urc.model.widget import WidgetPort
 
 __all__ = ["targets"]
 
 
-def targets(command: Command, port: Port, given: Given) -> dict[str, str]:
+def targets(command: Command, port: WidgetPort, given: OutputBinding) -> dict[str, str]:
     """Return argument of the command → argument of the output that supplies it.
 
     The binding decides. Without a binding, a value goes to the argument of the same name. A single

@@ -4,21 +4,21 @@ from collections.abc import Mapping
 from typing import Final, Literal, NamedTuple
 
 from urc.expressions import ExpressionError, Template
-from urc.model.codec import FramingSpec, ReadSpec, WriteSpec
-from urc.model.flow import (
-    Asides,
+from urc.model.exchange import (
     Confirm,
     ErrorReply,
     Hold,
     Keepalive,
     Offline,
     Priority,
+    ProvisionalReplies,
     Queue,
     Requirement,
     Retry,
     Stage,
     Verify,
 )
+from urc.model.payload import FramingSpec, ReadSpec, WriteSpec
 from urc.model.sequence import ExpectStep, RunStep, Step, all_steps
 from urc.model.values import NOTHING, ElementType, Reading, Signal, Value
 from urc.patterns import Pattern
@@ -117,7 +117,7 @@ class Reply(NamedTuple):
     """Error replies in addition to `errors`, read by any form."""
     framing: FramingSpec | None = None
     """Framing of the reply; None: the framing of the connection."""
-    asides: Asides = Asides()
+    asides: ProvisionalReplies = ProvisionalReplies()
     """Provisional replies that may precede the first reply."""
 
     def with_errors(self, errors: tuple[Pattern, ...], faults: tuple[ErrorReply, ...]) -> "Reply":

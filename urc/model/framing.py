@@ -7,7 +7,7 @@ negative one from behind its last byte.
 from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
-from urc._sums import FOLDED, PLAIN_CHECKSUMS, CrcSpec, FoldSpec
+from urc._checksum_math import FOLDED, PLAIN_CHECKSUMS, CrcSpec, FoldSpec
 from urc.model.values import NOTHING
 
 __all__ = [
@@ -22,8 +22,8 @@ __all__ = [
     "LengthSpec",
     "Salt",
     "Spelling",
-    "TrailSpec",
-    "Window",
+    "TrailerSpec",
+    "ByteRange",
     "spelt_size",
 ]
 
@@ -33,7 +33,7 @@ Digits = Literal["", "hex", "HEX", "base64"]
 """Notation of the bytes between the start and end markers; "" for raw bytes."""
 
 
-class Window(NamedTuple):
+class ByteRange(NamedTuple):
     """A byte range of a frame, as a Python slice."""
 
     start: int = 0
@@ -68,7 +68,7 @@ class ChecksumSpec(NamedTuple):
     algorithm: CrcSpec | FoldSpec | str
     """Parameters, or the name of an algorithm without parameters: ``fletcher16``, ``adler32`` …"""
     bits: int
-    over: Window
+    over: ByteRange
     at: int
     is_big: bool = True
     spelling: Spelling = "raw"
@@ -86,7 +86,7 @@ class ChecksumSpec(NamedTuple):
         return spelt_size(self.bits, self.spelling)
 
 
-class TrailSpec(NamedTuple):
+class TrailerSpec(NamedTuple):
     """A checksum behind a text of variable length."""
 
     checksum: ChecksumSpec
@@ -165,7 +165,7 @@ class FrameLayout(NamedTuple):
     """Those before it."""
     escape: EscapeSpec | None = None
     """Byte stuffing of the payload alone."""
-    trail: TrailSpec | None = None
+    trail: TrailerSpec | None = None
     """Trailing checksum, removed before all other checks and added after all others."""
     digits: Digits = ""
     """Notation of the bytes between start and end; places and `checksums` count decoded bytes."""

@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 
 from urc.model.values import NOTHING, Value
 
-__all__ = ["DEBUG", "Given", "Grid", "Interface", "SCREENS", "Slot", "Tab", "WidgetUse"]
+__all__ = ["DEBUG", "OutputBinding", "Layout", "Interface", "SCREENS", "Slot", "Tab", "WidgetUse"]
 
 SCREENS: Final = ("landscape", "portrait", "phone_portrait", "phone_landscape")
 """Kinds of screen that have a layout of their own."""
@@ -14,7 +14,7 @@ DEBUG: Final = "debug"
 """The built-in interface of every robot; documents must not use its name."""
 
 
-class Given(NamedTuple):
+class OutputBinding(NamedTuple):
     """Values that an output of a widget gives to the arguments of its command."""
 
     names: Mapping[str, str] = NOTHING
@@ -36,7 +36,7 @@ class WidgetUse(NamedTuple):
     options: Mapping[str, object] = NOTHING
     """Options with defaults, validated against the schema of the widget."""
     title: str = ""
-    given: Mapping[str, Given] = NOTHING
+    given: Mapping[str, OutputBinding] = NOTHING
     """Output of the widget → its binding, where one is declared."""
     lists: Mapping[str, tuple[str, ...]] = NOTHING
     """List input of the widget → signals of the driver, in order."""
@@ -56,7 +56,7 @@ class Slot(NamedTuple):
     column_span: int = 1
 
 
-class Grid(NamedTuple):
+class Layout(NamedTuple):
     """One layout: numbers of rows and columns, and its slots."""
 
     rows: int
@@ -73,8 +73,8 @@ class Tab(NamedTuple):
     name: str = ""
     """Name of the page; "" for an interface without tabs."""
     title: str = ""
-    layouts: Mapping[str, Grid] = NOTHING
-    left_handed: Mapping[str, Grid] = NOTHING
+    layouts: Mapping[str, Layout] = NOTHING
+    left_handed: Mapping[str, Layout] = NOTHING
     """Screen → declared left-handed layout."""
     is_mirrored: bool = True
     """Whether all other layouts are mirrored for left-handed operators."""
@@ -85,7 +85,7 @@ class Interface(NamedTuple):
 
     name: str
     title: str = ""
-    layouts: Mapping[str, Grid] = NOTHING
+    layouts: Mapping[str, Layout] = NOTHING
     """Screen → layout; empty when there are tabs."""
     background: str = ""
     """Name of the slot behind all others; "" for no background."""
@@ -95,7 +95,7 @@ class Interface(NamedTuple):
     licence: str = ""
     """SPDX identifier from the document."""
     author: str = ""
-    left_handed: Mapping[str, Grid] = NOTHING
+    left_handed: Mapping[str, Layout] = NOTHING
     """Left-handed layouts, as in a tab."""
     is_mirrored: bool = True
     tabs: Mapping[str, Tab] = NOTHING

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
 from urc.expressions import Template
-from urc.model.codec import Envelope, ReadSpec, WriteSpec
 from urc.model.driver import Driver, FramingSpec
 from urc.model.interface import Interface, WidgetUse
+from urc.model.payload import Envelope, ReadSpec, WriteSpec
 from urc.model.values import NOTHING, Alarm, Reading, Value
 from urc.model.widget import Widget
 from urc.model.world import WorldSpec
@@ -21,7 +21,7 @@ __all__ = [
     "Reaction",
     "Setting",
     "SimulatorRule",
-    "State",
+    "ExpectedState",
     "pieces_of",
 ]
 
@@ -64,7 +64,7 @@ def pieces_of(fed: Fed | tuple[Fed, ...]) -> tuple[Fed, ...]:
     return (fed,) if isinstance(fed, (str, bytes, Envelope)) else fed
 
 
-class State(NamedTuple):
+class ExpectedState(NamedTuple):
     """The expected state of a signal, in addition to its value."""
 
     has_value: bool = False
@@ -76,7 +76,7 @@ class State(NamedTuple):
     """Expected age: fresh, old or never set; "": any."""
 
 
-Expected = Value | tuple[Value, ...] | State
+Expected = Value | tuple[Value, ...] | ExpectedState
 """Expected value of a signal, or of all elements of an array."""
 
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from urc.expressions import Template
-from urc.model.codec import FramingSpec, ReadSpec, WriteSpec
-from urc.model.flow import ErrorReply
+from urc.model.exchange import ErrorReply
+from urc.model.payload import FramingSpec, ReadSpec, WriteSpec
 from urc.model.values import NOTHING, Value
 from urc.patterns import Pattern
 

@@ -2,12 +2,12 @@
 
 from typing import Literal, NamedTuple
 
-__all__ = ["FieldKind", "Hole", "JsonPath", "XmlPath", "XmlStep"]
+__all__ = ["FieldKind", "PatternField", "JsonPath", "XmlPath", "XmlStep"]
 
 FieldKind = Literal["integer", "number", "word", "text", "rest", "hex"]
 
 
-class Hole(NamedTuple):
+class PatternField(NamedTuple):
     """A field in a pattern, and the literal text before it."""
 
     before: str

@@ -17,7 +17,7 @@ __all__ = [
     "Axes",
     "Conversion",
     "ElementType",
-    "Limits",
+    "AlarmLimits",
     "NOTHING",
     "Reading",
     "Sample",
@@ -43,7 +43,7 @@ Alarm = Literal["", "lolo", "low", "high", "hihi"]
 """The limit that a value has passed; "" for normal."""
 
 
-class Limits(NamedTuple):
+class AlarmLimits(NamedTuple):
     """Alarm limits in the unit of the signal, with the names of EPICS."""
 
     lolo: float | None = None
@@ -90,7 +90,7 @@ class Signal(NamedTuple):
     """Number of significant digits after the decimal point."""
     states: tuple[tuple[str, str], ...] = ()
     """Raw text → displayed word, for enumerated signals."""
-    limits: Limits = Limits()
+    limits: AlarmLimits = AlarmLimits()
     stale_after_s: float = 0.0
     """Age in seconds after which a sample is stale. Always > 0 in a loaded driver."""
     description: str = ""

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 from urc.model.values import NOTHING
 
-__all__ = ["Port", "Widget"]
+__all__ = ["WidgetPort", "Widget"]
 
 
-class Port(NamedTuple):
+class WidgetPort(NamedTuple):
     """An input or output of a widget."""
 
     name: str
@@ -47,8 +47,8 @@ class Widget(NamedTuple):
     """Name of the widget, equal to that of its folder."""
     title: str
     folder: Path
-    inputs: Mapping[str, Port] = NOTHING
-    outputs: Mapping[str, Port] = NOTHING
+    inputs: Mapping[str, WidgetPort] = NOTHING
+    outputs: Mapping[str, WidgetPort] = NOTHING
     options: Mapping[str, object] = NOTHING
     """JSON Schema ``properties`` of its options."""
     at_least_one_of: tuple[str, ...] = ()

@@ -10,7 +10,7 @@ from typing import Final, Literal, NamedTuple
 
 from urc.model.driver import STOPPED
 
-__all__ = ["Changed", "Client", "Lease", "LeaseState", "Refused", "Role", "WATCHES"]
+__all__ = ["LeaseChanged", "Operator", "Lease", "LeaseState", "LeaseRefused", "Role", "WATCHES"]
 
 Role = Literal["viewer", "driver", "engineer", "admin"]
 _RANK: Final = {"viewer": 0, "driver": 1, "engineer": 2, "admin": 3}
@@ -22,7 +22,7 @@ REQUEST_S: Final = 10.0
 LONGEST_REQUEST_S: Final = 60.0
 
 
-class Client(NamedTuple):
+class Operator(NamedTuple):
     """Somebody at a screen."""
 
     id: str
@@ -36,8 +36,8 @@ class LeaseState(NamedTuple):
     """What everybody may see, and what survives a restart."""
 
     epoch: int = 0
-    holder: Client | None = None
-    asked_by: Client | None = None
+    holder: Operator | None = None
+    asked_by: Operator | None = None
     """Who wants it next."""
     asked_until: float = 0.0
     latched_by: str = ""
@@ -47,7 +47,7 @@ class LeaseState(NamedTuple):
     over, also when it was reset since."""
 
 
-class Changed(NamedTuple):
+class LeaseChanged(NamedTuple):
     """The lease is another one now."""
 
     state: LeaseState
@@ -55,7 +55,7 @@ class Changed(NamedTuple):
     """A stop goes out before anything of the new state does."""
 
 
-class Refused(NamedTuple):
+class LeaseRefused(NamedTuple):
     """Nothing was changed."""
 
     message: str
@@ -92,7 +92,7 @@ class Lease:
             return "the controls were taken anew meanwhile"
         return ""
 
-    def hindrance(self, client: Client, stops: int | None = None) -> str:
+    def hindrance(self, client: Operator, stops: int | None = None) -> str:
         """Return why a client may not begin what moves by itself, or "".
 
         It needs no lease: nothing is held. But it goes neither against a stop, nor against whoever
@@ -123,76 +123,78 @@ class Lease:
         """Take note that the holder is at work."""
         self._touched_at = now
 
-    def take(self, client: Client, now: float) -> Changed | Refused:
+    def take(self, client: Operator, now: float) -> LeaseChanged | LeaseRefused:
         """Give a free lease to `client`."""
         state = self.state
         if _RANK[client.role] < _RANK["driver"]:
-            return Refused("viewers cannot drive")
+            return LeaseRefused("viewers cannot drive")
         if state.latched_by:
-            return Refused(self.latched)
+            return LeaseRefused(self.latched)
         if state.holder is not None and state.holder.id != client.id:
-            return Refused(f"{_called(state.holder)} has the controls")
+            return LeaseRefused(f"{_called(state.holder)} has the controls")
         return self._give(client, now)
 
-    def ask(self, client: Client, now: float, for_s: float = REQUEST_S) -> Changed | Refused:
+    def ask(
+        self, client: Operator, now: float, for_s: float = REQUEST_S
+    ) -> LeaseChanged | LeaseRefused:
         """Ask the holder for the lease; without an answer in time it is handed over."""
         state = self.state
         if state.holder is None or state.holder.id == client.id:
             return self.take(client, now)
         if _RANK[client.role] < _RANK["driver"]:
-            return Refused("viewers cannot drive")
+            return LeaseRefused("viewers cannot drive")
         if state.asked_by is not None and state.asked_by.id != client.id:
-            return Refused(f"{_called(state.asked_by)} asks for the controls already")
+            return LeaseRefused(f"{_called(state.asked_by)} asks for the controls already")
         for_s = min(max(for_s, SHORTEST_REQUEST_S), LONGEST_REQUEST_S)
         self.state = state._replace(asked_by=client, asked_until=now + for_s)
-        return Changed(self.state, must_stop=False)
+        return LeaseChanged(self.state, must_stop=False)
 
-    def answer(self, client: str, now: float, *, is_granted: bool) -> Changed | Refused:
+    def answer(self, client: str, now: float, *, is_granted: bool) -> LeaseChanged | LeaseRefused:
         """Let the holder hand the lease over, or keep it."""
         state = self.state
         if state.holder is None or state.holder.id != client or state.asked_by is None:
-            return Refused("nobody asks you for the controls")
+            return LeaseRefused("nobody asks you for the controls")
         if is_granted:
             return self._give(state.asked_by, now)
         self.state = state._replace(asked_by=None, asked_until=0.0)
-        return Changed(self.state, must_stop=False)
+        return LeaseChanged(self.state, must_stop=False)
 
-    def force(self, client: Client, now: float) -> Changed | Refused:
+    def force(self, client: Operator, now: float) -> LeaseChanged | LeaseRefused:
         """Take the lease from whoever holds it; that is for engineers."""
         if _RANK[client.role] < _RANK["engineer"]:
-            return Refused("taking the controls by force needs an engineer")
+            return LeaseRefused("taking the controls by force needs an engineer")
         if self.state.latched_by:
-            return Refused(self.latched)
+            return LeaseRefused(self.latched)
         return self._give(client, now)
 
-    def leave(self, client: str) -> Changed | None:
+    def leave(self, client: str) -> LeaseChanged | None:
         """Take note that a client gave the lease back, or is gone; None when it had no part."""
         state = self.state
         if state.holder is not None and state.holder.id == client:
             self.state = self._next(latched_by=state.latched_by)
-            return Changed(self.state, must_stop=True)
+            return LeaseChanged(self.state, must_stop=True)
         if state.asked_by is not None and state.asked_by.id == client:
             self.state = state._replace(asked_by=None, asked_until=0.0)
-            return Changed(self.state, must_stop=False)
+            return LeaseChanged(self.state, must_stop=False)
         return None
 
-    def stop(self, by: str) -> Changed:
+    def stop(self, by: str) -> LeaseChanged:
         """Stop and latch: never refused."""
         state = self.state
         by = state.latched_by or by
         self.state = self._next(latched_by=by)._replace(stops=state.stops + 1)
-        return Changed(self.state, must_stop=True)
+        return LeaseChanged(self.state, must_stop=True)
 
-    def reset(self, client: Client) -> Changed | Refused:
+    def reset(self, client: Operator) -> LeaseChanged | LeaseRefused:
         """Let the robot be driven again, by whoever takes the lease next; starts nothing."""
         if _RANK[client.role] < _RANK["driver"]:
-            return Refused("viewers can stop the robot, and cannot reset it")
+            return LeaseRefused("viewers can stop the robot, and cannot reset it")
         if not self.state.latched_by:
-            return Refused("nothing is stopped")
+            return LeaseRefused("nothing is stopped")
         self.state = self._next()
-        return Changed(self.state, must_stop=False)
+        return LeaseChanged(self.state, must_stop=False)
 
-    def expire(self, now: float) -> Changed | None:
+    def expire(self, now: float) -> LeaseChanged | None:
         """Do what time alone does: hand over to who asked, take it from who went silent."""
         state = self.state
         if state.holder is None:
@@ -203,17 +205,17 @@ class Lease:
             return self.leave(state.holder.id)
         return None
 
-    def _give(self, client: Client, now: float) -> Changed:
+    def _give(self, client: Operator, now: float) -> LeaseChanged:
         self._touched_at = now
         self.state = self._next(holder=client)
-        return Changed(self.state, must_stop=True)
+        return LeaseChanged(self.state, must_stop=True)
 
-    def _next(self, holder: Client | None = None, latched_by: str = "") -> LeaseState:
+    def _next(self, holder: Operator | None = None, latched_by: str = "") -> LeaseState:
         """Return a later epoch, in which nobody has asked for anything yet."""
         return LeaseState(
             self.state.epoch + 1, holder, latched_by=latched_by, stops=self.state.stops
         )
 
 
-def _called(client: Client) -> str:
+def _called(client: Operator) -> str:
     return client.name or "somebody else"

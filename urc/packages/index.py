@@ -6,16 +6,16 @@ from typing import Annotated, Final
 import msgspec
 
 from urc.packages.archive import PACKAGE
-from urc.packages.names import KINDS, NAME, Key, PackageError, parse_key
-from urc.packages.notes import Notes, Provenance
+from urc.packages.names import KINDS, NAME, PackageError, PackageId, parse_key
 from urc.packages.package import Package
 from urc.packages.signature import Signature
+from urc.packages.version_notes import Notes, Provenance
 from urc.packages.versions import Version, parse_range, parse_version
 
 __all__ = [
     "INDEX",
     "INDEX_BYTES",
-    "Entry",
+    "IndexEntry",
     "Index",
     "check_entries",
     "entry_of",
@@ -29,7 +29,7 @@ INDEX_BYTES: Final = 64 << 20
 _Text = Annotated[str, msgspec.Meta(max_length=500)]
 
 
-class Entry(msgspec.Struct, frozen=True):
+class IndexEntry(msgspec.Struct, frozen=True):
     """One version of one package."""
 
     kind: Annotated[str, msgspec.Meta(pattern=rf"\A({'|'.join(KINDS)})\Z")]
@@ -61,9 +61,9 @@ class Entry(msgspec.Struct, frozen=True):
         return self.signature if isinstance(self.signature, Signature) else None
 
     @property
-    def key(self) -> Key:
+    def key(self) -> PackageId:
         """Its package."""
-        return Key(self.kind, self.name)
+        return PackageId(self.kind, self.name)
 
     @property
     def number(self) -> Version:
@@ -84,7 +84,7 @@ class Index(msgspec.Struct, frozen=True):
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     name: _Text
-    packages: tuple[Entry, ...]
+    packages: tuple[IndexEntry, ...]
     number: Annotated[int, msgspec.Meta(ge=0, le=1 << 53)] = 0
     """Number that grows with every change of the repository; 0 without numbers."""
 
@@ -95,11 +95,11 @@ class Index(msgspec.Struct, frozen=True):
 
 def entry_of(
     package: Package, signature: Signature | None = None, notes: Notes | None = None
-) -> Entry:
+) -> IndexEntry:
     """Return the index entry of a package."""
     notes = notes or Notes()
     said = package.manifest
-    return Entry(
+    return IndexEntry(
         *said.key,
         version=said.version,
         sha256=package.digest,
@@ -130,12 +130,12 @@ def read_index(data: bytes, where: str) -> Index:
     return index
 
 
-def in_order(entries: Iterable[Entry]) -> tuple[Entry, ...]:
+def in_order(entries: Iterable[IndexEntry]) -> tuple[IndexEntry, ...]:
     """Return entries in the order of an index."""
     return tuple(sorted(entries, key=lambda entry: (entry.key, entry.number)))
 
 
-def check_entries(entries: Iterable[Entry]) -> None:
+def check_entries(entries: Iterable[IndexEntry]) -> None:
     """Raise `PackageError` for an invalid version or range."""
     versions: set[str] = set()
     needs: set[tuple[str, str]] = set()
@@ -149,13 +149,13 @@ def check_entries(entries: Iterable[Entry]) -> None:
         parse_range(wanted)
 
 
-def search(entries: Iterable[Entry], words: Sequence[str], kind: str = "") -> list[Entry]:
+def search(entries: Iterable[IndexEntry], words: Sequence[str], kind: str = "") -> list[IndexEntry]:
     """Return the newest version of each package with all words; matches in the name come first.
 
     Withdrawn versions are left out.
     """
     wanted = [word.casefold() for word in words]
-    found: dict[tuple[str, str], Entry] = {}
+    found: dict[tuple[str, str], IndexEntry] = {}
     for entry in entries:
         if kind and entry.kind != kind:
             continue

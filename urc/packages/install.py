@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Iterable, Sequence
 
-from urc._phrases import joined, phrase
-from urc.packages.index import Entry
+from urc._translatable import joined, phrase
+from urc.packages.index import IndexEntry
+from urc.packages.install_plan import InstallPlan
 from urc.packages.lock import Lock, lock_of
-from urc.packages.names import Key, PackageError, Wish, parse_key
-from urc.packages.plan import Plan
+from urc.packages.names import PackageError, PackageId, PackageRequirement, parse_key
 from urc.packages.resolver import choose, resolve
 from urc.packages.signature import Signature
 from urc.packages.sources import FileSource, Source, merged, offered
@@ -15,7 +15,7 @@ from urc.packages.versions import parse_range
 from urc.shipped import shipped
 
 __all__ = [
-    "Plan",
+    "InstallPlan",
     "check_names",
     "origin_lines",
     "plan_file",
@@ -25,18 +25,18 @@ __all__ = [
     "withdrawn_lines",
 ]
 
-Found = dict[Key, list[tuple[Entry, Source]]]
+Found = dict[PackageId, list[tuple[IndexEntry, Source]]]
 
 
 def plan_wish(
-    wish: Wish,
+    wish: PackageRequirement,
     sources: Sequence[Source],
     store: Store,
     complain: Callable[[str], None],
     pinned: Lock | None = None,
     *,
     takes_withdrawn: bool = False,
-) -> Plan:
+) -> InstallPlan:
     """Return the plan of a requirement, with all archives.
 
     Args:
@@ -67,7 +67,7 @@ def plan_wish(
 
 def plan_file(
     source: FileSource, others: Sequence[Source], store: Store, complain: Callable[[str], None]
-) -> Plan:
+) -> InstallPlan:
     """Return the plan of the package in a file or folder.
 
     The other sources are asked only for needs that it does not include.
@@ -89,8 +89,8 @@ def plan_file(
 
 
 def plan_root(
-    root: Key, wanted: str, found: Found, store: Store, pinned: Lock | None = None
-) -> Plan:
+    root: PackageId, wanted: str, found: Found, store: Store, pinned: Lock | None = None
+) -> InstallPlan:
     """Return the plan of one package, with all archives.
 
     Args:
@@ -121,15 +121,15 @@ def plan_root(
         except PackageError:
             archives[entry.sha256] = source.fetch(entry)
     remarks = {entry.sha256: said for entry in chosen.values() if (said := _remark(entry))}
-    return Plan(lock, archives, origins, signatures, remarks=remarks)
+    return InstallPlan(lock, archives, origins, signatures, remarks=remarks)
 
 
-def settle(root: Key, wanted: str, found: Found) -> dict[Key, Entry]:
+def settle(root: PackageId, wanted: str, found: Found) -> dict[PackageId, IndexEntry]:
     """Return the chosen versions without fetching them; raise `PackageError`."""
     return resolve(root, wanted, {key: [entry for entry, _ in some] for key, some in found.items()})
 
 
-def check_names(chosen: Iterable[Key]) -> None:
+def check_names(chosen: Iterable[PackageId]) -> None:
     """Raise `PackageError` for a widget with the name of a built-in one."""
     for key in chosen:
         if key.kind == "widget" and (shipped("widgets") / key.name / "widget.yaml").is_file():
@@ -138,7 +138,7 @@ def check_names(chosen: Iterable[Key]) -> None:
             )
 
 
-def origin_lines(plan: Plan, store: Store) -> list[str]:
+def origin_lines(plan: InstallPlan, store: Store) -> list[str]:
     """Return a line with origin and signer for each package."""
     keys = store.state().keys
     lines: list[str] = []
@@ -158,7 +158,7 @@ def origin_lines(plan: Plan, store: Store) -> list[str]:
     return lines
 
 
-def withdrawn_lines(lock: Lock, entries: Sequence[Entry]) -> list[str]:
+def withdrawn_lines(lock: Lock, entries: Sequence[IndexEntry]) -> list[str]:
     """Return a line for each withdrawn part of an installed package, with the reason."""
     return [
         phrase("{package} was withdrawn: {why}", package=entry, why=entry.why_withdrawn)
@@ -168,7 +168,7 @@ def withdrawn_lines(lock: Lock, entries: Sequence[Entry]) -> list[str]:
     ]
 
 
-def _remark(entry: Entry) -> str:
+def _remark(entry: IndexEntry) -> str:
     """Return the repository's remarks about a version."""
     said: list[str] = []
     if entry.why_withdrawn:
@@ -176,7 +176,7 @@ def _remark(entry: Entry) -> str:
     return joined("; ", said + ([str(entry.provenance)] if entry.provenance else []))
 
 
-def _withdrawn(wish: Wish, found: Found) -> str:
+def _withdrawn(wish: PackageRequirement, found: Found) -> str:
     """Return the withdrawn versions that match the requirement, with the reasons."""
     wanted = parse_range(wish.range)
     gone = [

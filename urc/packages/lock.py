@@ -6,8 +6,8 @@ from typing import Annotated, Final
 import msgspec
 
 from urc.packages.archive import PACKAGE
-from urc.packages.index import Entry
-from urc.packages.names import Key, PackageError, parse_key
+from urc.packages.index import IndexEntry
+from urc.packages.names import PackageError, PackageId, parse_key
 from urc.packages.package import sha256
 from urc.packages.versions import Version, parse_version
 
@@ -45,7 +45,7 @@ class Lock(msgspec.Struct, frozen=True):
             parse_version(pin.version)
 
     @property
-    def key(self) -> Key:
+    def key(self) -> PackageId:
         """Requested package."""
         return parse_key(self.root)
 
@@ -72,7 +72,7 @@ class Lock(msgspec.Struct, frozen=True):
         return f"{self.root} {self.version}"
 
 
-def lock_of(root: Key, chosen: Mapping[Key, Entry]) -> Lock:
+def lock_of(root: PackageId, chosen: Mapping[PackageId, IndexEntry]) -> Lock:
     """Return the lock of resolved versions."""
     pins = {
         str(key): Pin(entry.version, entry.sha256, entry.size)

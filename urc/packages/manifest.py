@@ -2,10 +2,10 @@
 
 from typing import Any, Final, NamedTuple
 
-from urc.packages.names import KINDS, NAME, Key, PackageError, parse_key
+from urc.packages.names import KINDS, NAME, PackageError, PackageId, parse_key
 from urc.packages.versions import parse_range, parse_version
 from urc.problems import ProblemsError
-from urc.source import Document, Limits, Path, parse_document
+from urc.source import Document, DocumentLimits, Path, parse_document
 
 __all__ = ["LANGUAGE", "MANIFEST", "Manifest", "parse_manifest"]
 
@@ -22,7 +22,7 @@ _MUST: Final = _KEYS[:6]
 class Manifest(NamedTuple):
     """The checked content of ``package.yaml``."""
 
-    key: Key
+    key: PackageId
     version: str
     """Version by SemVer."""
     licence: str
@@ -46,7 +46,7 @@ def parse_manifest(content: bytes, file: str) -> Manifest:
         PackageError: its fault, with the line.
     """
     try:
-        document = parse_document(content, file, Limits(size_bytes=65536))
+        document = parse_document(content, file, DocumentLimits(size_bytes=65536))
     except ProblemsError as error:
         raise PackageError(str(error)) from None
     reader = _Reader(document)
@@ -60,7 +60,7 @@ def parse_manifest(content: bytes, file: str) -> Manifest:
     if type(data["urc"]) is not int or data["urc"] != LANGUAGE:
         raise reader.fault(("urc",), f"this URC reads language version {LANGUAGE}")
     return Manifest(
-        Key(reader.kind(), reader.name()),
+        PackageId(reader.kind(), reader.name()),
         reader.version(),
         reader.text("licence"),
         reader.authors(),

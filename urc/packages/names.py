@@ -5,7 +5,16 @@ from typing import Final, NamedTuple
 
 from urc.problems import UrcError
 
-__all__ = ["FOLDERS", "KINDS", "NAME", "Key", "PackageError", "Wish", "parse_key", "parse_wish"]
+__all__ = [
+    "FOLDERS",
+    "KINDS",
+    "NAME",
+    "PackageId",
+    "PackageError",
+    "PackageRequirement",
+    "parse_key",
+    "parse_wish",
+]
 
 KINDS: Final = ("driver", "interface", "widget", "robot")
 FOLDERS: Final = {f"{kind}s": kind for kind in KINDS}
@@ -17,7 +26,7 @@ class PackageError(UrcError):
     """A failed operation on a package, a repository or the store, with a one-line message."""
 
 
-class Key(NamedTuple):
+class PackageId(NamedTuple):
     """The identity of a package, without its version."""
 
     kind: str
@@ -28,7 +37,7 @@ class Key(NamedTuple):
         return f"{self.kind}s/{self.name}"
 
 
-class Wish(NamedTuple):
+class PackageRequirement(NamedTuple):
     """A requirement from a command line."""
 
     kind: str
@@ -41,7 +50,7 @@ class Wish(NamedTuple):
         return text if self.range == "*" else f"{text}@{self.range}"
 
 
-def parse_key(text: str) -> Key:
+def parse_key(text: str) -> PackageId:
     """Return the package with the name ``drivers/puppet``; raise `PackageError`."""
     folder, slash, name = text.partition("/")
     if not slash or folder not in FOLDERS or not NAME.fullmatch(name):
@@ -49,10 +58,10 @@ def parse_key(text: str) -> Key:
             f"{text!r} names no package: write drivers/NAME, interfaces/NAME, widgets/NAME"
             " or robots/NAME, in small letters, digits and '-'"
         )
-    return Key(FOLDERS[folder], name)
+    return PackageId(FOLDERS[folder], name)
 
 
-def parse_wish(text: str) -> Wish:
+def parse_wish(text: str) -> PackageRequirement:
     """Return the requirement in ``puppet``, ``drivers/puppet`` or ``puppet@^1.2``."""
     package, at, wanted = text.partition("@")
     if "/" in package:
@@ -66,4 +75,4 @@ def parse_wish(text: str) -> Wish:
         )
     if at and not wanted:
         raise PackageError(f"{text!r}: expected a version after '@'")
-    return Wish(kind, name, wanted or "*")
+    return PackageRequirement(kind, name, wanted or "*")

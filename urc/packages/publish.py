@@ -6,12 +6,12 @@ from urllib.parse import urlsplit
 
 import msgspec
 
+from urc.packages.http_repository import put, repository_url
 from urc.packages.index import entry_of
 from urc.packages.names import PackageError
-from urc.packages.notes import PROVENANCE, Provenance
 from urc.packages.package import Package
-from urc.packages.remote import put, repository_url
 from urc.packages.signature import SIGNATURE, Signature
+from urc.packages.version_notes import PROVENANCE, Provenance
 from urc.problems import printable
 
 __all__ = ["Published", "is_overheard", "publish"]

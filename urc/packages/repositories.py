@@ -9,13 +9,13 @@ from typing import Annotated, Final
 
 import msgspec
 
-from urc.packages import disk
-from urc.packages.head import HEAD, HEAD_BYTES, Head, read_head
-from urc.packages.index import INDEX, INDEX_BYTES, Entry, Index, read_index
+from urc.packages import atomic_files
+from urc.packages.http_repository import HttpResponse, ask, fetch_archive, repository_url
+from urc.packages.index import INDEX, INDEX_BYTES, Index, IndexEntry, read_index
+from urc.packages.index_head import HEAD, HEAD_BYTES, IndexHead, read_head
 from urc.packages.names import PackageError
 from urc.packages.package import sha256
-from urc.packages.remote import Answer, ask, fetch_archive, repository_url
-from urc.packages.trust import Trust
+from urc.packages.trust import PinnedKey
 
 __all__ = ["Repositories", "Repository"]
 
@@ -36,7 +36,7 @@ class _Tags(msgspec.Struct, frozen=True):
     index: str = ""
     """ETag of the index."""
     head: str = ""
-    said: Head | None = None
+    said: IndexHead | None = None
     """The head after its check; None without a matching one."""
 
 
@@ -60,19 +60,19 @@ class Repository:
         stem = hashlib.sha256(url.encode()).hexdigest()[:32]
         self._index = folder / f"{stem}.index.json"
         self._tags = folder / f"{stem}.tags.json"
-        self._trust = Trust(url, folder / f"{stem}.key.json", now)
+        self._trust = PinnedKey(url, folder / f"{stem}.key.json", now)
 
     @property
     def keeper(self) -> str:
         """Name and fingerprint of the index's signer, or ""."""
         return self._trust.keeper
 
-    def known(self) -> tuple[Entry, ...]:
+    def known(self) -> tuple[IndexEntry, ...]:
         """Return the entries of the stored index, without a request; () if there is no index."""
         kept = self._kept()
         return kept[0].packages if kept is not None else ()
 
-    def entries(self) -> tuple[Entry, ...]:
+    def entries(self) -> tuple[IndexEntry, ...]:
         """Return the current entries, or the stored ones while the repository is unreachable.
 
         Raises:
@@ -121,7 +121,7 @@ class Repository:
         return self._whole(kept, head, answer.etag)
 
     def _whole(
-        self, kept: tuple[Index, _Tags] | None, head: Head | None, etag: str
+        self, kept: tuple[Index, _Tags] | None, head: IndexHead | None, etag: str
     ) -> Index | None:
         """Request the whole index; return None if it does not match its signed head.
 
@@ -153,7 +153,7 @@ class Repository:
                 f" 'urc repo remove {self.name}' and add it again"
             )
 
-    def fetch(self, entry: Entry) -> bytes:
+    def fetch(self, entry: IndexEntry) -> bytes:
         """Return an archive of the repository."""
         return fetch_archive(self.name, entry)
 
@@ -169,8 +169,8 @@ class Repository:
         if tags.said is not None:
             self._trust.keep(tags.said, work)
         if data is not None:
-            disk.put_file(self._index, data, work)
-        disk.put_file(self._tags, msgspec.json.encode(tags), work)
+            atomic_files.put_file(self._index, data, work)
+        atomic_files.put_file(self._tags, msgspec.json.encode(tags), work)
 
     def _kept(self) -> tuple[Index, _Tags] | None:
         """Return the stored index, with its tags if they match, or None."""
@@ -205,7 +205,7 @@ class Repositories:
         """Add a reachable repository; return its address and its index."""
         url = repository_url(text)
         index = self._repository(url).refresh()
-        with disk.exclusive(self._folder / "changing"):
+        with atomic_files.exclusive(self._folder / "changing"):
             urls = self._urls()
             if len(urls) >= _MOST:
                 raise PackageError(f"at most {_MOST} repositories can be remembered")
@@ -216,7 +216,7 @@ class Repositories:
     def remove(self, text: str) -> str:
         """Remove a repository; packages from it stay installed."""
         url = repository_url(text)
-        with disk.exclusive(self._folder / "changing"):
+        with atomic_files.exclusive(self._folder / "changing"):
             urls = self._urls()
             if url not in urls:
                 known = ", ".join(urls) or "none"
@@ -239,10 +239,10 @@ class Repositories:
 
     def _write(self, urls: tuple[str, ...]) -> None:
         data = msgspec.json.encode(_Known(1, urls))
-        disk.put_file(self._file, data + b"\n", self._folder / "work")
+        atomic_files.put_file(self._file, data + b"\n", self._folder / "work")
 
 
-def _head(answer: Answer, url: str) -> Head | None:
+def _head(answer: HttpResponse, url: str) -> IndexHead | None:
     """Return the head in a response, or None for a missing or damaged one."""
     with suppress(PackageError):
         return read_head(answer.body, url + HEAD)

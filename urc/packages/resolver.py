@@ -12,9 +12,9 @@ from typing import Any, Final, NamedTuple
 from resolvelib import AbstractProvider, BaseReporter, ResolutionImpossible, Resolver
 from resolvelib.resolvers import ResolutionTooDeep
 
-from urc.packages.index import Entry
+from urc.packages.index import IndexEntry
 from urc.packages.manifest import LANGUAGE
-from urc.packages.names import Key, PackageError, Wish, parse_key
+from urc.packages.names import PackageError, PackageId, PackageRequirement, parse_key
 from urc.packages.versions import parse_range, parse_version
 
 __all__ = ["choose", "resolve"]
@@ -24,14 +24,14 @@ _PACKAGES_MOST: Final = 128
 
 
 class _Need(NamedTuple):
-    key: Key
+    key: PackageId
     wanted: str
 
 
-Entries = Mapping[Key, Sequence[Entry]]
+Entries = Mapping[PackageId, Sequence[IndexEntry]]
 
 
-def choose(entries: Entries, wish: Wish) -> Key:
+def choose(entries: Entries, wish: PackageRequirement) -> PackageId:
     """Return the package of a requirement.
 
     Raises:
@@ -47,10 +47,10 @@ def choose(entries: Entries, wish: Wish) -> Key:
 
     near = get_close_matches(wish.name, [key.name for key in entries], 1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise PackageError(f"no repository has {Wish(wish.kind, wish.name)}{hint}")
+    raise PackageError(f"no repository has {PackageRequirement(wish.kind, wish.name)}{hint}")
 
 
-def resolve(root: Key, wanted: str, entries: Entries) -> dict[Key, Entry]:
+def resolve(root: PackageId, wanted: str, entries: Entries) -> dict[PackageId, IndexEntry]:
     """Return one version of `root` and of each of its needs.
 
     Args:
@@ -61,7 +61,7 @@ def resolve(root: Key, wanted: str, entries: Entries) -> dict[Key, Entry]:
     Raises:
         PackageError: the conflicting needs, and the packages with these needs.
     """
-    resolver: Resolver[_Need, Entry, Key] = Resolver(_Provider(entries), BaseReporter())
+    resolver: Resolver[_Need, IndexEntry, PackageId] = Resolver(_Provider(entries), BaseReporter())
     try:
         result = resolver.resolve([_Need(root, wanted)], max_rounds=_ROUNDS)
     except ResolutionImpossible as error:
@@ -73,31 +73,31 @@ def resolve(root: Key, wanted: str, entries: Entries) -> dict[Key, Entry]:
     return dict(sorted(result.mapping.items()))
 
 
-class _Provider(AbstractProvider[_Need, Entry, Key]):
+class _Provider(AbstractProvider[_Need, IndexEntry, PackageId]):
     def __init__(self, entries: Entries) -> None:
         self._entries = entries
 
-    def identify(self, requirement_or_candidate: _Need | Entry) -> Key:
+    def identify(self, requirement_or_candidate: _Need | IndexEntry) -> PackageId:
         return requirement_or_candidate.key
 
     def get_preference(
         self,
-        identifier: Key,
-        resolutions: Mapping[Key, Entry],
-        candidates: Mapping[Key, Iterator[Entry]],
-        information: Mapping[Key, Iterator[Any]],
+        identifier: PackageId,
+        resolutions: Mapping[PackageId, IndexEntry],
+        candidates: Mapping[PackageId, Iterator[IndexEntry]],
+        information: Mapping[PackageId, Iterator[Any]],
         backtrack_causes: Sequence[Any],
-    ) -> tuple[bool, Key]:
+    ) -> tuple[bool, PackageId]:
         """Prefer packages of an earlier conflict."""
         causes = {cause.requirement.key for cause in backtrack_causes}
         return identifier not in causes, identifier
 
     def find_matches(
         self,
-        identifier: Key,
-        requirements: Mapping[Key, Iterator[_Need]],
-        incompatibilities: Mapping[Key, Iterator[Entry]],
-    ) -> list[Entry]:
+        identifier: PackageId,
+        requirements: Mapping[PackageId, Iterator[_Need]],
+        incompatibilities: Mapping[PackageId, Iterator[IndexEntry]],
+    ) -> list[IndexEntry]:
         needs = list(requirements.get(identifier, ()))
         refused = {entry.version for entry in incompatibilities.get(identifier, ())}
         found = [
@@ -109,10 +109,10 @@ class _Provider(AbstractProvider[_Need, Entry, Key]):
         ]
         return sorted(found, key=lambda entry: entry.number, reverse=True)
 
-    def is_satisfied_by(self, requirement: _Need, candidate: Entry) -> bool:
+    def is_satisfied_by(self, requirement: _Need, candidate: IndexEntry) -> bool:
         return _allows(requirement.wanted, candidate.version)
 
-    def get_dependencies(self, candidate: Entry) -> list[_Need]:
+    def get_dependencies(self, candidate: IndexEntry) -> list[_Need]:
         return [_Need(parse_key(key), wanted) for key, wanted in candidate.needs.items()]
 
 
@@ -122,10 +122,10 @@ def _allows(wanted: str, version: str) -> bool:
     return parse_range(wanted).allows(parse_version(version))
 
 
-def _conflict(error: "ResolutionImpossible[_Need, Entry]", entries: Entries) -> str:
+def _conflict(error: "ResolutionImpossible[_Need, IndexEntry]", entries: Entries) -> str:
     """Return a message with each need, its package, and the available versions."""
     causes: Iterable[Any] = error.causes
-    asked: dict[Key, list[str]] = {}
+    asked: dict[PackageId, list[str]] = {}
     for cause in causes:
         who = str(cause.parent) if cause.parent is not None else "you"
         verb = "ask for" if cause.parent is None else "needs"
@@ -136,7 +136,7 @@ def _conflict(error: "ResolutionImpossible[_Need, Entry]", entries: Entries) -> 
                      for key, lines in sorted(asked.items()))  # fmt: skip
 
 
-def _there_is(key: Key, entries: Entries) -> str:
+def _there_is(key: PackageId, entries: Entries) -> str:
     known = sorted(entries.get(key, ()), key=lambda entry: entry.number)
     usable = [entry.version for entry in known if entry.language == LANGUAGE]
     if usable:

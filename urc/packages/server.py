@@ -21,16 +21,16 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from urc.packages.archive import PACKAGE
-from urc.packages.head import HEAD, HEAD_BYTES, Head, Seal, read_head
-from urc.packages.index import INDEX, INDEX_BYTES, Entry, read_index, search
-from urc.packages.intake import Refused, Taken, take
-from urc.packages.keeper import urcpm
+from urc.packages.index import INDEX, INDEX_BYTES, IndexEntry, read_index, search
+from urc.packages.index_builder import urcpm
+from urc.packages.index_head import HEAD, HEAD_BYTES, IndexHead, IndexSigner, read_head
 from urc.packages.manifest import MANIFEST, parse_manifest
-from urc.packages.names import FOLDERS, Key, PackageError
-from urc.packages.notes import PROVENANCE, Provenance
+from urc.packages.names import FOLDERS, PackageError, PackageId
 from urc.packages.package import open_package, sha256
 from urc.packages.signature import SIGNATURE, Signature
-from urc.packages.tokens import Tokens
+from urc.packages.submission import SubmissionRefused, SubmissionResult, take
+from urc.packages.tokens import UploadTokens
+from urc.packages.version_notes import PROVENANCE, Provenance
 
 __all__ = ["repository_app"]
 
@@ -42,15 +42,15 @@ _Told = TypeVar("_Told", Signature, Provenance)
 _HEADERS: Final = {"cache-control": "no-store", "x-content-type-options": "nosniff"}
 
 
-class Door:
+class UploadService:
     """A service for `PUT archives/drivers/puppet/1.0.0.zip`, with `authorization: Bearer TOKEN`."""
 
     def __init__(
         self,
         folder: Path,
-        tokens: Tokens,
+        tokens: UploadTokens,
         examine: Callable[[Path], list[str]],
-        seal: Seal | None = None,
+        seal: IndexSigner | None = None,
     ) -> None:
         self._folder = folder
         self._tokens = tokens
@@ -61,19 +61,19 @@ class Door:
 
     async def answer(self, request: Request) -> Response:
         """Answer one request: 201 if the version is new, 200 if it was listed before."""
-        refusal: Refused | None = None
+        refusal: SubmissionRefused | None = None
         key = None
         try:
             key = await self._admitted(request)
-        except Refused as error:
+        except SubmissionRefused as error:
             refusal = error
         try:
             # Read the body of refused requests too, or the client may miss the response.
             body = await _body(request, is_kept=refusal is None)
             if refusal is not None or key is None:
-                raise refusal or Refused(404, "this path does not exist")
+                raise refusal or SubmissionRefused(404, "this path does not exist")
             taken = await self._taken(request, body)
-        except Refused as error:
+        except SubmissionRefused as error:
             headers = {"www-authenticate": "Bearer"} if error.status == 401 else {}
             return _told(error.status, {"error": str(error)}, headers)
         except ClientDisconnect:
@@ -85,36 +85,42 @@ class Door:
         said = {"listed": str(taken.entry), "sha256": taken.entry.sha256}
         return _told(201 if taken.is_new else 200, said)
 
-    async def _admitted(self, request: Request) -> Key:
-        """Return the package that this token may publish; raise `Refused`."""
+    async def _admitted(self, request: Request) -> PackageId:
+        """Return the package that this token may publish; raise `SubmissionRefused`."""
         scheme, _, text = request.headers.get("authorization", "").partition(" ")
         token = None
         if scheme.lower() == "bearer":
             try:
                 token = await asyncio.to_thread(self._tokens.find, text.strip())
             except PackageError:  # clients must not learn about damaged files
-                raise Refused(503, "the tokens of this repository cannot be read") from None
+                raise SubmissionRefused(
+                    503, "the tokens of this repository cannot be read"
+                ) from None
         if token is None:
-            raise Refused(401, "this repository needs a token; ask its maintainer for one")
+            raise SubmissionRefused(
+                401, "this repository needs a token; ask its maintainer for one"
+            )
         found = _FILE.fullmatch(request.path_params["path"])
         if found is None or found[1] not in FOLDERS:
-            raise Refused(404, "archives/drivers/NAME/VERSION.zip is expected")
-        key = Key(FOLDERS[found[1]], found[2])
+            raise SubmissionRefused(404, "archives/drivers/NAME/VERSION.zip is expected")
+        key = PackageId(FOLDERS[found[1]], found[2])
         if not token.allows(key):
             may = ", ".join(token.may)
-            raise Refused(403, f"the token {token.name!r} may publish {may}, and not {key}")
+            raise SubmissionRefused(
+                403, f"the token {token.name!r} may publish {may}, and not {key}"
+            )
         return key
 
-    async def _taken(self, request: Request, body: bytes) -> Taken:
+    async def _taken(self, request: Request, body: bytes) -> SubmissionResult:
         signature = _header(request, SIGNATURE, Signature, "no signature")
         provenance = _header(request, PROVENANCE, Provenance, "no origin")
         try:
             if provenance is not None:
                 provenance.check()
         except PackageError as error:
-            raise Refused(400, f"the header {PROVENANCE}: {error}") from None
+            raise SubmissionRefused(400, f"the header {PROVENANCE}: {error}") from None
         if self._waiting >= _WAITING_MOST:
-            raise Refused(503, "too many packages are being published; try again")
+            raise SubmissionRefused(503, "too many packages are being published; try again")
         self._waiting += 1
         try:
             async with self._turn:
@@ -136,24 +142,26 @@ class Door:
 
 
 async def _body(request: Request, *, is_kept: bool) -> bytes:
-    """Return the body, or nothing if it is not kept; raise `Refused` if it is too large."""
+    """Return the body, or nothing if it is not kept; raise `SubmissionRefused` if it is too large."""
     size = 0
     pieces = []
     async for piece in request.stream():
         size += len(piece)
         if size > PACKAGE.archive_bytes:
-            raise Refused(413, f"an archive has at most {PACKAGE.archive_bytes >> 20} MiB")
+            raise SubmissionRefused(
+                413, f"an archive has at most {PACKAGE.archive_bytes >> 20} MiB"
+            )
         if is_kept:
             pieces.append(piece)
     wanted = request.headers.get("urc-sha256", "")
     body = b"".join(pieces)
     if is_kept and wanted and sha256(body) != wanted:
-        raise Refused(400, "the upload was damaged on the way; try again")
+        raise SubmissionRefused(400, "the upload was damaged on the way; try again")
     return body
 
 
 def _header(request: Request, name: str, kind: type[_Told], lacks: str) -> _Told | None:
-    """Return the value of a header, JSON in base64, or None; raise `Refused`."""
+    """Return the value of a header, JSON in base64, or None; raise `SubmissionRefused`."""
     text = request.headers.get(name, "")
     if not text:
         return None
@@ -162,7 +170,7 @@ def _header(request: Request, name: str, kind: type[_Told], lacks: str) -> _Told
             raise ValueError
         return msgspec.json.decode(base64.b64decode(text, validate=True), type=kind)
     except (ValueError, msgspec.DecodeError):
-        raise Refused(400, f"the header {name} holds {lacks}") from None
+        raise SubmissionRefused(400, f"the header {name} holds {lacks}") from None
 
 
 def _told(status: int, said: dict[str, str], headers: dict[str, str] | None = None) -> Response:
@@ -182,22 +190,22 @@ _LASTING: Final = "public, max-age=31536000, immutable"
 
 def repository_app(
     folder: Path,
-    tokens: Tokens | None = None,
+    tokens: UploadTokens | None = None,
     examine: Callable[[Path], list[str]] | None = None,
-    seal: Seal | None = None,
+    seal: IndexSigner | None = None,
 ) -> Starlette:
     """Return the application that serves the repository in a folder.
 
     Args:
         folder: folder of the repository.
         tokens: upload tokens; None to refuse uploads.
-        examine: checks uploads, see `urc.packages.intake.take`.
+        examine: checks uploads, see `urc.packages.submission.take`.
         seal: signer of the maintainer, for the index with uploads.
     """
     shop = _Shop(folder)
     routes = [Route("/{path:path}", shop.answer, methods=["GET", "HEAD"])]
     if tokens is not None and examine is not None:
-        door = Door(folder, tokens, examine, seal)
+        door = UploadService(folder, tokens, examine, seal)
         routes.append(Route("/{path:path}", door.answer, methods=["PUT"]))
     return Starlette(routes=routes)
 
@@ -206,10 +214,10 @@ class _Shop:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._seen: tuple[int, ...] = ()
-        self._files: Mapping[str, Entry] = {}
-        self._newest: Mapping[str, Entry] = {}
+        self._files: Mapping[str, IndexEntry] = {}
+        self._newest: Mapping[str, IndexEntry] = {}
         self._lists: Mapping[str, bytes] = {}
-        self._known: Head | None = None
+        self._known: IndexHead | None = None
 
     async def answer(self, request: Request) -> Response:
         """Answer any request."""
@@ -238,7 +246,7 @@ class _Shop:
             return urcpm(parse_manifest(files[MANIFEST], file), files), "json"
         return files.get(file), file.rpartition(".")[2]
 
-    def _archive(self, entry: Entry) -> bytes:
+    def _archive(self, entry: IndexEntry) -> bytes:
         with open(self._folder / entry.file, "rb") as file:
             data = file.read(PACKAGE.archive_bytes + 1)
         if sha256(data) != entry.sha256:
@@ -263,11 +271,11 @@ class _Shop:
         newest = {str(entry.key): entry for entry in search(index.packages, ())}
         self._newest = newest
         self._files = {entry.file: entry for entry in index.packages}
-        head = head or Head(1, index.number, digest)
+        head = head or IndexHead(1, index.number, digest)
         self._lists = {**_lists(index.name, newest), INDEX: data, HEAD: head.to_bytes()}
         self._seen = seen
 
-    def _head(self) -> tuple[Head | None, tuple[int, ...]]:
+    def _head(self) -> tuple[IndexHead | None, tuple[int, ...]]:
         """Return the stored head, and the stamp of its file."""
         try:
             with open(self._folder / HEAD, "rb") as opened:
@@ -285,7 +293,7 @@ def _stamp(status: os.stat_result) -> tuple[int, ...]:
     return status.st_mtime_ns, status.st_size, status.st_ino
 
 
-def _lists(name: str, newest: Mapping[str, Entry]) -> dict[str, bytes]:
+def _lists(name: str, newest: Mapping[str, IndexEntry]) -> dict[str, bytes]:
     """Return the responses for the paths of the thesis's figure B.3."""
     paths = {
         folder: [f"/{key}/" for key, entry in sorted(newest.items()) if entry.kind == kind]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import msgspec
 
-from urc.packages.names import Key, PackageError
+from urc.packages.names import PackageError, PackageId
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -62,7 +62,7 @@ class Signature(msgspec.Struct, frozen=True):
         """Fingerprint of the public key for people: ``SHA256:…``."""
         return fingerprint(self.key)
 
-    def check(self, package: Key, version: str, sha256: str) -> None:
+    def check(self, package: PackageId, version: str, sha256: str) -> None:
         """Raise `PackageError` unless the key's holder signed exactly these bytes."""
         if not self.verifies(_statement(package, version, sha256, self.by)):
             raise PackageError(
@@ -99,7 +99,7 @@ class Signer:
         """Fingerprint of the public key."""
         return fingerprint(self.key)
 
-    def sign(self, package: Key, version: str, sha256: str) -> Signature:
+    def sign(self, package: PackageId, version: str, sha256: str) -> Signature:
         """Return the signature, which is the same for the same package."""
         return self.signs(_statement(package, version, sha256, self.by))
 
@@ -176,6 +176,6 @@ def _no_key(file: Path) -> str:
     return f"{file}: this is not a publisher's key; create one with 'urc repo key new NAME'"
 
 
-def _statement(package: Key, version: str, sha256: str, by: str) -> bytes:
+def _statement(package: PackageId, version: str, sha256: str, by: str) -> bytes:
     """Return the statement to sign. No part contains a line end, so no two look alike."""
     return _STATEMENT.format(package=package, version=version, sha256=sha256, by=by).encode()

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from urc.packages.archive import BUNDLE, read_archive, write_archive
-from urc.packages.index import INDEX, Entry, Index, entry_of, in_order, read_index
+from urc.packages.index import INDEX, Index, IndexEntry, entry_of, in_order, read_index
 from urc.packages.manifest import MANIFEST
-from urc.packages.names import Key, PackageError, parse_key
+from urc.packages.names import PackageError, PackageId, parse_key
 from urc.packages.package import Package, open_package, pack_folder, sha256
 from urc.packages.signature import Signature
 
@@ -23,10 +23,10 @@ class Source(Protocol):
     def name(self) -> str:
         """Name in messages."""
 
-    def entries(self) -> tuple[Entry, ...]:
+    def entries(self) -> tuple[IndexEntry, ...]:
         """Return every version of every package; raise `PackageError`."""
 
-    def fetch(self, entry: Entry) -> bytes:
+    def fetch(self, entry: IndexEntry) -> bytes:
         """Return an archive with exactly the digest of the entry; raise `PackageError`."""
 
 
@@ -37,7 +37,7 @@ class FileSource:
         self,
         name: str,
         packages: Iterable[Package],
-        roots: Iterable[Key],
+        roots: Iterable[PackageId],
         signatures: Mapping[str, Signature] | None = None,
         *,
         is_folder: bool = False,
@@ -51,7 +51,7 @@ class FileSource:
         """Packages to install for a request of the whole source."""
         self._packages = {package.digest: package for package in packages}
 
-    def entries(self) -> tuple[Entry, ...]:
+    def entries(self) -> tuple[IndexEntry, ...]:
         """Return the entries of its packages."""
         return tuple(
             entry_of(package, self.signatures.get(digest))
@@ -63,7 +63,7 @@ class FileSource:
         """The packages, with those to install first."""
         return tuple(self._packages.values())
 
-    def fetch(self, entry: Entry) -> bytes:
+    def fetch(self, entry: IndexEntry) -> bytes:
         """Return an archive of the source."""
         return self._packages[entry.sha256].data
 
@@ -103,7 +103,7 @@ def _pack_with_needs(folder: Path) -> list[Package]:
 
 
 def make_bundle(
-    root: Key, archives: Mapping[str, bytes], signatures: Mapping[str, Signature], name: str
+    root: PackageId, archives: Mapping[str, bytes], signatures: Mapping[str, Signature], name: str
 ) -> bytes:
     """Return the bytes of a bundle: a small repository in one file.
 
@@ -153,8 +153,8 @@ def _open_bundle(data: bytes, name: str) -> FileSource:
 
 
 def offered(
-    found: Mapping[Key, list[tuple[Entry, Source]]],
-) -> dict[Key, list[tuple[Entry, Source]]]:
+    found: Mapping[PackageId, list[tuple[IndexEntry, Source]]],
+) -> dict[PackageId, list[tuple[IndexEntry, Source]]]:
     """Return the versions that are not withdrawn."""
     kept = {key: [one for one in some if not one[0].why_withdrawn] for key, some in found.items()}
     return {key: some for key, some in kept.items() if some}
@@ -162,7 +162,7 @@ def offered(
 
 def merged(
     sources: Iterable[Source], complain: Callable[[str], None]
-) -> dict[Key, list[tuple[Entry, Source]]]:
+) -> dict[PackageId, list[tuple[IndexEntry, Source]]]:
     """Return every version of every package, also withdrawn ones, with its source.
 
     All versions of a package come from the first source that has it. So a source that is added
@@ -172,14 +172,14 @@ def merged(
         sources: the sources, in the order of requests.
         complain: receives a line for each unreachable source.
     """
-    found: dict[Key, list[tuple[Entry, Source]]] = {}
+    found: dict[PackageId, list[tuple[IndexEntry, Source]]] = {}
     for source in sources:
         try:
             entries = source.entries()
         except PackageError as error:
             complain(str(error))
             continue
-        fresh: dict[Key, list[tuple[Entry, Source]]] = {}
+        fresh: dict[PackageId, list[tuple[IndexEntry, Source]]] = {}
         for entry in entries:
             fresh.setdefault(entry.key, []).append((entry, source))
         found = fresh | found

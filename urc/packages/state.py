@@ -5,15 +5,15 @@ from typing import Annotated
 
 import msgspec
 
+from urc.packages.install_plan import InstallPlan
 from urc.packages.lock import Lock, Pin
-from urc.packages.names import Key, PackageError, parse_key
-from urc.packages.plan import Plan
+from urc.packages.names import PackageError, PackageId, parse_key
 from urc.packages.signature import fingerprint
 
-__all__ = ["State"]
+__all__ = ["StoreState"]
 
 
-class State(msgspec.Struct, frozen=True, omit_defaults=True):
+class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
     """The state of a store, without the archives."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
@@ -24,19 +24,19 @@ class State(msgspec.Struct, frozen=True, omit_defaults=True):
     before: dict[str, Lock] = {}
     """Digest of an installed lock → the lock that an update replaced, for one step back."""
 
-    def with_installed(self, plan: Plan) -> "State":
+    def with_installed(self, plan: InstallPlan) -> "StoreState":
         """Return the state with a plan installed. Other versions of the package stay."""
         lock = plan.lock
         others = [one for one in self.installed if not _same(one, lock)]
         return self._next((*others, lock), self.before, plan)
 
-    def with_update(self, old: Lock, plan: Plan) -> "State":
+    def with_update(self, old: Lock, plan: InstallPlan) -> "StoreState":
         """Return the state with `old` replaced; it stays available for one step back."""
         gone = (old, plan.lock)
         others = [one for one in self.installed if not any(_same(one, lock) for lock in gone)]
         return self._next((*others, plan.lock), {**self.before, plan.lock.digest: old}, plan)
 
-    def with_back(self, lock: Lock) -> "State":
+    def with_back(self, lock: Lock) -> "StoreState":
         """Return the state before the update to `lock`; a second call undoes the first.
 
         Raises:
@@ -48,13 +48,13 @@ class State(msgspec.Struct, frozen=True, omit_defaults=True):
         others = [one for one in self.installed if not (_same(one, old) or _same(one, lock))]
         return self._next((*others, old), {**self.before, old.digest: lock}, None)
 
-    def without(self, gone: Iterable[Lock]) -> "State":
+    def without(self, gone: Iterable[Lock]) -> "StoreState":
         """Return the state without some locks."""
         digests = {lock.digest for lock in gone}
         kept = tuple(lock for lock in self.installed if lock.digest not in digests)
         return self._next(kept, self.before, None)
 
-    def without_key(self, key: Key) -> "State":
+    def without_key(self, key: PackageId) -> "StoreState":
         """Return the state without a package's pinned key; raise `PackageError`."""
         if str(key) not in self.keys:
             known = ", ".join(sorted(self.keys)) or "none"
@@ -67,7 +67,7 @@ class State(msgspec.Struct, frozen=True, omit_defaults=True):
         """All locks whose archives are still needed."""
         return (*self.installed, *self.before.values())
 
-    def check(self, plan: Plan) -> None:
+    def check(self, plan: InstallPlan) -> None:
         """Raise `PackageError` for a plan that contradicts the state.
 
         Contradictions are other bytes of a known version, an invalid signature, another key than
@@ -100,8 +100,8 @@ class State(msgspec.Struct, frozen=True, omit_defaults=True):
                 )
 
     def _next(
-        self, installed: tuple[Lock, ...], before: Mapping[str, Lock], plan: Plan | None
-    ) -> "State":
+        self, installed: tuple[Lock, ...], before: Mapping[str, Lock], plan: InstallPlan | None
+    ) -> "StoreState":
         """Return the next state: sorted, with new keys, without steps back to removed locks."""
         digests = {lock.digest for lock in installed}
         keys = dict(self.keys)
@@ -110,7 +110,7 @@ class State(msgspec.Struct, frozen=True, omit_defaults=True):
                 signature = plan.signatures.get(pin.sha256)
                 if signature is not None and name not in plan.own:
                     keys.setdefault(name, signature.key)
-        return State(
+        return StoreState(
             1,
             tuple(sorted(installed, key=lambda lock: (lock.root, lock.number))),
             keys,

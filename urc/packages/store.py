@@ -19,18 +19,18 @@ from typing import Final
 
 import msgspec
 
-from urc.packages import disk
+from urc.packages import atomic_files
 from urc.packages.archive import PACKAGE, read_archive
+from urc.packages.install_plan import InstallPlan
 from urc.packages.lock import LOCK, Lock
 from urc.packages.manifest import Manifest
-from urc.packages.names import Key, PackageError, Wish, parse_key
+from urc.packages.names import PackageError, PackageId, PackageRequirement, parse_key
 from urc.packages.package import open_package, sha256
-from urc.packages.plan import Plan
 from urc.packages.signature import Signature
-from urc.packages.state import State
+from urc.packages.state import StoreState
 from urc.packages.versions import parse_range, parse_version
 
-__all__ = ["Change", "Store", "ecosystem_of", "kinds_in"]
+__all__ = ["StoreTransaction", "Store", "ecosystem_of", "kinds_in"]
 
 _STATE_BYTES: Final = 16 << 20
 
@@ -51,15 +51,15 @@ class Store:
         """
         return self.state().installed
 
-    def state(self) -> State:
+    def state(self) -> StoreState:
         """Return the state; raise `PackageError`."""
         try:
             with open(self._state, "rb") as file:
                 data = file.read(_STATE_BYTES)
         except FileNotFoundError:
-            return State(1, ())
+            return StoreState(1, ())
         try:
-            return msgspec.json.decode(data, type=State)
+            return msgspec.json.decode(data, type=StoreState)
         except (msgspec.DecodeError, PackageError, UnicodeDecodeError) as error:
             raise PackageError(f"{self._state}: this file is damaged: {error}") from None
 
@@ -67,7 +67,7 @@ class Store:
         """Return the lock that an update replaced by `lock`, or None."""
         return self.state().before.get(lock.digest)
 
-    def find(self, wish: Wish) -> Lock | None:
+    def find(self, wish: PackageRequirement) -> Lock | None:
         """Return the newest installed version of a requirement, or None.
 
         Raises:
@@ -122,10 +122,10 @@ class Store:
             return None
 
     def keep_signature(self, digest: str, signature: Signature) -> None:
-        """Store the signature of an archive; only for `Change`."""
+        """Store the signature of an archive; only for `StoreTransaction`."""
         if self.signature(digest) != signature:
             data = msgspec.json.encode(signature) + b"\n"
-            disk.put_file(self._signature_file(digest), data, self.work)
+            atomic_files.put_file(self._signature_file(digest), data, self.work)
 
     def make(self, lock: Lock) -> Path:
         """Return the folder of a lock's files; extract them again if they are incomplete.
@@ -137,29 +137,29 @@ class Store:
         """
         files = self._files(lock)
         if not _holds(self.place(lock), files):
-            disk.put_folder(self.place(lock), files, self.work)
+            atomic_files.put_folder(self.place(lock), files, self.work)
         return self.place(lock)
 
     def _signature_file(self, digest: str) -> Path:
         return self.folder / "signatures" / f"{digest}.json"
 
     @contextmanager
-    def changing(self) -> Iterator["Change"]:
+    def changing(self) -> Iterator["StoreTransaction"]:
         """Lock the store against other processes; at the end, delete unused files."""
-        with disk.exclusive(self.folder / "changing"):
+        with atomic_files.exclusive(self.folder / "changing"):
             with suppress(OSError):
-                disk.clear(self.work)
-            change = Change(self)
+                atomic_files.clear(self.work)
+            change = StoreTransaction(self)
             try:
                 yield change
             finally:
                 with suppress(OSError, PackageError):
                     self._collect()
 
-    def write_state(self, state: State) -> None:
-        """Write the state; only for `Change`."""
+    def write_state(self, state: StoreState) -> None:
+        """Write the state; only for `StoreTransaction`."""
         data = msgspec.json.format(msgspec.json.encode(state, order="sorted"), indent=1)
-        disk.put_file(self._state, data + b"\n", self.work)
+        atomic_files.put_file(self._state, data + b"\n", self.work)
 
     def _files(self, lock: Lock) -> dict[str, bytes]:
         """Return the expected files of a lock's folder."""
@@ -182,17 +182,17 @@ class Store:
             if (self.folder / folder).is_dir():
                 for entry in (self.folder / folder).iterdir():
                     if entry.name not in wanted:
-                        disk.discard(entry, self.work)
-        disk.clear(self.work)
+                        atomic_files.discard(entry, self.work)
+        atomic_files.clear(self.work)
 
 
-class Change:
+class StoreTransaction:
     """A change of the store, under its lock."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
 
-    def stage(self, plan: Plan) -> Path:
+    def stage(self, plan: InstallPlan) -> Path:
         """Extract the files of a plan for a preview, without installing them.
 
         Returns:
@@ -216,18 +216,18 @@ class Change:
                 raise PackageError(f"{key} {pin.version}: this is {said.key} {said.version}")
             opened.append(said)
             if pin.sha256 in plan.archives:
-                disk.put_file(store.blob_file(pin.sha256), data, store.work)
+                atomic_files.put_file(store.blob_file(pin.sha256), data, store.work)
             if signature := plan.signatures.get(pin.sha256):
                 store.keep_signature(pin.sha256, signature)
         for said in opened:
             _check_needs(said, plan.lock)
         return store.make(plan.lock)
 
-    def commit(self, plan: Plan) -> None:
+    def commit(self, plan: InstallPlan) -> None:
         """Install a staged plan. Other versions of the package stay installed."""
         self._store.write_state(self._store.state().with_installed(plan))
 
-    def replace(self, old: Lock, plan: Plan) -> None:
+    def replace(self, old: Lock, plan: InstallPlan) -> None:
         """Install a staged plan in place of `old`, which stays available for `back`."""
         self._store.write_state(self._store.state().with_update(old, plan))
 
@@ -239,7 +239,7 @@ class Change:
         self._store.write_state(state)
         return old
 
-    def remove(self, wish: Wish) -> tuple[list[Lock], list[str]]:
+    def remove(self, wish: PackageRequirement) -> tuple[list[Lock], list[str]]:
         """Remove an installed package, and the packages that only it needed.
 
         Returns:
@@ -256,7 +256,7 @@ class Change:
         self._store.write_state(after)
         return gone, sorted(_all(state.installed) - _all(after.installed))
 
-    def forget_key(self, key: Key) -> None:
+    def forget_key(self, key: PackageId) -> None:
         """Accept any signature of a package from now on; raise `PackageError`."""
         self._store.write_state(self._store.state().without_key(key))
 
@@ -281,7 +281,7 @@ def ecosystem_of(document: Path) -> Path | None:
     return None
 
 
-def _meant(wish: Wish, locks: tuple[Lock, ...]) -> list[Lock]:
+def _meant(wish: PackageRequirement, locks: tuple[Lock, ...]) -> list[Lock]:
     """Return the locks of a requirement; without a range, any installed version counts."""
     wanted = parse_range(wish.range)
     found = [
@@ -301,7 +301,7 @@ def _all(locks: tuple[Lock, ...]) -> set[str]:
     return {f"{key} {pin.version}" for lock in locks for key, pin in lock.packages.items()}
 
 
-def _not_installed(wish: Wish, locks: tuple[Lock, ...]) -> str:
+def _not_installed(wish: PackageRequirement, locks: tuple[Lock, ...]) -> str:
     needed = [
         f"{lock} needs {key} {pin.version}"
         for lock in locks
@@ -333,6 +333,6 @@ def _holds(folder: Path, files: Mapping[str, bytes]) -> bool:
     return found == len(files)
 
 
-def kinds_in(lock: Lock, kind: str) -> list[Key]:
+def kinds_in(lock: Lock, kind: str) -> list[PackageId]:
     """Return the packages of one kind in a lock."""
     return [key for key in map(parse_key, lock.packages) if key.kind == kind]

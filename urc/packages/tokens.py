@@ -9,11 +9,11 @@ from typing import Annotated, Final
 
 import msgspec
 
-from urc.packages import disk
-from urc.packages.names import FOLDERS, Key, PackageError
+from urc.packages import atomic_files
+from urc.packages.names import FOLDERS, PackageError, PackageId
 from urc.packages.package import sha256
 
-__all__ = ["Token", "Tokens", "new_token", "read_token"]
+__all__ = ["UploadToken", "UploadTokens", "new_token", "read_token"]
 
 _BYTES: Final = 1 << 20
 _MOST: Final = 1000
@@ -22,7 +22,7 @@ _MAY: Final = re.compile(rf"(?:({'|'.join(FOLDERS)})/(?:[a-z][a-z0-9-]{{0,63}})?
 _TOKEN: Final = re.compile(r"urc_[A-Za-z0-9_-]{43}")
 
 
-class Token(msgspec.Struct, frozen=True):
+class UploadToken(msgspec.Struct, frozen=True):
     """The stored form of a token."""
 
     name: str
@@ -31,7 +31,7 @@ class Token(msgspec.Struct, frozen=True):
     may: tuple[str, ...]
     """Allowed packages: ``drivers/puppet``, ``drivers/puppet*``, ``widgets/*`` or ``*``."""
 
-    def allows(self, key: Key) -> bool:
+    def allows(self, key: PackageId) -> bool:
         """Return whether the token allows uploads of a package."""
         text = str(key)
         return any(
@@ -41,16 +41,16 @@ class Token(msgspec.Struct, frozen=True):
 
 class _File(msgspec.Struct, frozen=True):
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
-    tokens: tuple[Token, ...]
+    tokens: tuple[UploadToken, ...]
 
 
-class Tokens:
+class UploadTokens:
     """A file of tokens; each call reads it, so that a removal takes effect at once."""
 
     def __init__(self, file: Path) -> None:
         self.file = file
 
-    def all(self) -> tuple[Token, ...]:
+    def all(self) -> tuple[UploadToken, ...]:
         """Return the stored tokens; raise `PackageError` for an unreadable file."""
         try:
             with open(self.file, "rb") as opened:
@@ -62,7 +62,7 @@ class Tokens:
         except OSError as error:
             raise PackageError(f"{self.file}: {error.strerror or error}") from None
 
-    def find(self, text: str) -> Token | None:
+    def find(self, text: str) -> UploadToken | None:
         """Return the token with this text, or None, in constant time."""
         digest = sha256(text.encode())
         found = None
@@ -91,7 +91,7 @@ class Tokens:
                 raise PackageError(f"{self.file}: a token {name!r} exists already")
             if len(known) >= _MOST:
                 raise PackageError(f"{self.file}: at most {_MOST} tokens can be kept")
-            self._write((*known, Token(name, sha256(text.encode()), may)))
+            self._write((*known, UploadToken(name, sha256(text.encode()), may)))
         return text
 
     def remove(self, name: str) -> None:
@@ -103,13 +103,13 @@ class Tokens:
             self._write(tuple(token for token in known if token.name != name))
 
     @contextmanager
-    def _changing(self) -> Iterator[tuple[Token, ...]]:
-        with disk.exclusive(self.file.with_name(f".{self.file.name}.changing")):
+    def _changing(self) -> Iterator[tuple[UploadToken, ...]]:
+        with atomic_files.exclusive(self.file.with_name(f".{self.file.name}.changing")):
             yield self.all()
 
-    def _write(self, tokens: tuple[Token, ...]) -> None:
+    def _write(self, tokens: tuple[UploadToken, ...]) -> None:
         data = msgspec.json.format(msgspec.json.encode(_File(1, tokens)), indent=1)
-        disk.put_file(self.file, data + b"\n", self.file.resolve().parent)
+        atomic_files.put_file(self.file, data + b"\n", self.file.resolve().parent)
 
 
 def new_token() -> str:

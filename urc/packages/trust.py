@@ -7,12 +7,12 @@ from typing import Annotated
 
 import msgspec
 
-from urc.packages import disk
-from urc.packages.head import Head
+from urc.packages import atomic_files
+from urc.packages.index_head import IndexHead
 from urc.packages.names import PackageError
 from urc.packages.signature import fingerprint
 
-__all__ = ["Trust"]
+__all__ = ["PinnedKey"]
 
 
 class _Pin(msgspec.Struct, frozen=True):
@@ -22,7 +22,7 @@ class _Pin(msgspec.Struct, frozen=True):
     """Highest number of an index signed with this key."""
 
 
-class Trust:
+class PinnedKey:
     """The pinned key of one repository."""
 
     def __init__(self, url: str, file: Path, now: Callable[[], float] = time.time) -> None:
@@ -49,7 +49,7 @@ class Trust:
         pin = self._pin()
         return pin.number if pin is not None else 0
 
-    def check(self, head: Head | None) -> None:
+    def check(self, head: IndexHead | None) -> None:
         """Raise `PackageError` unless a head has the pinned key, is valid now, and is not older.
 
         Args:
@@ -80,14 +80,14 @@ class Trust:
                 " installed packages stay"
             )
 
-    def keep(self, head: Head, work: Path) -> None:
+    def keep(self, head: IndexHead, work: Path) -> None:
         """Pin the key of a checked head."""
         signature = head.signed
         if signature is None:
             return
         new = _Pin(signature.key, signature.by, head.number)
         if new != self._pin():
-            disk.put_file(self._file, msgspec.json.encode(new) + b"\n", work)
+            atomic_files.put_file(self._file, msgspec.json.encode(new) + b"\n", work)
 
     def forget(self) -> None:
         """Accept any key the next time."""

@@ -9,19 +9,19 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from urc._phrases import phrase
+from urc._translatable import phrase
 from urc.packages.install import Found, plan_root, settle
+from urc.packages.install_plan import InstallPlan
 from urc.packages.lock import Lock, lock_of
 from urc.packages.names import PackageError
-from urc.packages.plan import Plan
 from urc.packages.sources import Source, merged, offered
 from urc.packages.store import Store, kinds_in
 from urc.packages.versions import parse_version
 
 __all__ = [
-    "Difference",
-    "Newer",
-    "Seen",
+    "UpdateDiff",
+    "AvailableUpdate",
+    "PackageSummary",
     "differences",
     "headline",
     "newer",
@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 
-class Newer(NamedTuple):
+class AvailableUpdate(NamedTuple):
     """An available update."""
 
     old: Lock
@@ -43,8 +43,8 @@ class Newer(NamedTuple):
         return version_lines(self.old, self.new)
 
 
-class Seen(Protocol):
-    """The preview of a package's documents; `urc.runtime.look` implements it."""
+class PackageSummary(Protocol):
+    """The preview of a package's documents; `urc.runtime.package_preview` implements it."""
 
     @property
     def permissions(self) -> Sequence[str]:
@@ -59,11 +59,11 @@ class Seen(Protocol):
         """Path in the document → its value, for all keys that decide the sent bytes."""
 
 
-Look = Callable[[Path, Path, Sequence[str]], Seen]
+Look = Callable[[Path, Path, Sequence[str]], PackageSummary]
 """Arguments: document, folder with all its files, names of included widgets."""
 
 
-class Difference(NamedTuple):
+class UpdateDiff(NamedTuple):
     """The changes of an update."""
 
     versions: list[str]
@@ -77,7 +77,9 @@ class Difference(NamedTuple):
     """Changed keys, as ``- commands.beep.send: "beep"`` and ``+ commands.beep.send: "BEEP"``."""
 
 
-def newer(store: Store, sources: Sequence[Source], complain: Callable[[str], None]) -> list[Newer]:
+def newer(
+    store: Store, sources: Sequence[Source], complain: Callable[[str], None]
+) -> list[AvailableUpdate]:
     """Return the available updates; only indexes are fetched.
 
     Of several installed versions of a package, the newest counts.
@@ -101,7 +103,7 @@ def newer(store: Store, sources: Sequence[Source], complain: Callable[[str], Non
             complain(str(error))
             continue
         if new is not None:
-            updates.append(Newer(lock, new))
+            updates.append(AvailableUpdate(lock, new))
     return updates
 
 
@@ -111,7 +113,7 @@ def plan_update(
     store: Store,
     complain: Callable[[str], None],
     wanted: str = "*",
-) -> Plan | None:
+) -> InstallPlan | None:
     """Return the plan of the newest version, with its archives, or None without an update.
 
     Args:
@@ -131,7 +133,9 @@ def plan_update(
     return None if new is None else plan_root(old.key, new.version, found, store)
 
 
-def staged_difference(old: Lock, plan: Plan, store: Store, staged: Path, look: Look) -> Difference:
+def staged_difference(
+    old: Lock, plan: InstallPlan, store: Store, staged: Path, look: Look
+) -> UpdateDiff:
     """Return the changes of a staged update.
 
     Args:
@@ -149,7 +153,7 @@ def staged_difference(old: Lock, plan: Plan, store: Store, staged: Path, look: L
     gained, lost = differences(before.permissions, after.permissions)
     risks = [line for line in after.risks if line not in before.risks]
     wire = _wire_lines(before.wire, after.wire)
-    return Difference(version_lines(old, plan.lock), gained, lost, risks, wire)
+    return UpdateDiff(version_lines(old, plan.lock), gained, lost, risks, wire)
 
 
 def differences(before: Iterable[str], after: Iterable[str]) -> tuple[list[str], list[str]]:
@@ -181,7 +185,7 @@ def version_lines(old: Lock, new: Lock) -> list[str]:
     return lines
 
 
-def _seen(lock: Lock, folder: Path, look: Look) -> Seen:
+def _seen(lock: Lock, folder: Path, look: Look) -> PackageSummary:
     document = folder / lock.root / f"{lock.key.kind}.yaml"
     return look(document, folder, [key.name for key in kinds_in(lock, "widget")])
 

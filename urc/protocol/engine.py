@@ -16,59 +16,59 @@ A returned `Close` means that the engine has discarded that connection. Close it
 it by `closed`.
 
 Theory of operation. Conversations, polls, commands and sequences do not call each other. A
-conversation returns internal events in its list: a request has `Ended`, an expected frame was
-`Heard`, or the conversation is `Leaving`. `_settle` removes these events, informs the owners, and
-advances the sequences, until only events for the outside remain.
+conversation returns internal events in its list: a request has `ExchangeEnded`, an expected frame
+was `Matched`, or the conversation is `ConnectionClosing`. `_settle` removes these events, informs
+the owners, and advances the sequences, until only events for the outside remain.
 """
 
 from collections.abc import Mapping, Sequence
 
-from urc.model.codec import Payload
 from urc.model.driver import Command, Driver
+from urc.model.payload import Payload
 from urc.model.values import Reading, Sample, Value
-from urc.protocol.actions import build_program, programs_of_lines
-from urc.protocol.answer import Heard
-from urc.protocol.asking import Builder
-from urc.protocol.bounds import GOOD_BYE_S, calm_s, lines_of, needs_readings
-from urc.protocol.commands import (
-    Verifications,
-    exchange_of,
-    is_guarded,
-    why_refused,
-)
-from urc.protocol.encode import BadArgument, build_check
 from urc.protocol.events import (
     Close,
     Event,
     Failed,
-    Fault,
     Open,
     Ready,
     Replied,
     Request,
     Samples,
     Send,
+    Violation,
 )
-from urc.protocol.exchange import (
-    Asked,
-    Ended,
-    Leaving,
+from urc.protocol.motion_encoder import MotionEncoder
+from urc.protocol.readings.readings import Readings
+from urc.protocol.requests.bounds import GOOD_BYE_S, calm_s, lines_of, needs_readings
+from urc.protocol.requests.condition_scope import SignalState
+from urc.protocol.requests.conversation import Conversation
+from urc.protocol.requests.encode import BadArgument, build_check
+from urc.protocol.requests.exchange import (
+    ConnectionClosing,
+    ExchangeEnded,
+    ExchangeOutcome,
     LineEvent,
-    Outcome,
+    ReplySink,
 )
-from urc.protocol.fresh import FIXED, Fresh
-from urc.protocol.known import Known
-from urc.protocol.line import Line
-from urc.protocol.motions import Motions
-from urc.protocol.readings import Readings
-from urc.protocol.schedule import Schedule
-from urc.protocol.steps import Runner, Sink, Unless
+from urc.protocol.requests.reply_match import Matched
+from urc.protocol.requests.request_compiler import RequestCompiler
+from urc.protocol.schedule import PollSchedule
+from urc.protocol.sequences.actions import build_program, programs_of_lines
+from urc.protocol.sequences.commands import (
+    Verifications,
+    exchange_of,
+    is_guarded,
+    why_refused,
+)
+from urc.protocol.sequences.sequence_runner import SequenceRunner, Sink, Unless
 from urc.protocol.times import soonest
+from urc.protocol.values.time_and_nonce import FIXED, TimeAndNonce
 
 __all__ = ["Engine"]
 
 
-_PLAIN = frozenset((Send, Fault, Open, Ready, Replied, Failed))
+_PLAIN = frozenset((Send, Violation, Open, Ready, Replied, Failed))
 """Events that the engine passes on without acting."""
 
 
@@ -91,14 +91,14 @@ class Engine:
         driver: Driver,
         settings: Mapping[str, Value],
         *,
-        fresh: Fresh = FIXED,
+        fresh: TimeAndNonce = FIXED,
         is_compiled: bool = False,
     ) -> None:
         names: dict[str, object] = {"settings": dict(settings)}
         self.readings = Readings(driver.signals, names)
-        self.known = Known(driver.signals, names)
-        builder = Builder(driver, self.readings, self.known, fresh, is_compiled=is_compiled)
-        self.lines: Mapping[str, Line] = builder.lines
+        self.known = SignalState(driver.signals, names)
+        builder = RequestCompiler(driver, self.readings, self.known, fresh, is_compiled=is_compiled)
+        self.lines: Mapping[str, Conversation] = builder.lines
         self._all_lines = tuple(self.lines.values())
         self._commands = driver.commands
         self._checks = {
@@ -115,11 +115,13 @@ class Engine:
             for name, command in driver.commands.items()
             if command.steps
         }
-        self.motions = Motions(self._commands, self._checks, self._asks, self.lines, self.known)
+        self.motions = MotionEncoder(
+            self._commands, self._checks, self._asks, self.lines, self.known
+        )
         self._greetings = programs_of_lines(driver, builder, "on_connect")
         self._good_byes = programs_of_lines(driver, builder, "on_close")
-        self._schedule = Schedule(driver, builder, self.known)
-        self._runners: list[Runner] = []
+        self._schedule = PollSchedule(driver, builder, self.known)
+        self._runners: list[SequenceRunner] = []
         self._verifications = Verifications(self.known)
         has_scripts = self.programs or self._greetings or self._good_byes
         is_timed = any(line.inbox.is_timed for line in self._all_lines)
@@ -166,7 +168,7 @@ class Engine:
             self._schedule.up(line, now)
         else:
 
-            def greeted(outcome: Outcome, now: float) -> list[LineEvent]:
+            def greeted(outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
                 if outcome.code:
                     return line.give_up(outcome.message, now)
                 self._schedule.up(line, now)
@@ -174,7 +176,7 @@ class Engine:
 
             limit_s = line.spec.timeouts.on_connect_s
             ends_at = None if limit_s is None else now + limit_s
-            runner = Runner(self, greeting, greeted, transport, ends_at=ends_at)
+            runner = SequenceRunner(self, greeting, greeted, transport, ends_at=ends_at)
             runner.variables = line.learnt
             self._begin(runner)
         return self._settle(events, now) + self._ask(now)
@@ -192,7 +194,7 @@ class Engine:
 
     def command(self, request: Request, now: float) -> list[Event]:
         """Run a command. Exactly one `Replied` or `Failed` reports the end of the command."""
-        asked, people = Asked(request), request.confirmed_by
+        asked, people = ReplySink(request), request.confirmed_by
         events = self.run(request.command, request.arguments, asked, now, confirmed_by=people)
         return self._settle(events, now)
 
@@ -259,11 +261,11 @@ class Engine:
         if found is None:
             known = ", ".join(self._commands) or "none"
             text = f"there is no command {command!r}; there are: {known}"
-            return sink(Outcome("unknown-command", text), now)
+            return sink(ExchangeOutcome("unknown-command", text), now)
         try:
             values = self._checks[command](arguments)
         except BadArgument as error:
-            return sink(Outcome("bad-argument", str(error)), now)
+            return sink(ExchangeOutcome("bad-argument", str(error)), now)
         if command in self._guarded:
             refused = why_refused(found, self.known, values, confirmed_by, now)
             if refused is not None:
@@ -272,8 +274,8 @@ class Engine:
         if program is None:
             return self._send(found, values, sink, now, privileged_on, unless)
         if any(runner.program is program for runner in self._runners):
-            return sink(Outcome("at-work", f"{command} is already running"), now)
-        runner = Runner(self, program, sink, privileged_on, confirmed_by)
+            return sink(ExchangeOutcome("at-work", f"{command} is already running"), now)
+        runner = SequenceRunner(self, program, sink, privileged_on, confirmed_by)
         runner.wait_for_logins(now)
         self._begin(runner)
         return []
@@ -288,17 +290,17 @@ class Engine:
         unless: Unless | None,
     ) -> list[LineEvent]:
         if command.verify is not None and self._verifications.is_full:
-            return sink(Outcome("queue-full", "too many commands await verification"), now)
+            return sink(ExchangeOutcome("queue-full", "too many commands await verification"), now)
         ask = self._asks[command.name]
         try:
             exchange = exchange_of(command, ask, values, sink, now, self.known, self._verifications)
         except BadArgument as error:
-            return sink(Outcome("bad-argument", str(error)), now)
+            return sink(ExchangeOutcome("bad-argument", str(error)), now)
         exchange.is_privileged = on == command.transport
         exchange.unless = unless
         return self.lines[command.transport].submit(exchange, now)
 
-    def _begin(self, runner: Runner) -> None:
+    def _begin(self, runner: SequenceRunner) -> None:
         self._runners.append(runner)
         for line in self._all_lines:
             line.is_scripted = True
@@ -329,14 +331,14 @@ class Engine:
         """Act on one event; append the resulting outside events to `told`."""
         if type(event) in _PLAIN:
             told.append(event)  # type: ignore[arg-type]  # events for the outside
-        elif isinstance(event, Ended):
+        elif isinstance(event, ExchangeEnded):
             exchange, outcome = event
             for one in exchange.owner.ended(exchange, outcome, now):
                 self._act(one, told, now)
-        elif isinstance(event, Heard):
+        elif isinstance(event, Matched):
             if event.ear.owner is not None:
                 event.ear.owner.heard(event.ear, event.offer, now)
-        elif isinstance(event, Leaving):
+        elif isinstance(event, ConnectionClosing):
             self._say_good_bye(self.lines[event.transport], now)
         else:
             if isinstance(event, Samples):
@@ -363,15 +365,17 @@ class Engine:
                 line.is_scripted = False
         return pending
 
-    def _say_good_bye(self, line: Line, now: float) -> None:
+    def _say_good_bye(self, line: Conversation, now: float) -> None:
         name = line.spec.name
 
-        def said(outcome: Outcome, now: float) -> list[LineEvent]:
+        def said(outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
             return line.shut(now) if line.is_open else []
 
-        self._begin(Runner(self, self._good_byes[name], said, name, ends_at=now + GOOD_BYE_S))
+        self._begin(
+            SequenceRunner(self, self._good_byes[name], said, name, ends_at=now + GOOD_BYE_S)
+        )
 
-    def _down(self, line: Line, reason: str) -> None:
+    def _down(self, line: Conversation, reason: str) -> None:
         """End everything that was started on a lost connection."""
         name = line.spec.name
         for runner in self._runners:

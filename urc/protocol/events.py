@@ -3,14 +3,14 @@
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from urc.model.codec import Counted, Payload
+from urc.model.payload import CountedFrame, Payload
 from urc.model.values import NOTHING, Reading, Sample
 
 __all__ = [
     "Close",
     "Event",
     "Failed",
-    "Fault",
+    "Violation",
     "Open",
     "Ready",
     "Replied",
@@ -45,7 +45,7 @@ class Send(NamedTuple):
     data: Payload
     is_secret: bool = False
     """Whether its text must not be shown or logged."""
-    counted: Counted | None = None
+    counted: CountedFrame | None = None
     """The same frame with its counters, on a connection that the guard shares."""
 
 
@@ -91,7 +91,7 @@ class Failed(NamedTuple):
     message: str
 
 
-class Fault(NamedTuple):
+class Violation(NamedTuple):
     """A protocol violation on the wire: counted and shown, never raised."""
 
     transport: str
@@ -101,4 +101,4 @@ class Fault(NamedTuple):
     message: str
 
 
-Event = Open | Send | Close | Ready | Samples | Replied | Failed | Fault
+Event = Open | Send | Close | Ready | Samples | Replied | Failed | Violation

@@ -4,16 +4,22 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 
 from urc.model.driver import Driver, Poll
-from urc.model.flow import Keepalive
-from urc.protocol.asking import Builder
-from urc.protocol.encode import BadArgument
-from urc.protocol.events import Fault
-from urc.protocol.exchange import Ask, Exchange, LineEvent, Outcome, expires_at
-from urc.protocol.known import Known
-from urc.protocol.line import Line
-from urc.protocol.steps import Sink
+from urc.model.exchange import Keepalive
+from urc.protocol.events import Violation
+from urc.protocol.requests.condition_scope import SignalState
+from urc.protocol.requests.conversation import Conversation
+from urc.protocol.requests.encode import BadArgument
+from urc.protocol.requests.exchange import (
+    CompiledRequest,
+    Exchange,
+    ExchangeOutcome,
+    LineEvent,
+    expires_at,
+)
+from urc.protocol.requests.request_compiler import RequestCompiler
+from urc.protocol.sequences.sequence_runner import Sink
 
-__all__ = ["KeptAlive", "PollState", "Schedule"]
+__all__ = ["KeepaliveState", "PollState", "PollSchedule"]
 
 Run = Callable[[str, Mapping[str, object], Sink, float], list[LineEvent]]
 """Function that runs a command: name, arguments, sink of the outcome, time."""
@@ -22,7 +28,9 @@ Run = Callable[[str, Mapping[str, object], Sink, float], list[LineEvent]]
 class PollState:
     """The state of one poll."""
 
-    def __init__(self, poll: Poll, ask: Ask, line: Line, known: Known) -> None:
+    def __init__(
+        self, poll: Poll, ask: CompiledRequest, line: Conversation, known: SignalState
+    ) -> None:
         self.poll = poll
         self.due: float | None = None
         """Time of the next request; None while its connection is down."""
@@ -61,7 +69,7 @@ class PollState:
             return []
         return _submit(self._line, self._ask, self, self._names, now)
 
-    def ended(self, exchange: Exchange, outcome: Outcome, now: float) -> list[LineEvent]:
+    def ended(self, exchange: Exchange, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
         """Count missed replies; report refusals."""
         if outcome.code == "timed-out" and self.poll.offline is not None:
             self._misses += 1
@@ -77,14 +85,20 @@ class PollState:
         # The next poll follows anyway, so only refusals are reported.
         if outcome.code in ("refused", "bad-argument"):
             text = f"{self._ask.label}: {outcome.message}"
-            return [Fault(self.poll.transport, outcome.code, text)]
+            return [Violation(self.poll.transport, outcome.code, text)]
         return []
 
 
-class KeptAlive:
+class KeepaliveState:
     """The keepalive of one connection."""
 
-    def __init__(self, keepalive: Keepalive, line: Line, ask: Ask | None, known: Known) -> None:
+    def __init__(
+        self,
+        keepalive: Keepalive,
+        line: Conversation,
+        ask: CompiledRequest | None,
+        known: SignalState,
+    ) -> None:
         """Initialise the keepalive.
 
         Args:
@@ -122,32 +136,34 @@ class KeptAlive:
             return run(self._keepalive.run)
         return _submit(self._line, self._ask, self, self._known.names, now)
 
-    def ended(self, exchange: Exchange, outcome: Outcome, now: float) -> list[LineEvent]:
+    def ended(self, exchange: Exchange, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
         """Record that the keepalive was sent."""
         return self.done(outcome, now)
 
-    def done(self, outcome: Outcome, now: float) -> list[LineEvent]:
+    def done(self, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
         """Record the end of the command; it reports its own failures."""
         self._is_asked = False
         return []
 
 
-class Schedule:
+class PollSchedule:
     """All polls and keepalives of one driver."""
 
-    def __init__(self, driver: Driver, builder: Builder, known: Known) -> None:
+    def __init__(self, driver: Driver, builder: RequestCompiler, known: SignalState) -> None:
         self._lines = builder.lines
         self._polls = [
             PollState(poll, builder.poll(poll, poll.name), self._lines[poll.transport], known)
             for poll in driver.polls
         ]
-        self._kept_alive: dict[str, KeptAlive] = {}
+        self._kept_alive: dict[str, KeepaliveState] = {}
         for name, spec in driver.transports.items():
             if spec.keepalive is not None:
                 send = spec.keepalive.send
                 ask = builder.plain(f"{name}.keepalive", name, send) if send else None
                 self._lines[name].counting = _counting(spec.keepalive, driver)
-                self._kept_alive[name] = KeptAlive(spec.keepalive, self._lines[name], ask, known)
+                self._kept_alive[name] = KeepaliveState(
+                    spec.keepalive, self._lines[name], ask, known
+                )
 
     @property
     def keeps_alive(self) -> bool:
@@ -175,7 +191,7 @@ class Schedule:
             if self._lines[poll.poll.transport].is_per_request:
                 poll.begin(now)
 
-    def up(self, line: Line, now: float) -> None:
+    def up(self, line: Conversation, now: float) -> None:
         """Start polls and keepalive of a ready connection."""
         name = line.spec.name
         if name in self._kept_alive:
@@ -185,7 +201,7 @@ class Schedule:
                 if poll.poll.transport == name:
                     poll.begin(now)
 
-    def down(self, line: Line) -> None:
+    def down(self, line: Conversation) -> None:
         """Stop the polls of a lost connection."""
         if not line.is_per_request:
             for poll in self._polls:
@@ -215,15 +231,19 @@ def _counting(keepalive: Keepalive, driver: Driver) -> frozenset[str] | None:
     return frozenset((*named, *(poll.name for poll in driver.polls if poll.run in named)))
 
 
-def _run_for(run: Run, one: KeptAlive, now: float, command: str) -> list[LineEvent]:
+def _run_for(run: Run, one: KeepaliveState, now: float, command: str) -> list[LineEvent]:
     return run(command, {}, one.done, now)
 
 
 def _submit(
-    line: Line, ask: Ask, owner: PollState | KeptAlive, names: Mapping[str, object], now: float
+    line: Conversation,
+    ask: CompiledRequest,
+    owner: PollState | KeepaliveState,
+    names: Mapping[str, object],
+    now: float,
 ) -> list[LineEvent]:
     try:
         data = ask.made(names)
     except BadArgument as error:
-        return [Fault(line.spec.name, "bad-argument", f"{ask.label}: {error}")]
+        return [Violation(line.spec.name, "bad-argument", f"{ask.label}: {error}")]
     return line.submit(Exchange(ask, owner, names, data, expires_at(ask, now)), now)

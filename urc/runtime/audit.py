@@ -25,7 +25,7 @@ from typing import Final, NamedTuple
 
 from urc.private_files import make_private
 
-__all__ = ["AuditLog", "Entry", "check", "read", "shown"]
+__all__ = ["AuditLog", "AuditEntry", "check", "read", "shown"]
 
 MOST_BYTES: Final = 32 * 1024 * 1024
 """Limit of the file, in bytes; the oldest entries are deleted first."""
@@ -47,7 +47,7 @@ _PAGE: Final = 4096
 log = logging.getLogger(__name__)
 
 
-class Entry(NamedTuple):
+class AuditEntry(NamedTuple):
     """One entry. Its maker must leave secrets out."""
 
     at: float
@@ -74,7 +74,7 @@ class Entry(NamedTuple):
     lasted_s: float = 0.0
 
 
-_COLUMNS: Final = Entry._fields
+_COLUMNS: Final = AuditEntry._fields
 _TYPES: Final = {"at": "REAL", "epoch": "INTEGER", "times": "INTEGER", "lasted_s": "REAL"}
 _CREATE: Final = (
     "CREATE TABLE IF NOT EXISTS entries (id INTEGER PRIMARY KEY, "
@@ -114,7 +114,7 @@ class AuditLog:
         self._most_bytes = most_bytes
         self._most_waiting = most_waiting
         self._now = now
-        self._waiting: deque[Entry] = deque()
+        self._waiting: deque[AuditEntry] = deque()
         self._lost = 0
         self._wakes = threading.Condition()
         self._is_closing = False
@@ -122,7 +122,7 @@ class AuditLog:
         self._thread = threading.Thread(target=self._run, name="urc-audit", daemon=True)
         self._thread.start()
 
-    def note(self, entry: Entry) -> None:
+    def note(self, entry: AuditEntry) -> None:
         """Queue an entry and return at once. Any thread may call it; it never raises."""
         with self._wakes:
             if len(self._waiting) >= self._most_waiting:
@@ -172,7 +172,7 @@ class AuditLog:
             with suppress(sqlite3.Error):
                 base.close()
 
-    def _next_batch(self) -> list[Entry]:
+    def _next_batch(self) -> list[AuditEntry]:
         """Return the queued entries after a short wait for more, or [] at the end."""
         with self._wakes:
             self._is_busy = False
@@ -219,13 +219,13 @@ class AuditLog:
             raise
         return base
 
-    def _write(self, base: sqlite3.Connection, batch: Sequence[Entry]) -> None:
+    def _write(self, base: sqlite3.Connection, batch: Sequence[AuditEntry]) -> None:
         with self._wakes:
             lost = self._lost
         entries = [*batch]
         if lost:
             text = f"{lost} entries could not be written"
-            entries.append(Entry(self._now(), "", "lost", outcome=text, times=lost))
+            entries.append(AuditEntry(self._now(), "", "lost", outcome=text, times=lost))
         base.execute("BEGIN IMMEDIATE")
         try:
             last = base.execute(_LAST).fetchone()  # another server may write to this folder
@@ -260,7 +260,7 @@ class AuditLog:
             log.warning("the audit log can be written again")
         self.fault = ""
 
-    def _unwell(self, fault: str, batch: Sequence[Entry]) -> None:
+    def _unwell(self, fault: str, batch: Sequence[AuditEntry]) -> None:
         with self._wakes:
             self._lost += len(batch)
         if not self.fault:  # log only the first of several failures
@@ -283,7 +283,7 @@ def shown(data: bytes, most: int = 64) -> str:
     return f"{len(data)} bytes, sha256 {hashlib.sha256(data).hexdigest()}"
 
 
-def read(file: Path, *, robot: str = "", since: float = 0.0, last: int = 200) -> list[Entry]:
+def read(file: Path, *, robot: str = "", since: float = 0.0, last: int = 200) -> list[AuditEntry]:
     """Return the newest entries, oldest first, or [] without a file.
 
     Args:
@@ -303,7 +303,7 @@ def read(file: Path, *, robot: str = "", since: float = 0.0, last: int = 200) ->
             rows = base.execute(_SELECT + where, (since, robot, robot, last)).fetchall()
     except sqlite3.Error as error:
         raise OSError(f"{file} cannot be read: {error}") from error
-    return [Entry(*row[1:-1]) for row in reversed(rows)]
+    return [AuditEntry(*row[1:-1]) for row in reversed(rows)]
 
 
 def check(file: Path) -> str:
@@ -318,7 +318,7 @@ def check(file: Path) -> str:
     except sqlite3.Error as error:
         raise OSError(f"{file} cannot be read: {error}") from error
     for before, row in pairwise(rows):
-        if row[-1] != _link(before[-1], Entry(*row[1:-1])) or row[0] != before[0] + 1:
+        if row[-1] != _link(before[-1], AuditEntry(*row[1:-1])) or row[0] != before[0] + 1:
             return f"entry {row[0]} does not follow from entry {before[0]}"
     return ""
 
@@ -327,14 +327,14 @@ def _reading(file: Path) -> sqlite3.Connection:
     return sqlite3.connect(f"{file.absolute().as_uri()}?mode=ro", uri=True, timeout=_LOCKED_S)
 
 
-def _link(before: str, entry: Entry) -> str:
+def _link(before: str, entry: AuditEntry) -> str:
     text = before + json.dumps(entry, ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _cut(entry: Entry) -> Entry:
+def _cut(entry: AuditEntry) -> AuditEntry:
     """Return an entry with shortened texts and without lone surrogates, which UTF-8 lacks."""
-    return Entry._make(_text(one) if isinstance(one, str) else one for one in entry)
+    return AuditEntry._make(_text(one) if isinstance(one, str) else one for one in entry)
 
 
 def _text(text: str) -> str:

@@ -6,10 +6,10 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Protocol
 
-__all__ = ["Alarm", "Clock", "LoopClock", "Repeating", "within"]
+__all__ = ["Timer", "Clock", "LoopClock", "PeriodicTimer", "within"]
 
 
-class Alarm(Protocol):
+class Timer(Protocol):
     """A call that is due later and can be cancelled."""
 
     def cancel(self) -> None:
@@ -25,7 +25,7 @@ class Clock(Protocol):
     async def sleep(self, seconds: float) -> None:
         """Return after `seconds`."""
 
-    def call_at(self, time_s: float, action: Callable[[], None]) -> Alarm:
+    def call_at(self, time_s: float, action: Callable[[], None]) -> Timer:
         """Call `action` at `time_s` on this clock, or at once if that is past."""
 
 
@@ -39,19 +39,19 @@ class LoopClock:
         """Return after `seconds`."""
         await asyncio.sleep(seconds)
 
-    def call_at(self, time_s: float, action: Callable[[], None]) -> Alarm:
+    def call_at(self, time_s: float, action: Callable[[], None]) -> Timer:
         """Call `action` at `time_s`, or at once if that is past."""
         # Relative to `now`, because an event loop's own clock may have another zero.
         return asyncio.get_running_loop().call_later(max(0.0, time_s - self.now()), action)
 
 
-class Repeating:
+class PeriodicTimer:
     """A timer whose action returns the seconds to the next call, or None for the last one."""
 
     def __init__(self, clock: Clock, delay_s: float, action: Callable[[], float | None]) -> None:
         self._clock = clock
         self._action = action
-        self._alarm: Alarm = clock.call_at(clock.now() + delay_s, self._ring)
+        self._alarm: Timer = clock.call_at(clock.now() + delay_s, self._ring)
 
     def cancel(self) -> None:
         """Cancel all further calls."""

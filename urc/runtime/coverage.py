@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Final, NamedTuple
 
 from urc.model.driver import Driver
-from urc.runtime.trial import Exercised, Kind
+from urc.runtime.test_engine import Exercised, Kind
 
 __all__ = ["Coverage", "Exercised", "measure", "summary"]
 

@@ -13,7 +13,7 @@ from urc.expressions import ExpressionError
 from urc.model.driver import TransportSpec
 from urc.model.profile import Profile
 from urc.model.values import Value
-from urc.protocol.json_text_form import filled
+from urc.protocol.forms.json_text import filled
 
 __all__ = ["destination_of"]
 

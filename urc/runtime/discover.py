@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from urc.model.codec import Envelope
+from urc.model.payload import Envelope
 from urc.model.values import NOTHING
 from urc.transports.base import Transport, TransportError
 

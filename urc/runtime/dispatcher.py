@@ -10,26 +10,26 @@ import logging
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal, Protocol
 
-from urc.model.codec import Payload
 from urc.model.driver import Command
+from urc.model.payload import Payload
 from urc.model.values import NOTHING, Sample
 from urc.protocol.events import (
     Close,
     Event,
     Failed,
-    Fault,
     Open,
     Ready,
     Replied,
     Request,
     Samples,
     Send,
+    Violation,
 )
-from urc.protocol.reins import Pull, Reins
-from urc.runtime.clock import Alarm, Clock
-from urc.runtime.hub import Hub, Note, Progress
+from urc.protocol.sequences.sequence_control import Pull, SequenceControl
+from urc.runtime.clock import Clock, Timer
+from urc.runtime.hub import Hub, LogEntry, SequenceProgress
 
-__all__ = ["MAX_WAITING", "Dispatcher", "EngineLike", "Port"]
+__all__ = ["MAX_WAITING", "Dispatcher", "EngineLike", "LinkPort"]
 
 
 MAX_WAITING = 256
@@ -38,7 +38,7 @@ MAX_WAITING = 256
 Answer = Replied | Failed
 
 
-class Waiting:
+class PendingCommands:
     """The futures of pending commands."""
 
     def __init__(self, clock: Clock, limit_s: Callable[[str], float]) -> None:
@@ -53,7 +53,7 @@ class Waiting:
         self._limits_s: dict[str, float] = {}
         self._all: dict[int, tuple[asyncio.Future[Answer], float, str]] = {}
         """Request number → future, deadline and command."""
-        self._alarm: Alarm | None = None
+        self._alarm: Timer | None = None
         self._alarm_s = 0.0
 
     @property
@@ -149,7 +149,7 @@ class EngineLike(Protocol):
         """Handle the deadline."""
 
 
-class Port(Protocol):
+class LinkPort(Protocol):
     """The dispatcher's interface to a `Link`. Its methods must not call the dispatcher."""
 
     @property
@@ -171,7 +171,7 @@ class Port(Protocol):
     def ready(self) -> None:
         """Handle the end of the connection's steps."""
 
-    def count(self, fault: Fault) -> None:
+    def count(self, fault: Violation) -> None:
         """Count a protocol violation."""
 
     def hang_up(self, reason: str) -> None:
@@ -191,7 +191,7 @@ class Dispatcher:
         clock: Clock,
         commands: Mapping[str, Command],
         limit_s: Callable[[str], float],
-        reins: Mapping[str, Reins] = NOTHING,
+        reins: Mapping[str, SequenceControl] = NOTHING,
     ) -> None:
         """Take over an engine.
 
@@ -207,17 +207,17 @@ class Dispatcher:
         self._hub = hub
         self._clock = clock
         self._commands = commands
-        self._ports: dict[str, Port] = {}
-        self._waiting = Waiting(clock, limit_s)
+        self._ports: dict[str, LinkPort] = {}
+        self._waiting = PendingCommands(clock, limit_s)
         self._reins = dict(reins)
         self._seen = dict.fromkeys(reins, 0)
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._alarm: Alarm | None = None
+        self._alarm: Timer | None = None
         self._alarm_s: float | None = None
         self._calm_s = engine.calm_s
         self._is_stopped = False
 
-    def attach(self, transport: str, port: Port) -> None:
+    def attach(self, transport: str, port: LinkPort) -> None:
         """Set the link of `transport`."""
         self._ports[transport] = port
 
@@ -355,7 +355,7 @@ class Dispatcher:
     def _change(self, event: Event) -> None:
         """Pass an event to the link whose state it changes."""
         match event:
-            case Fault(transport):
+            case Violation(transport):
                 self._ports[transport].count(event)
             case Open(transport):
                 self._ports[transport].want_open()
@@ -377,7 +377,9 @@ class Dispatcher:
                 state: Literal["idle", "running", "paused"] = "idle"
                 if reins.is_running:
                     state = "paused" if reins.is_paused else "running"
-                self._hub.set_progress(Progress(name, reins.place, reins.of, state, reins.reason))
+                self._hub.set_progress(
+                    SequenceProgress(name, reins.place, reins.of, state, reins.reason)
+                )
 
     def _arm(self, soonest_s: float = 0.0) -> None:
         if self._reins:
@@ -413,7 +415,7 @@ class Dispatcher:
         """Report a bug of URC, reopen all connections, and keep the timer running."""
         log.error("the engine failed", exc_info=bug)
         text = f"internal error ({type(bug).__name__}): please report it with the log"
-        self._hub.note(Note(self._clock.now(), "error", "engine", text))
+        self._hub.note(LogEntry(self._clock.now(), "error", "engine", text))
         for port in self._ports.values():
             port.hang_up(text)
         self._arm(_AFTER_A_BUG_S)

@@ -5,19 +5,19 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Final
 
-from urc.guard import wire
-from urc.guard.channel import LineSpec
+from urc.guard import messages
+from urc.guard.channel import GuardedLineSpec
 from urc.guard.guard_client import GuardClient, HeldSpec
 from urc.guard.local_channel import LocalChannel
 from urc.guard.pipe_channel import CAN_GUARD, PipeChannel
 from urc.model.driver import Command, Driver, TransportSpec
 from urc.model.values import Value
-from urc.motion.hold import Terms
+from urc.motion.hold_to_run import HoldTerms
 from urc.motion.stall import STALLED_S, WAITED_S
 from urc.registry import Table
 from urc.runtime.clock import Clock
-from urc.runtime.held import is_lossy, period_of
-from urc.runtime.lines import Made, make_lines
+from urc.runtime.held_commands import is_lossy, period_of
+from urc.runtime.transport_chain import BuiltTransport, make_lines
 
 __all__ = ["take_reins"]
 
@@ -62,7 +62,7 @@ def take_reins(
 
 def _held(command: Command, driver: Driver) -> HeldSpec:
     line = command.transport
-    terms = Terms(b"", period_s=period_of(driver, command), is_lossy=is_lossy(driver, line))
+    terms = HoldTerms(b"", period_s=period_of(driver, command), is_lossy=is_lossy(driver, line))
     return HeldSpec(line, terms)
 
 
@@ -89,10 +89,10 @@ def _silent_s(spec: TransportSpec) -> float | None:
     return spec.stale_after_s * _SOONER
 
 
-def _line(made: Made, driver: Driver) -> LineSpec:
+def _line(made: BuiltTransport, driver: Driver) -> GuardedLineSpec:
     setup, spec = made.setup, made.spec
     is_dear = _is_dear(spec, driver)
-    make = wire.Make(
+    make = messages.MakeTransport(
         line=setup.name,
         factory=made.factory,
         options=dict(setup.options),
@@ -102,4 +102,4 @@ def _line(made: Made, driver: Driver) -> LineSpec:
         is_strict=is_dear,
         silent_s=_silent_s(spec),
     )
-    return LineSpec(make, made.transport)
+    return GuardedLineSpec(make, made.transport)

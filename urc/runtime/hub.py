@@ -15,12 +15,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from urc.model.codec import Envelope
+from urc.model.payload import Envelope
 from urc.model.values import Reading, Sample, Signal
-from urc.runtime.blanking import Blanker
+from urc.runtime.redaction import Redactor
 
 if TYPE_CHECKING:
-    from urc.runtime.audit import Entry
+    from urc.runtime.audit import AuditEntry
 from typing import Final
 
 __all__ = [
@@ -28,13 +28,13 @@ __all__ = [
     "Hub",
     "LinkState",
     "LinkStatus",
-    "Moved",
-    "Note",
-    "Progress",
-    "Subscription",
-    "Tap",
+    "MotionRecord",
+    "LogEntry",
+    "SequenceProgress",
+    "HubSubscription",
+    "EventTap",
     "Tapped",
-    "Told",
+    "AuditRecord",
     "Traffic",
 ]
 
@@ -43,7 +43,7 @@ STREAM_KEPT: Final = 500
 """Number of stored readings of each such signal."""
 
 
-class Streams:
+class SampleHistory:
     """The last readings of some signals, each with its revision of the hub."""
 
     def __init__(self) -> None:
@@ -113,7 +113,7 @@ class LinkStatus:
 
 
 @dataclass(frozen=True, slots=True)
-class Note:
+class LogEntry:
     """A log entry: a fault or a change of state."""
 
     time_s: float
@@ -135,7 +135,7 @@ class Traffic:
     """Message with these bytes, on a transport with messages."""
 
 
-class Subscription:
+class HubSubscription:
     """A reader's position: the last revision that it has seen, and a wake-up for newer ones."""
 
     def __init__(self, hub: "Hub") -> None:
@@ -162,7 +162,7 @@ class Subscription:
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class SequenceProgress:
     """Progress of a sequence."""
 
     command: str
@@ -175,7 +175,7 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True)
-class Moved:
+class MotionRecord:
     """An accepted tick of a held command; only reported while a tap is open."""
 
     time_s: float
@@ -184,19 +184,19 @@ class Moved:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class AuditRecord:
     """An entry of the audit log."""
 
     time_s: float
     """Monotonic time; the entry itself has the time of day, which may be adjusted."""
-    entry: "Entry"
+    entry: "AuditEntry"
 
 
-Tapped: TypeAlias = Sample | Note | Traffic | LinkStatus | Moved | Told
+Tapped: TypeAlias = Sample | LogEntry | Traffic | LinkStatus | MotionRecord | AuditRecord
 """Item of a tap."""
 
 
-class Tap:
+class EventTap:
     """A complete, ordered stream of events for one reader; it counts its losses."""
 
     def __init__(self) -> None:
@@ -233,7 +233,7 @@ class Hub:
     def __init__(
         self,
         signals: Mapping[str, Signal],
-        blanker: Blanker | None = None,
+        blanker: Redactor | None = None,
         streams: Iterable[str] = (),
     ) -> None:
         """Start without values.
@@ -253,24 +253,24 @@ class Hub:
         self.links: dict[str, LinkStatus] = {}
         self.links_count = 0
         """Number of changes of the links."""
-        self.progress: dict[str, Progress] = {}
+        self.progress: dict[str, SequenceProgress] = {}
         """Sequence → its progress; sequences that never ran are missing."""
         self.progress_count = 0
         """Number of changes of the progress."""
-        self.notes: deque[Note] = deque(maxlen=NOTES_KEPT)
+        self.notes: deque[LogEntry] = deque(maxlen=NOTES_KEPT)
         self.notes_count = 0
         """Total number of log entries; the deque holds the last ones."""
         self.traffic: deque[Traffic] = deque(maxlen=TRAFFIC_KEPT)
         self.traffic_count = 0
         self.traffic_watchers = 0
         """Number of readers of traffic; traffic is recorded while it is above 0."""
-        self.streams = Streams()
+        self.streams = SampleHistory()
         """Signals of which every reading counts; none by default."""
         self._latest: dict[str, Sample] = {}
         self._changed: dict[str, int] = {}
         self._wakers: set[Callable[[], None]] = set()
-        self._taps: set[Tap] = set()
-        self._traffic_taps: set[Tap] = set()
+        self._taps: set[EventTap] = set()
+        self._traffic_taps: set[EventTap] = set()
 
     def put(self, samples: Iterable[Sample]) -> None:
         """Store readings; a repeated value also counts as a change, because its age is new."""
@@ -302,7 +302,7 @@ class Hub:
             tap.put((status,))
         self._wake()
 
-    def set_progress(self, progress: Progress) -> None:
+    def set_progress(self, progress: SequenceProgress) -> None:
         """Store the progress of a sequence."""
         if self._blanker is not None:
             progress = replace(progress, reason=self._blanker.text(progress.reason))
@@ -318,14 +318,14 @@ class Hub:
         """Whether a tap is open."""
         return bool(self._taps)
 
-    def tell(self, done: Moved | Told) -> None:
+    def tell(self, done: MotionRecord | AuditRecord) -> None:
         """Report an operator's action; only taps receive it."""
-        if self._blanker is not None and isinstance(done, Moved):
+        if self._blanker is not None and isinstance(done, MotionRecord):
             done = replace(done, arguments=self._blanker.value(done.arguments))
         for tap in self._taps:
             tap.put((done,))
 
-    def note(self, note: Note) -> None:
+    def note(self, note: LogEntry) -> None:
         """Add a log entry."""
         if self._blanker is not None:
             note = replace(note, text=self._blanker.text(note.text))
@@ -388,9 +388,9 @@ class Hub:
         return self.streams.filled(newest, max(revision, joined)) if self.streams else newest
 
     @contextmanager
-    def subscribe(self) -> Iterator[Subscription]:
+    def subscribe(self) -> Iterator[HubSubscription]:
         """Subscribe a reader for the duration of the context."""
-        subscription = Subscription(self)
+        subscription = HubSubscription(self)
         with self.heed(subscription.wake):
             yield subscription
 
@@ -404,13 +404,13 @@ class Hub:
             self._wakers.discard(wake)
 
     @contextmanager
-    def tap(self, *, with_traffic: bool = False) -> Iterator[Tap]:
+    def tap(self, *, with_traffic: bool = False) -> Iterator[EventTap]:
         """Open a tap on all samples and log entries for the duration of the context.
 
         Args:
             with_traffic: whether to include the bytes of the connections, recorded from now on.
         """
-        tap = Tap()
+        tap = EventTap()
         self._taps.add(tap)
         if with_traffic:
             self._traffic_taps.add(tap)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from urc.motion.lease import LeaseState
 from urc.private_files import put_private
 
-__all__ = ["Latch", "LatchFile"]
+__all__ = ["Latch", "LatchStore"]
 
 RETRY_S = 5.0
 _MOST_BYTES = 4096
@@ -36,7 +36,7 @@ class Latch(NamedTuple):
 _UNKNOWN = Latch(LeaseState(latched_by=_UNREADABLE), is_owed=True)
 
 
-class LatchFile:
+class LatchStore:
     """The file of one robot. Call `load` first, then `keep` from the event loop."""
 
     def __init__(self, folder: Path, robot: str) -> None:

@@ -22,14 +22,14 @@ import logging
 from collections.abc import Callable, Coroutine
 from typing import Any
 
-from urc.model.codec import Envelope, Payload
 from urc.model.driver import TransportSpec
-from urc.protocol.events import Fault, Send
-from urc.runtime.clock import Clock, Repeating, within
+from urc.model.payload import Envelope, Payload
+from urc.protocol.events import Send, Violation
+from urc.runtime.clock import Clock, PeriodicTimer, within
 from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.hub import Hub, LinkState
-from urc.runtime.outgoing import STUCK_S, Outgoing
-from urc.runtime.report import LinkReport
+from urc.runtime.link_report import LinkReport
+from urc.runtime.output_buffer import STUCK_S, OutputBuffer
 from urc.transports.base import NOTICE, Prompt, SupportsSettle, Transport, TransportError
 
 __all__ = ["Link"]
@@ -104,7 +104,7 @@ class Link:
         if not self._is_persistent:
             self.tried.set()
         self._report = LinkReport(spec.name, transport.address, hub, clock)
-        self._outgoing = Outgoing(
+        self._outgoing = OutputBuffer(
             transport, self._report, hub, clock, self._end, is_stream=self._is_stream
         )
 
@@ -177,7 +177,7 @@ class Link:
         else:
             self._greet()
 
-    def count(self, fault: Fault) -> None:
+    def count(self, fault: Violation) -> None:
         """Count a protocol violation, and log it at a limited rate."""
         self._report.count(fault)
         if fault.code in ("reply-timeout", "no-data"):
@@ -404,10 +404,10 @@ class Link:
         if self._ended is not None and not self._ended.done():
             self._ended.set_result(reason)
 
-    def _set_alarms(self) -> list[Repeating]:
-        alarms = [Repeating(self._clock, SETTLE_S, self._settled)]
+    def _set_alarms(self) -> list[PeriodicTimer]:
+        alarms = [PeriodicTimer(self._clock, SETTLE_S, self._settled)]
         if self._spec.timeouts.idle_s is not None:
-            alarms.append(Repeating(self._clock, self._spec.timeouts.idle_s, self._check_idle))
+            alarms.append(PeriodicTimer(self._clock, self._spec.timeouts.idle_s, self._check_idle))
         return alarms
 
     def _settled(self) -> float | None:

@@ -8,18 +8,18 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
-from urc.config.part import shown_duration
+from urc.config.node import shown_duration
 from urc.config.values import shown
 from urc.expressions import Template
-from urc.model.codec import each_of, traffic_of
 from urc.model.driver import Argument, Command, Driver, TransportSpec
 from urc.model.interface import WidgetUse
+from urc.model.payload import each_of, traffic_of
 from urc.model.profile import Profile, Setting
-from urc.model.values import Limits, Reading, Signal
+from urc.model.values import AlarmLimits, Reading, Signal
 from urc.problems import UrcError, printable
-from urc.protocol.codec import CodecContext
-from urc.protocol.encode import build_encode
-from urc.protocol.framing import build_framing
+from urc.protocol.framing.table import build_framing
+from urc.protocol.requests.encode import build_encode
+from urc.protocol.values.payload import CodecContext
 
 __all__ = ["manual"]
 
@@ -107,7 +107,7 @@ def _signals(signals: Mapping[str, Signal]) -> Iterator[str]:
     yield from _descriptions(signals.values())
 
 
-def _limits(limits: Limits) -> str:
+def _limits(limits: AlarmLimits) -> str:
     told = [
         text.format(f"{value:g}")
         for name, text in _LIMITS

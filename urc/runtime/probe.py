@@ -13,11 +13,11 @@ from typing import Final, Literal, NamedTuple
 from urc.model.driver import TransportSpec
 from urc.registry import Table
 from urc.runtime.hub import LinkStatus
-from urc.runtime.lines import make_lines
 from urc.runtime.session import Session
+from urc.runtime.transport_chain import make_lines
 from urc.transports.base import TransportError
 
-__all__ = ["LONGEST_S", "Tried", "Verdict", "probe"]
+__all__ = ["LONGEST_S", "ProbeResult", "Verdict", "probe"]
 
 LONGEST_S: Final = 12.0
 """Limit of a test, in seconds, regardless of the driver; the orderly close comes on top."""
@@ -31,7 +31,7 @@ _CLOSE_S: Final = 2.0
 Verdict = Literal["answers", "opens", "fails"]
 
 
-class Tried(NamedTuple):
+class ProbeResult(NamedTuple):
     """Result of one transport."""
 
     transport: str
@@ -51,7 +51,7 @@ async def probe(
     table: Table,
     *,
     longest_s: float = LONGEST_S,
-) -> list[Tried]:
+) -> list[ProbeResult]:
     """Test every transport of a robot; each wait is bounded.
 
     Args:
@@ -113,10 +113,10 @@ def _is_settled(status: LinkStatus | None, since_s: float, connected_s: float) -
     return connected_s >= _ANSWER_S
 
 
-async def _opened_alone(session: Session, names: list[str], table: Table) -> dict[str, Tried]:
+async def _opened_alone(session: Session, names: list[str], table: Table) -> dict[str, ProbeResult]:
     """Open and close the transports without a request."""
     driver = session.profile.driver
-    tried: dict[str, Tried] = {}
+    tried: dict[str, ProbeResult] = {}
     if not names:
         return tried
     made = make_lines(driver, session.settings, table)
@@ -124,13 +124,13 @@ async def _opened_alone(session: Session, names: list[str], table: Table) -> dic
         spec, transport = driver.transports[name], made[name].transport
         if spec.tunnel:
             text = f"is opened through {spec.tunnel} when a command needs it; it was not tried"
-            tried[name] = Tried(name, spec.type, transport.address, "opens", text, "")
+            tried[name] = ProbeResult(name, spec.type, transport.address, "opens", text, "")
             continue
         try:
             async with asyncio.timeout(spec.timeouts.connect_s + 1):
                 await transport.open(spec.timeouts.connect_s)
             text = "can be opened; commands open it as needed"
-            tried[name] = Tried(name, spec.type, transport.address, "opens", text, "")
+            tried[name] = ProbeResult(name, spec.type, transport.address, "opens", text, "")
         except (TransportError, TimeoutError) as error:
             text = str(error) or f"not open within {spec.timeouts.connect_s:g} s"
             tried[name] = _failed(spec, transport.address, text)
@@ -141,23 +141,23 @@ async def _opened_alone(session: Session, names: list[str], table: Table) -> dic
     return tried
 
 
-def _told(spec: TransportSpec, status: LinkStatus | None) -> Tried:
+def _told(spec: TransportSpec, status: LinkStatus | None) -> ProbeResult:
     if status is None:
         return _failed(spec, "", "it was not tried in time")
     if status.state == "live":
-        return Tried(spec.name, spec.type, status.address, "answers", "answers", "")
+        return ProbeResult(spec.name, spec.type, status.address, "answers", "answers", "")
     if _is_connected(status) and not status.attempts:
         text = status.detail or "connected, and an answer is overdue"
         advice = (
             "the replies do not fit this driver: check the port, and"
             " whether it is this robot; many robots serve one program at a time"
         )
-        return Tried(spec.name, spec.type, status.address, "opens", text, advice)
+        return ProbeResult(spec.name, spec.type, status.address, "opens", text, advice)
     return _failed(spec, status.address, status.detail or "not connected in time")
 
 
-def _failed(spec: TransportSpec, address: str, text: str) -> Tried:
-    return Tried(spec.name, spec.type, address, "fails", text, advice(text))
+def _failed(spec: TransportSpec, address: str, text: str) -> ProbeResult:
+    return ProbeResult(spec.name, spec.type, address, "fails", text, advice(text))
 
 
 _ADVICE: Final = (

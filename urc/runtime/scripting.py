@@ -20,7 +20,7 @@ from pathlib import Path
 from urc.model.profile import Profile
 from urc.model.values import Reading, Sample, Value
 from urc.problems import UrcError
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import CommandFailed, Session, resolve_settings
 
 __all__ = ["CommandFailed", "ConnectedRobot", "connect", "load"]

@@ -11,35 +11,35 @@ from random import random as random_share
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal
 
-from urc.model.codec import Payload
 from urc.model.driver import STOPPED, Driver
+from urc.model.payload import Payload
 from urc.model.profile import Profile
 from urc.model.values import NOTHING, Reading, Value
 from urc.problems import UrcError
-from urc.protocol.bounds import GOOD_BYE_S, lines_of, longest_s
 from urc.protocol.engine import Engine
 from urc.protocol.events import Failed, Replied, Request
-from urc.protocol.fresh import Fresh
-from urc.protocol.reins import PAUSE_S, Pull
+from urc.protocol.requests.bounds import GOOD_BYE_S, lines_of, longest_s
+from urc.protocol.sequences.sequence_control import PAUSE_S, Pull
+from urc.protocol.values.time_and_nonce import TimeAndNonce
 from urc.registry import Table
-from urc.runtime.blanking import Blanker
 from urc.runtime.clock import Clock, LoopClock, within
 from urc.runtime.dispatcher import Dispatcher
-from urc.runtime.held import is_lossy
+from urc.runtime.held_commands import is_lossy
 from urc.runtime.hub import Hub
-from urc.runtime.lines import make_transports
 from urc.runtime.link import Link
-from urc.runtime.motion import Frames
+from urc.runtime.motion_controller import MotionFrames
+from urc.runtime.redaction import Redactor
 from urc.runtime.settings import resolve_settings
+from urc.runtime.transport_chain import make_transports
 
 if TYPE_CHECKING:
     from urc.guard.guard_client import GuardClient
     from urc.transports.base import Transport
 
-__all__ = ["CommandFailed", "Motion", "Session", "Turnstile", "resolve_settings"]
+__all__ = ["CommandFailed", "Motion", "Session", "FifoEvent", "resolve_settings"]
 
 
-class Turnstile:
+class FifoEvent:
     """A FIFO queue in front of an event."""
 
     def __init__(self, event: asyncio.Event) -> None:
@@ -126,15 +126,15 @@ class Session:
         self.profile = profile
         self.settings = dict(settings)
         driver = profile.driver
-        self._blanker = Blanker.of(profile, self.settings)
+        self._blanker = Redactor.of(profile, self.settings)
         streams = (
             name for name, spec in driver.transports.items() if spec.framing.type != "datagram"
         )
         self.hub = Hub(driver.signals, self._blanker, streams)
         self._clock: Clock = clock or LoopClock()
-        fresh = Fresh(time.time, secrets.token_bytes)
+        fresh = TimeAndNonce(time.time, secrets.token_bytes)
         engine = Engine(driver, self.settings, fresh=fresh, is_compiled=True)
-        self.frames: Frames = engine.motions
+        self.frames: MotionFrames = engine.motions
         """Renders the frames of held commands."""
         self.movers = self._made_movers(engine, transports, motion)
         """Writer of the frames; None without motion."""
@@ -153,7 +153,7 @@ class Session:
             random,
         )
         self._stops = 0
-        self._untried = {name: Turnstile(link.tried) for name, link in self._links.items()}
+        self._untried = {name: FifoEvent(link.tried) for name, link in self._links.items()}
         """Links before the end of their first attempt: commands wait for it, in order."""
         self._numbers = count(1)
         self._group = asyncio.TaskGroup()

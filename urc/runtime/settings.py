@@ -17,7 +17,7 @@ from urc.model.driver import TransportSpec
 from urc.model.profile import Profile, Setting
 from urc.model.values import Value
 from urc.problems import UrcError, printable
-from urc.protocol.json_text_form import filled
+from urc.protocol.forms.json_text import filled
 
 __all__ = ["environment_name", "options_of", "parse_setting", "resolve_settings"]
 

@@ -10,19 +10,27 @@ from functools import partial
 from typing import Final, NamedTuple
 
 from urc.expressions import COUNTERS, ExpressionError, Template
-from urc.model.codec import Envelope, Payload, ReadSpec, WriteSpec, each_of
 from urc.model.driver import Argument, Command, Driver, FramingSpec, Poll, TransportSpec
+from urc.model.payload import Envelope, Payload, ReadSpec, WriteSpec, each_of
 from urc.model.sequence import ExpectStep, IfStep, PromptStep, RepeatStep, SendStep, Step
 from urc.model.values import NOTHING, Value
 from urc.patterns import Pattern, example
-from urc.protocol.codec import CodecContext, Frame, NotWritable, Reader, Writer
-from urc.protocol.convert import BadValue
-from urc.protocol.decode import build_raw
-from urc.protocol.forms import build_reader, build_writer
-from urc.protocol.framing import build_framing
-from urc.protocol.framings.base import Framing, FramingError
-from urc.simulator.backwards import computed_fields
-from urc.simulator.echo import (
+from urc.protocol.forms.table import build_reader, build_writer
+from urc.protocol.framing.base import Framing, FramingError
+from urc.protocol.framing.table import build_framing
+from urc.protocol.values.convert import BadValue
+from urc.protocol.values.decode import build_raw
+from urc.protocol.values.payload import (
+    CodecContext,
+    Frame,
+    NotWritable,
+    PayloadReader,
+    PayloadWriter,
+)
+from urc.simulator.expression_inverse import computed_fields
+from urc.simulator.fields import Fields
+from urc.simulator.multiline_replies import in_lines
+from urc.simulator.reply_echo import (
     correlated,
     guesses,
     is_alike,
@@ -30,11 +38,17 @@ from urc.simulator.echo import (
     rule_for,
     typed_arguments,
 )
-from urc.simulator.fields import Fields
-from urc.simulator.in_lines import in_lines
 from urc.simulator.values import Values
 
-__all__ = ["Answer", "Asked", "AutoLine", "AutoMessage", "AutoRobot", "Unanswered", "numbered"]
+__all__ = [
+    "SimulatedReply",
+    "ReceivedRequest",
+    "DefaultConnection",
+    "DefaultMessage",
+    "DefaultResponder",
+    "Unanswered",
+    "numbered",
+]
 
 _ALWAYS_KNOWN: Final = frozenset(("settings", COUNTERS))
 _SLOWEST_S: Final = 1.0
@@ -45,11 +59,11 @@ class Unanswered(Exception):
     """The reason why a declared request has no reply, for people."""
 
 
-class Answer(NamedTuple):
+class SimulatedReply(NamedTuple):
     """One reply frame, or text without an end mark."""
 
     spec: ReadSpec
-    reader: Reader | None
+    reader: PayloadReader | None
     framing: Framing
     prompt: Pattern | None = None
     match: Template | None = None
@@ -64,24 +78,24 @@ class Answer(NamedTuple):
             return False
 
 
-class AutoMessage(NamedTuple):
+class DefaultMessage(NamedTuple):
     """An unsolicited message of the robot."""
 
     every_s: float
-    answer: Answer
+    answer: SimulatedReply
 
 
 class _Request(NamedTuple):
     """A request that the driver can send."""
 
     label: str
-    writer: Writer
+    writer: PayloadWriter
     arguments: Mapping[str, Argument]
-    answers: tuple[Answer, ...]
+    answers: tuple[SimulatedReply, ...]
     names: frozenset[str]
 
 
-class Asked(NamedTuple):
+class ReceivedRequest(NamedTuple):
     """A received request, with its arguments."""
 
     request: _Request
@@ -89,7 +103,7 @@ class Asked(NamedTuple):
     frame: Frame
 
 
-class AutoRobot:
+class DefaultResponder:
     """The shared values of all connections of one emulated robot."""
 
     def __init__(self, driver: Driver, settings: Mapping[str, Value], values: Values) -> None:
@@ -98,7 +112,7 @@ class AutoRobot:
         self.values = values
         self._raw = {name: build_raw(one) for name, one in driver.signals.items()}
 
-    def line(self, transport: str, framing: Framing, *, talks: bool) -> "AutoLine":
+    def line(self, transport: str, framing: Framing, *, talks: bool) -> "DefaultConnection":
         """Return the robot's side of one transport.
 
         Args:
@@ -106,7 +120,7 @@ class AutoRobot:
             framing: framing of the robot's side.
             talks: whether it sends unsolicited messages.
         """
-        return AutoLine(self, self.driver.transports[transport], framing, talks=talks)
+        return DefaultConnection(self, self.driver.transports[transport], framing, talks=talks)
 
     def _raw_of(self, name: str, now_s: float) -> object:
         if name not in self._raw:
@@ -143,23 +157,23 @@ class AutoRobot:
         return Fields(numbers, others, own, tuple(unknown))
 
 
-class AutoLine:
+class DefaultConnection:
     """The robot's side of one transport."""
 
     def __init__(
-        self, robot: AutoRobot, spec: TransportSpec, framing: Framing, *, talks: bool
+        self, robot: DefaultResponder, spec: TransportSpec, framing: Framing, *, talks: bool
     ) -> None:
-        """Prepare; `AutoRobot.line` calls this."""
+        """Prepare; `DefaultResponder.line` calls this."""
         self._robot = robot
         self._spec = spec
         self._framing = framing
         self._context = CodecContext(spec.encoding, robot.settings)
         self.opening, requests = self._script("on_connect", spec.on_connect)
         self._requests = [*requests, *self._declared()]
-        self.messages: list[AutoMessage] = []
+        self.messages: list[DefaultMessage] = []
         if talks and spec.connection == "persistent":
             self.messages = [
-                AutoMessage(self._period_s(one.read), self.message(one.name))
+                DefaultMessage(self._period_s(one.read), self.message(one.name))
                 for one in robot.driver.messages.values()
                 if one.transport == spec.name
             ]
@@ -180,7 +194,7 @@ class AutoLine:
         self._robot.values.remember(asked.arguments)
         return self.answers(asked, now_s)
 
-    def answers(self, asked: Asked, now_s: float) -> list[Payload]:
+    def answers(self, asked: ReceivedRequest, now_s: float) -> list[Payload]:
         """Return the declared replies to a request; raise `Unanswered`."""
         known, label = asked.arguments, asked.request.label
         try:
@@ -197,7 +211,7 @@ class AutoLine:
                 return request.answers[0].framing
         return self._framing
 
-    def message(self, name: str) -> Answer:
+    def message(self, name: str) -> SimulatedReply:
         """Return a declared message, to be sent."""
         message = self._robot.driver.messages[name]
         names = message.acknowledge.names if message.acknowledge is not None else frozenset()
@@ -205,7 +219,7 @@ class AutoLine:
         return self._answer(message.read)._replace(needed=needed)
 
     def say(
-        self, answer: Answer, now_s: float, known: Mapping[str, object] = NOTHING
+        self, answer: SimulatedReply, now_s: float, known: Mapping[str, object] = NOTHING
     ) -> list[Payload]:
         """Return the frames of one reply or message; raise `Unanswered`."""
         if answer.prompt is not None:
@@ -229,15 +243,15 @@ class AutoLine:
                 why = str(error)
         raise Unanswered(f"no reply can be built as {answer.spec.form}: {why}")
 
-    def asked(self, frame: Frame, label: str = "") -> Asked | None:
+    def asked(self, frame: Frame, label: str = "") -> ReceivedRequest | None:
         """Return the request in a frame with its arguments; an exact match goes first.
 
         Args:
             frame: the received frame.
             label: the preferred command or poll if several send the same frame; "" for any.
         """
-        near: Asked | None = None
-        best: Asked | None = None
+        near: ReceivedRequest | None = None
+        best: ReceivedRequest | None = None
         for one in self._readings(frame):
             near = near or one
             if not self._gives(one):
@@ -251,7 +265,7 @@ class AutoLine:
         best = best or near
         return best if best is not None and label in ("", best.request.label) else None
 
-    def asked_too(self, frame: Frame, label: str) -> Asked | None:
+    def asked_too(self, frame: Frame, label: str) -> ReceivedRequest | None:
         """Return a frame as a request of the command `label` if its first match has no reply.
 
         Two declarations often send the same stop: the release of a held command, and a close
@@ -271,7 +285,7 @@ class AutoLine:
         exact = {one.request.label for one in found if self._gives(one)}
         return exact or {one.request.label for one in found[:1]}
 
-    def _readings(self, frame: Frame) -> Iterator[Asked]:
+    def _readings(self, frame: Frame) -> Iterator[ReceivedRequest]:
         """Yield all requests that a frame may be, constant ones first."""
         for request in self._requests:
             found = request.writer.read(frame)
@@ -279,12 +293,12 @@ class AutoLine:
             if arguments is None:
                 continue
             for guess in guesses(request.arguments, arguments):
-                asked = Asked(request, guess, frame)
+                asked = ReceivedRequest(request, guess, frame)
                 if self._gives(asked):
                     yield asked
-            yield Asked(request, arguments, frame)
+            yield ReceivedRequest(request, arguments, frame)
 
-    def _gives(self, asked: Asked) -> bool:
+    def _gives(self, asked: ReceivedRequest) -> bool:
         """Return whether a request with its arguments encodes to this exact frame."""
         request, arguments, frame = asked
         if not request.names:
@@ -326,7 +340,7 @@ class AutoLine:
         self, label: str, asked: Command | Poll, arguments: Mapping[str, Argument]
     ) -> _Request:
         reply = asked.reply
-        answers: list[Answer] = []
+        answers: list[SimulatedReply] = []
         if reply is not None:
             reads = [reply.read, *(stage.read for stage in reply.stages)]
             answers += [
@@ -340,7 +354,7 @@ class AutoLine:
         self,
         label: str,
         send: WriteSpec,
-        answers: tuple[Answer, ...],
+        answers: tuple[SimulatedReply, ...],
         arguments: Mapping[str, Argument] = NOTHING,
     ) -> _Request:
         writer = build_writer(send, self._context)
@@ -348,14 +362,16 @@ class AutoLine:
 
     def _answer(
         self, read: ReadSpec, framing: FramingSpec | None = None, match: Template | None = None
-    ) -> Answer:
+    ) -> SimulatedReply:
         own = self._framing if framing is None else build_framing(framing).reversed()
-        return Answer(read, build_reader(read, self._context), own, match=match)
+        return SimulatedReply(read, build_reader(read, self._context), own, match=match)
 
-    def _script(self, label: str, steps: Iterable[Step]) -> tuple[list[Answer], list[_Request]]:
+    def _script(
+        self, label: str, steps: Iterable[Step]
+    ) -> tuple[list[SimulatedReply], list[_Request]]:
         """Return the frames expected before the first send, and those after each send."""
-        opening: list[Answer] = []
-        requests: list[tuple[WriteSpec, list[Answer]]] = []
+        opening: list[SimulatedReply] = []
+        requests: list[tuple[WriteSpec, list[SimulatedReply]]] = []
         for step in _main_way(steps):
             if isinstance(step, (SendStep, ExpectStep, PromptStep)):
                 if step.transport != self._spec.name:
@@ -367,7 +383,7 @@ class AutoLine:
                     answers.append(self._answer(step.read, step.framing))
                 else:
                     prompt = ReadSpec("prompt")
-                    answers.append(Answer(prompt, None, self._framing, step.pattern))
+                    answers.append(SimulatedReply(prompt, None, self._framing, step.pattern))
         return opening, [self._sent(label, send, tuple(after)) for send, after in requests]
 
     def _period_s(self, read: ReadSpec) -> float:

@@ -9,13 +9,13 @@ from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from urc.config.part import duration_s
-from urc.model.codec import Payload
+from urc.config.node import duration_s
+from urc.model.payload import Payload
 from urc.model.values import Reading
 from urc.problems import UrcError
 from urc.simulator.world.chance import uniform
 
-__all__ = ["FAULTS", "Fault", "Faults", "Late", "parse_fault"]
+__all__ = ["FAULTS", "Fault", "Faults", "DelayLine", "parse_fault"]
 
 MOST_LATE: Final = 1024
 """Most delayed frames of one connection; beyond them the newest are lost."""
@@ -142,7 +142,7 @@ class Faults:
         return bool(self.dropped) and not self.dropped.isdisjoint(names)
 
 
-class Late:
+class DelayLine:
     """The delayed frames of one connection."""
 
     def __init__(self) -> None:

@@ -7,50 +7,63 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from urc.expressions import COUNTERS, ExpressionError, Template
-from urc.model.codec import Envelope, Payload, ReadSpec, traffic_of
 from urc.model.driver import TransportSpec
+from urc.model.payload import Envelope, Payload, ReadSpec, traffic_of
 from urc.model.profile import Reaction, SimulatorRule
 from urc.model.values import NOTHING
-from urc.protocol.codec import BadText, CodecContext, Frame, NotWritable, Reader, Writer
-from urc.protocol.convert import Unusable
-from urc.protocol.forms import build_reader, build_writer
-from urc.protocol.framing import build_framing
-from urc.protocol.framings.base import Framing, FramingError
-from urc.protocol.gate import Counters
-from urc.protocol.topics import frame_of
-from urc.simulator.auto import Answer, Asked, AutoLine, Unanswered, numbered
+from urc.protocol.forms.table import build_reader, build_writer
+from urc.protocol.forms.topics import frame_of
+from urc.protocol.framing.base import Framing, FramingError
+from urc.protocol.framing.table import build_framing
+from urc.protocol.requests.rate import Counters
+from urc.protocol.values.convert import Unusable
+from urc.protocol.values.payload import (
+    BadText,
+    CodecContext,
+    Frame,
+    NotWritable,
+    PayloadReader,
+    PayloadWriter,
+)
+from urc.simulator.auto import (
+    DefaultConnection,
+    ReceivedRequest,
+    SimulatedReply,
+    Unanswered,
+    numbered,
+)
 from urc.simulator.values import Names, Unsettable, Values
 
-__all__ = ["Course", "Ruled", "Rules", "not_taken"]
+__all__ = ["RunningRule", "ReadyRule", "RuleSet", "not_taken"]
 
 
-class Deed(NamedTuple):
+class ReadyReaction(NamedTuple):
     """A compiled reaction."""
 
     what: Reaction
-    writer: Writer | None
+    writer: PayloadWriter | None
     framing: Framing
-    message: Answer | None
+    message: SimulatedReply | None
 
 
-class Ruled(NamedTuple):
+class ReadyRule(NamedTuple):
     """A compiled rule."""
 
     what: SimulatorRule
-    reader: Reader | None
-    deeds: tuple[Deed, ...]
+    reader: PayloadReader | None
+    deeds: tuple[ReadyReaction, ...]
 
 
-class Course:
+class RunningRule:
     """The pending reactions of one rule."""
 
     __slots__ = ("asked", "deeds", "frame", "has_waited", "left_s", "names", "sets")
 
     def __init__(
         self,
-        deeds: tuple[Deed, ...],
+        deeds: tuple[ReadyReaction, ...],
         names: Mapping[str, object],
-        asked: Asked | None = None,
+        asked: ReceivedRequest | None = None,
         frame: Frame | None = None,
         *,
         sets: bool = True,
@@ -70,7 +83,7 @@ class Course:
         self.has_waited = False
 
 
-class Rules:
+class RuleSet:
     """The rules of one transport, in the order of the document.
 
     Args:
@@ -86,7 +99,7 @@ class Rules:
         rules: tuple[SimulatorRule, ...],
         spec: TransportSpec,
         framing: Framing,
-        auto: AutoLine,
+        auto: DefaultConnection,
         values: Values,
     ) -> None:
         self._context = CodecContext(spec.encoding, values.settings)
@@ -99,30 +112,30 @@ class Rules:
         """Rules that frames trigger."""
         self.periodic = tuple(rule for rule in ready if rule.what.every_s is not None)
 
-    def _ready(self, rule: SimulatorRule) -> Ruled:
+    def _ready(self, rule: SimulatorRule) -> ReadyRule:
         is_form = isinstance(rule.match, ReadSpec)
         reader = build_reader(rule.match, self._context) if is_form else None  # type: ignore[arg-type]  # as told
         framing = self._auto.framing_of(rule.request) if rule.request else self._framing
-        return Ruled(rule, reader, tuple(self._deed(one, framing) for one in rule.reactions))
+        return ReadyRule(rule, reader, tuple(self._deed(one, framing) for one in rule.reactions))
 
-    def _deed(self, what: Reaction, framing: Framing) -> Deed:
+    def _deed(self, what: Reaction, framing: Framing) -> ReadyReaction:
         if what.framing is not None:
             framing = build_framing(what.framing).reversed()
-        return Deed(
+        return ReadyReaction(
             what,
             build_writer(what.send, self._context) if what.send is not None else None,
             framing,
             self._auto.message(what.message) if what.message else None,
         )
 
-    def find(self, frame: Frame, now_s: float) -> Course | None:
+    def find(self, frame: Frame, now_s: float) -> RunningRule | None:
         """Return the reactions of the first rule that matches a frame, or None.
 
         Raises:
             Unanswered: the condition of a rule has no value, or a field has none.
         """
         for rule in self.asked:
-            asked: Asked | None = None
+            asked: ReceivedRequest | None = None
             names: Mapping[str, object] | None
             if rule.what.request:
                 asked = self._auto.asked(frame, rule.what.request)
@@ -143,12 +156,12 @@ class Rules:
 
     def _course(
         self,
-        rule: Ruled,
+        rule: ReadyRule,
         names: Mapping[str, object] | None,
-        asked: Asked | None,
+        asked: ReceivedRequest | None,
         frame: Frame,
         now_s: float,
-    ) -> Course | None:
+    ) -> RunningRule | None:
         """Return the reactions of a rule to a frame with `names`; None if its condition fails."""
         for name, value in (names or NOTHING).items():
             if isinstance(value, Unusable):
@@ -157,7 +170,7 @@ class Rules:
             return None
         if asked is not None:
             self._values.remember(asked.arguments)
-        return Course(rule.deeds, names, asked, frame)
+        return RunningRule(rule.deeds, names, asked, frame)
 
     def holds(
         self, condition: Template | None, now_s: float, names: Mapping[str, object] = NOTHING
@@ -170,7 +183,7 @@ class Rules:
         except ExpressionError as error:
             raise Unanswered(str(error)) from None
 
-    def do(self, deed: Deed, course: Course, now_s: float) -> list[Payload]:
+    def do(self, deed: ReadyReaction, course: RunningRule, now_s: float) -> list[Payload]:
         """Perform one reaction and return its frames; raise `Unanswered` if that is impossible."""
         what = deed.what
         said: list[Payload] = []
@@ -208,7 +221,7 @@ class Rules:
             names |= what.send.names
         return body is not None and bool(body.world.dropped) and "world" in names
 
-    def _set(self, what: Reaction, course: Course, now_s: float) -> None:
+    def _set(self, what: Reaction, course: RunningRule, now_s: float) -> None:
         names = Names(self._values, now_s, course.names)
         values = {
             name: one.evaluate(names) if isinstance(one, Template) else one
@@ -217,7 +230,9 @@ class Rules:
         for name, value in values.items():  # all use the values from before
             self._values.put(name, value)
 
-    def _written(self, deed: Deed, writer: Writer, course: Course, now_s: float) -> Payload:
+    def _written(
+        self, deed: ReadyReaction, writer: PayloadWriter, course: RunningRule, now_s: float
+    ) -> Payload:
         draw = self._counters.draw()
         names = Names(self._values, now_s, {**course.names, COUNTERS: draw})
         payload = writer.write(names)
@@ -228,7 +243,7 @@ class Rules:
         return said if course.frame is None else numbered(said, course.frame)
 
 
-def _names_in(rule: Ruled, came: Frame) -> Mapping[str, object] | None:
+def _names_in(rule: ReadyRule, came: Frame) -> Mapping[str, object] | None:
     """Return the names in a frame by a rule's own pattern or form; None without a match."""
     frame = came if isinstance(came.payload, bytes) else frame_of(came.payload, came.encoding)
     try:

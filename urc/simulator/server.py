@@ -14,8 +14,9 @@ from urc.model.driver import TransportSpec
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError
-from urc.protocol.json_text_form import filled
-from urc.protocol.topics import listened
+from urc.protocol.forms.json_text import filled
+from urc.protocol.forms.topics import listened
+from urc.simulator.emulated_robot import EmulatedRobot
 from urc.simulator.servers.base import (
     SERVERS,
     Endpoint,
@@ -24,7 +25,6 @@ from urc.simulator.servers.base import (
     SimulatedServer,
     host_and_port,
 )
-from urc.simulator.twin import Twin
 
 __all__ = ["serve"]
 
@@ -41,7 +41,7 @@ async def serve(
     *,
     now: Callable[[], float] = time.time,
     is_anywhere: bool = False,
-    twin: Twin | None = None,
+    twin: EmulatedRobot | None = None,
 ) -> AsyncIterator[Mapping[str, Endpoint]]:
     """Emulate the robot of `profile` until the context ends.
 
@@ -59,7 +59,7 @@ async def serve(
     Raises:
         UrcError: a transport cannot be emulated, or an address is not available.
     """
-    robot = twin or Twin(profile, settings)
+    robot = twin or EmulatedRobot(profile, settings)
     transports = profile.driver.transports
     inside: dict[str, dict[tuple[str, int], Endpoint]] = {name: {} for name in transports}
     last_peer = LastPeer()

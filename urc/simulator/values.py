@@ -11,13 +11,13 @@ from zlib import crc32
 
 from urc.expressions import ExpressionError, Template
 from urc.model.driver import Driver
-from urc.model.values import NOTHING, ElementType, Limits, Reading, Signal, SignalType, Value
+from urc.model.values import NOTHING, AlarmLimits, ElementType, Reading, Signal, SignalType, Value
 from urc.model.world import WorldSpec
 from urc.problems import UrcError
-from urc.protocol.convert import BadValue
-from urc.protocol.decode import build_converter
-from urc.simulator.embodied import Embodied
+from urc.protocol.values.convert import BadValue
+from urc.protocol.values.decode import build_converter
 from urc.simulator.faults import Faults
+from urc.simulator.simulated_body import SimulatedBody
 
 __all__ = ["Names", "Unsettable", "Values"]
 
@@ -65,7 +65,7 @@ def _single(signal: Signal, kind: ElementType | SignalType, place: int, now_s: f
 
 def _range(signal: Signal) -> tuple[float, float]:
     """Return the range of values without any alarm."""
-    limits: Limits = signal.limits
+    limits: AlarmLimits = signal.limits
     lowest, highest = signal.min, signal.max
     floors = [one for one in (signal.min, limits.lolo, limits.low) if one is not None]
     tops = [one for one in (signal.max, limits.high, limits.hihi) if one is not None]
@@ -112,7 +112,7 @@ class Values:
         """Values that are no signals."""
         self.chosen: dict[str, Reading] = {}
         """Signals with a set value."""
-        self.body: Embodied | None = None
+        self.body: SimulatedBody | None = None
         """The body with its sensors; None without a world."""
         self.senses: Mapping[str, object] = NOTHING
         """Signals that the world gives."""
@@ -121,7 +121,10 @@ class Values:
         for name, value in initial.items():
             self.put(name, value)
         if world is not None:
-            self.body, self.senses = Embodied(world, driver, self.evaluate, self.put), world.senses
+            self.body, self.senses = (
+                SimulatedBody(world, driver, self.evaluate, self.put),
+                world.senses,
+            )
 
     def remember(self, arguments: Mapping[str, object]) -> None:
         """Store the arguments of a command whose names are signals."""
@@ -215,7 +218,7 @@ class Names(Mapping[str, object]):
         return sum(1 for _ in self)
 
 
-def _sensed(body: Embodied, signal: Signal, now_s: float) -> Reading:
+def _sensed(body: SimulatedBody, signal: Signal, now_s: float) -> Reading:
     """Return the world's value of a signal; None if it is invalid."""
     try:
         value = body.sense(signal.name, now_s)

@@ -8,19 +8,19 @@ from typing import Any
 
 import yaml
 
-from urc.model.codec import Payload
 from urc.model.driver import Command, Driver, TransportSpec
-from urc.model.interface import Grid, Interface, Slot, WidgetUse
+from urc.model.interface import Interface, Layout, Slot, WidgetUse
+from urc.model.payload import Payload
 from urc.model.profile import Profile, Setting
-from urc.model.values import Alarm, Limits, Reading, Sample, Signal, Value
-from urc.model.widget import Port, Widget
+from urc.model.values import Alarm, AlarmLimits, Reading, Sample, Signal, Value
+from urc.model.widget import Widget, WidgetPort
 from urc.protocol.events import Replied
-from urc.protocol.reins import Pull
+from urc.protocol.sequences.sequence_control import Pull
 from urc.runtime.clock import Clock, LoopClock
-from urc.runtime.hub import Hub, LinkState, LinkStatus, Note
-from urc.runtime.motion import Movers
+from urc.runtime.hub import Hub, LinkState, LinkStatus, LogEntry
+from urc.runtime.motion_controller import MotionBackend
 from urc.shipped import shipped
-from urc.testing.movers import FakeFrames, FakeMovers
+from urc.testing.movers import FakeFrames, FakeMotionBackend
 
 __all__ = ["FakeRobot", "dashboard_profile", "option_defaults", "plain_widget"]
 
@@ -30,7 +30,7 @@ BATTERY = Signal(
     unit="%",
     min=0,
     max=100,
-    limits=Limits(lolo=10, low=20),
+    limits=AlarmLimits(lolo=10, low=20),
     stale_after_s=3.0,
 )
 
@@ -48,7 +48,7 @@ def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -
     types = ("integer", "number", "boolean", "string", "array", "object", "image", "blob")
     known = declared.get("inputs", {})
     ports = {
-        each: Port(
+        each: WidgetPort(
             each,
             types,
             unit=known.get(each, {}).get("unit", ""),
@@ -59,7 +59,7 @@ def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -
         for each in {**known, **dict.fromkeys(inputs)}
     }
     outputs = {
-        each: Port(
+        each: WidgetPort(
             each, is_held=port.get("hold", False), arguments=tuple(port.get("arguments", {}))
         )
         for each, port in declared.get("outputs", {}).items()
@@ -98,7 +98,7 @@ def dashboard_profile(
         for use in wanted
     ]
     slots = tuple(Slot(use.slot, 0, column) for column, use in enumerate(given))
-    grid = Grid(1, len(slots), slots)
+    grid = Layout(1, len(slots), slots)
     return Profile(
         name=name,
         title=name.title(),
@@ -135,7 +135,7 @@ class FakeRobot:
         self.latched: list[str] = []
         """Reasons of all latches."""
         self.frames = FakeFrames(profile.driver)
-        self.movers: Movers | None = FakeMovers(self.clock)
+        self.movers: MotionBackend | None = FakeMotionBackend(self.clock)
         self.on_command: Callable[[str, Mapping[str, Reading]], Mapping[str, Value]] | None = None
         """Returns the values of a command's reply, or raises an error; None: no values."""
 
@@ -189,4 +189,4 @@ class FakeRobot:
 
     def tell(self, text: str) -> None:
         """Add a log entry."""
-        self.hub.note(Note(self.clock.now(), "info", "wire", text))
+        self.hub.note(LogEntry(self.clock.now(), "info", "wire", text))

@@ -3,15 +3,15 @@
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
 
-from urc.model.codec import Counted, Payload, Series
 from urc.model.driver import Driver
+from urc.model.payload import CountedFrame, FrameVariants, Payload
 from urc.model.values import Reading
-from urc.motion.hold import Mover, Reason, Terms
+from urc.motion.hold_to_run import HoldTerms, HoldToRun, Reason
 from urc.problems import UrcError
-from urc.protocol.encode import check_arguments
-from urc.runtime.clock import Alarm, Clock
+from urc.protocol.requests.encode import check_arguments
+from urc.runtime.clock import Clock, Timer
 
-__all__ = ["FakeFrames", "FakeMovers"]
+__all__ = ["FakeFrames", "FakeMotionBackend"]
 
 
 class FakeFrames:
@@ -73,7 +73,7 @@ class FakeFrames:
         return data
 
 
-class FakeMovers:
+class FakeMotionBackend:
     """Real movers with a fake transport that accepts all data while `is_up`."""
 
     def __init__(self, clock: Clock, write: Callable[[bytes], None] | None = None) -> None:
@@ -86,8 +86,8 @@ class FakeMovers:
         self.is_up = True
         self._clock = clock
         self._write = write
-        self._movers: dict[str, Mover] = {}
-        self._alarm: Alarm | None = None
+        self._movers: dict[str, HoldToRun] = {}
+        self._alarm: Timer | None = None
         self._stops: asyncio.Queue[tuple[str, Reason]] = asyncio.Queue()
 
     @property
@@ -95,21 +95,21 @@ class FakeMovers:
         """Return the written texts."""
         return [text for _, text in self.written]
 
-    def arm(self, command: str, terms: Terms) -> None:
+    def arm(self, command: str, terms: HoldTerms) -> None:
         """Accept ticks from now on."""
         mover = self._movers.get(command)
         if mover is None or mover.state == "idle":
-            mover = self._movers[command] = Mover(terms)
+            mover = self._movers[command] = HoldToRun(terms)
         mover.arm()
 
-    def tick(self, command: str, data: Payload | Counted) -> None:
+    def tick(self, command: str, data: Payload | CountedFrame) -> None:
         """Renew the lease."""
-        assert not isinstance(data, Counted)  # noqa: S101 - the fake has no shared counters
+        assert not isinstance(data, CountedFrame)  # noqa: S101 - the fake has no shared counters
         if self._movers[command].tick(data or None, self._clock.now()):
             self.ticked_s = self._clock.now()
         self.step()
 
-    def renew(self, command: str, stop: Payload | Series) -> None:
+    def renew(self, command: str, stop: Payload | FrameVariants) -> None:
         """Replace the stop frame."""
         mover = self._movers[command]
         mover.renew(mover.terms.stopped_by(stop))
@@ -128,11 +128,11 @@ class FakeMovers:
             self._movers[command].stop("released", self._clock.now())
         self.step()
 
-    def stop(self, stops: Mapping[str, Payload | Series]) -> None:
+    def stop(self, stops: Mapping[str, Payload | FrameVariants]) -> None:
         """Stop all motion."""
         for command, frame in stops.items():
-            terms = Terms(b"", period_s=0.05).stopped_by(frame)
-            mover = self._movers.setdefault(command, Mover(terms))
+            terms = HoldTerms(b"", period_s=0.05).stopped_by(frame)
+            mover = self._movers.setdefault(command, HoldToRun(terms))
             mover.stop("stopped", self._clock.now())
         self.step()
 

@@ -1,7 +1,6 @@
 """A robot with one transport, built without a document."""
 
 from urc.expressions import compile_template
-from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import (
     Argument,
     Backoff,
@@ -14,6 +13,7 @@ from urc.model.driver import (
     Timeouts,
     TransportSpec,
 )
+from urc.model.payload import ReadSpec, WriteSpec
 from urc.model.profile import Profile, Reaction, Setting, SimulatorRule
 from urc.model.values import Signal
 from urc.patterns import compile_pattern

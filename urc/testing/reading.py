@@ -2,12 +2,12 @@
 
 from collections.abc import Collection
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext, parse_read
-from urc.config.part import Findings, Part
-from urc.model.codec import ReadSpec
+from urc.model.payload import ReadSpec
 from urc.problems import ProblemsError
-from urc.protocol.codec import CodecContext, Reader
-from urc.protocol.forms import build_reader
+from urc.protocol.forms.table import build_reader
+from urc.protocol.values.payload import CodecContext, PayloadReader
 from urc.source import parse_document
 
 __all__ = ["read_spec", "reader_of"]
@@ -20,14 +20,14 @@ def read_spec(text: str, signals: Collection[str] = (), encoding: str = "utf-8")
         ProblemsError: the form has errors.
     """
     document = parse_document(text, "reply.yaml")
-    findings = Findings()
+    findings = Problems()
     context = FormContext(encoding, frozenset(signals))
-    spec = parse_read(Part(document, (), document.data), findings, context)
+    spec = parse_read(Node(document, (), document.data), findings, context)
     if findings.problems:
         raise ProblemsError(findings.problems)
     return spec
 
 
-def reader_of(text: str, signals: Collection[str] = (), encoding: str = "utf-8") -> Reader:
+def reader_of(text: str, signals: Collection[str] = (), encoding: str = "utf-8") -> PayloadReader:
     """Return the reader of the form in `text`."""
     return build_reader(read_spec(text, signals, encoding), CodecContext(encoding))

@@ -2,15 +2,15 @@
 
 from collections.abc import Mapping
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext
 from urc.config.parse.forms.struct import parse_read, parse_write
 from urc.config.parse.struct.numbers import parse_enums
 from urc.config.parse.types import parse_types
-from urc.config.part import Findings, Part
-from urc.model.codec import ReadSpec, WriteSpec
+from urc.model.payload import ReadSpec, WriteSpec
 from urc.problems import to_text
-from urc.protocol.codec import CodecContext, Frame, Reader, Writer
-from urc.protocol.forms import build_reader, build_writer
+from urc.protocol.forms.table import build_reader, build_writer
+from urc.protocol.values.payload import CodecContext, Frame, PayloadReader, PayloadWriter
 from urc.source import parse_document
 
 __all__ = ["frame", "reader", "struct_read", "struct_write", "writer"]
@@ -38,12 +38,12 @@ def struct_write(source: str) -> WriteSpec:
     return spec
 
 
-def reader(source: str, encoding: str = "utf-8") -> Reader:
+def reader(source: str, encoding: str = "utf-8") -> PayloadReader:
     """Return the reader of such frames."""
     return build_reader(struct_read(source), CodecContext(encoding))
 
 
-def writer(source: str, encoding: str = "utf-8") -> Writer:
+def writer(source: str, encoding: str = "utf-8") -> PayloadWriter:
     """Return the writer of such frames."""
     return build_writer(struct_write(source), CodecContext(encoding))
 
@@ -53,16 +53,16 @@ def frame(data: bytes | str) -> Frame:
     return Frame(bytes.fromhex(data) if isinstance(data, str) else data, "utf-8")
 
 
-def _context(source: str) -> tuple[Part, FormContext, Findings]:
+def _context(source: str) -> tuple[Node, FormContext, Problems]:
     document = parse_document(source, "test.yaml")
-    findings = Findings()
+    findings = Problems()
     assert isinstance(document.data, Mapping)  # noqa: S101  # a mistake in the test
-    part = Part(document, (), document.data)
+    part = Node(document, (), document.data)
     enums = parse_enums(part, findings)
     types = parse_types(part, enums, findings)
     return part, FormContext(types=types, enums=enums), findings
 
 
-def _assert_none(findings: Findings) -> None:
+def _assert_none(findings: Problems) -> None:
     told = "".join(map(to_text, findings))
     assert not told, told  # noqa: S101  # the purpose of this module

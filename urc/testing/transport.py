@@ -4,7 +4,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
-from urc.registry import Row, Table
+from urc.registry import RegistryEntry, Table
 from urc.transports.base import ConnectFailed, PeerClosed, Transport
 
 __all__ = ["MemoryTransport", "table_of"]
@@ -120,11 +120,11 @@ class _GivenTable(Table):
     def __iter__(self) -> Iterator[str]:
         return iter(self._transports)
 
-    def get(self, name: str) -> Row | None:
+    def get(self, name: str) -> RegistryEntry | None:
         return _GivenRow(name, self._transports[name]) if name in self._transports else None
 
 
-class _GivenRow(Row):
+class _GivenRow(RegistryEntry):
     def __init__(self, name: str, transport: Transport) -> None:
         super().__init__(name, "")
         self.transport = transport

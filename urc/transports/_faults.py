@@ -4,7 +4,7 @@ import errno
 import socket
 
 from urc.problems import printable
-from urc.transports.own_doors import OwnDoor
+from urc.transports.own_listeners import OwnAddressError
 
 __all__ = ["CLOSED", "HUNG_UP", "broke", "explain", "late", "one_line", "place_of", "reason"]
 
@@ -42,7 +42,7 @@ def broke(fault: BaseException) -> str:
 
 def explain(host: str, place: str, fault: OSError | UnicodeError) -> str:
     """Return one line with the reason why a connection to `place` could not be opened."""
-    if isinstance(fault, OwnDoor):
+    if isinstance(fault, OwnAddressError):
         return f"{place}: {fault.strerror}"
     if isinstance(fault, socket.gaierror | UnicodeError):
         return f"no such host {host!r}"

@@ -9,14 +9,14 @@ from typing import TypeVar
 
 from urc._daemon import in_daemon
 
-__all__ = ["Address", "Lookup"]
+__all__ = ["Address", "AddressLookup"]
 
 Address = tuple[socket.AddressFamily, tuple[str | int, ...] | tuple[int, bytes]]
 """Address family and address, as for a socket."""
 _Connected = TypeVar("_Connected")
 
 
-class Lookup:
+class AddressLookup:
     """The address lookup of one host and port.
 
     The thread pool of the event loop delays the end of the program, and a resolver without a

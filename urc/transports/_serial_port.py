@@ -19,7 +19,7 @@ from urc.transports._faults import CLOSED, HUNG_UP, broke, reason
 from urc.transports._stream import READ_AHEAD_BYTES, forget_unsent, unsent_in
 from urc.transports.base import PeerClosed
 
-__all__ = ["FAULTS", "SerialPort", "open_port"]
+__all__ = ["FAULTS", "SerialStream", "open_port"]
 
 FAULTS: tuple[type[Exception], ...] = (OSError, SerialException, ValueError, LookupError)
 """Exceptions of the library; LookupError comes from servers without valid RFC 2217."""
@@ -37,7 +37,7 @@ _DRAIN_S, _LOOK_S = 0.3, 0.01
 
 async def open_port(
     port: str, arguments: Mapping[str, object], tune: Callable[[socket.socket], None]
-) -> "SerialPort":
+) -> "SerialStream":
     """Open and configure `port`; discard earlier input.
 
     Args:
@@ -50,7 +50,7 @@ async def open_port(
             configured.
     """
     loop = asyncio.get_running_loop()
-    stream = SerialPort()
+    stream = SerialStream()
     kind = _Rfc2217 if port.startswith("rfc2217://") else None
     transport, _ = await create_serial_connection(
         loop, lambda: stream, port, transport_cls=kind, **cast("dict[str, Any]", arguments)
@@ -101,7 +101,7 @@ class _Rfc2217(RFC2217SerialTransport):
         return await super()._send_and_wait(cmd)
 
 
-class SerialPort(asyncio.Protocol):
+class SerialStream(asyncio.Protocol):
     """A `ByteStream` with `unsent` and `reset`.
 
     While no task reads the stream, the port is not read either.

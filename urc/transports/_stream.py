@@ -15,7 +15,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import cast
 
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.transports._faults import CLOSED, HUNG_UP, broke
 from urc.transports.base import (
     ByteStream,
@@ -31,8 +31,8 @@ if sys.platform == "linux":
 
 __all__ = [
     "READ_AHEAD_BYTES",
-    "Stream",
-    "StreamLine",
+    "TcpStream",
+    "StreamTransport",
     "adopt",
     "as_bytes",
     "forget_unsent",
@@ -55,7 +55,7 @@ _CAN_WRITE = os.name == "posix"
 _LINGER_NOT = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
 
 
-class Stream(asyncio.BufferedProtocol):
+class TcpStream(asyncio.BufferedProtocol):
     """One open connection.
 
     The standard `asyncio.Protocol` would allocate 256 KiB for every read.
@@ -206,7 +206,7 @@ class Stream(asyncio.BufferedProtocol):
             raise PeerClosed(self._ended)
 
 
-class StreamLine:
+class StreamTransport:
     """The methods of a transport that need only an open stream."""
 
     def __init__(self) -> None:
@@ -247,10 +247,10 @@ class StreamLine:
             await self.close()
 
 
-async def adopt(line: socket.socket, read_ahead_bytes: int = READ_AHEAD_BYTES) -> Stream:
+async def adopt(line: socket.socket, read_ahead_bytes: int = READ_AHEAD_BYTES) -> TcpStream:
     """Return a stream for a connected socket; the stream owns the socket from then on."""
     loop = asyncio.get_running_loop()
-    _, stream = await loop.create_connection(lambda: Stream(read_ahead_bytes), sock=line)
+    _, stream = await loop.create_connection(lambda: TcpStream(read_ahead_bytes), sock=line)
     return stream
 
 

@@ -10,19 +10,19 @@ of the errors below.
 from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple, Protocol, runtime_checkable
 
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.model.values import NOTHING, Value
 from urc.problems import UrcError
 
 __all__ = [
     "NOTICE",
     "ByteStream",
-    "Carrier",
+    "Tunnel",
     "ConnectFailed",
     "PeerClosed",
     "Prompt",
-    "Setup",
-    "Subscription",
+    "TransportSetup",
+    "TopicSubscription",
     "SupportsAbort",
     "SupportsEnd",
     "SupportsForget",
@@ -108,14 +108,14 @@ class ByteStream(Protocol):
         """Close at once. Never raises, may be called twice."""
 
 
-class Carrier(Protocol):
+class Tunnel(Protocol):
     """A transport that tunnels others, such as SSH port forwarding."""
 
     async def connect(self, host: str, port: int, timeout_s: float) -> ByteStream:
         """Connect to `host` and `port` as seen from the far end; raise `ConnectFailed`."""
 
 
-class Subscription(NamedTuple):
+class TopicSubscription(NamedTuple):
     """A topic of a driver's messages, on a transport that carries messages."""
 
     topic: str
@@ -123,15 +123,15 @@ class Subscription(NamedTuple):
     """Options of the subscription: type, throttle, quality of service …"""
 
 
-class Setup(NamedTuple):
+class TransportSetup(NamedTuple):
     """The input of a transport factory."""
 
     name: str
     """Name of the transport in the driver."""
     options: Mapping[str, object] = NOTHING
     """Evaluated options: plain values, and lists and mappings of them."""
-    subscriptions: tuple[Subscription, ...] = ()
-    tunnel: Carrier | None = None
+    subscriptions: tuple[TopicSubscription, ...] = ()
+    tunnel: Tunnel | None = None
     """Tunnel of the connection; None: the network of this machine."""
 
 

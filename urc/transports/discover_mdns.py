@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 
 from urc.transports.base import TransportError
 
-__all__ = ["Announced", "announced"]
+__all__ = ["ServiceAnnouncement", "announced"]
 
 RESOLVE_S = 1.0
 """Timeout for resolving one service, in seconds."""
 MAX_SERVICES = 256
 
 
-class Announced(NamedTuple):
+class ServiceAnnouncement(NamedTuple):
     """One announced service."""
 
     type: str
@@ -30,7 +30,7 @@ class Announced(NamedTuple):
 
 async def announced(
     types: Sequence[str], seconds: float, interfaces: Sequence[str] = ()
-) -> list[Announced]:
+) -> list[ServiceAnnouncement]:
     """Return the services announced within `seconds`, sorted by type and name.
 
     Args:
@@ -71,7 +71,7 @@ async def announced(
     return sorted(one for several in places for one in several)
 
 
-async def _resolve(zeroconf: Any, kind: str, name: str) -> list[Announced]:
+async def _resolve(zeroconf: Any, kind: str, name: str) -> list[ServiceAnnouncement]:
     """Return the addresses of a service; an announcement without an address gives none."""
     from zeroconf import IPVersion
     from zeroconf.asyncio import AsyncServiceInfo
@@ -82,4 +82,4 @@ async def _resolve(zeroconf: Any, kind: str, name: str) -> list[Announced]:
     addresses = info.parsed_addresses(IPVersion.V4Only) or info.parsed_addresses()
     short = kind.removesuffix(".local.")
     label = name.removesuffix(f".{kind}")
-    return [Announced(short, label, address, info.port) for address in addresses[:1]]
+    return [ServiceAnnouncement(short, label, address, info.port) for address in addresses[:1]]

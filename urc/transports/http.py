@@ -14,15 +14,15 @@ import httpx2
 import msgspec
 
 from urc._headers import is_reserved
-from urc.model.codec import Envelope, Payload
+from urc.model.payload import Envelope, Payload
 from urc.transports._faults import CLOSED, late
-from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport, TransportError
+from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportError, TransportSetup
 from urc.transports.http_body import body_of, complaint
-from urc.transports.http_client import Client, HttpFault
-from urc.transports.http_inbox import Inbox
-from urc.transports.http_streams import Pulse, Stream, streams_of
+from urc.transports.http_client import HttpClient, HttpFault
+from urc.transports.http_receive_queue import HttpReceiveQueue
+from urc.transports.http_streams import HttpStream, LastActivity, streams_of
 from urc.transports.web_dial import Dialer
-from urc.transports.web_place import Options
+from urc.transports.web_origin import OptionReader
 
 __all__ = ["HttpTransport", "from_setup"]
 
@@ -36,13 +36,13 @@ PATIENCE_S = 1.0
 class HttpTransport:
     """The web server of one robot; it may be opened repeatedly."""
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: TransportSetup) -> None:
         """Read the options of `setup`, without connecting.
 
         Raises:
             TransportError: an option or a subscription is invalid.
         """
-        options = Options("http", setup.options)
+        options = OptionReader("http", setup.options)
         self._place = options.place("http")
         self._credentials = options.credentials(("basic", "bearer", "digest"))
         self._headers = options.headers()
@@ -63,7 +63,7 @@ class HttpTransport:
     async def open(self, timeout_s: float) -> None:
         """Check the connection, or raise `ConnectFailed` within `timeout_s` seconds."""
         await self.close()
-        client = Client(
+        client = HttpClient(
             self._place,
             self._dialer,
             credentials=self._credentials,
@@ -83,7 +83,7 @@ class HttpTransport:
             await talk.close()
             raise
         for spec in self._streams:
-            talk.listen(Stream(spec, client, talk.inbox, talk.pulse, self._max_body))
+            talk.listen(HttpStream(spec, client, talk.inbox, talk.pulse, self._max_body))
         self._talk = talk
 
     async def receive(self) -> Envelope:
@@ -132,7 +132,7 @@ class HttpTransport:
             await talk.close()
 
 
-def from_setup(setup: Setup) -> Transport:
+def from_setup(setup: TransportSetup) -> Transport:
     """Return a transport for the options of a document, or raise `TransportError`."""
     return HttpTransport(setup)
 
@@ -140,9 +140,9 @@ def from_setup(setup: Setup) -> Transport:
 class _Talk:
     """The state of one opening of the transport."""
 
-    def __init__(self, client: Client, most: int, answer_s: float, max_body_bytes: int) -> None:
-        self.inbox = Inbox()
-        self.pulse = Pulse()
+    def __init__(self, client: HttpClient, most: int, answer_s: float, max_body_bytes: int) -> None:
+        self.inbox = HttpReceiveQueue()
+        self.pulse = LastActivity()
         self._client = client
         self.unsent, self.forget = client.unsent, client.forget
         self._most = most
@@ -156,7 +156,7 @@ class _Talk:
         self._tasks: set[asyncio.Task[None]] = set()
         """All running tasks, including those of dropped requests."""
 
-    def listen(self, stream: Stream) -> None:
+    def listen(self, stream: HttpStream) -> None:
         self._start(stream.run())
 
     def _start(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
@@ -281,7 +281,7 @@ class _Handed(httpx2.AsyncByteStream):
         self._handed.set()
 
 
-def _request_of(client: Client, data: Envelope) -> httpx2.Request:
+def _request_of(client: HttpClient, data: Envelope) -> httpx2.Request:
     """Return the library's request for an envelope."""
     attributes = data.attributes
     path, query = str(attributes.get("path", "/")), attributes.get("query")

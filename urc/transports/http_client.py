@@ -16,12 +16,12 @@ import httpcore2
 import httpx2
 
 from urc.transports._faults import HUNG_UP, late, one_line
-from urc.transports._stream import Stream
+from urc.transports._stream import TcpStream
 from urc.transports.base import ByteStream, ConnectFailed, PeerClosed, TransportError, unsent_of
 from urc.transports.web_dial import Dialer
-from urc.transports.web_place import Credentials, WebPlace
+from urc.transports.web_origin import Credentials, WebOrigin
 
-__all__ = ["Client", "HttpFault", "leads_up"]
+__all__ = ["HttpClient", "HttpFault", "leads_up"]
 
 KEPT_S = 3.0
 """Reuse time of an idle connection, in seconds; small robots close theirs after five."""
@@ -48,12 +48,12 @@ class HttpFault(TransportError):
         self.is_unanswered = is_unanswered
 
 
-class Client:
+class HttpClient:
     """All connections of one open transport."""
 
     def __init__(
         self,
-        place: WebPlace,
+        place: WebOrigin,
         dialer: Dialer,
         *,
         credentials: Credentials | None,
@@ -348,14 +348,14 @@ class _Connection(httpcore2.AsyncNetworkStream):
         A connection that the robot has closed counts as 0, even while the library keeps it.
         """
         stream = self._stream
-        return 0 if isinstance(stream, Stream) and stream.has_ended else unsent_of(stream)
+        return 0 if isinstance(stream, TcpStream) and stream.has_ended else unsent_of(stream)
 
     def drop(self) -> None:
         """Close now and discard unsent data; waiting tasks get an error.
 
         A tunnelled connection keeps its order, and stays open.
         """
-        if isinstance(self._stream, Stream):
+        if isinstance(self._stream, TcpStream):
             self._ended(self)
             self._stream.drop()
 
@@ -371,7 +371,7 @@ class _Connection(httpcore2.AsyncNetworkStream):
         server_hostname: str | None = None,
         timeout: float | None = None,
     ) -> httpcore2.AsyncNetworkStream:
-        return self  # already started by `Reach`
+        return self  # already started by `StreamDialer`
 
     def get_extra_info(self, info: str) -> object:
         return self.is_readable() if info == "is_readable" else None

@@ -7,7 +7,7 @@ and parsing continues after it.
 
 from typing import Final, NamedTuple
 
-__all__ = ["Event", "EventCutter", "LineCutter"]
+__all__ = ["Event", "EventStreamParser", "LineSplitter"]
 
 _BOM: Final = b"\xef\xbb\xbf"
 _MAX_NAME: Final = 200
@@ -27,7 +27,7 @@ class Event(NamedTuple):
     """Newest id of the stream, from which a new connection continues."""
 
 
-class LineCutter:
+class LineSplitter:
     """Splits a body, received in any pieces, into lines without their ends (CR LF, LF or CR)."""
 
     def __init__(self, max_bytes: int, instead: bytes | None = None) -> None:
@@ -87,13 +87,13 @@ class LineCutter:
         self._buffer.clear()
 
 
-class EventCutter:
+class EventStreamParser:
     """Parses an event stream, received in any pieces."""
 
     def __init__(self, max_bytes: int, last_id: str = "") -> None:
         """Skip events of more than `max_bytes`; `last_id` is that of the previous connection."""
         self._most = max_bytes
-        self._lines = LineCutter(max_bytes + _MAX_NAME, _TOO_LONG)
+        self._lines = LineSplitter(max_bytes + _MAX_NAME, _TOO_LONG)
         self._is_start = True
         self._name = ""
         self._data: list[bytes] = []

@@ -10,7 +10,7 @@ import re
 from email.message import Message
 from typing import Final, Literal
 
-__all__ = ["MAX_BOUNDARY", "MAX_HEADER_BYTES", "MultipartCutter", "MultipartFault", "boundary_of"]
+__all__ = ["MAX_BOUNDARY", "MAX_HEADER_BYTES", "MultipartParser", "MultipartFault", "boundary_of"]
 
 MAX_BOUNDARY: Final = 200
 """Longest boundary in characters; RFC 2046 allows 70, but not all cameras comply."""
@@ -46,7 +46,7 @@ def boundary_of(content_type: str) -> bytes:
     return core.encode()
 
 
-class MultipartCutter:
+class MultipartParser:
     """Splits a body, received in any pieces, into parts without their headers."""
 
     def __init__(self, boundary: bytes, max_part_bytes: int) -> None:

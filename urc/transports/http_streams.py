@@ -15,14 +15,14 @@ from typing import Final, NamedTuple
 
 import httpx2
 
-from urc.transports.base import Subscription, TransportError
+from urc.transports.base import TopicSubscription, TransportError
 from urc.transports.http_body import fault_of, read_body
-from urc.transports.http_client import Client, HttpFault
-from urc.transports.http_events import Event, EventCutter, LineCutter
-from urc.transports.http_inbox import Inbox
-from urc.transports.http_multipart import MultipartCutter, MultipartFault, boundary_of
+from urc.transports.http_client import HttpClient, HttpFault
+from urc.transports.http_events import Event, EventStreamParser, LineSplitter
+from urc.transports.http_multipart import MultipartFault, MultipartParser, boundary_of
+from urc.transports.http_receive_queue import HttpReceiveQueue
 
-__all__ = ["SHORTEST_RETRY_S", "Pulse", "Stream", "StreamSpec", "streams_of"]
+__all__ = ["SHORTEST_RETRY_S", "LastActivity", "HttpStream", "StreamSpec", "streams_of"]
 
 KINDS: Final = ("mjpeg", "stills", "sse", "lines")
 MAX_STREAMS: Final = 16
@@ -51,7 +51,7 @@ class StreamSpec(NamedTuple):
     """All topics of that path; for events, a topic with ``#NAME`` has only events of that name."""
 
 
-def streams_of(subscriptions: Sequence[Subscription]) -> list[StreamSpec]:
+def streams_of(subscriptions: Sequence[TopicSubscription]) -> list[StreamSpec]:
     """Return the streams of all subscriptions; several topics may share one.
 
     Raises:
@@ -78,7 +78,7 @@ def streams_of(subscriptions: Sequence[Subscription]) -> list[StreamSpec]:
     return list(found.values())
 
 
-class Pulse:
+class LastActivity:
     """Time of the last data from the robot, on any connection."""
 
     def __init__(self) -> None:
@@ -95,11 +95,16 @@ class Pulse:
         return self._clock() - self._beat_s
 
 
-class Stream:
+class HttpStream:
     """One stream of an open transport; `run` works until it is cancelled."""
 
     def __init__(
-        self, spec: StreamSpec, client: Client, inbox: Inbox, pulse: Pulse, max_body_bytes: int
+        self,
+        spec: StreamSpec,
+        client: HttpClient,
+        inbox: HttpReceiveQueue,
+        pulse: LastActivity,
+        max_body_bytes: int,
     ) -> None:
         """Initialise the stream.
 
@@ -141,7 +146,7 @@ class Stream:
         patience = _Bound(SILENCE_S, "no picture")
         async with self._open({}, SILENCE_S) as response, patience:
             boundary = boundary_of(response.headers.get("content-type", ""))
-            cutter = MultipartCutter(boundary, self._max_bytes)
+            cutter = MultipartParser(boundary, self._max_bytes)
             async for piece in response.aiter_raw():
                 parts = [part for part in cutter.feed(piece) if part]
                 if parts:
@@ -169,7 +174,7 @@ class Stream:
             kind = response.headers.get("content-type", "no Content-Type")
             if not kind.startswith("text/event-stream"):
                 raise HttpFault(f"the answer is {kind[:80]}, not text/event-stream")
-            cutter = EventCutter(MAX_EVENT_BYTES, self._last_id)
+            cutter = EventStreamParser(MAX_EVENT_BYTES, self._last_id)
             async for piece in response.aiter_raw():
                 for event in cutter.feed(piece):
                     self._came()
@@ -181,7 +186,7 @@ class Stream:
 
     async def _lines(self) -> None:
         async with self._open({}, None) as response:
-            cutter = LineCutter(MAX_EVENT_BYTES)
+            cutter = LineSplitter(MAX_EVENT_BYTES)
             async for piece in response.aiter_raw():
                 for line in cutter.feed(piece):
                     await self._line(line)

@@ -13,12 +13,12 @@ from urc._folders import data_folder
 from urc.private_files import put_private
 from urc.transports.base import TransportError
 
-__all__ = ["DEFAULT_PORT", "HostKeys", "Known", "fingerprint", "own_file", "remember"]
+__all__ = ["DEFAULT_PORT", "HostKeys", "HostKeyStatus", "fingerprint", "own_file", "remember"]
 
 DEFAULT_PORT = 22
 
 
-class Known(NamedTuple):
+class HostKeyStatus(NamedTuple):
     """The known keys of one server."""
 
     trusted: tuple[asyncssh.SSHKey, ...] = ()
@@ -55,21 +55,23 @@ class HostKeys:
         """Whether the document itself pins the host key."""
         return bool(self._pinned)
 
-    def known(self, host: str, port: int) -> Known:
+    def known(self, host: str, port: int) -> HostKeyStatus:
         """Return the known keys of a server.
 
         Raises:
             TransportError: a file cannot be read.
         """
         if self._pinned:
-            return Known()
+            return HostKeyStatus()
         found = _read(own_file(), host, port, is_asked_for=False)
         if self._file:
             other = _read(Path(self._file).expanduser(), host, port, is_asked_for=True)
-            found = Known(*(mine + theirs for mine, theirs in zip(found, other, strict=True)))
+            found = HostKeyStatus(
+                *(mine + theirs for mine, theirs in zip(found, other, strict=True))
+            )
         return found
 
-    def judge(self, key: asyncssh.SSHKey, known: Known) -> str:
+    def judge(self, key: asyncssh.SSHKey, known: HostKeyStatus) -> str:
         """Return "" for a trusted `key`, else a fingerprint, ``revoked`` or ``unknown``."""
         if self._pinned:
             return "" if fingerprint(key) == self._pinned else self._pinned
@@ -102,13 +104,13 @@ def _name(host: str, port: int) -> str:
     return host if port == DEFAULT_PORT else f"[{host}]:{port}"
 
 
-def _read(file: Path, host: str, port: int, *, is_asked_for: bool) -> Known:
+def _read(file: Path, host: str, port: int, *, is_asked_for: bool) -> HostKeyStatus:
     try:
         text = file.read_text("utf-8")
     except FileNotFoundError as missing:
         if is_asked_for:
             raise TransportError(f"there is no known-hosts file {file}") from missing
-        return Known()
+        return HostKeyStatus()
     except (OSError, UnicodeError) as fault:
         raise TransportError(f"cannot read the known-hosts file {file} ({_why(fault)})") from fault
     try:
@@ -119,7 +121,7 @@ def _read(file: Path, host: str, port: int, *, is_asked_for: bool) -> Known:
     except ValueError as fault:
         raise TransportError(f"{file} is not a known-hosts file ({fault})") from fault
     trusted, authorities, revoked = (tuple(keys) for keys in found[:3])
-    return Known(trusted, authorities, revoked)
+    return HostKeyStatus(trusted, authorities, revoked)
 
 
 def _write(file: Path, text: str) -> None:

@@ -5,15 +5,15 @@ The module needs no MQTT library, so that it can report a missing one.
 
 from importlib.util import find_spec
 
-from urc.transports.base import Setup, Transport, TransportError
+from urc.transports.base import Transport, TransportError, TransportSetup
 from urc.transports.mqtt_options import read_options
 from urc.transports.web_dial import Dialer
-from urc.transports.web_place import WebPlace
+from urc.transports.web_origin import WebOrigin
 
 __all__ = ["from_setup"]
 
 
-def from_setup(setup: Setup) -> Transport:
+def from_setup(setup: TransportSetup) -> Transport:
     """Return a transport for the options of a document; see docs/transports/mqtt.md.
 
     Raises:
@@ -24,5 +24,5 @@ def from_setup(setup: Setup) -> Transport:
         raise TransportError("mqtt needs the package paho-mqtt: pip install 'urc[mqtt]'")
     from urc.transports.mqtt_client import MqttTransport  # imports paho
 
-    place = WebPlace(options.tls is not None, options.host, options.port, "")
+    place = WebOrigin(options.tls is not None, options.host, options.port, "")
     return MqttTransport(options, Dialer(place, tls=options.tls, tunnel=setup.tunnel))

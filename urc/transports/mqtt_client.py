@@ -21,11 +21,11 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 
-from urc.model.codec import Envelope, Payload
+from urc.model.payload import Envelope, Payload
 from urc.transports._faults import CLOSED, HUNG_UP, broke, late, reason
 from urc.transports.base import ConnectFailed, PeerClosed, TransportError
-from urc.transports.mqtt_options import Options, body_bytes
-from urc.transports.topics import Inbox
+from urc.transports.mqtt_options import MqttOptions, body_bytes
+from urc.transports.topic_queue import TopicReceiveQueue
 from urc.transports.web_dial import Dialer
 
 __all__ = ["MqttTransport"]
@@ -52,7 +52,7 @@ log = logging.getLogger(__name__)
 class MqttTransport:
     """One connection to a broker; it may be opened repeatedly."""
 
-    def __init__(self, options: Options, dialer: Dialer) -> None:
+    def __init__(self, options: MqttOptions, dialer: Dialer) -> None:
         """Initialise for the broker of `dialer`, without connecting."""
         self._options = options
         self._dialer = dialer
@@ -136,8 +136,8 @@ class MqttTransport:
 class _Session:
     """One open connection and its paho client."""
 
-    def __init__(self, options: Options, line: socket.socket) -> None:
-        self.inbox = Inbox()
+    def __init__(self, options: MqttOptions, line: socket.socket) -> None:
+        self.inbox = TopicReceiveQueue()
         self._options = options
         self.line = line
         self._loop = asyncio.get_running_loop()
@@ -327,7 +327,7 @@ class _Session:
 class _Client(Client):
     """A paho client on a given socket, instead of one of its own."""
 
-    def __init__(self, options: Options, line: socket.socket) -> None:
+    def __init__(self, options: MqttOptions, line: socket.socket) -> None:
         version = MQTTProtocolVersion.MQTTv5 if options.is_v5 else MQTTProtocolVersion.MQTTv311
         super().__init__(
             CallbackAPIVersion.VERSION2,

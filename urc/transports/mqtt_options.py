@@ -8,23 +8,23 @@ import msgspec
 from urc.transports import _options
 from urc.transports._faults import place_of
 from urc.transports._tls import Tls
-from urc.transports.base import Setup, TransportError
+from urc.transports.base import TransportError, TransportSetup
 
-__all__ = ["Options", "Topic", "Will", "body_bytes", "read_options"]
+__all__ = ["MqttOptions", "MqttTopic", "WillMessage", "body_bytes", "read_options"]
 
 DEFAULT_PORT, DEFAULT_TLS_PORT = 1883, 8883
 
 _encode = msgspec.json.Encoder().encode
 
 
-class Topic(NamedTuple):
+class MqttTopic(NamedTuple):
     """One subscription."""
 
     topic: str
     qos: int = 0
 
 
-class Will(NamedTuple):
+class WillMessage(NamedTuple):
     """The message that the broker publishes when the connection ends."""
 
     topic: str
@@ -33,7 +33,7 @@ class Will(NamedTuple):
     retain: bool = False
 
 
-class Options(NamedTuple):
+class MqttOptions(NamedTuple):
     """All options of one transport."""
 
     host: str
@@ -45,8 +45,8 @@ class Options(NamedTuple):
     username: str = ""
     password: str | None = None
     tls: Tls | None = None
-    will: Will | None = None
-    subscriptions: tuple[Topic, ...] = ()
+    will: WillMessage | None = None
+    subscriptions: tuple[MqttTopic, ...] = ()
 
     @property
     def where(self) -> str:
@@ -54,7 +54,7 @@ class Options(NamedTuple):
         return place_of(self.host, self.port)
 
 
-def read_options(setup: Setup) -> Options:
+def read_options(setup: TransportSetup) -> MqttOptions:
     """Return the options of `setup`; raise `TransportError` with one line for an invalid one."""
     given: Mapping[str, object] = setup.options
     tls = Tls.of("mqtt", given.get("tls"))
@@ -66,7 +66,7 @@ def read_options(setup: Setup) -> Options:
     version = str(given.get("version", 5))
     if version not in ("5", "3.1.1"):
         raise TransportError(f"mqtt needs 5 or 3.1.1 as version, not {version!r}")
-    return Options(
+    return MqttOptions(
         _options.host("mqtt", given),
         _options.port("mqtt", {"port": port, **given}),
         version == "5",
@@ -75,7 +75,7 @@ def read_options(setup: Setup) -> Options:
         password or None,
         tls,
         _will(given.get("will")),
-        tuple(Topic(one.topic, _qos("qos", one.attributes)) for one in setup.subscriptions),
+        tuple(MqttTopic(one.topic, _qos("qos", one.attributes)) for one in setup.subscriptions),
     )
 
 
@@ -95,7 +95,7 @@ def body_bytes(body: object) -> bytes:
         raise TransportError(f"this cannot be sent as JSON ({problem})") from problem
 
 
-def _will(given: object) -> Will | None:
+def _will(given: object) -> WillMessage | None:
     if given is None:
         return None
     if not isinstance(given, Mapping):
@@ -105,7 +105,7 @@ def _will(given: object) -> Will | None:
         raise TransportError(f"mqtt needs one topic without wildcards for its will, not {topic!r}")
     payload = _options.text("mqtt", given, "payload").encode()
     retain = _options.flag("mqtt", given, "retain", default=False)
-    return Will(topic, payload, _qos("qos", given), retain)
+    return WillMessage(topic, payload, _qos("qos", given), retain)
 
 
 def _qos(name: str, given: Mapping[str, object]) -> int:

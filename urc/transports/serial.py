@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 from urc.transports import _options
 from urc.transports._faults import late, reason
-from urc.transports._reach import Reach
-from urc.transports._stream import StreamLine, tune
-from urc.transports.base import ConnectFailed, Setup, Transport, TransportError
+from urc.transports._stream import StreamTransport, tune
+from urc.transports._stream_dialer import StreamDialer
+from urc.transports.base import ConnectFailed, Transport, TransportError, TransportSetup
 
 if TYPE_CHECKING:
-    from urc.transports._serial_port import SerialPort
+    from urc.transports._serial_port import SerialStream
 
-__all__ = ["Settings", "SerialTransport", "from_setup"]
+__all__ = ["SerialSettings", "SerialTransport", "from_setup"]
 
 _PARITIES = {"none": "N", "odd": "O", "even": "E", "mark": "M", "space": "S"}
 _FLOWS = ("none", "rts_cts", "xon_xoff")
 _SOCKET, _RFC2217 = "socket://", "rfc2217://"
 
 
-class Settings(NamedTuple):
+class SerialSettings(NamedTuple):
     """Settings of a serial port."""
 
     baud: int = 115_200
@@ -43,17 +43,17 @@ class Settings(NamedTuple):
     """Whether other programs are locked out."""
 
 
-class SerialTransport(StreamLine):
+class SerialTransport(StreamTransport):
     """One serial port; it may be opened repeatedly."""
 
-    def __init__(self, port: str, settings: Settings) -> None:
+    def __init__(self, port: str, settings: SerialSettings) -> None:
         """Initialise; `port` is a path or name, or an address with its scheme."""
         super().__init__()
         self._port = port
         self._settings = settings
-        self._reach: Reach | None = None
+        self._reach: StreamDialer | None = None
         if port.startswith((_SOCKET, _RFC2217)):
-            self._reach = Reach(*_host_and_port(port))
+            self._reach = StreamDialer(*_host_and_port(port))
         self._is_raw = port.startswith(_SOCKET)
 
     @property
@@ -69,7 +69,7 @@ class SerialTransport(StreamLine):
         else:
             self._stream = await self._open_port(timeout_s)
 
-    async def _open_port(self, timeout_s: float) -> "SerialPort":
+    async def _open_port(self, timeout_s: float) -> "SerialStream":
         from urc.transports._serial_port import FAULTS, open_port
 
         try:
@@ -85,7 +85,7 @@ class SerialTransport(StreamLine):
         return self._reach.place if self._reach is not None else self._port
 
 
-def from_setup(setup: Setup) -> Transport:
+def from_setup(setup: TransportSetup) -> Transport:
     """Return a transport for the options of a document.
 
     Raises:
@@ -139,8 +139,8 @@ def _remedy(port: str) -> str:
     )
 
 
-def _settings_of(options: Mapping[str, object]) -> Settings:
-    return Settings(
+def _settings_of(options: Mapping[str, object]) -> SerialSettings:
+    return SerialSettings(
         baud=_number(options, "baud", 115_200, range(50, 20_000_001)),
         data_bits=_number(options, "data_bits", 8, range(5, 9)),
         parity=_options.choice("serial", options, "parity", tuple(_PARITIES), "none"),
@@ -173,7 +173,7 @@ def _pin(options: Mapping[str, object], key: str) -> bool | None:
     return _options.flag("serial", options, key, default=True)
 
 
-def _arguments_of(settings: Settings) -> dict[str, object]:
+def _arguments_of(settings: SerialSettings) -> dict[str, object]:
     """Return the settings with the names of the library."""
     from serialx import PinState
 

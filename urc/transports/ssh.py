@@ -13,25 +13,25 @@ from typing import Final, Literal, NamedTuple, cast
 
 import asyncssh
 
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.transports import _options
 from urc.transports._faults import CLOSED, late
 from urc.transports.base import (
     ByteStream,
     ConnectFailed,
     PeerClosed,
-    Setup,
     TransportError,
+    TransportSetup,
     bytes_of,
 )
 from urc.transports.known_hosts import DEFAULT_PORT, HostKeys
-from urc.transports.ssh_channel import Channel
-from urc.transports.ssh_connection import Connection, Shared
-from urc.transports.ssh_dial import Offer, Target, dial, look_at_key
+from urc.transports.ssh_channel import SshChannel
+from urc.transports.ssh_connection import SharedConnection, SshConnection
+from urc.transports.ssh_dial import OfferedHostKey, SshTarget, dial, look_at_key
 from urc.transports.ssh_login import Login
 from urc.transports.topic_socket import Address
 
-__all__ = ["Program", "SshTransport", "from_setup", "read_program", "read_target"]
+__all__ = ["RemoteProgram", "SshTransport", "from_setup", "read_program", "read_target"]
 
 
 Mode = Literal["shell", "exec", "forward"]
@@ -43,7 +43,7 @@ _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _ALIVE_S: Final = (0.2, 60.0)
 
 
-class Program(NamedTuple):
+class RemoteProgram(NamedTuple):
     """The program at the far end."""
 
     mode: Mode = "shell"
@@ -54,7 +54,7 @@ class Program(NamedTuple):
     environment: tuple[tuple[str, str], ...] = ()
 
 
-def read_target(setup: Setup) -> Target:
+def read_target(setup: TransportSetup) -> SshTarget:
     """Return the server and login of the options; raise `TransportError`."""
     options = setup.options
     username = _text(options, "username")
@@ -65,7 +65,7 @@ def read_target(setup: Setup) -> Target:
         raise TransportError(
             f"ssh: host_key is a fingerprint as 'ssh-keygen -l' prints it, SHA256:…, not {pinned!r}"
         )
-    return Target(
+    return SshTarget(
         address=_address(options),
         login=Login(
             username=username,
@@ -81,7 +81,7 @@ def read_target(setup: Setup) -> Target:
     )
 
 
-def read_program(setup: Setup) -> Program:
+def read_program(setup: TransportSetup) -> RemoteProgram:
     """Return the remote program of the options; raise `TransportError`."""
     options = setup.options
     mode = _options.choice("ssh", options, "mode", ("shell", "exec", "forward"), "shell")
@@ -90,7 +90,7 @@ def read_program(setup: Setup) -> Program:
         raise TransportError("ssh: 'mode: exec' needs a command")
     if command and mode != "exec":
         raise TransportError(f"ssh: a command needs 'mode: exec', not 'mode: {mode}'")
-    return Program(
+    return RemoteProgram(
         mode=cast(Mode, mode),
         command=command,
         has_pty=_options.flag("ssh", options, "pty", default=mode == "shell"),
@@ -141,19 +141,19 @@ _COLUMNS, _ROWS = 240, 24
 
 
 class SshTransport:
-    """One SSH server; a `Transport`, and a `Carrier` of others."""
+    """One SSH server; a `Transport`, and a `Tunnel` of others."""
 
     def __init__(
-        self, target: Target, program: Program, outer: "SshTransport | None" = None
+        self, target: SshTarget, program: RemoteProgram, outer: "SshTransport | None" = None
     ) -> None:
         """Initialise for `target`, tunnelled through `outer` if given, without connecting."""
         self.target = target
         self._program = program
         self._outer = outer
-        self._shared = Shared(self._dial)
-        self._connection: Connection | None = None
+        self._shared = SharedConnection(self._dial)
+        self._connection: SshConnection | None = None
         """Connection while open, of which this transport is a user."""
-        self._channel: Channel | None = None
+        self._channel: SshChannel | None = None
 
     @property
     def address(self) -> str:
@@ -230,7 +230,7 @@ class SshTransport:
                 raise
         return _Carried(channel, self._shared, self.break_off)
 
-    async def look_at_key(self, timeout_s: float) -> Offer:
+    async def look_at_key(self, timeout_s: float) -> OfferedHostKey:
         """Return the host key of the server, without logging in.
 
         Raises:
@@ -253,7 +253,7 @@ class SshTransport:
         """Give up a connection of `join`."""
         await self._shared.leave()
 
-    async def _dial(self, timeout_s: float) -> Connection:
+    async def _dial(self, timeout_s: float) -> SshConnection:
         if self._outer is None:
             return await dial(self.target, None, timeout_s)
         outer = await self._outer.join(timeout_s)
@@ -265,7 +265,7 @@ class SshTransport:
         connection.when_closed = self._outer.leave
         return connection
 
-    async def _start(self, connection: Connection) -> Channel | None:
+    async def _start(self, connection: SshConnection) -> SshChannel | None:
         program = self._program
         if program.mode == "forward":
             return None
@@ -282,7 +282,9 @@ class SshTransport:
 class _Carried:
     """A forwarded connection, which keeps the SSH connection open."""
 
-    def __init__(self, channel: Channel, shared: Shared, break_off: Callable[[], None]) -> None:
+    def __init__(
+        self, channel: SshChannel, shared: SharedConnection, break_off: Callable[[], None]
+    ) -> None:
         self._channel = channel
         self._break_off = break_off
         self._shared = shared
@@ -308,7 +310,7 @@ class _Carried:
             await self._shared.leave()
 
 
-def from_setup(setup: Setup) -> SshTransport:
+def from_setup(setup: TransportSetup) -> SshTransport:
     """Return a transport for the options of a document; see docs/transports/ssh.md.
 
     Raises:

@@ -12,9 +12,9 @@ from asyncssh.constants import EXTENDED_DATA_STDERR
 
 from urc.transports._faults import CLOSED, HUNG_UP, one_line
 from urc.transports.base import PeerClosed
-from urc.transports.ssh_wire import Wire, why_lost
+from urc.transports.ssh_wire import SshSocket, why_lost
 
-__all__ = ["MAX_PACKET", "WINDOW", "Channel"]
+__all__ = ["MAX_PACKET", "WINDOW", "SshChannel"]
 
 READ_AHEAD_BYTES = 65536
 """Size of the receive buffer, in bytes."""
@@ -27,10 +27,10 @@ _LAST_WORDS = 200
 """Largest part of standard error in the message about the end of a program, in bytes."""
 
 
-class Channel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
+class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
     """A shell, a program, or a forwarded connection."""
 
-    def __init__(self, wire: Wire, program: str = "") -> None:
+    def __init__(self, wire: SshSocket, program: str = "") -> None:
         """Initialise a channel.
 
         Args:

@@ -11,24 +11,26 @@ import asyncssh
 
 from urc._addresses import is_of_this_machine
 from urc.transports._faults import CLOSED, HUNG_UP, explain, one_line
-from urc.transports._lookup import Lookup
+from urc.transports._lookup import AddressLookup
 from urc.transports.base import ConnectFailed, PeerClosed
-from urc.transports.own_doors import OWN_DOORS, OwnDoor
-from urc.transports.ssh_channel import MAX_PACKET, WINDOW, Channel
-from urc.transports.ssh_wire import Wire
+from urc.transports.own_listeners import OWN_DOORS, OwnAddressError
+from urc.transports.ssh_channel import MAX_PACKET, WINDOW, SshChannel
+from urc.transports.ssh_wire import SshSocket
 from urc.transports.topic_socket import Address
 
-__all__ = ["Connection", "Shared"]
+__all__ = ["SshConnection", "SharedConnection"]
 
 _GONE_WITHIN_S = 0.5
 """Timeout for the close of a connection, in seconds."""
 _LOOK_UP_S = 2.0
 
 
-class Connection:
+class SshConnection:
     """An SSH connection after its login."""
 
-    def __init__(self, ssh: asyncssh.SSHClientConnection, wire: Wire, address: Address) -> None:
+    def __init__(
+        self, ssh: asyncssh.SSHClientConnection, wire: SshSocket, address: Address
+    ) -> None:
         """Take over an SSH connection and its socket."""
         self.ssh = ssh
         self._wire = wire
@@ -52,7 +54,7 @@ class Connection:
         await self.ssh.wait_closed()
         raise PeerClosed(self._wire.fault or HUNG_UP)
 
-    async def program(self, command: str | None, **options: Any) -> Channel:
+    async def program(self, command: str | None, **options: Any) -> SshChannel:
         """Start `command`, or a shell for None, and return its standard input and output."""
         what = "the shell" if command is None else "the command"
         return await self._opened(
@@ -60,27 +62,27 @@ class Connection:
                 lambda: channel, command, encoding=None, window=WINDOW, max_pktsize=MAX_PACKET,
                 **options,
             ),
-            Channel(self._wire, what),
+            SshChannel(self._wire, what),
             f"{self._address.text} does not start {what}",
         )  # fmt: skip
 
-    async def forwarded(self, host: str, port: int) -> Channel:
+    async def forwarded(self, host: str, port: int) -> SshChannel:
         """Return a connection to `host` and `port` as seen from the server."""
         place = Address(host, port).text
         try:
             host = await self._checked(host, port)
-        except OwnDoor as fault:
+        except OwnAddressError as fault:
             raise ConnectFailed(explain(host, place, fault)) from fault
         return await self._opened(
             lambda channel: self.ssh.create_connection(
                 lambda: channel, host, port, encoding=None, window=WINDOW, max_pktsize=MAX_PACKET
             ),
-            Channel(self._wire),
+            SshChannel(self._wire),
             f"cannot connect to {place} through ssh {self._address.text}",
         )
 
     async def _checked(self, host: str, port: int) -> str:
-        """Return the target address for `host`; raise `OwnDoor` for the own dashboard.
+        """Return the target address for `host`; raise `OwnAddressError` for the own dashboard.
 
         An SSH server on this machine can reach all its listeners. For such a server, a name is
         looked up here, once, so that the server cannot find another address.
@@ -90,7 +92,7 @@ class Connection:
         if is_near:
             try:
                 async with asyncio.timeout(_LOOK_UP_S):
-                    found = await Lookup(host, port, socket.SOCK_STREAM).addresses()
+                    found = await AddressLookup(host, port, socket.SOCK_STREAM).addresses()
             except (OSError, UnicodeError) as fault:
                 raise ConnectFailed(explain(host, Address(host, port).text, fault)) from fault
             addresses = [str(address[0]) for _, address in found]
@@ -128,8 +130,8 @@ class Connection:
         self._wire.reset()
 
     async def _opened(
-        self, begin: Callable[[Channel], Awaitable[Any]], channel: Channel, failure: str
-    ) -> Channel:
+        self, begin: Callable[[SshChannel], Awaitable[Any]], channel: SshChannel, failure: str
+    ) -> SshChannel:
         """Open `channel`; after a cancellation, close it as soon as it is open.
 
         asyncssh would forget a channel whose opening is cancelled, but the server would not.
@@ -152,16 +154,16 @@ class Connection:
             raise
         return channel
 
-    def _drop(self, task: "asyncio.Task[Any]", channel: Channel) -> None:
+    def _drop(self, task: "asyncio.Task[Any]", channel: SshChannel) -> None:
         self._strays.discard(task)
         if not task.cancelled() and task.exception() is None:
             channel.discard()
 
 
-class Shared:
+class SharedConnection:
     """The shared connection of a transport: opened by the first user, closed by the last."""
 
-    def __init__(self, dial: Callable[[float], Awaitable[Connection]]) -> None:
+    def __init__(self, dial: Callable[[float], Awaitable[SshConnection]]) -> None:
         """Initialise.
 
         Args:
@@ -169,10 +171,10 @@ class Shared:
         """
         self._dial = dial
         self._users = 0
-        self._attempt: asyncio.Task[Connection] | None = None
+        self._attempt: asyncio.Task[SshConnection] | None = None
         """Task that opens the connection, and then holds it."""
 
-    async def join(self, timeout_s: float) -> Connection:
+    async def join(self, timeout_s: float) -> SshConnection:
         """Return the connection, opened if necessary; call `leave` afterwards.
 
         The caller sets the timeout; other callers that wait for the same attempt continue.
@@ -208,15 +210,15 @@ class Shared:
             self._attempt.result().reset()
 
     async def _again(
-        self, before: "asyncio.Task[Connection] | None", timeout_s: float
-    ) -> Connection:
+        self, before: "asyncio.Task[SshConnection] | None", timeout_s: float
+    ) -> SshConnection:
         """Close a dead connection, if any, and open a new one."""
         if before is not None and not before.cancelled() and before.exception() is None:
             await before.result().close()
         return await self._dial(timeout_s)
 
     @staticmethod
-    def _is_good(attempt: "asyncio.Task[Connection]") -> bool:
+    def _is_good(attempt: "asyncio.Task[SshConnection]") -> bool:
         if not attempt.done():
             return True
         failed = attempt.cancelled() or attempt.exception() is not None

@@ -6,19 +6,19 @@ import asyncssh
 
 from urc.transports._faults import one_line
 from urc.transports.base import ConnectFailed, TransportError
-from urc.transports.known_hosts import HostKeys, Known, fingerprint
-from urc.transports.ssh_connection import Connection
+from urc.transports.known_hosts import HostKeys, HostKeyStatus, fingerprint
+from urc.transports.ssh_connection import SshConnection
 from urc.transports.ssh_login import Login, algorithms, credentials, host_key_algorithms
-from urc.transports.ssh_wire import Through, why_lost
+from urc.transports.ssh_wire import TunnelAdapter, why_lost
 from urc.transports.topic_socket import Address
 
-__all__ = ["Offer", "Target", "dial", "look_at_key"]
+__all__ = ["OfferedHostKey", "SshTarget", "dial", "look_at_key"]
 
 ALIVE_COUNT = 2
 """Largest number of unanswered keepalives."""
 
 
-class Offer(NamedTuple):
+class OfferedHostKey(NamedTuple):
     """The host key of a server."""
 
     key: asyncssh.SSHKey
@@ -37,7 +37,7 @@ class Offer(NamedTuple):
         return self.key.algorithm.decode("ascii")
 
 
-class Target(NamedTuple):
+class SshTarget(NamedTuple):
     """One server, with its login and trusted keys."""
 
     address: Address
@@ -52,17 +52,17 @@ class Target(NamedTuple):
 class _Client(asyncssh.SSHClient):
     """Checks the host key, and records the reason of the end."""
 
-    def __init__(self, target: Target, known: Known, *, only_looks: bool) -> None:
+    def __init__(self, target: SshTarget, known: HostKeyStatus, *, only_looks: bool) -> None:
         self._keys = target.keys
         self._known = known
         self._only_looks = only_looks
-        self.through: Through | None = None
-        self.offer: Offer | None = None
+        self.through: TunnelAdapter | None = None
+        self.offer: OfferedHostKey | None = None
 
     def validate_host_public_key(
         self, host: str, addr: str, port: int, key: asyncssh.SSHKey
     ) -> bool:
-        self.offer = Offer(key, self._keys.judge(key, self._known))
+        self.offer = OfferedHostKey(key, self._keys.judge(key, self._known))
         return not self.offer.expected and not self._only_looks
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -71,8 +71,8 @@ class _Client(asyncssh.SSHClient):
 
 
 async def dial(
-    target: Target, outer: asyncssh.SSHClientConnection | None, timeout_s: float
-) -> Connection:
+    target: SshTarget, outer: asyncssh.SSHClientConnection | None, timeout_s: float
+) -> SshConnection:
     """Connect and log in.
 
     Args:
@@ -89,8 +89,8 @@ async def dial(
 
 
 async def look_at_key(
-    target: Target, outer: asyncssh.SSHClientConnection | None, timeout_s: float
-) -> Offer:
+    target: SshTarget, outer: asyncssh.SSHClientConnection | None, timeout_s: float
+) -> OfferedHostKey:
     """Return the host key of the server, without logging in; see `dial`."""
     client = _Client(target, _known(target), only_looks=True)
     try:
@@ -105,14 +105,14 @@ async def look_at_key(
 
 
 async def _connect(
-    target: Target,
+    target: SshTarget,
     client: _Client,
     outer: asyncssh.SSHClientConnection | None,
     timeout_s: float,
     secrets: dict[str, Any],
-) -> Connection:
+) -> SshConnection:
     try:
-        client.through = through = Through(outer or await target.address.dial(timeout_s))
+        client.through = through = TunnelAdapter(outer or await target.address.dial(timeout_s))
     except (OSError, UnicodeError) as fault:
         raise ConnectFailed(target.address.explain(fault)) from fault
     known = _known(target)
@@ -140,17 +140,17 @@ async def _connect(
         raise ConnectFailed(_explain(target, client, fault)) from fault
     finally:
         through.give_up_unused()
-    return Connection(ssh, through.wire, target.address)
+    return SshConnection(ssh, through.wire, target.address)
 
 
-def _known(target: Target) -> Known:
+def _known(target: SshTarget) -> HostKeyStatus:
     try:
         return target.keys.known(target.address.host, target.address.port)
     except TransportError as fault:
         raise ConnectFailed(str(fault)) from fault
 
 
-def _explain(target: Target, client: _Client, fault: Exception) -> str:
+def _explain(target: SshTarget, client: _Client, fault: Exception) -> str:
     """Return one line for people with the reason of a failed connection."""
     place, login = target.address.text, target.login
     if client.offer is not None and client.offer.expected:
@@ -183,7 +183,7 @@ def _explain(target: Target, client: _Client, fault: Exception) -> str:
             return f"cannot connect to {place} ({_first(str(fault)).lower()})"
 
 
-def _explain_key(target: Target, offer: Offer) -> str:
+def _explain_key(target: SshTarget, offer: OfferedHostKey) -> str:
     place, shown = target.address.text, f"{offer.fingerprint} ({offer.algorithm})"
     command = f"'urc trust PROFILE {target.name}'"
     if offer.expected == "unknown":

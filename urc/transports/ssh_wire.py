@@ -14,7 +14,7 @@ import asyncssh
 from urc.transports._faults import CLOSED, HUNG_UP, broke, one_line
 from urc.transports._stream import forget_unsent, unsent_in
 
-__all__ = ["Through", "Wire", "why_lost"]
+__all__ = ["TunnelAdapter", "SshSocket", "why_lost"]
 
 _READ_BYTES = 65536
 UNTAKEN_BYTES = 8_388_608
@@ -36,7 +36,7 @@ def why_lost(exc: Exception | None) -> str:
     return broke(exc)
 
 
-class Wire(asyncio.BufferedProtocol):
+class SshSocket(asyncio.BufferedProtocol):
     """Passes bytes between asyncssh and the socket; see `is_full` and `fault`."""
 
     def __init__(self, inner: asyncio.Protocol) -> None:
@@ -147,21 +147,21 @@ class Wire(asyncio.BufferedProtocol):
         self._gone.set()
 
 
-class Through:
+class TunnelAdapter:
     """A tunnel for asyncssh: provides the connection below the SSH connection."""
 
     def __init__(self, line: socket.socket | asyncssh.SSHClientConnection) -> None:
         """Use a connected socket, or another SSH connection that forwards."""
         self._line = line
         self._is_used = False
-        self.wire: Wire
+        self.wire: SshSocket
 
     async def create_connection(
         self, factory: Callable[[], Any], host: str, port: int
     ) -> tuple[object, object]:
         """Return the transport and the protocol that `factory` makes, connected."""
         inner = factory()
-        self.wire = Wire(inner)
+        self.wire = SshSocket(inner)
         if isinstance(self._line, socket.socket):
             loop = asyncio.get_running_loop()
             transport, _ = await loop.create_connection(lambda: self.wire, sock=self._line)
@@ -181,7 +181,7 @@ class Through:
 class _Nested(asyncssh.SSHTCPSession[bytes]):
     """A channel of another SSH connection, as the socket of this one."""
 
-    def __init__(self, wire: Wire) -> None:
+    def __init__(self, wire: SshSocket) -> None:
         self._wire = wire
 
     def connection_made(self, chan: asyncssh.SSHTCPChannel[bytes]) -> None:

@@ -14,8 +14,8 @@ TRANSPORTS = Table(
         "telnet": "urc.transports.telnet:from_setup",
         "http": "urc.transports.http:from_setup",
         "websocket": "urc.transports.websocket:from_setup",
-        "ros": "urc.transports.rosbridge:from_setup",
+        "ros": "urc.transports.ros.rosbridge:from_setup",
         "mqtt": "urc.transports.mqtt:from_setup",
     },
 )
-"""Type → factory, which takes a `urc.transports.base.Setup` and returns a `Transport`."""
+"""Type → factory, which takes a `urc.transports.base.TransportSetup` and returns a `Transport`."""

@@ -8,18 +8,18 @@ from contextlib import suppress
 
 from urc.transports import _options
 from urc.transports._faults import place_of, reason
-from urc.transports._lookup import Lookup
-from urc.transports._reach import Reach
-from urc.transports._stream import READ_AHEAD_BYTES, Stream, StreamLine, adopt, tune
+from urc.transports._lookup import AddressLookup
+from urc.transports._stream import READ_AHEAD_BYTES, StreamTransport, TcpStream, adopt, tune
+from urc.transports._stream_dialer import StreamDialer
 from urc.transports._tls import Tls
 from urc.transports.base import (
     ByteStream,
-    Carrier,
     ConnectFailed,
-    Setup,
     SupportsEnd,
     Transport,
     TransportError,
+    TransportSetup,
+    Tunnel,
 )
 
 __all__ = ["READ_AHEAD_BYTES", "TcpListener", "TcpTransport", "from_setup"]
@@ -36,7 +36,7 @@ _Caller = tuple[socket.socket, str]
 """A connection, and its remote address."""
 
 
-class TcpListener(StreamLine):
+class TcpListener(StreamTransport):
     """Listens on a port for one robot at a time; a newer robot replaces the older one.
 
     A failed `open` keeps listening, so that a robot between two attempts is not refused. The first
@@ -58,7 +58,7 @@ class TcpListener(StreamLine):
         self._port = port
         self._only = only
         self._tls = tls
-        self._lookup = Lookup(only, 0, socket.SOCK_STREAM) if only else None
+        self._lookup = AddressLookup(only, 0, socket.SOCK_STREAM) if only else None
         self._listener: socket.socket | None = None
         self._newer: _Caller | None = None
         self._door: asyncio.Task[None] | None = None
@@ -250,7 +250,7 @@ def _plain(address: str) -> str:
 _LOOPBACK = "127.0.0.1"
 
 
-class TcpTransport(StreamLine):
+class TcpTransport(StreamTransport):
     """One TCP connection; it may be opened repeatedly."""
 
     def __init__(
@@ -258,13 +258,15 @@ class TcpTransport(StreamLine):
         host: str,
         port: int,
         *,
-        tunnel: Carrier | None = None,
+        tunnel: Tunnel | None = None,
         tls: Tls | None = None,
         read_ahead_bytes: int = READ_AHEAD_BYTES,
     ) -> None:
         """Initialise for `host` (name or address) and `port` 1..65535, without connecting."""
         super().__init__()
-        self._reach = Reach(host, port, tunnel=tunnel, tls=tls, read_ahead_bytes=read_ahead_bytes)
+        self._reach = StreamDialer(
+            host, port, tunnel=tunnel, tls=tls, read_ahead_bytes=read_ahead_bytes
+        )
 
     @property
     def address(self) -> str:
@@ -284,21 +286,21 @@ class TcpTransport(StreamLine):
     def offer(self, data: bytes) -> bool:
         """Send `data` if no earlier data waits; return whether it was accepted."""
         stream = self._stream
-        return type(stream) is Stream and stream.offer(data)
+        return type(stream) is TcpStream and stream.offer(data)
 
     @property
     def is_clogged(self) -> bool:
         """Whether accepted data waits for the kernel; `send` waits for it."""
         stream = self._stream
-        return type(stream) is Stream and not stream.is_writable
+        return type(stream) is TcpStream and not stream.is_writable
 
     def divert(self, sink: Callable[[bytes], bool]) -> None:
         """Pass received data to `sink`, before `receive`, until the connection is closed."""
-        if isinstance(self._stream, Stream):
+        if isinstance(self._stream, TcpStream):
             self._stream.sink = sink
 
 
-def from_setup(setup: Setup) -> Transport:
+def from_setup(setup: TransportSetup) -> Transport:
     """Return a transport for the options of a document.
 
     ``host`` and ``port`` are the address of the robot. With ``mode: listen`` the robot connects to

@@ -11,21 +11,21 @@ from typing import Any, Final, NamedTuple
 
 from urc.transports import _options
 from urc.transports._faults import late
-from urc.transports._stream import StreamLine, adopt
+from urc.transports._stream import StreamTransport, adopt
 from urc.transports.base import (
     ByteStream,
-    Carrier,
     ConnectFailed,
     PeerClosed,
-    Setup,
     TransportError,
+    TransportSetup,
+    Tunnel,
     reset,
     unsent_of,
 )
-from urc.transports.telnet_protocol import BINARY, ECHO, NAWS, SGA, TTYPE, TelnetTalk
+from urc.transports.telnet_protocol import BINARY, ECHO, NAWS, SGA, TTYPE, TelnetNegotiation
 from urc.transports.topic_socket import Address
 
-__all__ = ["TelnetTransport", "Wishes", "from_setup"]
+__all__ = ["TelnetTransport", "TelnetOptions", "from_setup"]
 
 DEFAULT_PORT: Final = 23
 _QUICKACK: Final = getattr(socket, "TCP_QUICKACK", None)
@@ -36,7 +36,7 @@ _SMALL_BYTES: Final = 1024
 """Limit in bytes below which an immediate acknowledgement pays off."""
 
 
-class Wishes(NamedTuple):
+class TelnetOptions(NamedTuple):
     """The Telnet options that URC requests or allows."""
 
     is_first: bool = False
@@ -49,10 +49,12 @@ class Wishes(NamedTuple):
     """Terminal type in replies."""
 
 
-class TelnetTransport(StreamLine):
+class TelnetTransport(StreamTransport):
     """One Telnet connection; it may be opened repeatedly."""
 
-    def __init__(self, host: str, port: int, wishes: Wishes, tunnel: Carrier | None = None) -> None:
+    def __init__(
+        self, host: str, port: int, wishes: TelnetOptions, tunnel: Tunnel | None = None
+    ) -> None:
         """Initialise for `host`, tunnelled through `tunnel` if given, without connecting."""
         super().__init__()
         self._address = Address(host, port)
@@ -103,7 +105,9 @@ class TelnetTransport(StreamLine):
 class _TelnetStream:
     """The text of a Telnet connection."""
 
-    def __init__(self, inner: ByteStream, talk: TelnetTalk, line: socket.socket | None) -> None:
+    def __init__(
+        self, inner: ByteStream, talk: TelnetNegotiation, line: socket.socket | None
+    ) -> None:
         """Use Telnet over `inner`; `line` is its socket, if it has one here."""
         self._inner = inner
         self._talk = talk
@@ -146,7 +150,7 @@ def _acknowledge(line: socket.socket) -> None:
             line.setsockopt(socket.IPPROTO_TCP, _QUICKACK, 1)
 
 
-def from_setup(setup: Setup) -> TelnetTransport:
+def from_setup(setup: TransportSetup) -> TelnetTransport:
     """Return a transport for the options of a document; see docs/transports/telnet.md.
 
     Raises:
@@ -159,7 +163,7 @@ def from_setup(setup: Setup) -> TelnetTransport:
             f"telnet takes as terminal a name of up to {_LONGEST_NAME} letters, not {terminal!r}"
         )
     negotiate = _options.choice("telnet", options, "negotiate", ("full", "passive"), "passive")
-    wishes = Wishes(
+    wishes = TelnetOptions(
         is_first=negotiate == "full",
         echo=_options.flag("telnet", options, "echo", default=False),
         binary=_options.flag("telnet", options, "binary", default=False),
@@ -169,11 +173,11 @@ def from_setup(setup: Setup) -> TelnetTransport:
     return TelnetTransport(host, port, wishes, setup.tunnel)
 
 
-def _begin(wishes: Wishes) -> tuple[TelnetTalk, bytes]:
+def _begin(wishes: TelnetOptions) -> tuple[TelnetNegotiation, bytes]:
     """Return a new negotiation and its first bytes to send."""
     binary = (BINARY,) if wishes.binary else ()
     echo = (ECHO,) if wishes.echo else ()
-    talk = TelnetTalk(
+    talk = TelnetNegotiation(
         ours=frozenset((SGA, TTYPE, NAWS, *binary)),
         theirs=frozenset((SGA, *binary, *echo)),
         terminal=wishes.terminal,

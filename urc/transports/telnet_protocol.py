@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable
 from typing import Final
 
-__all__ = ["BINARY", "ECHO", "NAWS", "SGA", "TTYPE", "TelnetTalk"]
+__all__ = ["BINARY", "ECHO", "NAWS", "SGA", "TTYPE", "TelnetNegotiation"]
 
 BINARY: Final = 0
 """Transparent bytes, NUL and CR included (RFC 856)."""
@@ -71,7 +71,7 @@ class _Side:
         return bytes((_IAC, self._refuse, option))
 
 
-class TelnetTalk:
+class TelnetNegotiation:
     """The protocol state of one end of a Telnet connection."""
 
     def __init__(

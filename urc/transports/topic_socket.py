@@ -7,8 +7,8 @@ like the TCP transport, with the same error texts.
 import socket
 
 from urc.transports._faults import explain, place_of, reason
-from urc.transports._lookup import Lookup
-from urc.transports.hurry import connected
+from urc.transports._lookup import AddressLookup
+from urc.transports.connect_race import connected
 
 __all__ = ["Address", "reason"]
 
@@ -21,7 +21,7 @@ class Address:
         self.host = host
         self.port = port
         self.text = place_of(host, port)
-        self._lookup = Lookup(host, port, socket.SOCK_STREAM)
+        self._lookup = AddressLookup(host, port, socket.SOCK_STREAM)
 
     async def dial(self, timeout_s: float) -> socket.socket:
         """Return a connected non-blocking socket; each address gets an equal share of the time.

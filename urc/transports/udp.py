@@ -15,12 +15,12 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.transports import _options
 from urc.transports._faults import CLOSED, broke, explain, place_of, reason
-from urc.transports._lookup import Lookup
+from urc.transports._lookup import AddressLookup
 from urc.transports._stream import as_bytes
-from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport, TransportError
+from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportError, TransportSetup
 
 __all__ = ["UdpTransport", "from_setup"]
 
@@ -70,7 +70,7 @@ class UdpTransport:
         self._bind = bind
         self._accepts_any = accepts_any or not host
         self._is_broadcast = is_broadcast
-        self._lookup = Lookup(host, port, socket.SOCK_DGRAM) if host else None
+        self._lookup = AddressLookup(host, port, socket.SOCK_DGRAM) if host else None
         self._allowed: frozenset[str] = frozenset()
         self._robot: _Address | None = None
         """Destination address; None until a robot has sent a datagram."""
@@ -278,7 +278,7 @@ class _Endpoint(asyncio.DatagramProtocol):
             self._note(exc)
 
 
-def from_setup(setup: Setup) -> Transport:
+def from_setup(setup: TransportSetup) -> Transport:
     """Return a transport for the options of a document.
 
     Raises:

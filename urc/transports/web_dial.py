@@ -1,7 +1,7 @@
 """Connections to the server of a web transport: direct or tunnelled, with or without TLS.
 
-`Reach` returns our own streams. A library with its own protocol needs a socket. Such a library gets
-the socket of a plain connection, or one end of a socket pair with a relay.
+`StreamDialer` returns our own streams. A library with its own protocol needs a socket. Such a
+library gets the socket of a plain connection, or one end of a socket pair with a relay.
 """
 
 import asyncio
@@ -10,19 +10,19 @@ from collections.abc import Coroutine
 from typing import Any
 
 from urc.transports._faults import late
-from urc.transports._reach import Reach
 from urc.transports._stream import forget_unsent, unsent_in
+from urc.transports._stream_dialer import StreamDialer
 from urc.transports._tls import Tls
 from urc.transports.base import (
     ByteStream,
-    Carrier,
     ConnectFailed,
     PeerClosed,
     SupportsReset,
+    Tunnel,
     unsent_of,
 )
 from urc.transports.topic_socket import Address
-from urc.transports.web_place import WebPlace
+from urc.transports.web_origin import WebOrigin
 
 __all__ = ["Dialer"]
 
@@ -32,9 +32,9 @@ _PIECE_BYTES = 65536
 class Dialer:
     """Connects to one server, repeatedly."""
 
-    def __init__(self, place: WebPlace, *, tls: Tls | None, tunnel: Carrier | None) -> None:
+    def __init__(self, place: WebOrigin, *, tls: Tls | None, tunnel: Tunnel | None) -> None:
         """Initialise for `place`, with `tls` and through `tunnel` if given."""
-        self._reach = Reach(place.host, place.port, tunnel=tunnel, tls=tls)
+        self._reach = StreamDialer(place.host, place.port, tunnel=tunnel, tls=tls)
         is_plain = tls is None and tunnel is None
         self._address = Address(place.host, place.port) if is_plain else None
         self._bridges: set[asyncio.Task[None]] = set()

@@ -19,12 +19,12 @@ from websockets.exceptions import (
 from websockets.frames import CloseCode
 from websockets.typing import Subprotocol
 
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.transports._faults import CLOSED, HUNG_UP, broke, late, one_line
 from urc.transports._stream import as_bytes
-from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport, TransportError
+from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportError, TransportSetup
 from urc.transports.web_dial import Dialer
-from urc.transports.web_place import Options
+from urc.transports.web_origin import OptionReader
 
 __all__ = ["WebSocketTransport", "from_setup"]
 
@@ -41,13 +41,13 @@ _CLOSE_S = 0.2
 class WebSocketTransport:
     """One WebSocket; it may be opened repeatedly."""
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: TransportSetup) -> None:
         """Read the options of `setup`, without connecting.
 
         Raises:
             TransportError: an option is missing or invalid.
         """
-        options = Options("websocket", setup.options)
+        options = OptionReader("websocket", setup.options)
         self._place = options.place("ws")
         self._headers = options.headers()
         credentials = options.credentials(("basic", "bearer"))
@@ -227,7 +227,7 @@ class _Connect(connect):
         return exc
 
 
-def from_setup(setup: Setup) -> Transport:
+def from_setup(setup: TransportSetup) -> Transport:
     """Return a transport for the options of a document, or raise `TransportError`."""
     return WebSocketTransport(setup)
 

@@ -23,41 +23,41 @@ from starlette.websockets import WebSocket
 from urc import __version__
 from urc.model.profile import Profile
 from urc.runtime.audit import AuditLog
-from urc.runtime.blanking import secret_texts
-from urc.runtime.latch import LatchFile
-from urc.runtime.trail import Trail
+from urc.runtime.audit_recorder import AuditRecorder
+from urc.runtime.latch import LatchStore
+from urc.runtime.redaction import secret_texts
 from urc.shipped import vendored
 from urc.web import words
+from urc.web.access_page import AccessMiddleware, Stoppable
 from urc.web.api_document import DOCUMENT, document
 from urc.web.dev.routes import Dev, dev_url, no_dev_routes
 from urc.web.dev.start import DevStart, no_dev_start
+from urc.web.dev.timeline import timeline
 from urc.web.dev.watch import Remake
-from urc.web.door import Door, Stoppable
-from urc.web.drive.once import can_move
-from urc.web.drive.spare import Spare
+from urc.web.drive.one_shot_commands import can_move
+from urc.web.drive.redundant_socket import RedundantSocket
 from urc.web.fleet.fleet import Fleet
-from urc.web.fleet.garage import Garage, Workshop
-from urc.web.fleet.robots import LINGER_S, Robot, Station, Tape, missing_settings
+from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
+from urc.web.fleet.robots import LINGER_S, Playback, Robot, RobotService, missing_settings
 from urc.web.load.assets import Assets, import_map
 from urc.web.load.file_routes import FileRoutes
-from urc.web.load.foreign import Border
+from urc.web.load.widget_trust import WidgetTrust
 from urc.web.manage.manager import Manager
+from urc.web.manage.playback_control import move_tape, tape_state
 from urc.web.manage.routes import ManageRoutes
 from urc.web.manage.settings_routes import SettingsRoutes
+from urc.web.page_socket import BrowserClient
 from urc.web.serve.access import Access
 from urc.web.serve.policy import Policy
 from urc.web.serve.server import serve
+from urc.web.serve.visitor import guest_of, is_here, may_manage
 from urc.web.show.card import Cards
-from urc.web.show.foreign_frame import Frames
-from urc.web.show.framed import Linked
+from urc.web.show.external_pages import ExternalPages
+from urc.web.show.frame_document import FrameDocuments
 from urc.web.show.gallery import Gallery
 from urc.web.show.interfaces import KEPT, chosen
-from urc.web.show.menu import Ways, menu_page
-from urc.web.show.pages import Head, error_page, robot_page
-from urc.web.socket import Client
-from urc.web.tape import move_tape, tape_state
-from urc.web.timeline import timeline
-from urc.web.visitor import guest_of, is_here, may_manage
+from urc.web.show.menu import NavigationLinks, menu_page
+from urc.web.show.pages import PageHead, error_page, robot_page
 from urc.web.wire import messages as wire
 
 __all__ = ["Robot", "build_app", "serve"]
@@ -74,7 +74,7 @@ def build_app(
     data: Path | None = None,
     tiles: Path | None = None,
     remake: Mapping[str, Remake] | None = None,
-    workshop: Workshop | None = None,
+    workshop: RobotOptions | None = None,
     trusted: Iterable[str] = (),
 ) -> Starlette:
     """Return the application that serves `robots`.
@@ -96,23 +96,23 @@ def build_app(
     audit = AuditLog(data / "audit.sqlite") if data else None
     fleet = Fleet(
         robots,
-        lambda name, robot: Station(
+        lambda name, robot: RobotService(
             robot, linger_s=linger_s, latch=_latch(data, robot), trail=_trail(audit, name, robot)
         ),
     )
     routes = _Routes(
         fleet=fleet,
         modules=import_map(vendored()),
-        ways=Ways(has_managers=workshop is not None, has_dev=remake is not None),
+        ways=NavigationLinks(has_managers=workshop is not None, has_dev=remake is not None),
         audit=audit,
-        border=Border.of(trusted),
+        border=WidgetTrust.of(trusted),
     )
 
     def renew(name: str, robot: Robot) -> None:
         routes.renew(name, robot, _latch(data, robot))
 
     if workshop is not None:
-        routes.manager = Manager(Garage(workshop), fleet, time.monotonic, renew)
+        routes.manager = Manager(RobotFactory(workshop), fleet, time.monotonic, renew)
     dev = None
     if remake is not None:
         dev = Dev(fleet.stations, remake, renew, is_here)
@@ -121,18 +121,18 @@ def build_app(
     return _Dashboard(routes, files, access or Access(), frozenset(allowed_hosts), dev)
 
 
-def _latch(data: Path | None, robot: Robot) -> LatchFile | None:
+def _latch(data: Path | None, robot: Robot) -> LatchStore | None:
     if data is None or not can_move(robot.profile.driver):
         return None
     folder = data / "latches"
-    return LatchFile(folder / "emulated" if robot.is_emulated else folder, robot.profile.name)
+    return LatchStore(folder / "emulated" if robot.is_emulated else folder, robot.profile.name)
 
 
-def _trail(audit: AuditLog | None, name: str, robot: Robot) -> Trail | None:
+def _trail(audit: AuditLog | None, name: str, robot: Robot) -> AuditRecorder | None:
     if audit is None:
         return None
     secrets = secret_texts(robot.profile, robot.settings)
-    return Trail(name, audit.note, utc=time.time, secrets=secrets)
+    return AuditRecorder(name, audit.note, utc=time.time, secrets=secrets)
 
 
 class _Dashboard(Starlette):
@@ -157,7 +157,7 @@ class _Dashboard(Starlette):
             border=routes.border,
             ways=routes.ways,
         )
-        frames = Frames(routes.modules, files.has_widget, access.frame_code)
+        frames = FrameDocuments(routes.modules, files.has_widget, access.frame_code)
         super().__init__(
             routes=[
                 Route("/", routes.menu),
@@ -174,7 +174,7 @@ class _Dashboard(Starlette):
                 *gallery.routes(),
                 *files.routes(),
                 Route("/frames/{widget}", frames.frame),
-                *Linked(lambda: routes.robots).routes(),
+                *ExternalPages(lambda: routes.robots).routes(),
                 WebSocketRoute("/ws", routes.socket),
                 WebSocketRoute("/ws/spare", routes.spare),
                 *(dev.routes() if dev else no_dev_routes()),
@@ -186,17 +186,19 @@ class _Dashboard(Starlette):
 
     def build_middleware_stack(self) -> ASGIApp:
         """Put the policy around everything, also around the handler of unexpected errors."""
-        door = Door(super().build_middleware_stack(), self._access, self._stoppable)
-        return Policy(words.Reader(door), self._access, allowed_hosts=self._allowed_hosts)
+        door = AccessMiddleware(super().build_middleware_stack(), self._access, self._stoppable)
+        return Policy(
+            words.LanguageMiddleware(door), self._access, allowed_hosts=self._allowed_hosts
+        )
 
 
 @dataclass(slots=True)
 class _Routes:
     fleet: Fleet
     modules: Mapping[str, object]
-    ways: Ways
+    ways: NavigationLinks
     audit: AuditLog | None = None
-    border: Border = field(default_factory=Border)
+    border: WidgetTrust = field(default_factory=WidgetTrust)
     manager: Manager | None = None
     dev: Dev | None = None
     dev_start: DevStart | None = None
@@ -208,7 +210,7 @@ class _Routes:
         return self.fleet.robots
 
     @property
-    def stations(self) -> Mapping[str, Station]:
+    def stations(self) -> Mapping[str, RobotService]:
         """The stations of the robots, by the same name."""
         return self.fleet.stations
 
@@ -235,7 +237,7 @@ class _Routes:
         """Return the files of widgets: those of the robots, then those of the gallery."""
         return self.fleet.widgets, self.gallery.assets
 
-    def renew(self, name: str, robot: Robot, latch: LatchFile | None) -> None:
+    def renew(self, name: str, robot: Robot, latch: LatchStore | None) -> None:
         """Switch to another version of a robot; raise `UrcError` when its widgets clash."""
         robot = self.fleet.renew(name, robot)
         secrets = secret_texts(robot.profile, robot.settings)
@@ -260,7 +262,7 @@ class _Routes:
                 await asyncio.to_thread(self.audit.close)
 
     async def menu(self, request: Request) -> Response:
-        head = Head(request.state.nonce, "URC")
+        head = PageHead(request.state.nonce, "URC")
         drivers: Mapping[str, str] = {}
         if self.manager is not None:
             await self.manager.look()
@@ -339,7 +341,7 @@ class _Routes:
         """Change a playback."""
         return await move_tape(request, self._tape(request))
 
-    def _tape(self, request: Request) -> Tape | None:
+    def _tape(self, request: Request) -> Playback | None:
         robot = self.robots.get(request.path_params["name"])
         return robot.tape if robot is not None else None
 
@@ -350,16 +352,16 @@ class _Routes:
             guest = guest_of(websocket)
             if station.robot.tape is not None:
                 guest = guest._replace(role="viewer")
-            await Client(websocket, station, flow, guest).serve()
+            await BrowserClient(websocket, station, flow, guest).serve()
 
     async def spare(self, websocket: WebSocket) -> None:
         """Serve a redundant socket of a page that drives."""
         station = await self._accepted(websocket)
         if station is not None:
             flow = websocket.scope["state"]["flow"]
-            await Spare(websocket, station.controls, station.clock, flow).serve()
+            await RedundantSocket(websocket, station.controls, station.clock, flow).serve()
 
-    async def _accepted(self, websocket: WebSocket) -> Station | None:
+    async def _accepted(self, websocket: WebSocket) -> RobotService | None:
         await websocket.accept()
         names = list(self.stations)
         default = names[0] if len(names) == 1 else ""

@@ -17,12 +17,12 @@ from pathlib import Path
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from urc._phrases import Phrase
+from urc._translatable import Phrase
 
 __all__ = [
     "COOKIE",
     "LANGUAGES",
-    "Reader",
+    "LanguageMiddleware",
     "address",
     "choose",
     "language",
@@ -110,7 +110,7 @@ def _wish(text: str) -> tuple[str, float]:
         return tag.strip(), 0.0
 
 
-class Reader:
+class LanguageMiddleware:
     """ASGI middleware that sets the language of each request."""
 
     def __init__(self, app: ASGIApp) -> None:

@@ -5,7 +5,7 @@
  * Its rungs are drawn for three times the visible range, and then only moved; it is redrawn when the
  * mark comes near an end.
  */
-import { wholes } from "urc/scale";
+import { wholes } from "urc/axis_ticks";
 
 /** Height of the drawing, in its own units. */
 export const HIGH = 200;

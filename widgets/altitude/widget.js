@@ -3,7 +3,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 import { attribute, clamp, drawing, format, noteOf, number, part, style, svg, write } from "urc/kit";
-import { digitsOf } from "urc/scale";
+import { digitsOf } from "urc/axis_ticks";
 import { covers, offset, tape } from "./tape.js";
 
 /** Climb below which the flight is level, as a share of a unit. */

@@ -3,7 +3,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Hand} Hand */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
-import { bounded, snapped } from "urc/curve";
+import { bounded, snapped } from "urc/response_curve";
 import { clamp, part, style, write } from "urc/kit";
 import { DIRECTIONS, Motion, pointed, pulled, signed, speak } from "urc/motion";
 

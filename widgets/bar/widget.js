@@ -4,7 +4,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Signal} Signal */
 import { attribute, fit, format, number, part, style } from "urc/kit";
 import { Meter } from "urc/meter";
-import { bands, digitsOf, share, ticks } from "urc/scale";
+import { bands, digitsOf, share, ticks } from "urc/axis_ticks";
 
 const TICKS = 4;
 

@@ -4,7 +4,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 /** @typedef {Readonly<Record<string, Reading>>} Readings */
 import { attribute, drawing, fit, format, many, noteOf, number, numbers, part, style, tell, worst, write } from "urc/kit";
-import { share } from "urc/scale";
+import { share } from "urc/axis_ticks";
 import { Mean, cellScale, clock, spread, timeLeft } from "./charge.js";
 import { INSIDE, mark } from "./drawing.js";
 

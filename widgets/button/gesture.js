@@ -4,7 +4,7 @@
  * or a key, counts as the whole gesture if the gesture cannot be told by time.
  */
 
-import { isDown } from "urc/giving";
+import { isDown } from "urc/command_kit";
 
 /** Time of a long press. */
 export const HOLD_MS = 800;

@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
-import { Giver, slide } from "urc/giving";
+import { Giver, slide } from "urc/command_kit";
 import { attribute, noteOf, part, style, write } from "urc/kit";
 import { listen } from "./gesture.js";
 

@@ -1,7 +1,7 @@
 // @ts-check
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
-import { Giver } from "urc/giving";
+import { Giver } from "urc/command_kit";
 import { attribute, part, write } from "urc/kit";
 
 export default {

@@ -5,10 +5,10 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("./field.js").Field} Field */
 /** @typedef {import("./field.js").Form} Form */
-import { grasp } from "urc/giving";
+import { grasp } from "urc/command_kit";
 import { DASH, attribute, clamp, colours, format, noteOf, part, style, write } from "urc/kit";
-import { palette, pixel } from "urc/palette";
-import { Sheet } from "urc/sheet";
+import { palette, pixel } from "urc/colour_map";
+import { Sheet } from "urc/offscreen_canvas";
 import { arrayField, paint, pixelAt, probe, readField } from "./field.js";
 
 const STEP = 0.02;

@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Hand} Hand */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
-import { arrow } from "urc/curve";
+import { arrow } from "urc/response_curve";
 import { attribute, part } from "urc/kit";
 import { along, DIRECTIONS, Motion, pointed } from "urc/motion";
 

@@ -4,7 +4,7 @@
  *
  * @typedef {import("../../urc/web/static/core/types.js").Context} Context
  * @typedef {import("../../urc/web/static/core/types.js").PadView} PadView
- * @typedef {import("../../urc/web/static/widgets/padmap.js").PadMap} PadMap
+ * @typedef {import("../../urc/web/static/widgets/gamepad_map.js").PadMap} PadMap
  *
  * @typedef {object} Part One part of the mapping.
  * @property {string} text
@@ -12,7 +12,7 @@
  * @property {number} axis Index of the axis, 0 to 3; -1 for a button.
  * @property {"left" | "right" | "slower" | "faster"} [button]
  */
-import { STANDARD, movedAxis, withAxis, withButton } from "urc/padmap";
+import { STANDARD, movedAxis, withAxis, withButton } from "urc/gamepad_map";
 import { button, part, t, write } from "urc/kit";
 
 const LEARN = "gamepad-learn urc-pad-act";

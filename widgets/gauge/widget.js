@@ -4,7 +4,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Signal} Signal */
 import { attribute, drawing, format, number, style, svg } from "urc/kit";
 import { Meter } from "urc/meter";
-import { bands, digitsOf, share, ticks } from "urc/scale";
+import { bands, digitsOf, share, ticks } from "urc/axis_ticks";
 import { angle, arc, dashes, needle, place } from "./arc.js";
 
 const TICKS = 6;

@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 import { attribute, noteOf, part, write } from "urc/kit";
-import { Sheet } from "urc/sheet";
+import { Sheet } from "urc/offscreen_canvas";
 import { pictureOf } from "./source.js";
 
 export default {

@@ -1,7 +1,7 @@
 // @ts-check
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
-import { Setpoint, SetpointFace } from "urc/giving";
+import { Setpoint, SetpointFace } from "urc/command_kit";
 import { attribute, drawing } from "urc/kit";
 import { Pull, arc, ray, shareAt } from "./dial.js";
 

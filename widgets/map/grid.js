@@ -3,7 +3,7 @@
 /** @typedef {import("leaflet").Map} LeafletMap */
 /** @typedef {import("./geo.js").Place} Place */
 import { board, colours, write } from "urc/kit";
-import { wholes } from "urc/scale";
+import { wholes } from "urc/axis_ticks";
 import { distance, distanceText, gridStep, perMetre } from "./geo.js";
 
 /** Limit of the number of lines, above that of any screen. */

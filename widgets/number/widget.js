@@ -1,7 +1,7 @@
 // @ts-check
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
-import { Setpoint, SetpointFace, keyed } from "urc/giving";
+import { Setpoint, SetpointFace, keyed } from "urc/command_kit";
 import { attribute, part } from "urc/kit";
 import { numberOf } from "./typed.js";
 

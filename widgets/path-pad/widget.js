@@ -2,11 +2,11 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
-/** @typedef {import("../../urc/web/static/widgets/stroke.js").Point} Point */
-import { grasp } from "urc/giving";
+/** @typedef {import("../../urc/web/static/widgets/path_simplify.js").Point} Point */
+import { grasp } from "urc/command_kit";
 import { attribute, clamp, drawing, format, number, part, svg, write } from "urc/kit";
 import { DIRECTIONS, pointed } from "urc/motion";
-import { fitted, lengthOf } from "urc/stroke";
+import { fitted, lengthOf } from "urc/path_simplify";
 
 /** Distance from the middle to the edge, in units of the drawing, which is 200 wide. */
 const EDGE = 96;

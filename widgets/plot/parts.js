@@ -3,7 +3,7 @@
  * Small elements of the plot, and its use of browser functions.
  */
 import { format, style, write } from "urc/kit";
-import { digitsOf, ticks } from "urc/scale";
+import { digitsOf, ticks } from "urc/axis_ticks";
 
 /** Milliseconds since 1970 at time 0 of the page's clock. */
 export function epoch() {

@@ -12,7 +12,7 @@
  * @property {number} to Column after the last one.
  * @property {boolean} isDrawn Whether it has content that is not shown yet.
  */
-import { Sheet } from "urc/sheet";
+import { Sheet } from "urc/offscreen_canvas";
 
 /** Number of strips in the width of the picture. */
 const STRIPS = 4;

@@ -4,7 +4,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("./live.js").Trace} Trace */
 import { ALARMS, DASH, attribute, clock, colours, figure, isStill, many, noteOf, number, part, save, style, write } from "urc/kit";
-import { spanOf } from "urc/scale";
+import { spanOf } from "urc/axis_ticks";
 import { History } from "./history.js";
 import { Live } from "./live.js";
 import { epoch, legendItem, ruled, writeValue } from "./parts.js";

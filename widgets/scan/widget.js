@@ -6,8 +6,8 @@
 /** @typedef {import("./fan.js").Fault} Fault */
 /** @typedef {import("./paint.js").Ink} Ink */
 import { DASH, attribute, colours, format, noteOf, number, part, worst, write } from "urc/kit";
-import { palette, pixel } from "urc/palette";
-import { Sheet } from "urc/sheet";
+import { palette, pixel } from "urc/colour_map";
+import { Sheet } from "urc/offscreen_canvas";
 import { Even, Uneven, faultOf } from "./fan.js";
 import { Overlay } from "./overlay.js";
 import { arc, band, chart, dots, graph, view } from "./paint.js";

@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 import { attribute, clamp, format, noteOf, number, numbers, part, style, write } from "urc/kit";
-import { ends, share } from "urc/scale";
+import { ends, share } from "urc/axis_ticks";
 import { lengthOf, shownIn } from "./pace.js";
 
 export default {

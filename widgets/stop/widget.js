@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/core/types.js").StopState} StopState */
-import { whenPressed } from "urc/giving";
+import { whenPressed } from "urc/command_kit";
 import { inTurn } from "urc/kit";
 
 export default {

@@ -4,7 +4,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet */
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("../../urc/web/static/core/types.js").Value} Value */
-import { Giver, Wish } from "urc/giving";
+import { Giver, Wish } from "urc/command_kit";
 import { attribute, noteOf, part, wordOf, write } from "urc/kit";
 
 export default {

@@ -3,7 +3,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/core/types.js").LogLine} LogLine */
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
-import { Giver } from "urc/giving";
+import { Giver } from "urc/command_kit";
 import { attribute, noteOf, part, write } from "urc/kit";
 import { hexOf, pairsOf, plain, Typed } from "./hex.js";
 import { Screen } from "./screen.js";

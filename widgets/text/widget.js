@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
-import { Giver, Wish } from "urc/giving";
+import { Giver, Wish } from "urc/command_kit";
 import { attribute, noteOf, part, write } from "urc/kit";
 
 export default {

@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Hand} Hand */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
-import { gate, settingsOf, tilted } from "urc/curve";
+import { gate, settingsOf, tilted } from "urc/response_curve";
 import { attribute, drawing, part, write } from "urc/kit";
 import { DIRECTIONS, Motion, pointed, pulled, signed } from "urc/motion";
 

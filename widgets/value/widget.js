@@ -3,7 +3,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 import { attribute, digitsIn, figure, fit, format, noteOf, number, part as find, write } from "urc/kit";
-import { spanOf } from "urc/scale";
+import { spanOf } from "urc/axis_ticks";
 import { Trend } from "./trend.js";
 
 const LIMITS = /** @type {const} */ (["lolo", "low", "high", "hihi"]);

@@ -2,10 +2,10 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/core/types.js").Value} Value */
-import { grasp } from "urc/giving";
+import { grasp } from "urc/command_kit";
 import { attribute, drawing, format, part, write } from "urc/kit";
 import { DIRECTIONS, pointed } from "urc/motion";
-import { cutTo, polar } from "urc/stroke";
+import { cutTo, polar } from "urc/path_simplify";
 
 /** Radius of the rim, in units of the drawing, which is 200 wide. */
 const RIM = 90;
@@ -59,7 +59,7 @@ class VectorPad {
     this.at = null;
     /** @type {[number, number] | null} */
     this.last = null;
-    /** Present pointer capture. @type {import("../../urc/web/static/control/grasp.js").Grasp | null} */
+    /** Present pointer capture. @type {import("../../urc/web/static/control/pointer_capture.js").Grasp | null} */
     this.hold = null;
     /** @type {[number, number]} */
     this.start = [0, 0];

@@ -9,17 +9,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.effort import examples
-from urc.config.load import Shelf, check
+from urc.config.load import WidgetFolder, check
 from urc.expressions import ExpressionError
 from urc.model.driver import Driver
 from urc.problems import to_text
-from urc.protocol.codec import BadText, CodecContext, Frame, NotWritable
-from urc.protocol.forms import build_reader, build_writer
-from urc.runtime.catalog import built_in_catalog
+from urc.protocol.forms.table import build_reader, build_writer
+from urc.protocol.values.payload import BadText, CodecContext, Frame, NotWritable
+from urc.runtime.registries import built_in_catalog
 
 ROOT = Path(__file__).resolve().parents[3]
 DATA = yaml.safe_load((ROOT / "tests/contract/every_key/binary.yaml").read_text("utf-8"))
-SHELF = Shelf(ROOT / "tests" / "broken" / "shelf")
+SHELF = WidgetFolder(ROOT / "tests" / "broken" / "shelf")
 CATALOG = built_in_catalog()
 
 words = st.sampled_from(

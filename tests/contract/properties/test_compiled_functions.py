@@ -9,24 +9,24 @@ from hypothesis import strategies as st
 from tests.effort import examples
 from urc.expressions import compile_template
 from urc.model.driver import Argument, Command, FramingSpec
-from urc.model.values import Conversion, Limits, Signal
-from urc.protocol.answer import Matcher
-from urc.protocol.codec import CodecContext, Frame
-from urc.protocol.encode import BadArgument, build_check, build_encode, check_arguments
-from urc.protocol.fast_encode import build_fast_encode
-from urc.protocol.fast_read import build_fast_read
-from urc.protocol.fast_value import Taken
-from urc.protocol.forms import build_reader
-from urc.protocol.framing import build_framing
-from urc.protocol.messages import Messages
-from urc.protocol.readings import Readings
+from urc.model.values import AlarmLimits, Conversion, Signal
+from urc.protocol.forms.table import build_reader
+from urc.protocol.framing.table import build_framing
+from urc.protocol.readings.compiled import build_fast_read
+from urc.protocol.readings.compiled_value import Taken
+from urc.protocol.readings.readings import Readings
+from urc.protocol.requests.compiled_encode import build_fast_encode
+from urc.protocol.requests.encode import BadArgument, build_check, build_encode, check_arguments
+from urc.protocol.requests.messages import Messages
+from urc.protocol.requests.reply_match import Matcher
+from urc.protocol.values.payload import CodecContext, Frame
 from urc.testing.profile import text
 from urc.testing.reading import read_spec
 
 SIGNALS = {
     one.name: one
     for one in (
-        Signal("volts", min=0, max=60, limits=Limits(low=20, hysteresis=1)),
+        Signal("volts", min=0, max=60, limits=AlarmLimits(low=20, hysteresis=1)),
         Signal("amps"),
         Signal("top", max=5),
         Signal("count", "integer", min=-5),

@@ -7,14 +7,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.effort import examples
-from urc.config.load import Shelf, check
+from urc.config.load import WidgetFolder, check
 from urc.problems import ProblemsError, to_json, to_text
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.source import parse_document
 
 ROOT = Path(__file__).resolve().parents[3]
 PUPPET = (ROOT / "robots" / "puppet.yaml").read_text("utf-8")
-SHELF = Shelf(ROOT / "tests" / "broken" / "shelf")
+SHELF = WidgetFolder(ROOT / "tests" / "broken" / "shelf")
 CATALOG = built_in_catalog()
 
 pieces = st.sampled_from(

@@ -6,9 +6,8 @@ from typing import Any
 import pytest
 
 from tests.unit.protocol.framing_samples import MAVLINK, NMEA, UBX, framing
-from urc.protocol import checksums
-from urc.protocol.framings import searched
-from urc.protocol.stream import Credit, Stream
+from urc.protocol.framing.receive_buffer import ReceiveBuffer, RescanBudget
+from urc.protocol.framing.table import checksums, searched
 
 SIZE = 1 << 14
 
@@ -110,12 +109,12 @@ def test_almost_frames_cost_linear_work(
     """16 KiB of what nearly is a frame, at once and in drips."""
     counter = CountingBytes.counter = Counter()
     count_patterns(counter, monkeypatch)
-    decoder = framing(text).decoder(Stream(CountingBytes()))
+    decoder = framing(text).decoder(ReceiveBuffer(CountingBytes()))
     stream = (piece * size)[:size]
     for place in range(0, size, step):
         decoder.feed(stream[place : place + step], place / 1e6)
         assert decoder.pending <= 2 * SIZE + 2
-    per_byte = (counter.bytes - 3 * Credit.MOST) / size
+    per_byte = (counter.bytes - 3 * RescanBudget.MOST) / size
     assert per_byte < (MOST_SMALL if "regex" in text else MOST)
 
 

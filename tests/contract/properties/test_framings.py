@@ -19,9 +19,9 @@ from tests.unit.protocol.framing_samples import (
     spec,
     wire,
 )
-from urc.protocol.framing import build_framing
-from urc.protocol.framings.base import Decoder, FrameFault, FramingError
-from urc.protocol.stream import Stream
+from urc.protocol.framing.base import Decoder, FrameFault, FramingError
+from urc.protocol.framing.receive_buffer import ReceiveBuffer
+from urc.protocol.framing.table import build_framing
 from urc.testing.framing import feed_three_ways
 
 EACH = pytest.mark.parametrize("sample", SAMPLES, ids=[one.name for one in SAMPLES])
@@ -67,7 +67,7 @@ def test_payloads_become_the_sample_again(sample: Sample) -> None:
 @pytest.mark.parametrize("sample", STREAMED, ids=[one.name for one in STREAMED])
 def test_a_decoder_goes_on_where_another_has_stopped(sample: Sample) -> None:
     """So a reply may bring its own framing: what it leaves is still there."""
-    stream = Stream()
+    stream = ReceiveBuffer()
     stream.push(sample.wire + sample.wire)
     made = framing(sample.text)
     found = []

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from tests.dialogue import Dialogue
 from tests.effort import examples
 from urc.model.values import Sample, Signal
-from urc.protocol.answer import Matcher
-from urc.protocol.codec import CodecContext, Frame
+from urc.protocol.compile.source import function_of
 from urc.protocol.events import Event, Samples
-from urc.protocol.fast_read import build_fast_read
-from urc.protocol.forms import build_reader
-from urc.protocol.generate import function_of
-from urc.protocol.readings import Readings
+from urc.protocol.forms.table import build_reader
+from urc.protocol.readings.compiled import build_fast_read
+from urc.protocol.readings.readings import Readings
+from urc.protocol.requests.reply_match import Matcher
+from urc.protocol.values.payload import CodecContext, Frame
 from urc.testing.reading import read_spec
 
 LINE = """

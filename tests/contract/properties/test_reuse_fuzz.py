@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from tests.effort import examples
 from urc.config.load import check
-from urc.config.parse.widget import Shelf
+from urc.config.parse.widget import WidgetFolder
 from urc.config.resolve import resolve, written
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.source import read_document
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -62,7 +62,7 @@ def test_no_change_of_the_documents_raises(data: st.DataObject, tmp_path_factory
     for name, document in changed.items():
         text = "".join(written(key, value) for key, value in document.items())  # type: ignore[union-attr]
         (folder / f"{name}.yaml").write_text(text, "utf-8")
-    shelf = Shelf(EVERY_KEY / "shelf")
+    shelf = WidgetFolder(EVERY_KEY / "shelf")
     for name in ("robot-of-parts", "driver-that-extends"):
         file = str(folder / f"{name}.yaml")
         for problem in check(file, built_in_catalog(), shelf).problems:

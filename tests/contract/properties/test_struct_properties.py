@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from tests.effort import examples
 from urc.expressions import compile_expression
 from urc.model.binary import Extent, Item, Number, Switch, joined_name, number_of
-from urc.model.codec import Envelope, ReadSpec
-from urc.protocol.codec import BadItem, CodecContext, Frame, NotWritable
-from urc.protocol.struct_form import StructReader
-from urc.protocol.struct_read import build_steps, read_frame
-from urc.protocol.struct_source import generate_read
-from urc.protocol.struct_source_write import generate_write
-from urc.protocol.struct_write import build_write_steps, write_frame
+from urc.model.payload import Envelope, ReadSpec
+from urc.protocol.struct.form import StructReader
+from urc.protocol.struct.read import build_steps, read_frame
+from urc.protocol.struct.read_source import generate_read
+from urc.protocol.struct.write import build_write_steps, write_frame
+from urc.protocol.struct.write_source import generate_write
+from urc.protocol.values.payload import BadItem, CodecContext, Frame, NotWritable
 
 Declared = tuple[tuple[Item, ...], st.SearchStrategy[dict[str, Any]]]
 """Items, and values that fit them."""

@@ -10,13 +10,13 @@ from playwright.async_api import CDPSession, Locator, Page
 from tests.e2e.browser import PLAIN_HOST
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import WAIT_S, until
-from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command
-from urc.model.flow import Hold
-from urc.model.interface import Given, WidgetUse
+from urc.model.exchange import Hold
+from urc.model.interface import OutputBinding, WidgetUse
+from urc.model.payload import WriteSpec
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS
-from urc.testing.movers import FakeMovers
+from urc.testing.movers import FakeMotionBackend
 from urc.web.app import Robot, build_app, serve
 
 SEND = WriteSpec("text", {})
@@ -49,15 +49,15 @@ def commands(lease_s: float) -> dict[str, Command]:
 USES = (
     WidgetUse(
         "left", "joystick", {}, {"moved": "drive"}, {"axes": "x", "expo": 0.0, "dead_zone": 0.0},
-        title="Throttle", given={"moved": Given({"speed": "x"})},
+        title="Throttle", given={"moved": OutputBinding({"speed": "x"})},
     ),
     WidgetUse(
         "right", "joystick", {}, {"moved": "drive"}, {"axes": "y", "expo": 0.0, "dead_zone": 0.0},
-        title="Steering", given={"moved": Given({"turn": "y"})},
+        title="Steering", given={"moved": OutputBinding({"turn": "y"})},
     ),
     WidgetUse(
         "up", "hold-button", {}, {"held": "lift"}, {"label": "Lift"},
-        given={"held": Given({"rate": "level"})},
+        given={"held": OutputBinding({"rate": "level"})},
     ),
 )  # fmt: skip
 LEFT, RIGHT, UP = "[data-cell='0'] .joystick-pad", "[data-cell='1'] .joystick-pad", "#cell-2-main"
@@ -73,9 +73,9 @@ class Wire(FakeRobot):
         super().__init__(dashboard_profile(uses=tuple(uses.values()), commands=commands(lease_s)))
 
     @property
-    def line(self) -> FakeMovers:
+    def line(self) -> FakeMotionBackend:
         """What was written."""
-        assert isinstance(self.movers, FakeMovers)
+        assert isinstance(self.movers, FakeMotionBackend)
         return self.movers
 
     def after(self, count: int) -> list[str]:

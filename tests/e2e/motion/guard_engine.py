@@ -22,8 +22,8 @@ from pathlib import Path
 
 from urc.config.load import load_profile
 from urc.guard.pipe_channel import PipeChannel
-from urc.motion.hold import Terms
-from urc.runtime.catalog import built_in_catalog
+from urc.motion.hold_to_run import HoldTerms
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Motion, Session
 
 DOCUMENT = """\
@@ -103,7 +103,7 @@ class Engine:
         """Do as told."""
         if word in ("drive", "big"):
             self.is_driving, self.is_big = True, word == "big"
-            self.movers.arm("drive", Terms(self.frames.stop_frame("drive"), period_s=0.02))
+            self.movers.arm("drive", HoldTerms(self.frames.stop_frame("drive"), period_s=0.02))
         elif word == "rest":
             self.is_driving = False
         elif word == "release":

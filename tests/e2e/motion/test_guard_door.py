@@ -9,12 +9,12 @@ from functools import partial
 
 import pytest
 
-from urc.guard import wire
-from urc.guard.channel import LineSpec
+from urc.guard import messages
+from urc.guard.channel import GuardedLineSpec
 from urc.guard.guard_client import GuardClient, HeldSpec
 from urc.guard.pipe_channel import PipeChannel
-from urc.guard.process import Door
-from urc.motion.hold import Terms
+from urc.guard.process import GuardAcceptor
+from urc.motion.hold_to_run import HoldTerms
 from urc.transports.tcp import TcpTransport
 
 pytestmark = pytest.mark.anyio
@@ -52,9 +52,11 @@ async def guarded() -> AsyncIterator[tuple[GuardClient, Robot]]:
     server = await asyncio.start_server(robot.listen, "127.0.0.1", 0)
     port = server.sockets[0].getsockname()[1]
     options = {"host": "127.0.0.1", "port": port}
-    make = wire.Make("wire", "urc.transports.tcp:from_setup", options, [], "", 0.22, False)
-    lines = [LineSpec(make, TcpTransport("127.0.0.1", port))]
-    held = {"drive": HeldSpec("wire", Terms(b"", period_s=0.02))}
+    make = messages.MakeTransport(
+        "wire", "urc.transports.tcp:from_setup", options, [], "", 0.22, False
+    )
+    lines = [GuardedLineSpec(make, TcpTransport("127.0.0.1", port))]
+    held = {"drive": HeldSpec("wire", HoldTerms(b"", period_s=0.02))}
     guard = GuardClient(lines, held, partial(PipeChannel, is_inherited=False))
     guard.start()
     try:
@@ -73,7 +75,7 @@ def process_of(guard: GuardClient) -> "subprocess.Popen[bytes]":
 async def test_it_moves_and_stops_as_any_other() -> None:
     async with guarded() as (guard, robot):
         await guard.transports["wire"].open(BOUND_S)
-        guard.arm("drive", Terms(STOP, period_s=0.02))
+        guard.arm("drive", HoldTerms(STOP, period_s=0.02))
         guard.tick("drive", b"go\n")
         await robot.hears(STOP)
         assert robot.heard == b"go\n" + STOP
@@ -82,7 +84,7 @@ async def test_it_moves_and_stops_as_any_other() -> None:
 async def test_the_next_one_stops_what_moved() -> None:
     async with guarded() as (guard, robot):
         await guard.transports["wire"].open(BOUND_S)
-        guard.arm("drive", Terms(STOP, period_s=0.02, lease_s=1.0))
+        guard.arm("drive", HoldTerms(STOP, period_s=0.02, lease_s=1.0))
         guard.tick("drive", b"go\n")
         await robot.hears(b"go\n")
         process_of(guard).kill()
@@ -99,7 +101,7 @@ async def test_a_guard_that_was_not_needed_is_ended_before_it_came() -> None:
 @pytest.mark.parametrize("word", [b"", b"guess", b"0" * 64])
 async def test_a_stranger_is_turned_away(word: bytes) -> None:
     """And the guard is let in after it."""
-    door = Door()
+    door = GuardAcceptor()
     admitted = asyncio.ensure_future(door.admitted())
     with socket.create_connection(("127.0.0.1", door.port)) as stranger:
         stranger.sendall(word)

@@ -12,7 +12,7 @@ from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import WAIT_S, until, until_text
 from tests.e2e.motion.driving import STOP, fresh
 from urc.config.load import load_profile
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
 from urc.testing.entry import ACCESS
 from urc.web.app import Robot, build_app, serve

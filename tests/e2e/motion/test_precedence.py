@@ -13,7 +13,7 @@ pytestmark = [
 TIMEOUT_S = 60
 PROGRAM = """
 import os
-from urc.guard.precedence import Precedence
+from urc.guard.real_time_priority import Precedence
 refusal = Precedence().ask()
 ordinary = os.SCHED_OTHER
 reset = os.SCHED_RESET_ON_FORK

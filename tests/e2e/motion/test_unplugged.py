@@ -10,10 +10,10 @@ import pytest
 
 from tests.e2e.transports.programs import listens, program
 from urc.config.load import load_profile
-from urc.model.codec import Payload
-from urc.motion.hold import Terms
+from urc.model.payload import Payload
+from urc.motion.hold_to_run import HoldTerms
 from urc.problems import UrcError
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
 
 pytestmark = [pytest.mark.anyio, pytest.mark.needs("socat")]
@@ -76,7 +76,7 @@ def arm(session: Session) -> None:
     assert session.movers is not None
     stop = session.frames.stop_frame("drive")
     assert isinstance(stop, Payload)
-    session.movers.arm("drive", Terms(stop, period_s=0.05, is_lossy=True))
+    session.movers.arm("drive", HoldTerms(stop, period_s=0.05, is_lossy=True))
 
 
 async def test_port_that_comes_back_hears_the_stop_first_and_nothing_moves_by_itself(

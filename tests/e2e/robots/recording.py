@@ -13,14 +13,14 @@ import pytest
 
 from tests.e2e.dashboards import WAIT_S
 from urc.config.load import load_profile
-from urc.model.codec import Envelope, Payload
+from urc.model.payload import Envelope, Payload
 from urc.model.profile import Profile
 from urc.model.values import Value
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.selftest import sample_settings
+from urc.runtime.document_tests import sample_settings
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
-from urc.simulator.stand_in import stand_in
-from urc.simulator.twin import Twin, TwinLine
+from urc.simulator.emulated_profile import stand_in
+from urc.simulator.emulated_robot import EmulatedConnection, EmulatedRobot
 from urc.testing.entry import ACCESS
 from urc.web.app import Robot, build_app, serve
 
@@ -55,12 +55,12 @@ class Overheard:
     def _since(self, transport: str, mark: Mapping[str, int]) -> Sequence[Payload]:
         return self._heard.get(transport, [])[mark.get(transport, 0) :]
 
-    def twin(self, settings: Mapping[str, Value]) -> Twin:
+    def twin(self, settings: Mapping[str, Value]) -> EmulatedRobot:
         """Return the emulated robot, whose lines are overheard."""
         return _Overheard(self.profile, settings, self._heard)
 
 
-class _Overheard(Twin):
+class _Overheard(EmulatedRobot):
     def __init__(
         self,
         profile: Profile,
@@ -70,7 +70,7 @@ class _Overheard(Twin):
         super().__init__(profile, settings)
         self._notes = heard
 
-    def line(self, transport: str) -> TwinLine:
+    def line(self, transport: str) -> EmulatedConnection:
         line = super().line(transport)
         receive, ask, notes = line.receive, line.ask, self._notes.setdefault(transport, [])
 

@@ -11,11 +11,11 @@ from typing import Literal, NamedTuple
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from tests.e2e.robots.recording import Overheard
-from urc.model.codec import Envelope
 from urc.model.driver import Driver
+from urc.model.payload import Envelope
 from urc.model.profile import Fed, Profile, pieces_of
 from urc.model.values import Reading
-from urc.protocol.framing import build_framing
+from urc.protocol.framing.table import build_framing
 
 __all__ = ["GOODBYES", "STOPS", "Sample", "came", "newest", "samples", "stopped"]
 

@@ -1,6 +1,6 @@
 """A carrier that leads every place to one port of this machine, as the far end of an SSH would."""
 
-from urc.transports._reach import Reach
+from urc.transports._stream_dialer import StreamDialer
 from urc.transports.base import ByteStream
 
 __all__ = ["Detour"]
@@ -14,4 +14,4 @@ class Detour:
 
     async def connect(self, host: str, port: int, timeout_s: float) -> ByteStream:
         assert host == "robot.inside"
-        return await Reach("127.0.0.1", self._port).open(timeout_s)
+        return await StreamDialer("127.0.0.1", self._port).open(timeout_s)

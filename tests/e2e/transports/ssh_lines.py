@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.e2e.transports.sshd import PASSWORD, USER, Sshd
-from urc.transports.base import ConnectFailed, PeerClosed, Setup
+from urc.transports.base import ConnectFailed, PeerClosed, TransportSetup
 from urc.transports.ssh import SshTransport, from_setup
 
 __all__ = ["OPEN_S", "end_of", "hears", "line_to", "public_folder", "refusal"]
@@ -34,7 +34,7 @@ def line_to(sshd: Sshd, **options: Any) -> SshTransport:
         "host_key": sshd.fingerprint,
     }  # fmt: skip
     given = {name: value for name, value in (default | options).items() if value is not None}
-    return from_setup(Setup("gauge", given))
+    return from_setup(TransportSetup("gauge", given))
 
 
 async def refusal(line: SshTransport) -> str:

@@ -17,7 +17,7 @@ from tests.e2e.transports.telnetd import Telnetd
 from urc.config.load import load_profile
 from urc.model.profile import Profile
 from urc.model.values import Value
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import CommandFailed, Session
 
 pytestmark = [

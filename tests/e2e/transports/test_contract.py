@@ -13,7 +13,7 @@ import pytest
 
 from tests.e2e.transports.leaks import nothing_left
 from tests.e2e.transports.peers.base import WAIT_S, Behaviour, Peer, Traits
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportError
 
 pytestmark = pytest.mark.anyio

@@ -15,13 +15,13 @@ from zeroconf.asyncio import AsyncZeroconf
 from tests.e2e.ports import free_port
 from tests.e2e.transports.leaks import nothing_left
 from urc.config.load import load_profile
-from urc.runtime.catalog import built_in_catalog
 from urc.runtime.discover import RosTopic, ros_topics, snippet
+from urc.runtime.registries import built_in_catalog
 from urc.simulator.server import serve
-from urc.transports.base import ConnectFailed, Setup
-from urc.transports.discover_mdns import Announced, announced
+from urc.transports.base import ConnectFailed, TransportSetup
+from urc.transports.discover_mdns import ServiceAnnouncement, announced
 from urc.transports.discover_serial import serial_ports
-from urc.transports.rosbridge import from_setup
+from urc.transports.ros.rosbridge import from_setup
 
 pytestmark = pytest.mark.anyio
 
@@ -71,7 +71,7 @@ async def test_announced_services_are_found_with_their_place() -> None:
         service("_http._tcp", "printer", 80),
     ):
         found = await announced(["_rosbridge._tcp"], 1.5, LOOPBACK)
-    assert found == [Announced("_rosbridge._tcp", "rover seven", "127.0.0.1", 9090)]
+    assert found == [ServiceAnnouncement("_rosbridge._tcp", "rover seven", "127.0.0.1", 9090)]
 
 
 async def test_listening_for_what_nobody_announces_ends_in_its_time() -> None:
@@ -96,7 +96,7 @@ async def test_topics_of_a_bridge_come_with_a_document_that_reads_them(tmp_path:
     profile = load_profile(robot, built_in_catalog())
     async with nothing_left(), serve(profile, {"port": 0}) as listening:
         port = listening["ros"].port
-        transport = from_setup(Setup("ros", {"host": "127.0.0.1", "port": port}))
+        transport = from_setup(TransportSetup("ros", {"host": "127.0.0.1", "port": port}))
         topics = await ros_topics(transport, 3.0)
         told = await discover(str(robot), "--json", "--for", "100ms", "--set", f"port={port}")
     assert topics == [RosTopic("/lamp", "std_msgs/Bool"), RosTopic("/odom", "nav_msgs/Odometry")]
@@ -146,7 +146,7 @@ def test_topic_whose_name_is_none_gets_into_no_document() -> None:
 
 async def test_bridge_that_is_not_there_is_told() -> None:
     """As by any other line."""
-    transport = from_setup(Setup("ros", {"host": "127.0.0.1", "port": 1}))
+    transport = from_setup(TransportSetup("ros", {"host": "127.0.0.1", "port": 1}))
     with pytest.raises(ConnectFailed, match="nothing listens on"):
         await ros_topics(transport, 1.0)
 

@@ -9,7 +9,7 @@ import pytest
 
 from tests.e2e.transports.hostile import WAIT_S, Talk, bounded, ended, liar, turn_deaf, until
 from tests.e2e.transports.leaks import nothing_left
-from urc.transports.base import ConnectFailed, Setup, Subscription, Transport
+from urc.transports.base import ConnectFailed, TopicSubscription, Transport, TransportSetup
 from urc.transports.mqtt import from_setup
 
 pytestmark = pytest.mark.anyio
@@ -51,7 +51,7 @@ async def line(port: int, within_s: float = 20.0) -> AsyncIterator[Transport]:
     """Open a line, and see to it that nothing of it is left."""
     async with nothing_left():
         options = {"host": "127.0.0.1", "port": port, "version": "3.1.1"}
-        transport = from_setup(Setup("wire", options, (Subscription("cells/+", {}),)))
+        transport = from_setup(TransportSetup("wire", options, (TopicSubscription("cells/+", {}),)))
         try:
             await transport.open(within_s)
             yield transport

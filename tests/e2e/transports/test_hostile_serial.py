@@ -6,7 +6,7 @@ import pytest
 
 from tests.e2e.transports.hostile import bounded, liar, turn_deaf
 from tests.e2e.transports.leaks import nothing_left
-from urc.transports.base import ConnectFailed, Setup
+from urc.transports.base import ConnectFailed, TransportSetup
 from urc.transports.serial import from_setup
 
 pytestmark = pytest.mark.anyio
@@ -27,7 +27,7 @@ async def refusal(said: bytes, *, is_deaf: bool, most_bytes: int) -> str:
                 return
 
     async with liar(talk, window=16384) as port, nothing_left():
-        transport = from_setup(Setup("wire", {"port": f"rfc2217://127.0.0.1:{port}"}))
+        transport = from_setup(TransportSetup("wire", {"port": f"rfc2217://127.0.0.1:{port}"}))
         with bounded(most_bytes), pytest.raises(ConnectFailed) as raised:
             await transport.open(1.0)
         await transport.close()

@@ -10,7 +10,7 @@ import pytest
 from tests.e2e.transports.hostile import WAIT_S, bounded, ended, liar, turn_deaf
 from tests.e2e.transports.leaks import nothing_left
 from tests.e2e.transports.peers.ssh import HOST_KEY
-from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport
+from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportSetup
 from urc.transports.ssh import from_setup
 from urc.transports.telnet import from_setup as telnet_from_setup
 
@@ -58,7 +58,7 @@ async def line(port: int, **options: object) -> AsyncIterator[Transport]:
     """Open a shell, and see to it that nothing of it is left."""
     key = HOST_KEY.get_fingerprint()
     given = {"host": "127.0.0.1", "port": port, "username": "me", "host_key": key, "pty": False}
-    transport = from_setup(Setup("jump", given | options))
+    transport = from_setup(TransportSetup("jump", given | options))
     try:
         await transport.open(20.0)
         yield transport
@@ -154,7 +154,7 @@ async def test_options_without_end_and_no_ear_fill_nothing(storm: bytes) -> None
             await writer.drain()
 
     async with liar(talk) as port, nothing_left():
-        transport = telnet_from_setup(Setup("wire", {"host": "127.0.0.1", "port": port}))
+        transport = telnet_from_setup(TransportSetup("wire", {"host": "127.0.0.1", "port": port}))
         await transport.open(20.0)
         with bounded(20_000_000), suppress(TimeoutError, PeerClosed):
             async with asyncio.timeout(1.5):

@@ -11,9 +11,15 @@ import pytest
 
 from tests.e2e.transports.hostile import WAIT_S, Talk, bounded, ended, liar, turn_deaf, until
 from tests.e2e.transports.leaks import nothing_left
-from urc.model.codec import Envelope
+from urc.model.payload import Envelope
 from urc.transports import http, http_streams, websocket
-from urc.transports.base import PeerClosed, Setup, Subscription, Transport, TransportError
+from urc.transports.base import (
+    PeerClosed,
+    TopicSubscription,
+    Transport,
+    TransportError,
+    TransportSetup,
+)
 
 pytestmark = pytest.mark.anyio
 
@@ -39,14 +45,14 @@ def answers(*texts: bytes, count: list[int] | None = None) -> Talk:
 
 @asynccontextmanager
 async def line(
-    factory: Callable[[Setup], Transport],
+    factory: Callable[[TransportSetup], Transport],
     url: str,
-    subscriptions: tuple[Subscription, ...] = (),
+    subscriptions: tuple[TopicSubscription, ...] = (),
     **options: object,
 ) -> AsyncIterator[Transport]:
     """Open a line, and see to it that nothing of it is left."""
     async with nothing_left():
-        transport = factory(Setup("robot", {"url": url, **options}, subscriptions))
+        transport = factory(TransportSetup("robot", {"url": url, **options}, subscriptions))
         try:
             await transport.open(20.0)
             yield transport
@@ -164,7 +170,7 @@ async def test_stream_with_a_senseless_head_is_asked_for_again(
     talk = answers(
         b"HTTP/1.1 " + status + b"\r\nContent-Length: 3\r\n" + head + b"\r\nabc", count=count
     )
-    how = Subscription("/cam", {"stream": kind, "every": 0.01})
+    how = TopicSubscription("/cam", {"stream": kind, "every": 0.01})
     auth = {"type": "digest", "user": "me", "password": "s3cret"}
     async with (
         liar(talk) as port,
@@ -179,7 +185,7 @@ async def test_stream_that_wants_no_pause_gets_one() -> None:
     body = b"retry: 0\ndata: x\n\n"
     head = b"HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nContent-Length: %d\r\n\r\n"
     talk = answers(head % len(body) + body, count=count)
-    how = Subscription("/events", {"stream": "sse"})
+    how = TopicSubscription("/events", {"stream": "sse"})
     async with (
         liar(talk) as port,
         line(http.from_setup, f"http://127.0.0.1:{port}/", (how,)) as robot,
@@ -211,7 +217,7 @@ async def test_picture_that_drips_is_asked_for_again(
             await writer.drain()
             await asyncio.sleep(0.02)
 
-    how = Subscription("/cam", {"stream": "mjpeg"})
+    how = TopicSubscription("/cam", {"stream": "mjpeg"})
     async with liar(talk) as port, line(http.from_setup, f"http://127.0.0.1:{port}/", (how,)):
         await until(lambda: came >= 3)
     assert f"http 127.0.0.1:{port} /cam: no picture within 0.3 s" in caplog.text
@@ -317,7 +323,9 @@ async def test_refusal_is_told_in_one_line(reason: bytes, told: str) -> None:
     """The words of a status are the server's own."""
     talk = answers(b"HTTP/1.1 403 " + reason + b"\r\nContent-Length: 0\r\n\r\n")
     async with liar(talk) as port:
-        transport = websocket.from_setup(Setup("robot", {"url": f"ws://127.0.0.1:{port}/"}))
+        transport = websocket.from_setup(
+            TransportSetup("robot", {"url": f"ws://127.0.0.1:{port}/"})
+        )
         with pytest.raises(TransportError, match=told) as raised:
             await transport.open(20.0)
         assert str(raised.value).isprintable()

@@ -15,8 +15,14 @@ from tests.e2e.transports.leaks import nothing_left
 from tests.e2e.transports.processes import Server
 from tests.e2e.transports.programs import listens, program
 from tests.e2e.transports.web import PASSWORD, USER, camera, lighttpd
-from urc.model.codec import Envelope
-from urc.transports.base import ConnectFailed, PeerClosed, Setup, Subscription, Transport
+from urc.model.payload import Envelope
+from urc.transports.base import (
+    ConnectFailed,
+    PeerClosed,
+    TopicSubscription,
+    Transport,
+    TransportSetup,
+)
 from urc.transports.http import from_setup
 
 WAIT_S = 15.0
@@ -35,12 +41,12 @@ async def web(tmp_path: Path) -> AsyncIterator[Server]:
 
 @asynccontextmanager
 async def line(
-    port: int, *topics: Subscription, scheme: str = "http", **options: object
+    port: int, *topics: TopicSubscription, scheme: str = "http", **options: object
 ) -> AsyncIterator[Transport]:
     """Open a line to a port of loopback, and see to it that nothing of it is left."""
     options = {"url": f"{scheme}://127.0.0.1:{port}", **options}
     async with nothing_left():
-        transport = from_setup(Setup("web", options, topics))
+        transport = from_setup(TransportSetup("web", options, topics))
         try:
             await transport.open(20.0)
             yield transport
@@ -237,8 +243,8 @@ async def test_probe_decides_whether_the_robot_is_there(web: Server) -> None:
 async def test_events_go_on_after_the_last_one(web: Server) -> None:
     """Named events have a topic of their own; a new connection starts where the old one ended."""
     topics = [
-        Subscription("/events.cgi#battery", {"stream": "sse"}),
-        Subscription("/events.cgi", {"stream": "sse"}),
+        TopicSubscription("/events.cgi#battery", {"stream": "sse"}),
+        TopicSubscription("/events.cgi", {"stream": "sse"}),
     ]
     async with line(web.port, *topics) as transport:
         heard = [await received(transport) for _ in range(14)]
@@ -253,7 +259,7 @@ async def test_events_go_on_after_the_last_one(web: Server) -> None:
 @WEB
 async def test_lines_come_one_by_one(web: Server) -> None:
     """In order and whole, while the body is still under way."""
-    async with line(web.port, Subscription("/lines.cgi", {"stream": "lines"})) as transport:
+    async with line(web.port, TopicSubscription("/lines.cgi", {"stream": "lines"})) as transport:
         heard = [await received(transport) for _ in range(50)]
     assert [one.body for one in heard] == [f"line {n}".encode() for n in range(1, 51)]
 
@@ -266,7 +272,7 @@ async def test_stills_are_fetched_again_and_again(
     picture = tmp_path / "www" / "still.jpg"
     caplog.set_level(logging.INFO, "urc.transports")
     picture.write_bytes(b"\xff\xd8 one \xff\xd9")
-    topic = Subscription("/still.jpg", {"stream": "stills", "every": 0.05})
+    topic = TopicSubscription("/still.jpg", {"stream": "stills", "every": 0.05})
     async with line(web.port, topic) as transport:
         first = await received(transport)
         assert (first.attributes["topic"], first.body) == ("/still.jpg", b"\xff\xd8 one \xff\xd9")
@@ -288,7 +294,7 @@ async def test_camera_that_streams() -> None:
     port = free_port()
     async with program(*camera(port)):
         await listens(port)
-        async with line(port, Subscription("/cam", {"stream": "mjpeg"})) as transport:
+        async with line(port, TopicSubscription("/cam", {"stream": "mjpeg"})) as transport:
             for _ in range(10):
                 picture = await received(transport)
                 assert picture.attributes["topic"] == "/cam"
@@ -351,9 +357,9 @@ async def test_no_path_leads_to_another_host(web: Server, path: str) -> None:
 async def test_line_through_another_transport(web: Server) -> None:
     """The far end of the carrier knows the name; streams and requests go through it alike."""
     async with nothing_left():
-        topics = (Subscription("/lines.cgi", {"stream": "lines"}),)
+        topics = (TopicSubscription("/lines.cgi", {"stream": "lines"}),)
         options = {"url": "http://robot.inside"}
-        transport = from_setup(Setup("web", options, topics, tunnel=Detour(web.port)))
+        transport = from_setup(TransportSetup("web", options, topics, tunnel=Detour(web.port)))
         await transport.open(20.0)
         heard = [(await received(transport)).body for _ in range(3)]
         assert heard == [b"line 1", b"line 2", b"line 3"]

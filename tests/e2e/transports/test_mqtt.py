@@ -13,12 +13,18 @@ from tests.e2e.transports.authority import Authority
 from tests.e2e.transports.leaks import nothing_left
 from tests.e2e.transports.programs import listens, program
 from urc.config.load import load_profile
-from urc.model.codec import Envelope
+from urc.model.payload import Envelope
 from urc.problems import UrcError
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
 from urc.simulator.server import serve as serve_robot
-from urc.transports.base import ConnectFailed, PeerClosed, Setup, Subscription, TransportError
+from urc.transports.base import (
+    ConnectFailed,
+    PeerClosed,
+    TopicSubscription,
+    TransportError,
+    TransportSetup,
+)
 from urc.transports.mqtt import from_setup
 from urc.transports.mqtt_client import MqttTransport
 
@@ -52,8 +58,10 @@ commands:
 """
 
 
-def line(port: int, *topics: Subscription, **options: object) -> MqttTransport:
-    made = from_setup(Setup("wire", {"host": "127.0.0.1", "port": port, **options}, topics))
+def line(port: int, *topics: TopicSubscription, **options: object) -> MqttTransport:
+    made = from_setup(
+        TransportSetup("wire", {"host": "127.0.0.1", "port": port, **options}, topics)
+    )
     assert isinstance(made, MqttTransport)
     return made
 
@@ -140,7 +148,7 @@ async def test_other_clients_hear_and_are_heard(tmp_path: Path, version: object)
     """Wildcards, every quality of service, and whether a message had been kept for us."""
     async with nothing_left(), broker(tmp_path) as port:
         await publish(port, "cells/1/volts", "3.7", "-r")
-        topics = (Subscription("cells/+/volts", {"qos": 1}), Subscription("log/#"))
+        topics = (TopicSubscription("cells/+/volts", {"qos": 1}), TopicSubscription("log/#"))
         transport = line(port, *topics, version=version)
         await transport.open(20.0)
         kept = await heard(transport)
@@ -235,7 +243,7 @@ async def test_line_with_tls_talks_to_a_broker_that_it_trusts_alone(tmp_path: Pa
     own = authority.sign("127.0.0.1")
     settings = ("allow_anonymous true", f"certfile {own.cert}", f"keyfile {own.key}")
     async with nothing_left(), broker(tmp_path, *settings) as port:
-        transport = line(port, Subscription("state"), tls={"ca": authority.file})
+        transport = line(port, TopicSubscription("state"), tls={"ca": authority.file})
         await transport.open(20.0)
         await transport.send(said("state", b"on" * 50_000))
         assert (await heard(transport)).body == b"on" * 50_000

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from urc import _loop
+from urc import _event_loop
 from urc.transports.base import TransportError
 from urc.transports.tcp import TcpTransport
 
@@ -16,7 +16,7 @@ PIECE = 1000
 MOST_PIECES = 100_000
 
 Run = Callable[[Coroutine[Any, Any, None]], None]
-on_both_loops = pytest.mark.parametrize("run", [asyncio.run, _loop.run], ids=["own", "fast"])
+on_both_loops = pytest.mark.parametrize("run", [asyncio.run, _event_loop.run], ids=["own", "fast"])
 
 
 def robot() -> socket.socket:

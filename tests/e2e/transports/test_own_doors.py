@@ -10,7 +10,7 @@ import pytest
 from tests.e2e.dashboards import running_dashboard
 from tests.e2e.transports.peers.ssh import HOST_KEY
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.transports.base import ConnectFailed, Setup, Transport
+from urc.transports.base import ConnectFailed, Transport, TransportSetup
 from urc.transports.table import TRANSPORTS
 
 pytestmark = pytest.mark.anyio
@@ -44,7 +44,7 @@ def lines(host: str, port: int) -> Mapping[str, Mapping[str, object]]:
 
 def made(kind: str, options: Mapping[str, object]) -> Transport:
     """Make a transport."""
-    found: Transport = TRANSPORTS[kind].load()(Setup("line", options))
+    found: Transport = TRANSPORTS[kind].load()(TransportSetup("line", options))
     return found
 
 
@@ -102,7 +102,9 @@ async def test_nor_through_an_ssh_server_of_this_machine(host: str, port: int) -
                 "mode": "forward",
             },
         )
-        line = TRANSPORTS["tcp"].load()(Setup("line", lines(host, port)["tcp"], tunnel=jump))
+        line = TRANSPORTS["tcp"].load()(
+            TransportSetup("line", lines(host, port)["tcp"], tunnel=jump)
+        )
         with pytest.raises(ConnectFailed) as told:
             await line.open(WAIT_S)
         assert SAID in str(told.value)
@@ -110,7 +112,7 @@ async def test_nor_through_an_ssh_server_of_this_machine(host: str, port: int) -
         server = await asyncio.start_server(lambda _, writer: writer.close(), "127.0.0.1", 0)
         async with server:
             other = lines("localhost", server.sockets[0].getsockname()[1])["tcp"]
-            line = TRANSPORTS["tcp"].load()(Setup("line", other, tunnel=jump))
+            line = TRANSPORTS["tcp"].load()(TransportSetup("line", other, tunnel=jump))
             await line.open(WAIT_S)
             await line.close()
         await jump.close()

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from tests.documentation import blocks
-from urc.config.load import Shelf, check
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.selftest import sample_settings
+from urc.config.load import WidgetFolder, check
+from urc.runtime.document_tests import sample_settings
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
-from urc.simulator.stand_in import stand_in
+from urc.simulator.emulated_profile import stand_in
 
 pytestmark = pytest.mark.anyio
 
@@ -24,7 +24,7 @@ async def test_robot_of_a_page_drives_its_emulated_self(page: str, tmp_path: Pat
     text = next(block.text for block in blocks(PAGES / f"{page}.md") if "kind: robot" in block.text)
     file = tmp_path / "robot.yaml"
     file.write_text(text, "utf-8")
-    profile = check(str(file), built_in_catalog(), Shelf(tmp_path)).profile
+    profile = check(str(file), built_in_catalog(), WidgetFolder(tmp_path)).profile
     assert profile is not None
     settings = sample_settings(profile.settings)
     async with (

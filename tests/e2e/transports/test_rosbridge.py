@@ -17,13 +17,20 @@ from tests.e2e.ports import free_port
 from tests.e2e.transports.leaks import nothing_left
 from tests.e2e.transports.programs import listens, program
 from urc.config.load import load_profile
-from urc.model.codec import Envelope
+from urc.model.payload import Envelope
 from urc.model.profile import Profile
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
 from urc.simulator.server import serve as serve_robot
-from urc.transports.base import NOTICE, PeerClosed, Setup, Subscription, Transport, TransportError
-from urc.transports.rosbridge import from_setup
+from urc.transports.base import (
+    NOTICE,
+    PeerClosed,
+    TopicSubscription,
+    Transport,
+    TransportError,
+    TransportSetup,
+)
+from urc.transports.ros.rosbridge import from_setup
 
 pytestmark = pytest.mark.anyio
 
@@ -58,8 +65,8 @@ commands:
 """
 
 
-def line(port: int, *topics: Subscription, **options: object) -> Transport:
-    return from_setup(Setup("ros", {"host": "127.0.0.1", "port": port, **options}, topics))
+def line(port: int, *topics: TopicSubscription, **options: object) -> Transport:
+    return from_setup(TransportSetup("ros", {"host": "127.0.0.1", "port": port, **options}, topics))
 
 
 async def heard(transport: Transport) -> Envelope:
@@ -125,9 +132,9 @@ async def bridge() -> AsyncIterator[Bridge]:
 async def test_line_subscribes_each_topic_once_and_asks_which_there_are() -> None:
     """A second subscription would cancel the first one's throttle: the lowest of both is sent."""
     topics = (
-        Subscription("/imu", {"type": "sensor_msgs/Imu", "throttle": 0.2, "queue_length": 1}),
-        Subscription("/imu", {"throttle": 0.1}),
-        Subscription("/camera", {"compression": "cbor"}),
+        TopicSubscription("/imu", {"type": "sensor_msgs/Imu", "throttle": 0.2, "queue_length": 1}),
+        TopicSubscription("/imu", {"throttle": 0.1}),
+        TopicSubscription("/camera", {"compression": "cbor"}),
     )
     async with nothing_left(), bridge() as robot:
         transport = line(robot.port, *topics, version=2)
@@ -207,7 +214,7 @@ async def test_topics_that_nobody_publishes_are_told_once() -> None:
     """The bridge itself says nothing about them, and would not for ever."""
     told = []
     async with nothing_left(), bridge() as robot:
-        transport = line(robot.port, Subscription("/odom"), Subscription("/lidar"))
+        transport = line(robot.port, TopicSubscription("/odom"), TopicSubscription("/lidar"))
         for count in (3, 6):
             await transport.open(20.0)
             asked = (await robot.hears(count))[-3]
@@ -231,7 +238,7 @@ async def test_driving_where_nothing_listens_is_told() -> None:
     twist = Envelope("publish", {"topic": "/cmd_vel", "type": "geometry_msgs/Twist"}, {})
     stray = Envelope("publish", {"topic": "/nobody", "type": "geometry_msgs/Twist"}, {})
     async with nothing_left(), bridge() as robot:
-        transport = line(robot.port, Subscription("/odom"), version=2)
+        transport = line(robot.port, TopicSubscription("/odom"), version=2)
         await transport.open(20.0)
         asked, _ = await robot.hears(2)
         types = {"/cmd_vel": "geometry_msgs/msg/TwistStamped", "/odom": "nav_msgs/msg/Odometry"}
@@ -260,7 +267,7 @@ async def test_driving_where_nothing_listens_is_told() -> None:
 async def test_a_line_spells_types_as_the_bridge_does(types: list[str], spelled: str) -> None:
     """``version: auto`` serves both versions: the answer comes before the subscriptions."""
     async with nothing_left(), bridge() as robot:
-        odometry = Subscription("/odom", {"type": "nav_msgs/Odometry"})
+        odometry = TopicSubscription("/odom", {"type": "nav_msgs/Odometry"})
         transport = line(robot.port, odometry, version="auto")
         opening = asyncio.create_task(transport.open(20.0))
         (asked,) = await robot.hears(1)
@@ -273,7 +280,7 @@ async def test_a_line_spells_types_as_the_bridge_does(types: list[str], spelled:
 async def test_slow_taker_gets_the_newest() -> None:
     """The bridge is never held up; of one topic the oldest go, of the other none."""
     async with nothing_left(), bridge() as robot:
-        transport = line(robot.port, Subscription("/fast"), Subscription("/rare"))
+        transport = line(robot.port, TopicSubscription("/fast"), TopicSubscription("/rare"))
         await transport.open(20.0)
         await robot.hears(3)
         await robot.say({"op": "publish", "topic": "/rare", "msg": {"n": -1}})
@@ -371,7 +378,7 @@ async def test_twist_reaches_a_real_ros_master_and_odometry_comes_back(
                 await ears.send(
                     json.dumps({"op": "advertise", "topic": "/odom", "type": "nav_msgs/Odometry"})
                 )
-                topics = (Subscription("/odom", {"type": "nav_msgs/Odometry"}),)
+                topics = (TopicSubscription("/odom", {"type": "nav_msgs/Odometry"}),)
                 transport = line(bridge_port, *topics)
                 await transport.open(20.0)
                 twist = {"linear": {"x": 0.25}, "angular": {"z": -0.5}}

@@ -21,12 +21,12 @@ from tests.e2e.transports.programs import listens, program
 from urc.model.driver import Backoff, Timeouts, TransportSpec
 from urc.model.profile import Profile
 from urc.problems import UrcError
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
+from urc.simulator.emulated_profile import stand_in
 from urc.simulator.server import serve
-from urc.simulator.stand_in import stand_in
 from urc.testing.profile import line_profile
-from urc.transports.base import ConnectFailed, PeerClosed, Setup, TransportError
+from urc.transports.base import ConnectFailed, PeerClosed, TransportError, TransportSetup
 from urc.transports.serial import SerialTransport, explain, from_setup
 
 pytestmark = [pytest.mark.anyio, pytest.mark.needs("socat")]
@@ -36,7 +36,7 @@ ASK = b"Give me the battery %\n"
 
 
 def line(port: Path | str, **options: object) -> SerialTransport:
-    made = from_setup(Setup("wire", {"port": str(port), **options}))
+    made = from_setup(TransportSetup("wire", {"port": str(port), **options}))
     assert isinstance(made, SerialTransport)
     return made
 
@@ -188,7 +188,7 @@ async def test_missing_permission_names_the_group(tmp_path: Path) -> None:
 )
 async def test_bad_option_is_one_line(options: dict[str, object], told: str) -> None:
     with pytest.raises(TransportError) as problem:
-        from_setup(Setup("wire", {"port": "/dev/ttyUSB0", **options}))
+        from_setup(TransportSetup("wire", {"port": "/dev/ttyUSB0", **options}))
     assert str(problem.value) == told
 
 

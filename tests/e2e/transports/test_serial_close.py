@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.e2e.transports.test_serial import cable, line, opened, says_back
-from urc.transports._serial_port import SerialPort
+from urc.transports._serial_port import SerialStream
 
 pytestmark = [pytest.mark.anyio, pytest.mark.needs("socat")]
 
@@ -15,7 +15,7 @@ async def test_closing_makes_the_system_forget_nothing_that_it_has_taken(
 ) -> None:
     """A pseudo terminal drops then what it has not handed on yet, and counts as sent."""
     forgotten: list[str] = []
-    monkeypatch.setattr(SerialPort, "_forget_unsent", lambda _: forgotten.append("all"))
+    monkeypatch.setattr(SerialStream, "_forget_unsent", lambda _: forgotten.append("all"))
     async with cable(tmp_path) as port, opened(line(port)) as transport:
         await says_back(transport, b"last words")
         await transport.close()

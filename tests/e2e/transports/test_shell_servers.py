@@ -16,11 +16,11 @@ from tests.e2e.transports.sshd import fingerprint_of, new_key
 from urc.config.load import load_profile
 from urc.model.profile import Profile
 from urc.model.values import Value
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
+from urc.simulator.emulated_profile import stand_in
 from urc.simulator.server import serve
 from urc.simulator.servers.base import Endpoint
-from urc.simulator.stand_in import stand_in
 
 pytestmark = pytest.mark.anyio
 

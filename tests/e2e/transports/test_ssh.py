@@ -7,7 +7,7 @@ import pytest
 from tests.e2e.transports.leaks import nothing_left
 from tests.e2e.transports.ssh_lines import OPEN_S, end_of, hears, line_to, public_folder, refusal
 from tests.e2e.transports.sshd import PASSWORD, USER, Sshd
-from urc.transports.base import ConnectFailed, PeerClosed, Setup
+from urc.transports.base import ConnectFailed, PeerClosed, TransportSetup
 from urc.transports.ssh import from_setup
 
 pytestmark = [pytest.mark.anyio, pytest.mark.needs("sshd")]
@@ -213,7 +213,7 @@ async def test_ssh_goes_through_ssh(sshd: Sshd) -> None:
         "host": "127.0.0.1", "port": sshd.port, "username": USER, "password": PASSWORD,
         "mode": "exec", "command": "cat", "host_key": sshd.fingerprint,
     }  # fmt: skip
-    inner = from_setup(Setup("inner", options, tunnel=outer))
+    inner = from_setup(TransportSetup("inner", options, tunnel=outer))
     async with nothing_left():
         for _ in range(2):
             await inner.open(OPEN_S)

@@ -13,11 +13,17 @@ from tests.e2e.transports.authority import Authority, Pair
 from tests.e2e.transports.leaks import nothing_left
 from tests.e2e.transports.packets import Loss
 from tests.e2e.transports.programs import listens, program
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
-from urc.simulator.stand_in import stand_in
+from urc.simulator.emulated_profile import stand_in
 from urc.testing.profile import line_profile
-from urc.transports.base import ByteStream, ConnectFailed, PeerClosed, Setup, TransportError
+from urc.transports.base import (
+    ByteStream,
+    ConnectFailed,
+    PeerClosed,
+    TransportError,
+    TransportSetup,
+)
 from urc.transports.tcp import TcpListener, TcpTransport, from_setup
 
 pytestmark = [pytest.mark.anyio, pytest.mark.needs("socat")]
@@ -42,7 +48,7 @@ async def secret_echo(pair: Pair, more: str = "verify=0") -> AsyncIterator[int]:
 
 
 def line(port: int, tls: object, host: str = "127.0.0.1") -> TcpTransport:
-    made = from_setup(Setup("wire", {"host": host, "port": port, "tls": tls}))
+    made = from_setup(TransportSetup("wire", {"host": host, "port": port, "tls": tls}))
     assert isinstance(made, TcpTransport)
     return made
 
@@ -169,7 +175,7 @@ async def test_bad_option_is_one_line(tls: object, told: str) -> None:
 
 
 def listener(**options: object) -> TcpListener:
-    made = from_setup(Setup("wire", {"mode": "listen", "port": free_port(), **options}))
+    made = from_setup(TransportSetup("wire", {"mode": "listen", "port": free_port(), **options}))
     assert isinstance(made, TcpListener)
     return made
 
@@ -242,7 +248,7 @@ async def test_emulated_robot_calls_the_driver_that_listens() -> None:
         for _ in range(2):
             assert 0 <= (await session.command("ask")).values["battery"] < 100  # type: ignore[operator]
     with pytest.raises(TransportError) as told:
-        from_setup(Setup("wire", {"host": "arm", "port": 1, "bind": "0.0.0.0"}))
+        from_setup(TransportSetup("wire", {"host": "arm", "port": 1, "bind": "0.0.0.0"}))
     assert str(told.value) == "tcp takes bind and from with mode: listen only"
 
 
@@ -351,7 +357,7 @@ async def test_line_goes_through_another_transport(authority: Authority) -> None
     async with secret_echo(authority.sign("arm.inside")) as port, nothing_left():
         relay = Relay(port)
         options = {"host": "arm.inside", "port": 443, "tls": {"ca": authority.file}}
-        transport = from_setup(Setup("wire", options, tunnel=relay))
+        transport = from_setup(TransportSetup("wire", options, tunnel=relay))
         assert isinstance(transport, TcpTransport)
         await transport.open(20.0)
         assert relay.asked == [("arm.inside", 443)]

@@ -10,7 +10,7 @@ import pytest
 
 from tests.e2e.transports.leaks import nothing_left
 from tests.e2e.transports.telnetd import Telnetd
-from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport
+from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportSetup
 from urc.transports.telnet import from_setup
 
 pytestmark = pytest.mark.anyio
@@ -28,7 +28,7 @@ async def telnetd(tmp_path: Path) -> AsyncIterator[Telnetd]:
 
 
 def line_to(port: int, **options: object) -> Transport:
-    return from_setup(Setup("console", {"host": "127.0.0.1", "port": port, **options}))
+    return from_setup(TransportSetup("console", {"host": "127.0.0.1", "port": port, **options}))
 
 
 async def hears(line: Transport, expected: bytes) -> bytes:

@@ -17,11 +17,11 @@ from tests.e2e.transports.leaks import nothing_left
 from tests.e2e.transports.test_contract import PEERS, robot
 from tests.e2e.transports.test_mqtt import broker
 from urc.config.load import load_profile
-from urc.model.codec import Envelope, Payload
-from urc.runtime.catalog import built_in_catalog
+from urc.model.payload import Envelope, Payload
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import CommandFailed, Session
+from urc.simulator.emulated_robot import EmulatedConnection
 from urc.simulator.server import serve
-from urc.simulator.twin import TwinLine
 from urc.transports.base import Transport, TransportError
 
 pytestmark = pytest.mark.anyio
@@ -159,16 +159,16 @@ class Ear:
         """Each with how many had been said by then."""
         self.said = 0
         self.greetings = 0
-        hear = TwinLine._heard
+        hear = EmulatedConnection._heard
 
-        def heard(line: TwinLine, data: Payload, *more: Any) -> list[Payload]:
+        def heard(line: EmulatedConnection, data: Payload, *more: Any) -> list[Payload]:
             said = str(data.body if isinstance(data, Envelope) else data)
             self.numbers += [(int(number), self.said) for number in re.findall(r"say (\d+)", said)]
             self.greetings += said.count("hello")
             return hear(line, data, *more)
 
         # Every server passes its frames here, as a stream or one at a time.
-        patch.setattr(TwinLine, "_heard", heard)
+        patch.setattr(EmulatedConnection, "_heard", heard)
 
     async def hears_more(self) -> None:
         """Wait until a few more numbers have come."""

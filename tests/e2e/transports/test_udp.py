@@ -12,12 +12,12 @@ from tests.e2e.transports.leaks import nothing_left
 from tests.e2e.transports.programs import program
 from urc.model.driver import Backoff, FramingSpec, Timeouts
 from urc.model.profile import Profile
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Session
+from urc.simulator.emulated_profile import stand_in
 from urc.simulator.server import serve
-from urc.simulator.stand_in import stand_in
 from urc.testing.profile import line_profile
-from urc.transports.base import ConnectFailed, PeerClosed, Setup, TransportError
+from urc.transports.base import ConnectFailed, PeerClosed, TransportError, TransportSetup
 from urc.transports.udp import READ_AHEAD, UdpTransport, from_setup
 
 pytestmark = pytest.mark.anyio
@@ -26,7 +26,7 @@ WAIT_S = 20.0
 
 
 def line(**options: object) -> UdpTransport:
-    made = from_setup(Setup("wire", options))
+    made = from_setup(TransportSetup("wire", options))
     assert isinstance(made, UdpTransport)
     return made
 

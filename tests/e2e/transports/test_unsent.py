@@ -18,8 +18,8 @@ from tests.e2e.transports.test_contract import (
     robot,
     within,
 )
-from urc.model.codec import Envelope
-from urc.transports.base import Setup, Transport, TransportError
+from urc.model.payload import Envelope
+from urc.transports.base import Transport, TransportError, TransportSetup
 from urc.transports.http import from_setup
 
 pytestmark = pytest.mark.anyio
@@ -145,7 +145,7 @@ async def test_connection_that_a_robot_has_closed_holds_nothing_up() -> None:
 
     async with await asyncio.start_server(answer, "127.0.0.1", 0) as server:
         port = server.sockets[0].getsockname()[1]
-        transport = from_setup(Setup("web", {"url": f"http://127.0.0.1:{port}/"}))
+        transport = from_setup(TransportSetup("web", {"url": f"http://127.0.0.1:{port}/"}))
         await transport.open(OPEN_S)
         await transport.send(Envelope("request", {"path": "/go"}, None))
         await within(WAIT_S, transport.receive())

@@ -11,7 +11,7 @@ from tests.e2e.transports.certificates import Authority
 from tests.e2e.transports.detour import Detour
 from tests.e2e.transports.leaks import nothing_left
 from tests.e2e.transports.programs import listens, program
-from urc.transports.base import ConnectFailed, PeerClosed, Setup, Transport, TransportError
+from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportError, TransportSetup
 from urc.transports.websocket import from_setup
 
 WAIT_S = 20.0
@@ -34,7 +34,7 @@ async def line(port: int, scheme: str = "ws", **options: object) -> AsyncIterato
     """Open a line to a port of loopback, and see to it that nothing of it is left."""
     options = {"url": f"{scheme}://127.0.0.1:{port}/robot?speed=1", **options}
     async with nothing_left():
-        transport = from_setup(Setup("socket", options))
+        transport = from_setup(TransportSetup("socket", options))
         try:
             await transport.open(20.0)
             yield transport
@@ -167,7 +167,7 @@ async def test_line_through_another_transport() -> None:
     """The far end of the carrier knows the name; nothing is left when either side ends."""
     async with robot("cat") as port, nothing_left():
         url = "ws://robot.inside:8765/robot"
-        transport = from_setup(Setup("socket", {"url": url}, tunnel=Detour(port)))
+        transport = from_setup(TransportSetup("socket", {"url": url}, tunnel=Detour(port)))
         for _ in range(2):
             await transport.open(20.0)
             for _ in range(3):

@@ -10,9 +10,9 @@ from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until, until_text
 from tests.e2e.motion.driving import STOP, centre, driven, fresh
 from tests.e2e.widgets.inputs import Inputs, use
-from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command
 from urc.model.interface import WidgetUse
+from urc.model.payload import WriteSpec
 from urc.model.values import Reading
 from urc.protocol.events import Replied
 

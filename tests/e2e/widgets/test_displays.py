@@ -13,10 +13,10 @@ from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_attribute, until_text
 from tests.e2e.drawn import PIXELS_OF
 from tests.e2e.ports import free_port
-from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command
-from urc.model.interface import Grid, Interface, Slot, WidgetUse
-from urc.model.values import Limits, Signal
+from urc.model.interface import Interface, Layout, Slot, WidgetUse
+from urc.model.payload import WriteSpec
+from urc.model.values import AlarmLimits, Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.show.demos import colour_bars as made_picture
 
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.anyio
 SIGNALS = {
     signal.name: signal
     for signal in (
-        Signal("amps", unit="A", min=0, max=30, precision=1, limits=Limits(high=20, hihi=25)),
+        Signal("amps", unit="A", min=0, max=30, precision=1, limits=AlarmLimits(high=20, hihi=25)),
         Signal("goal", unit="A"),
         Signal("pace", unit="m/s", min=-2, max=2),
         Signal("height", unit="m"),
@@ -63,7 +63,7 @@ async def shown(
     slots = tuple(
         Slot(each.slot, place // columns, place % columns) for place, each in enumerate(uses)
     )
-    grid = Grid(-(-len(uses) // columns), columns, slots)
+    grid = Layout(-(-len(uses) // columns), columns, slots)
     robot = FakeRobot(
         profile._replace(interfaces={"default": Interface("default", "", {"landscape": grid})})
     )

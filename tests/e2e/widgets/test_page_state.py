@@ -7,7 +7,7 @@ import pytest
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_text
 from urc.model.interface import WidgetUse
-from urc.model.values import Limits, Signal
+from urc.model.values import AlarmLimits, Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio
@@ -66,7 +66,7 @@ async def test_what_the_page_knows_is_shown_and_acted_upon(new_page: PageMaker) 
 
 async def test_no_alert_is_said_only_of_what_is_known(new_page: PageMaker) -> None:
     """Before a value came, while it is old, and without URC nobody knows whether all is well."""
-    volts = Signal("volts", title="Battery", limits=Limits(low=11), stale_after_s=60)
+    volts = Signal("volts", title="Battery", limits=AlarmLimits(low=11), stale_after_s=60)
     uses = [WidgetUse("alerts", "alerts")]
     robot = FakeRobot(dashboard_profile(uses=uses, signals={"volts": volts}))
     page = await new_page(size="desktop")
@@ -88,7 +88,7 @@ async def test_what_was_acknowledged_stays_so_when_the_page_is_opened_anew(
     new_page: PageMaker,
 ) -> None:
     """Before a value came nothing is over; one that is over is new the next time."""
-    volts = Signal("volts", title="Battery", limits=Limits(low=11), stale_after_s=60)
+    volts = Signal("volts", title="Battery", limits=AlarmLimits(low=11), stale_after_s=60)
     robot = FakeRobot(
         dashboard_profile(uses=[WidgetUse("alerts", "alerts")], signals={"volts": volts})
     )

@@ -10,7 +10,7 @@ from tests.e2e.dashboards import running_dashboard, until, until_attribute, unti
 from tests.e2e.test_dashboard_widgets import made_widget
 from urc.model.interface import WidgetUse
 from urc.model.values import Signal
-from urc.model.widget import Port, Widget
+from urc.model.widget import Widget, WidgetPort
 from urc.testing.dashboard import BATTERY, FakeRobot, dashboard_profile, plain_widget
 from urc.web.show.demos import colour_bars
 
@@ -100,8 +100,8 @@ async def test_lists_arrays_and_units_reach_a_widget(new_page: PageMaker, tmp_pa
     """In the order of the binding; elements in the unit that the input asks for."""
     folder = made_widget(tmp_path, "lines", LINES)
     ports = {
-        "series": Port("series", is_multiple=True),
-        "turned": Port("turned", ("array",), unit="deg"),
+        "series": WidgetPort("series", is_multiple=True),
+        "turned": WidgetPort("turned", ("array",), unit="deg"),
     }
     use = WidgetUse("lines", "lines", {"turned": "turned"}, lists={"series": ("b", "a")})
     signals = {

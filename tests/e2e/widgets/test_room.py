@@ -6,7 +6,7 @@ from playwright.async_api import Page
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until
 from tests.e2e.gallery import resize
-from urc.model.interface import Grid, Interface, Slot, WidgetUse
+from urc.model.interface import Interface, Layout, Slot, WidgetUse
 from urc.model.values import Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
@@ -73,7 +73,7 @@ async def test_the_legend_of_a_plot_shows_every_signal(
     names = [f"joint_{number}" for number in range(6)]
     signals = {name: Signal(name, unit="°", stale_after_s=60) for name in names}
     plot = WidgetUse("plot", "plot", lists={"series": tuple(names)})
-    grid = Grid(3, 2, (Slot("plot", 0, 0, 1, 2),))
+    grid = Layout(3, 2, (Slot("plot", 0, 0, 1, 2),))
     profile = dashboard_profile(signals=signals, uses=[plot])
     robot = FakeRobot(profile._replace(interfaces={"x": Interface("x", "X", {"landscape": grid})}))
     async with running_dashboard(robot) as address:

@@ -6,7 +6,7 @@ from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until_attribute, until_text
 from tests.e2e.motion.driving import centre, fingers_on, fire
 from tests.e2e.widgets.inputs import PLAIN, shown, until_values, use
-from urc.model.interface import Given
+from urc.model.interface import OutputBinding
 
 pytestmark = pytest.mark.anyio
 
@@ -22,7 +22,7 @@ async def test_a_stick_of_one_axis_gives_nothing_for_the_other(new_page: PageMak
     """Also where that is bound by its name: the other stick goes on, and says what it gives."""
     left = use("joystick", axes="x", **PLAIN)
     right = use("joystick", axes="y", **PLAIN)
-    right = right._replace(slot="right", given={"moved": Given({"turn": "y"})})
+    right = right._replace(slot="right", given={"moved": OutputBinding({"turn": "y"})})
     async with shown(new_page, left, right, size="tablet") as (robot, page):
         hands = await fingers_on(page)
         (x, y), (other_x, other_y) = [await centre(page, one) for one in (LEFT, RIGHT)]

@@ -8,14 +8,16 @@ from pathlib import Path
 import pytest
 
 from urc.cli.main import main
-from urc.runtime.audit import AuditLog, Entry
+from urc.runtime.audit import AuditEntry, AuditLog
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     with AuditLog(tmp_path / "audit.sqlite") as log:
         for number in range(6):
-            log.note(Entry(1000.0 + number, "rover" if number % 2 else "puppet", "moved", "Ann"))
+            log.note(
+                AuditEntry(1000.0 + number, "rover" if number % 2 else "puppet", "moved", "Ann")
+            )
         assert log.settle()
     return tmp_path
 

@@ -15,7 +15,7 @@ import yaml
 from urc.cli import main as main_module
 from urc.cli import send as send_module
 from urc.cli.demo import has_screen
-from urc.cli.failures import Misuse, explain
+from urc.cli.error_report import Misuse, explain
 from urc.cli.main import VERBS, main
 from urc.cli.output import json_text
 from urc.model.driver import Argument, Command

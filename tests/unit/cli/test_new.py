@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from urc.cli.main import main
-from urc.config.parse.widget import Shelf
+from urc.config.parse.widget import WidgetFolder
 from urc.web.show.cells import render_widget, widget_context
 from urc.web.show.demos import demo_states
 
@@ -15,7 +15,7 @@ def test_a_new_widget_validates_and_shows_all_its_states(tmp_path: Path) -> None
     """Manifest, template and demo fit each other."""
     assert main(["new", "widget", "twin-lamp", "--into", str(tmp_path)]) == 0
     assert main(["validate", str(tmp_path / "twin-lamp" / "widget.yaml")]) == 0
-    shelf = Shelf(tmp_path)
+    shelf = WidgetFolder(tmp_path)
     widget = shelf.get("twin-lamp")
     assert widget is not None, shelf.problems
     assert (widget.title, shelf.problems) == ("Twin lamp", [])

@@ -7,7 +7,7 @@ import pytest
 from tests.unit.packages.made import install, keep_settings, package
 from urc.cli.main import main
 from urc.packages.store import Store
-from urc.runtime.kept import Kept, KeptFile
+from urc.runtime.settings_store import SettingsStore, StoredSettings
 
 SECRET = {"key": "open sesame"}
 
@@ -24,21 +24,21 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_what_was_filled_in_goes_along(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["remove", "drivers/rover"]) == 0
     assert "deleted the settings of rover, including its secrets" in capsys.readouterr().out
-    assert not KeptFile(data / "robots", "rover").file.exists()
+    assert not SettingsStore(data / "robots", "rover").file.exists()
 
 
 def test_what_was_filled_in_may_stay(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["remove", "rover", "--keep-settings"]) == 0
     assert "kept the settings of rover: " in capsys.readouterr().out
-    assert KeptFile(data / "robots", "rover").load().settings == SECRET
+    assert SettingsStore(data / "robots", "rover").load().settings == SECRET
 
 
 def test_what_is_of_another_robot_of_that_name_stays(
     data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A document that was named at the start, or another version that is still installed."""
-    file = KeptFile(data / "robots", "rover")
-    file.save(Kept(settings=SECRET, destination="somewhere"))
+    file = SettingsStore(data / "robots", "rover")
+    file.save(StoredSettings(settings=SECRET, destination="somewhere"))
     assert main(["remove", "rover"]) == 0
     assert "filled in" not in capsys.readouterr().out
     assert file.load().settings == SECRET

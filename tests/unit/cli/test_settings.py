@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from urc.cli.failures import Misuse
+from urc.cli.error_report import Misuse
 from urc.cli.settings import complete_settings, settings_given
 from urc.model.profile import Profile, Setting
 from urc.problems import ProblemsError, to_text

@@ -2,7 +2,7 @@
 
 import logging
 
-from urc.cli.simulate import Complaints
+from urc.cli.simulate import UnansweredLog
 
 
 class Teller:
@@ -11,7 +11,7 @@ class Teller:
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.now = 0.0
-        self.complaints = Complaints(self.lines.append, lambda: self.now)
+        self.complaints = UnansweredLog(self.lines.append, lambda: self.now)
 
     def hear(self, text: str, times: int = 1) -> list[str]:
         """Let something be complained of; return what is told."""

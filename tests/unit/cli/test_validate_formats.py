@@ -9,7 +9,7 @@ import pytest
 
 from urc.cli.main import main
 from urc.config.codes import pages
-from urc.config.formats import to_github, to_sarif
+from urc.config.report_formats import to_github, to_sarif
 from urc.problems import Problem
 
 Output = pytest.CaptureFixture[str]

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from urc.config.load import Checked, check
-from urc.config.parse.widget import Shelf
+from urc.config.load import CheckResult, check
+from urc.config.parse.widget import WidgetFolder
 from urc.problems import Problem
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 
 ROOT = Path(__file__).resolve().parents[3]
 SHELF = ROOT / "tests" / "broken" / "shelf"
@@ -25,8 +25,8 @@ class Folder:
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text, "utf-8")
 
-    def check(self, name: str) -> Checked:
-        return check(self.folder / f"{name}.yaml", built_in_catalog(), Shelf(SHELF))
+    def check(self, name: str) -> CheckResult:
+        return check(self.folder / f"{name}.yaml", built_in_catalog(), WidgetFolder(SHELF))
 
     def found(self, name: str) -> list[Problem]:
         return list(self.check(name).problems)

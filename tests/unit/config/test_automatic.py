@@ -7,15 +7,15 @@ import pytest
 
 from tests.unit.config.folder import WIRE, head
 from urc.config.default_look import MOST_PLAIN, automatic_slots, default_interface
-from urc.config.load import Checked, check
-from urc.config.parse.widget import Shelf
+from urc.config.load import CheckResult, check
+from urc.config.parse.widget import WidgetFolder
 from urc.config.resolve import resolve
-from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command, Driver
-from urc.model.flow import Hold
-from urc.model.interface import Given, Grid, Interface, Slot, WidgetUse
+from urc.model.exchange import Hold
+from urc.model.interface import Interface, Layout, OutputBinding, Slot, WidgetUse
+from urc.model.payload import WriteSpec
 from urc.model.values import Signal
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 
 ANY = "{ type: [integer, number, boolean, string] }"
 NUMBER = "{ type: [integer, number] }"
@@ -45,14 +45,14 @@ WIDGETS = {
 }
 
 
-def shelf(folder: Path, *names: str) -> Shelf:
+def shelf(folder: Path, *names: str) -> WidgetFolder:
     """Return a shelf with these of the widgets; all of them by default."""
     for name in names or WIDGETS:
         place = folder / name
         place.mkdir(parents=True, exist_ok=True)
         text = f"urc: 1\nkind: widget\nname: {name}\ntitle: W\nsummary: S.\n{WIDGETS[name]}\n"
         (place / "widget.yaml").write_text(text, "utf-8")
-    return Shelf(folder)
+    return WidgetFolder(folder)
 
 
 def made(folder: Path, *signals: Signal, names: tuple[str, ...] = ()) -> dict[str, str]:
@@ -160,7 +160,7 @@ def test_a_command_is_given_by_what_it_takes(
     assert use.widget == widget
     output = next(iter(use.outputs))
     assert use.outputs[output] == one.name
-    assert use.given.get(output, Given()).names == names
+    assert use.given.get(output, OutputBinding()).names == names
 
 
 @pytest.mark.parametrize(
@@ -215,7 +215,7 @@ def test_the_grid_has_the_stick_at_the_bottom_right() -> None:
     uses = (use("a", "value"), use("stick", "joystick", "m"), use("cam", "camera"))
     slots = {one.slot: one for one in (*uses, use("ring", "button", "p"))}
     grids = default_interface(slots, "T").layouts
-    assert grids["landscape"] == Grid(
+    assert grids["landscape"] == Layout(
         4,
         4,
         (
@@ -255,7 +255,7 @@ DOCUMENT = (
 )
 
 
-def loaded(file: Path, folder: Path) -> Checked:
+def loaded(file: Path, folder: Path) -> CheckResult:
     """Return the document as checked with the widgets of the tests."""
     return check(file, built_in_catalog(), shelf(folder / "shelf"))
 

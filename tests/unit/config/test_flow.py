@@ -4,10 +4,10 @@ import pytest
 
 from tests.dialogue import driver_of
 from urc.config.load import check
-from urc.model.flow import Hold, Offline
+from urc.model.exchange import Hold, Offline
 from urc.model.sequence import PromptStep, SendStep, all_steps
-from urc.registry import Catalog, Table
-from urc.runtime.catalog import built_in_catalog
+from urc.registry import Registries, Table
+from urc.runtime.registries import built_in_catalog
 
 HEAD = "urc: 1\nkind: driver\nname: talker\n"
 
@@ -19,7 +19,7 @@ def codes(text: str, folder: object) -> set[str]:
         file.write(HEAD + text)
     catalog = built_in_catalog()
     lines = Table("urc.transports", {"tcp": "x:x", "pigeon": "x:x"})
-    return {problem.code for problem in check(path, Catalog(lines, catalog.framings)).problems}
+    return {problem.code for problem in check(path, Registries(lines, catalog.framings)).problems}
 
 
 @pytest.mark.parametrize(
@@ -126,7 +126,7 @@ tests:
     path = f"{tmp_path}/talker.yaml"
     with open(path, "w", encoding="utf-8") as file:
         file.write(HEAD + text)
-    from urc.runtime.selftest import exercise
+    from urc.runtime.document_tests import exercise
 
     profile = check(path, built_in_catalog()).profile
     assert profile is not None

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.unit.config.folder import WIRE, Folder, head
-from urc.model.interface import Grid, Interface, Slot
+from urc.model.interface import Interface, Layout, Slot
 
 SIGNALS = "signals:\n  v: { type: number }\n"
 LOOK = (
@@ -37,7 +37,7 @@ def test_tabs_are_pages_in_their_order(folder: Folder) -> None:
         ("drive", "Drive"),
         ("more_on_it", "More on it"),
     ]
-    assert found.pages[0].layouts == {"landscape": Grid(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))}
+    assert found.pages[0].layouts == {"landscape": Layout(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))}
     assert list(found.pages[1].layouts) == ["landscape", "phone_portrait"]
     assert found.shown == ("a", "b")
 
@@ -47,7 +47,7 @@ def test_an_interface_without_tabs_is_one_page(folder: Folder) -> None:
     found = interface(folder, "{ grid: a b, left_handed: { landscape: b a }, mirror: false }")
     (page,) = found.pages
     assert (page.name, page.is_mirrored) == ("", False)
-    assert page.left_handed == {"landscape": Grid(1, 2, (Slot("b", 0, 0), Slot("a", 0, 1)))}
+    assert page.left_handed == {"landscape": Layout(1, 2, (Slot("b", 0, 0), Slot("a", 0, 1)))}
 
 
 def test_what_an_interface_says_of_mirroring_holds_for_its_tabs(folder: Folder) -> None:

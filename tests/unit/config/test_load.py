@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from urc.config.load import Checked, Shelf, check, load_profile
+from urc.config.load import CheckResult, WidgetFolder, check, load_profile
 from urc.expressions import compile_template
 from urc.model.driver import Backoff, FramingSpec, Timeouts
-from urc.model.interface import Grid, Slot, WidgetUse
+from urc.model.interface import Layout, Slot, WidgetUse
 from urc.model.profile import DocumentTest, Profile
-from urc.model.values import Limits, Signal
+from urc.model.values import AlarmLimits, Signal
 from urc.problems import ProblemsError
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.testing.profile import text
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -42,8 +42,8 @@ class Checker:
         file.write_text(text, "utf-8")
         return file
 
-    def __call__(self, text: str, name: str = "puppet.yaml") -> Checked:
-        return check(self.write(name, text), built_in_catalog(), Shelf(SHELF))
+    def __call__(self, text: str, name: str = "puppet.yaml") -> CheckResult:
+        return check(self.write(name, text), built_in_catalog(), WidgetFolder(SHELF))
 
     def profile(self, text: str) -> Profile:
         result = self(text)
@@ -59,7 +59,7 @@ class Checker:
 def test_puppet_becomes_the_model_that_it_describes() -> None:
     """The whole profile of the tutorial, value by value."""
     file = ROOT / "robots" / "puppet.yaml"
-    profile = load_profile(file, built_in_catalog(), Shelf(SHELF))
+    profile = load_profile(file, built_in_catalog(), WidgetFolder(SHELF))
     wire = profile.driver.transports["wire"]
     (poll,) = profile.driver.polls
     assert (profile.name, profile.title, profile.file) == ("puppet", "Puppet", str(file))
@@ -78,7 +78,7 @@ def test_puppet_becomes_the_model_that_it_describes() -> None:
         unit="%",
         min=0,
         max=100,
-        limits=Limits(lolo=10, low=20, hysteresis=2),
+        limits=AlarmLimits(lolo=10, low=20, hysteresis=2),
         stale_after_s=3.0,
     )
     assert (poll.name, poll.transport, poll.every_s) == ("polls.0", "wire", 1.0)
@@ -91,7 +91,7 @@ def test_puppet_becomes_the_model_that_it_describes() -> None:
         )
     }
     assert profile.interfaces["default"].layouts == {
-        "landscape": Grid(2, 3, (Slot("battery", 1, 2),))
+        "landscape": Layout(2, 3, (Slot("battery", 1, 2),))
     }
     assert list(profile.widgets) == ["battery"]
     (test,) = profile.tests
@@ -216,7 +216,7 @@ def test_without_an_interface_the_widgets_are_laid_out(checked: Checker) -> None
         + MESSAGE
         + "widgets:\n  a: { use: battery, bind: { level: battery } }\n"
     )
-    assert profile.interfaces["default"].layouts["landscape"] == Grid(1, 1, (Slot("a", 0, 0),))
+    assert profile.interfaces["default"].layouts["landscape"] == Layout(1, 1, (Slot("a", 0, 0),))
 
 
 @pytest.mark.parametrize(
@@ -252,7 +252,7 @@ def test_without_any_look_each_signal_is_shown(
 def test_robot_with_nothing_to_show_has_an_empty_interface(checked: Checker) -> None:
     """There is always one interface."""
     grid = checked.profile(HEAD + WIRE).interfaces["default"].layouts["landscape"]
-    assert grid == Grid(1, 1, ())
+    assert grid == Layout(1, 1, ())
 
 
 def test_grid_slots_span_rows_and_columns(checked: Checker) -> None:
@@ -262,8 +262,8 @@ def test_grid_slots_span_rows_and_columns(checked: Checker) -> None:
         "        a   a     b\n      phone_portrait: a\n"
     )  # fmt: skip
     assert profile.interfaces["x"].layouts == {
-        "landscape": Grid(2, 3, (Slot("a", 0, 0, 2, 2), Slot("b", 1, 2))),
-        "phone_portrait": Grid(1, 1, (Slot("a", 0, 0),)),
+        "landscape": Layout(2, 3, (Slot("a", 0, 0, 2, 2), Slot("b", 1, 2))),
+        "phone_portrait": Layout(1, 1, (Slot("a", 0, 0),)),
     }
 
 
@@ -303,7 +303,7 @@ def test_profile_is_refused_with_all_errors_and_no_warning(checked: Checker) -> 
     """The exception says the first, and how many more there are."""
     file = checked.write("p.yaml", HEAD + WIRE + "widgits: {}\ntitel: x\n")
     with pytest.raises(ProblemsError) as caught:
-        load_profile(file, built_in_catalog(), Shelf(SHELF))
+        load_profile(file, built_in_catalog(), WidgetFolder(SHELF))
     assert [problem.code for problem in caught.value.problems] == ["unknown-key", "unknown-key"]
     assert str(caught.value).endswith("(and 1 more: run 'urc validate')")
 
@@ -312,7 +312,7 @@ def test_interface_is_no_profile(checked: Checker) -> None:
     """`urc serve` on one says so."""
     file = checked.write("i.yaml", "urc: 1\nkind: interface\nname: i\ngrid: a\n")
     with pytest.raises(ProblemsError) as caught:
-        load_profile(file, built_in_catalog(), Shelf(SHELF))
+        load_profile(file, built_in_catalog(), WidgetFolder(SHELF))
     assert caught.value.problems[0].code == "wrong-kind"
 
 
@@ -341,7 +341,7 @@ def test_broken_widget_is_told_where_it_stands(checked: Checker, tmp_path: Path)
     robot = checked.write(
         "puppet.yaml", HEAD + WIRE + "widgets:\n  a: { use: gauge }\n  b: { use: gauge }\n"
     )
-    result = check(robot, built_in_catalog(), Shelf(tmp_path))
+    result = check(robot, built_in_catalog(), WidgetFolder(tmp_path))
     assert [(one.file, one.code) for one in result.problems] == [(str(manifest), "missing-key")]
     assert result.profile is None
 
@@ -371,7 +371,7 @@ def test_reference_is_followed_from_the_document_that_makes_it(
     checked.write("robots/drivers/d.yaml", "urc: 1\nkind: driver\nname: d\n" + WIRE + "titel: x\n")
     checked.write("robots/p.yaml", HEAD + "driver: drivers/d.yaml\n")
     monkeypatch.chdir(checked.folder)
-    (problem,) = check("robots/p.yaml", built_in_catalog(), Shelf(SHELF)).problems
+    (problem,) = check("robots/p.yaml", built_in_catalog(), WidgetFolder(SHELF)).problems
     assert problem.headline.startswith("robots/drivers/d.yaml:6:1: error unknown-key")
 
 
@@ -379,7 +379,7 @@ def test_good_document_imports_neither_jsonschema_nor_an_event_loop() -> None:
     """Start-up time is a promise: `urc validate` on a good document stays light."""
     code = (
         "import sys; from urc.config.load import check;"
-        "from urc.runtime.catalog import built_in_catalog;"
+        "from urc.runtime.registries import built_in_catalog;"
         "assert check('robots/puppet.yaml', built_in_catalog()).problems == ();"
         "print([name for name in ('jsonschema', 'asyncio', 'starlette', 'difflib', 'dataclasses')"
         " if name in sys.modules])"

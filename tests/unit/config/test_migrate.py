@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urc.cli.main import main
-from urc.config.load import Shelf, check
+from urc.config.load import WidgetFolder, check
 from urc.config.migrate import migrate
 from urc.config.renames import CODES, KEYS, VALUES
 from urc.problems import Problem, ProblemsError
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.shipped import shipped
 
 WIRE = "{ type: tcp, host: h, port: 1, framing: { type: delimiter, tx: LF, rx: LF }"
@@ -133,7 +133,7 @@ def problems(folder: Path, text: str, name: str) -> tuple[Problem, ...]:
     file = folder / name
     file.parent.mkdir(exist_ok=True)
     file.write_text(text, "utf-8")
-    return check(str(file), built_in_catalog(), Shelf(shipped("widgets"))).problems
+    return check(str(file), built_in_catalog(), WidgetFolder(shipped("widgets"))).problems
 
 
 def test_each_renamed_key_has_a_document() -> None:

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from tests.unit.config.folder import WIRE, Folder, head
-from urc.protocol.encode import BadArgument
 from urc.protocol.engine import Engine
+from urc.protocol.requests.encode import BadArgument
 
 DRIVER = (
     head("driver", "cart")

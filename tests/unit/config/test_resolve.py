@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.unit.config.folder import SHELF, WIRE, Folder, head
 from urc.config.compose.merge import count_nodes
 from urc.config.gather import gather
-from urc.config.parse.widget import Shelf
+from urc.config.parse.widget import WidgetFolder
 from urc.config.resolve import resolve, written
 from urc.source import parse_document
 
@@ -128,7 +128,7 @@ def test_resolved_document_means_the_same(folder: Folder) -> None:
     )
     whole = folder.check("bot").profile
     assert whole is not None
-    resolved = resolve(str(folder.folder / "bot.yaml"), Shelf(SHELF))
+    resolved = resolve(str(folder.folder / "bot.yaml"), WidgetFolder(SHELF))
     folder.write(alone__bot=resolved.text)
     again = folder.check("alone/bot")
     assert [one.headline for one in again.problems] == []
@@ -150,7 +150,7 @@ def test_resolved_keys_say_where_they_stand(folder: Folder) -> None:
         bot=head("robot", "bot") + "driver:\n  use: line.yaml\n  overrides:\n"
         "    signals: { j_1: { min: 1 } }\n",
     )
-    text = resolve(str(folder.folder / "bot.yaml"), Shelf(SHELF)).text
+    text = resolve(str(folder.folder / "bot.yaml"), WidgetFolder(SHELF)).text
     found = [line.replace(f"{folder.folder}/", "") for line in text.splitlines()]
     start = found.index("signals:  # bot.yaml:7")
     assert found[start + 1 :] == [

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.unit.config.folder import WIRE, Folder, head
-from urc.config.compose.fill import Budget, TooMuch, fill
+from urc.config.compose.fill import ExpansionBudget, ExpansionTooLarge, fill
 from urc.config.compose.merge import Tree, merge
 from urc.config.resolve import written
 from urc.source import Document, parse_document
@@ -298,7 +298,7 @@ def test_character_of_a_filled_in_text_is_found_in_the_written_one(
     """`{i}` becomes 123 here, so that all behind it moves."""
     document = parse_document(written("t", text), "a.yaml")
     one = Tree(document.data, document.mark, document)
-    filled = fill(one, (), {"i": 123}, Budget(100), _Nobody())
+    filled = fill(one, (), {"i": 123}, ExpansionBudget(100), _Nobody())
     mark = filled.mark.children["t"]
     assert mark.written is not None
     assert mark.written.offset(offset) == written_offset
@@ -316,5 +316,5 @@ def test_text_that_grows_without_end_is_refused() -> None:
     """A megabyte of names, each of 200 characters."""
     document = parse_document(written("t", "{i}" * 100_000), "a.yaml")
     one = Tree(document.data, document.mark, document)
-    with pytest.raises(TooMuch):
-        fill(one, (), {"i": "x" * 200}, Budget(100), _Nobody())
+    with pytest.raises(ExpansionTooLarge):
+        fill(one, (), {"i": "x" * 200}, ExpansionBudget(100), _Nobody())

@@ -6,9 +6,9 @@ import pytest
 
 from tests.unit.config.folder import WIRE, Folder, head
 from urc.config.load import check
-from urc.config.parse.widget import Shelf
+from urc.config.parse.widget import WidgetFolder
 from urc.problems import Problem
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.shipped import shipped
 
 PARAMS = "params: { ros: 1, speed: 0.5, back: -0.5, turn: 1.0, right: -1.0, watchdog: none }"
@@ -22,7 +22,7 @@ def folder(tmp_path: Path) -> Folder:
 def found(folder: Folder, name: str) -> tuple[Problem, ...]:
     """Return what is found in a document that has the widgets of URC."""
     file = folder.folder / f"{name}.yaml"
-    return tuple(check(file, built_in_catalog(), Shelf(shipped("widgets"))).problems)
+    return tuple(check(file, built_in_catalog(), WidgetFolder(shipped("widgets"))).problems)
 
 
 def test_a_driver_is_used_by_its_name(folder: Folder) -> None:
@@ -34,7 +34,9 @@ def test_a_driver_is_used_by_its_name(folder: Folder) -> None:
         + "interfaces: { default: ros-base }\n"
     )
     assert found(folder, "mine") == ()
-    loaded = check(folder.folder / "mine.yaml", built_in_catalog(), Shelf(shipped("widgets")))
+    loaded = check(
+        folder.folder / "mine.yaml", built_in_catalog(), WidgetFolder(shipped("widgets"))
+    )
     assert loaded.profile is not None
     assert "drive" in loaded.profile.driver.commands
     assert loaded.profile.interfaces["default"].name == "default"
@@ -51,7 +53,9 @@ def test_a_robot_that_extends_one_changes_its_driver(folder: Folder) -> None:
     over = "driver: { params: { speed: 0.2 }, overrides: { signals: { x: { title: East } } } }\n"
     folder.write(mine=head("robot", "mine") + "extends: generic-ros1\n" + over)
     assert found(folder, "mine") == ()
-    loaded = check(folder.folder / "mine.yaml", built_in_catalog(), Shelf(shipped("widgets")))
+    loaded = check(
+        folder.folder / "mine.yaml", built_in_catalog(), WidgetFolder(shipped("widgets"))
+    )
     assert loaded.profile is not None
     driver = loaded.profile.driver
     assert driver.signals["x"].title == "East"

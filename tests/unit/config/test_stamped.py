@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.unit.config.folder import Folder, head
-from urc.runtime.selftest import exercise
+from urc.runtime.document_tests import exercise
 
 ROS = "transports: { ros: { type: ros, host: robot, stale_after: 3s, version: auto } }\n"
 DRIVE = """

@@ -12,15 +12,15 @@ from contextlib import asynccontextmanager
 import pytest
 
 from tests.dialogue import driver_of
-from urc.guard import wire
+from urc.guard import messages
 from urc.guard.local_channel import LocalChannel
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.model.profile import Profile
-from urc.motion.fresh import Input
-from urc.motion.hold import Reason
-from urc.motion.lease import Client
-from urc.runtime import guarding, held
-from urc.runtime.motion import MotionDesk
+from urc.motion.freshness import ControlInput
+from urc.motion.hold_to_run import Reason
+from urc.motion.lease import Operator
+from urc.runtime import guarding, held_commands
+from urc.runtime.motion_controller import MotionController
 from urc.runtime.session import Session
 from urc.testing.clock import FakeClock, settle
 from urc.testing.transport import table_of
@@ -165,11 +165,11 @@ class PipedChannel(LocalChannel):
     def start(self) -> None:
         self._to_guard: deque[bytes] = deque()
         self._to_engine: deque[bytes] = deque()
-        self._encode = wire.encoder().encode
-        self._of_guard, self._of_server = wire.decoder_of_guard(), wire.decoder_of_server()
+        self._encode = messages.encoder().encode
+        self._of_guard, self._of_server = messages.decoder_of_guard(), messages.decoder_of_server()
         super().start()
 
-    def post(self, message: wire.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
+    def post(self, message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
         self._to_guard.append(self._encode(message))
         self._clock.call_at(self._clock.now() + self.delay_s, self._to)
 
@@ -178,7 +178,7 @@ class PipedChannel(LocalChannel):
             self._host.take(self._of_guard.decode(self._to_guard.popleft()))
             self._host.settle()
 
-    def _emit(self, message: wire.FromGuard) -> int:
+    def _emit(self, message: messages.FromGuard) -> int:
         data = self._encode(message)
         self._to_engine.append(data)
         self._clock.call_at(self._clock.now() + self.delay_s, self._from)
@@ -202,8 +202,8 @@ class World:
 
     def __init__(self, session: Session, robot: Robot, clock: FakeClock) -> None:
         self.session, self.robot, self.clock = session, robot, clock
-        self.desk = MotionDesk(session.profile.driver)
-        self.desk.join(Client("ann", "ann", "engineer"))
+        self.desk = MotionController(session.profile.driver)
+        self.desk.join(Operator("ann", "ann", "engineer"))
         assert session.movers is not None
         self.guard = session.movers
         self.desk.attach(session.frames, session.movers)
@@ -226,7 +226,7 @@ class World:
         """Hold a control."""
         self._ticks += 1
         now = self.clock.now()
-        given = Input(self.desk.lease.state.epoch, self._ticks, self.desk.beat("ann", now))
+        given = ControlInput(self.desk.lease.state.epoch, self._ticks, self.desk.beat("ann", now))
         return self.desk.tick("ann", command, {"v": value}, given, now)
 
     def ask(self, command: str) -> None:
@@ -261,7 +261,7 @@ async def opened(
     table = table_of(**{kind: robot})
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(guarding, "LocalChannel", PipedChannel)
-        patch.setattr(held, "_LOSSY", frozenset(("pigeon",)))
+        patch.setattr(held_commands, "_LOSSY", frozenset(("pigeon",)))
         session = Session(
             _PROFILES[kind], {}, table, clock=clock, random=lambda: 0.0, motion="here"
         )

@@ -4,13 +4,13 @@ import asyncio
 from collections.abc import Callable
 from functools import partial
 
-from urc.guard import wire
-from urc.guard.channel import LineSpec
+from urc.guard import messages
+from urc.guard.channel import GuardedLineSpec
 from urc.guard.guard_client import GuardClient, HeldSpec
-from urc.guard.host import Host
 from urc.guard.local_channel import LocalChannel
-from urc.model.codec import Payload
-from urc.motion.hold import Terms
+from urc.guard.server import GuardServer
+from urc.model.payload import Payload
+from urc.motion.hold_to_run import HoldTerms
 from urc.motion.stall import STALLED_S
 from urc.testing.clock import FakeClock, settle
 from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportError
@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 STOP = b"stop"
-TERMS = Terms(STOP, period_s=0.02)
+TERMS = HoldTerms(STOP, period_s=0.02)
 HELD = {name: HeldSpec("wire", TERMS) for name in ("drive", "turn", "lift", "aim")}
 
 
@@ -166,36 +166,36 @@ class Bench:
     ) -> None:
         self.robot = robot
         self.clock = FakeClock()
-        self.said: list[wire.FromGuard] = []
-        self.host = Host(self._emit, self.clock)
-        self.host.add(wire.Make("wire", "", {}, [], "", stalled_s, is_strict), robot)
+        self.said: list[messages.FromGuard] = []
+        self.host = GuardServer(self._emit, self.clock)
+        self.host.add(messages.MakeTransport("wire", "", {}, [], "", stalled_s, is_strict), robot)
 
-    def _emit(self, said: wire.FromGuard) -> int:
+    def _emit(self, said: messages.FromGuard) -> int:
         self.said.append(said)
-        return len(said.data) if isinstance(said, wire.Received) else 0
+        return len(said.data) if isinstance(said, messages.BytesReceived) else 0
 
-    def tell(self, *messages: wire.ToGuard) -> None:
+    def tell(self, *messages: messages.ToGuard) -> None:
         """Tell it what comes together."""
         for message in messages:
             self.host.take(message)
         self.host.settle()
 
     async def open(self, turn: int = 1) -> None:
-        self.tell(wire.Open("wire", turn, 1.0))
+        self.tell(messages.OpenLine("wire", turn, 1.0))
         await settle()
-        assert self.heard() == [wire.Opened("wire", turn, "wire", {})]
+        assert self.heard() == [messages.LineOpened("wire", turn, "wire", {})]
 
-    def heard(self) -> list[wire.FromGuard]:
+    def heard(self) -> list[messages.FromGuard]:
         """Return what it said since this was last asked."""
         said, self.said[:] = [*self.said], []
         return said
 
     def tick(self, data: Payload, *, number: int = 1, control: str = "drive") -> None:
-        self.tell(wire.Tick(control, number, data, self.clock.now()))
+        self.tell(messages.RenewLease(control, number, data, self.clock.now()))
 
-    async def drive(self, terms: Terms = TERMS) -> None:
+    async def drive(self, terms: HoldTerms = TERMS) -> None:
         await self.open()
-        self.tell(wire.Arm("wire", "drive", terms))
+        self.tell(messages.ArmControl("wire", "drive", terms))
         self.tick(b"go 1")
         await settle()
 
@@ -213,15 +213,15 @@ class Rig:
     ) -> None:
         self.robot = robot
         self.clock = FakeClock()
-        make = wire.Make("wire", "", {}, [], "", stalled_s, is_strict, silent_s)
+        make = messages.MakeTransport("wire", "", {}, [], "", stalled_s, is_strict, silent_s)
         line: Transport = robot
-        lines = [LineSpec(make, line)]
+        lines = [GuardedLineSpec(make, line)]
         channel_to = partial(LocalChannel, lines=lines, clock=self.clock)
         self.guard = GuardClient(lines, HELD, channel_to)
         self.guard.start()
         self.transport = self.guard.transports["wire"]
 
-    async def drive(self, terms: Terms = TERMS) -> None:
+    async def drive(self, terms: HoldTerms = TERMS) -> None:
         await self.transport.open(1.0)
         self.guard.arm("drive", terms)
         self.tick(b"go 1")
@@ -230,12 +230,12 @@ class Rig:
     def tick(self, data: Payload) -> None:
         self.guard.tick("drive", data)
 
-    def caught(self) -> list[tuple[str, wire.ToGuard]]:
+    def caught(self) -> list[tuple[str, messages.ToGuard]]:
         """Return the messages that replace unsent ones, with their slots: none is sent any more."""
-        found: list[tuple[str, wire.ToGuard]] = []
+        found: list[tuple[str, messages.ToGuard]] = []
         post = self.guard.channel.post
 
-        def catch(message: wire.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
+        def catch(message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
             if slot:
                 found.append((slot, message))
             else:

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from tests.effort import examples
 from tests.unit.guard.counted import NUMBERS, Robot, World, opened, parted
-from urc.guard.tally import Tally
-from urc.model.codec import Count, Numbered
-from urc.model.flow import MOST_STOPS
-from urc.motion.hold import STOP_EVERY_S, STOP_FOR_S
+from urc.guard.sent_counters import SentCounters
+from urc.model.exchange import MOST_STOPS
+from urc.model.payload import Count, Numbered
+from urc.motion.hold_to_run import STOP_EVERY_S, STOP_FOR_S
 
 pytestmark = pytest.mark.anyio
 
@@ -199,7 +199,7 @@ def test_whatever_happens_numbers_are_gapless_and_the_stop_is_last(
 
 
 def test_counters_change_only_when_numbers_have_left() -> None:
-    tally = Tally()
+    tally = SentCounters()
     assert not tally.is_changed
     tally.left(Count({}, {"n": 7}))
     assert tally.is_changed
@@ -209,7 +209,7 @@ def test_counters_change_only_when_numbers_have_left() -> None:
 
 def test_stop_with_a_wrong_number_is_better_than_none() -> None:
     """The last one is of the newest numbers."""
-    tally = Tally()
+    tally = SentCounters()
     stops = [Numbered(b"%d" % at, Count({"n": at - 1}, {"n": at})) for at in (5, 6, 7)]
     assert tally.choose(stops).data == b"7"
     tally.left(stops[0].takes)

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from tests.unit.guard.lines import STOP, TERMS, Bench, CountedWire
-from urc.guard import line, wire
+from urc.guard import guarded_connection, messages
 from urc.testing.clock import settle
 from urc.transports.base import PeerClosed
 
@@ -57,9 +57,9 @@ async def test_fault_of_a_connection_that_was_closed_does_not_cut_the_next_one()
     bench = Bench(CountedWire())
     await bench.open(1)
     of_the_first = bench.robot.arriving
-    bench.tell(wire.Close("wire", 1))
+    bench.tell(messages.CloseLine("wire", 1))
     await settle()
-    assert bench.heard() == [wire.Closed("wire", 1)]
+    assert bench.heard() == [messages.LineClosed("wire", 1)]
     await bench.open(2)
     of_the_first.put_nowait(PeerClosed("too late"))
     await settle()
@@ -72,11 +72,11 @@ async def test_owed_stop_is_written_after_an_attempt_of_the_engine_that_failed()
     """Nothing is left of that attempt; the guard opens the line by itself."""
     bench = Bench(CountedWire())
     bench.robot.refusal = "nothing listens"
-    bench.tell(wire.Open("wire", 1, 1.0))
+    bench.tell(messages.OpenLine("wire", 1, 1.0))
     await settle()
-    assert bench.heard() == [wire.OpenFailed("wire", 1, "nothing listens")]
+    assert bench.heard() == [messages.OpenFailed("wire", 1, "nothing listens")]
     bench.robot.refusal = ""
-    bench.tell(wire.Owe("wire", "drive", TERMS))
+    bench.tell(messages.RecoverStop("wire", "drive", TERMS))
     await bench.clock.advance(0.1)
     assert bench.robot.written == [STOP]
     await finish(bench)
@@ -94,7 +94,9 @@ async def test_last_stop_is_not_thrown_away_at_the_end() -> None:
 async def test_reading_that_does_not_end_does_not_hold_up_the_end(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(line, "_CLOSE_S", 0.01)  # of real time, and it is waited for in full
+    monkeypatch.setattr(
+        guarded_connection, "_CLOSE_S", 0.01
+    )  # of real time, and it is waited for in full
     bench = Bench(robot := Stubborn())
     await bench.drive()
     try:
@@ -109,7 +111,7 @@ async def test_reading_that_does_not_end_does_not_hold_up_the_end(
 async def test_line_that_does_not_close_does_not_hold_up_the_end(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(line, "_CLOSE_S", 0.01)  # as above
+    monkeypatch.setattr(guarded_connection, "_CLOSE_S", 0.01)  # as above
     bench = Bench(robot := Hanging())
     await bench.drive()
     await finish(bench)

@@ -2,17 +2,17 @@
 
 import pytest
 
-from urc.guard import wire
+from urc.guard import messages
 from urc.guard.channel import ChannelListener
 from urc.guard.guard_client import GuardClient, HeldSpec
-from urc.model.codec import Count, Numbered, Payload, Series
-from urc.motion.hold import LEASE_S, Terms
+from urc.model.payload import Count, FrameVariants, Numbered, Payload
+from urc.motion.hold_to_run import LEASE_S, HoldTerms
 from urc.problems import UrcError
 
 pytestmark = pytest.mark.anyio
 
-TERMS = Terms(b"stop", period_s=0.05)
-SERIES = Series(
+TERMS = HoldTerms(b"stop", period_s=0.05)
+SERIES = FrameVariants(
     (Numbered(b"7 stop", Count({}, {"n": 7})), Numbered(b"8 stop", Count({"n": 7}, {"n": 8})))
 )
 
@@ -31,8 +31,8 @@ class FakeChannel:
     async def finish(self) -> None:
         self.told.append("finish")
 
-    def post(self, message: wire.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
-        assert is_urgent is isinstance(message, wire.Stop)
+    def post(self, message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
+        assert is_urgent is isinstance(message, messages.StopMotion)
         self.told.append(message)
 
     def drop(self, slot: str) -> None:
@@ -46,8 +46,8 @@ class FakeChannel:
 
 
 HELD = {
-    "drive": HeldSpec("wire", Terms(b"", 0.05, LEASE_S, is_lossy=False)),
-    "lift": HeldSpec("air", Terms(b"", 0.05, LEASE_S, is_lossy=True)),
+    "drive": HeldSpec("wire", HoldTerms(b"", 0.05, LEASE_S, is_lossy=False)),
+    "lift": HeldSpec("air", HoldTerms(b"", 0.05, LEASE_S, is_lossy=True)),
 }
 
 
@@ -75,9 +75,9 @@ async def test_control_is_armed_on_its_line(guard: GuardClient) -> None:
     await guard.finish()
     assert told(guard) == [
         "start",
-        wire.Arm("wire", "drive", TERMS),
-        wire.Arm("air", "lift", TERMS),
-        wire.Release("drive"),
+        messages.ArmControl("wire", "drive", TERMS),
+        messages.ArmControl("air", "lift", TERMS),
+        messages.ReleaseControl("drive"),
         "finish",
     ]
 
@@ -100,8 +100,8 @@ def test_stop_goes_by_the_terms_of_what_is_armed(guard: GuardClient) -> None:
     guard.stop({"drive": SERIES})
     stops = {"stop": b"7 stop", "stops": SERIES.frames}
     assert told(guard)[1:] == [
-        wire.Stop([("wire", "drive", terms._replace(stop=b"stop 2"))]),
-        wire.Stop([("wire", "drive", terms._replace(**stops))]),
+        messages.StopMotion([("wire", "drive", terms._replace(stop=b"stop 2"))]),
+        messages.StopMotion([("wire", "drive", terms._replace(**stops))]),
     ]
 
 
@@ -112,7 +112,9 @@ def test_all_that_may_move_is_stopped_by_the_frames_of_now(guard: GuardClient) -
     guard.tick("drive", b"go")
     told(guard)
     guard.stop_all(render)
-    assert told(guard) == [wire.Stop([("wire", "drive", TERMS._replace(stop=b"drive stop"))])]
+    assert told(guard) == [
+        messages.StopMotion([("wire", "drive", TERMS._replace(stop=b"drive stop"))])
+    ]
     guard.tick("lift", b"up")
     guard.renew("drive", b"stop 7")
     guard.renew("lift", SERIES)
@@ -124,7 +126,7 @@ def test_all_that_may_move_is_stopped_by_the_frames_of_now(guard: GuardClient) -
     guard.stop_all(broken)
     numbered = TERMS._replace(stop=b"7 stop", stops=SERIES.frames)
     assert told(guard) == [
-        wire.Stop(
+        messages.StopMotion(
             [("wire", "drive", TERMS._replace(stop=b"stop 7")), ("air", "lift", numbered)],
         )
     ]
@@ -135,10 +137,10 @@ def test_stop_of_what_was_never_armed_has_the_terms_of_its_line(guard: GuardClie
     guard.stop({"drive": b"halt", "lift": b"down"})
     guard.stop({})
     assert told(guard) == [
-        wire.Stop(
+        messages.StopMotion(
             [
-                ("wire", "drive", Terms(b"halt", 0.05, LEASE_S, is_lossy=False)),
-                ("air", "lift", Terms(b"down", 0.05, LEASE_S, is_lossy=True)),
+                ("wire", "drive", HoldTerms(b"halt", 0.05, LEASE_S, is_lossy=False)),
+                ("air", "lift", HoldTerms(b"down", 0.05, LEASE_S, is_lossy=True)),
             ]
         )
     ]

@@ -5,11 +5,11 @@ import asyncio
 import pytest
 
 from tests.unit.guard.lines import STOP, TERMS, Bench, CountedWire, GatedWire, Prompter, Rig
-from urc.guard import line, wire
-from urc.guard.lane import Lane
-from urc.model.codec import Count, Numbered, Payload
+from urc.guard import guarded_connection, messages
+from urc.guard.send_queue import SendQueue
+from urc.model.payload import Count, Numbered, Payload
 from urc.testing.clock import FakeClock, settle
-from urc.transports.hurry import HURRY
+from urc.transports.connect_race import HURRY
 
 pytestmark = pytest.mark.anyio
 
@@ -18,19 +18,19 @@ NUMBERED = TERMS._replace(stops=(Numbered(b"0 stop", Count({}, {"n": 0})),))
 
 async def test_line_without_news_says_nothing(benches: list[Bench]) -> None:
     benches.append(bench := Bench(CountedWire()))
-    bench.tell(wire.Arm("wire", "drive", TERMS), wire.Release("drive"))
+    bench.tell(messages.ArmControl("wire", "drive", TERMS), messages.ReleaseControl("drive"))
     assert bench.heard() == []
     await bench.open()
-    bench.tell(wire.Release("drive"))
+    bench.tell(messages.ReleaseControl("drive"))
     assert bench.heard() == []
 
 
 async def test_stop_overtakes_a_poll_that_waits_behind_motion(benches: list[Bench]) -> None:
     benches.append(bench := Bench(robot := GatedWire()))
     await bench.drive()
-    bench.tell(wire.Send("wire", 1, 1, b"poll"))
+    bench.tell(messages.SendBytes("wire", 1, 1, b"poll"))
     await settle()
-    bench.tell(wire.Stop([("wire", "drive", TERMS)]))
+    bench.tell(messages.StopMotion([("wire", "drive", TERMS)]))
     await settle()
     robot.let_through(3)
     await settle()
@@ -41,19 +41,19 @@ async def test_engine_is_told_which_numbers_the_stop_of_a_rescue_has_used(
     benches: list[Bench],
 ) -> None:
     benches.append(bench := Bench(CountedWire()))
-    bench.tell(wire.Owe("wire", "drive", NUMBERED))
+    bench.tell(messages.RecoverStop("wire", "drive", NUMBERED))
     await bench.clock.advance(0.1)
     assert bench.robot.written == [b"0 stop"]
     bench.heard()
-    bench.tell(wire.Open("wire", 1, 1.0))
-    assert bench.heard() == [wire.Opened("wire", 1, "wire", {"n": 0})]
+    bench.tell(messages.OpenLine("wire", 1, 1.0))
+    assert bench.heard() == [messages.LineOpened("wire", 1, "wire", {"n": 0})]
 
 
 async def test_rescued_line_of_a_new_guard_is_closed_when_unused(
     benches: list[Bench],
 ) -> None:
     benches.append(bench := Bench(CountedWire()))
-    bench.tell(wire.Owe("wire", "drive", TERMS))
+    bench.tell(messages.RecoverStop("wire", "drive", TERMS))
     await bench.clock.advance(0.1)
     assert bench.robot.is_open
     await bench.clock.advance(10.0)
@@ -69,28 +69,30 @@ async def test_engine_that_waits_for_a_rescue_without_an_answer_is_told_so(
         await asyncio.Event().wait()
 
     robot.open = never  # type: ignore[method-assign]
-    bench.tell(wire.Owe("wire", "drive", TERMS))
+    bench.tell(messages.RecoverStop("wire", "drive", TERMS))
     await settle()
-    bench.tell(wire.Open("wire", 1, 0.1))
+    bench.tell(messages.OpenLine("wire", 1, 0.1))
     await bench.clock.advance(0.2)
-    assert bench.heard() == [wire.OpenFailed("wire", 1, "no answer from wire")]
+    assert bench.heard() == [messages.OpenFailed("wire", 1, "no answer from wire")]
 
 
 async def test_transport_that_ignores_its_time_is_given_up(
     benches: list[Bench], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(line, "_GRACE_S", 0.0)  # of real time, and it is waited for in full
+    monkeypatch.setattr(
+        guarded_connection, "_GRACE_S", 0.0
+    )  # of real time, and it is waited for in full
     benches.append(bench := Bench(robot := CountedWire()))
 
     async def never(timeout_s: float) -> None:
         await asyncio.Event().wait()
 
     robot.open = never  # type: ignore[method-assign]
-    bench.tell(wire.Open("wire", 1, 0.01))
+    bench.tell(messages.OpenLine("wire", 1, 0.01))
     async with asyncio.timeout(5.0):
         while not bench.said:
             await settle()
-    assert bench.heard() == [wire.OpenFailed("wire", 1, "no answer from wire within 0.01 s")]
+    assert bench.heard() == [messages.OpenFailed("wire", 1, "no answer from wire within 0.01 s")]
 
 
 async def test_tries_of_a_rescue_overlap_and_those_of_the_engine_do_not(rig: Rig) -> None:
@@ -154,17 +156,17 @@ class Eager(Prompter):
 async def test_new_arrivals_wait_behind_unread_ones(benches: list[Bench]) -> None:
     """Neither between two reads, nor right after the engine has taken a rescued line over."""
     benches.append(bench := Bench(robot := Eager()))
-    bench.tell(wire.Owe("wire", "drive", TERMS))
+    bench.tell(messages.RecoverStop("wire", "drive", TERMS))
     robot.let_through(1)
     await bench.clock.advance(0.1)
     robot.arriving.put_nowait(b"first")
     robot.arriving.put_nowait(b"second")
     bench.heard()
-    bench.tell(wire.Open("wire", 1, 1.0))
+    bench.tell(messages.OpenLine("wire", 1, 1.0))
     robot.arrive()
     await settle()
     assert robot.taken[:2] == [False, False]
-    received = [said.data for said in bench.heard() if isinstance(said, wire.Received)]
+    received = [said.data for said in bench.heard() if isinstance(said, messages.BytesReceived)]
     assert received[:2] == [b"first", b"second"]
 
 
@@ -173,16 +175,16 @@ async def test_frames_may_be_refused_more_than_once(benches: list[Bench]) -> Non
     benches.append(bench := Bench(CountedWire()))
     await bench.open()
     used, free = Count({}, {"n": 0}), Count({"n": 0}, {"n": 1})
-    bench.tell(wire.Send("wire", 1, 1, b"0 poll", used))
-    bench.tell(wire.Send("wire", 1, 2, b"0 ping", used))
-    bench.tell(wire.Send("wire", 1, 2, b"0 ping", used, 1))
-    bench.tell(wire.Send("wire", 1, 2, b"1 late", free, 1))
-    bench.tell(wire.Send("wire", 1, 2, b"1 ping", free, 2))
+    bench.tell(messages.SendBytes("wire", 1, 1, b"0 poll", used))
+    bench.tell(messages.SendBytes("wire", 1, 2, b"0 ping", used))
+    bench.tell(messages.SendBytes("wire", 1, 2, b"0 ping", used, 1))
+    bench.tell(messages.SendBytes("wire", 1, 2, b"1 late", free, 1))
+    bench.tell(messages.SendBytes("wire", 1, 2, b"1 ping", free, 2))
     assert bench.robot.written == [b"0 poll", b"1 ping"]
 
 
 async def test_next_frame_of_a_lane_has_its_own_time() -> None:
-    lane = Lane[int](robot := GatedWire(), clock := FakeClock(), lambda tag, fault: None)
+    lane = SendQueue[int](robot := GatedWire(), clock := FakeClock(), lambda tag, fault: None)
     lane.put(lambda: b"first", 1)
     lane.put(lambda: b"second", 2)
     assert lane.busy_since_s == clock.now()

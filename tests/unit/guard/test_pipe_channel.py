@@ -8,19 +8,19 @@ from collections.abc import AsyncIterator, Callable
 import pytest
 
 from tests.unit.guard.lines import HELD, STOP, TERMS, CountedWire
-from urc.guard import pipe_channel, wire
-from urc.guard.channel import LineSpec
+from urc.guard import messages, pipe_channel
+from urc.guard.channel import GuardedLineSpec
 from urc.guard.guard_client import GuardClient
 from urc.guard.pipe import Pipe
 from urc.guard.pipe_channel import PipeChannel
-from urc.guard.process import CAN_INHERIT, Door, Standing
+from urc.guard.process import CAN_INHERIT, GuardAcceptor, ProcessState
 from urc.testing.clock import settle
 from urc.transports.base import ConnectFailed, PeerClosed
 
 pytestmark = pytest.mark.anyio
 
 BOUND_S = 10.0
-MAKE = wire.Make("wire", "urc.transports.tcp:from_setup", {}, [], "", 0.22, False)
+MAKE = messages.MakeTransport("wire", "urc.transports.tcp:from_setup", {}, [], "", 0.22, False)
 TURN = TERMS._replace(stop=b"halt")
 
 
@@ -29,20 +29,20 @@ class Process:
 
     def __init__(self, number: int, line: socket.socket) -> None:
         self.pid = number
-        self.heard: list[wire.ToGuard] = []
+        self.heard: list[messages.ToGuard] = []
         self.is_killed = self.is_over = False
         self.is_stubborn = False
         self._changed = asyncio.Event()
         self.pipe = Pipe(
             line,
-            wire.encoder(),
-            wire.decoder_of_guard(),
+            messages.encoder(),
+            messages.decoder_of_guard(),
             take=self._take,
             settle=lambda: None,
             gone=self._gone,
         )
 
-    def _take(self, said: wire.ToGuard) -> None:
+    def _take(self, said: messages.ToGuard) -> None:
         self.heard.append(said)
         self._changed.set()
 
@@ -61,7 +61,7 @@ class Process:
         self.is_killed = True
         self.die()
 
-    async def hears(self, count: int) -> list[wire.ToGuard]:
+    async def hears(self, count: int) -> list[messages.ToGuard]:
         """Return all that it was told, once that is `count` things."""
         async with asyncio.timeout(BOUND_S):
             while len(self.heard) < count:
@@ -77,7 +77,7 @@ class House:
         self.started: list[Process] = []
         self.fault: OSError | None = None
         self._news = asyncio.Event()
-        self.guard = GuardClient([LineSpec(MAKE, CountedWire())], HELD, PipeChannel)
+        self.guard = GuardClient([GuardedLineSpec(MAKE, CountedWire())], HELD, PipeChannel)
         self.is_inherited = CAN_INHERIT
 
     def launch(self, *, is_inherited: bool) -> tuple[Process, socket.socket]:
@@ -111,8 +111,8 @@ class House:
         """Open the line, which the guard says it has done."""
         opening = asyncio.ensure_future(self.guard.transports["wire"].open(BOUND_S))
         process = self.started[-1]
-        await self.until(lambda: any(isinstance(one, wire.Open) for one in process.heard))
-        process.pipe.post(wire.Opened("wire", 1, "robot:1", {}))
+        await self.until(lambda: any(isinstance(one, messages.OpenLine) for one in process.heard))
+        process.pipe.post(messages.LineOpened("wire", 1, "robot:1", {}))
         await opening
 
 
@@ -134,7 +134,7 @@ async def test_guard_is_told_what_there_is(house: House) -> None:
     house.guard.arm("drive", TERMS)
     process = house.begin()
     assert house.channel.pid == process.pid
-    assert await process.hears(2) == [MAKE, wire.Arm("wire", "drive", TERMS)]
+    assert await process.hears(2) == [MAKE, messages.ArmControl("wire", "drive", TERMS)]
 
 
 async def test_guard_is_told_what_controls_do(house: House) -> None:
@@ -147,16 +147,16 @@ async def test_guard_is_told_what_controls_do(house: House) -> None:
     house.guard.release("drive")
     house.guard.stop({"drive": STOP})
     _, armed, first, second, *rest = await process.hears(7)
-    assert armed == wire.Arm("wire", "drive", TERMS)
-    assert isinstance(first, wire.Tick)
-    assert isinstance(second, wire.Tick)
+    assert armed == messages.ArmControl("wire", "drive", TERMS)
+    assert isinstance(first, messages.RenewLease)
+    assert isinstance(second, messages.RenewLease)
     assert (first.control, first.number, first.data) == ("drive", 1, b"go 1")
     assert (second.number, second.data) == (2, b"go 2")
     assert first.at_s <= second.at_s
     assert rest == [
-        wire.Renew("drive", b"stop 2"),
-        wire.Release("drive"),
-        wire.Stop([("wire", "drive", TERMS)]),
+        messages.ReplaceStop("drive", b"stop 2"),
+        messages.ReleaseControl("drive"),
+        messages.StopMotion([("wire", "drive", TERMS)]),
     ]
 
 
@@ -177,14 +177,14 @@ async def test_stop_goes_before_what_waits_and_no_old_tick_after_it(house: House
     house.guard.renew("turn", b"halt 2")
     house.guard.release("lift")
     house.guard.stop({"drive": STOP})
-    await house.until(lambda: any(isinstance(one, wire.Renew) for one in process.heard))
-    told = [one for one in process.heard[known:] if not isinstance(one, wire.Send)]
+    await house.until(lambda: any(isinstance(one, messages.ReplaceStop) for one in process.heard))
+    told = [one for one in process.heard[known:] if not isinstance(one, messages.SendBytes)]
     stop, release, tick, renewed = told
-    assert stop == wire.Stop([("wire", "drive", TERMS)])
-    assert release == wire.Release("lift")
-    assert isinstance(tick, wire.Tick)
+    assert stop == messages.StopMotion([("wire", "drive", TERMS)])
+    assert release == messages.ReleaseControl("lift")
+    assert isinstance(tick, messages.RenewLease)
     assert (tick.control, tick.number, tick.data) == ("turn", 3, b"turn 2")
-    assert renewed == wire.Renew("turn", b"halt 2")
+    assert renewed == messages.ReplaceStop("turn", b"halt 2")
 
 
 async def test_next_guard_is_told_what_may_move(house: House) -> None:
@@ -195,8 +195,8 @@ async def test_next_guard_is_told_what_may_move(house: House) -> None:
         house.guard.arm(control, terms)
         if control != "turn":
             house.guard.tick(control, b"go")
-    first.pipe.post(wire.Stopped("lift", "released", 1))
-    first.pipe.post(wire.Stopped("aim", "expired", 1))
+    first.pipe.post(messages.StopWritten("lift", "released", 1))
+    first.pipe.post(messages.StopWritten("aim", "expired", 1))
     async with asyncio.timeout(BOUND_S):
         stops: list[tuple[str, str]] = []
         while len(stops) < 2:
@@ -207,16 +207,16 @@ async def test_next_guard_is_told_what_may_move(house: House) -> None:
     assert house.channel.pid == second.pid
     assert await second.hears(4) == [
         MAKE,
-        wire.Owe("wire", "drive", TERMS),
-        wire.Arm("wire", "turn", TURN),
-        wire.Arm("wire", "lift", TERMS),
+        messages.RecoverStop("wire", "drive", TERMS),
+        messages.ArmControl("wire", "turn", TURN),
+        messages.ArmControl("wire", "lift", TERMS),
     ]
     with pytest.raises(PeerClosed, match="the guard of this line ended; another one is starting"):
         await house.guard.transports["wire"].receive()
     house.guard.arm("drive", TERMS)
     house.guard.tick("drive", b"go on")
     tick = (await second.hears(6))[-1]
-    assert isinstance(tick, wire.Tick)
+    assert isinstance(tick, messages.RenewLease)
     assert tick.number == 1, "the new guard counts from the beginning"
 
 
@@ -226,11 +226,14 @@ async def test_stop_of_an_older_tick_leaves_a_control_in_doubt(house: House) -> 
     house.guard.arm("drive", TERMS)
     house.guard.tick("drive", b"go 1")
     house.guard.tick("drive", b"go 2")
-    first.pipe.post(wire.Stopped("drive", "released", 1))
+    first.pipe.post(messages.StopWritten("drive", "released", 1))
     async with asyncio.timeout(BOUND_S):
         await house.guard.stops()
     first.die()
-    assert await (await house.nth(2)).hears(2) == [MAKE, wire.Owe("wire", "drive", TERMS)]
+    assert await (await house.nth(2)).hears(2) == [
+        MAKE,
+        messages.RecoverStop("wire", "drive", TERMS),
+    ]
 
 
 async def test_guard_that_died_is_killed_for_good(house: House) -> None:
@@ -257,8 +260,8 @@ async def test_guards_that_end_at_once_are_started_at_a_pace(
     assert len(house.started) == 3
     opening = asyncio.ensure_future(house.guard.transports["wire"].open(BOUND_S))
     fourth = await house.nth(4)
-    assert await fourth.hears(2) == [MAKE, wire.Open("wire", 1, BOUND_S)]
-    fourth.pipe.post(wire.OpenFailed("wire", 1, "no robot"))
+    assert await fourth.hears(2) == [MAKE, messages.OpenLine("wire", 1, BOUND_S)]
+    fourth.pipe.post(messages.OpenFailed("wire", 1, "no robot"))
     with pytest.raises(ConnectFailed, match="no robot"):
         await opening
     assert [one.levelno for one in caplog.records] == [logging.ERROR] * 3
@@ -273,9 +276,9 @@ async def test_guard_that_opened_a_line_was_started_well(house: House) -> None:
         await house.nth(count + 1)
     opening = asyncio.ensure_future(house.guard.transports["wire"].open(BOUND_S))
     await house.started[-1].hears(2)
-    house.started[-1].pipe.post(wire.Opened("wire", 1, "robot:1", {}))
+    house.started[-1].pipe.post(messages.LineOpened("wire", 1, "robot:1", {}))
     await opening
-    house.started[-1].pipe.post(wire.Received("wire", 1, b"hello"))
+    house.started[-1].pipe.post(messages.BytesReceived("wire", 1, b"hello"))
     assert await house.guard.transports["wire"].receive() == b"hello"
     for _ in range(3):
         count = len(house.started)
@@ -298,7 +301,7 @@ async def test_guard_that_cannot_be_started_is_tried_again(
     house.fault = None
     first = await house.nth(1)
     assert await first.hears(2) == [
-        MAKE, wire.Owe("wire", "drive", TERMS._replace(stop=b"later")),
+        MAKE, messages.RecoverStop("wire", "drive", TERMS._replace(stop=b"later")),
     ]  # fmt: skip
 
 
@@ -306,10 +309,10 @@ async def test_what_a_line_brings_is_counted_as_on_the_other_side(house: House) 
     """The guard waits for that before it reads on."""
     process = house.begin()
     await house.open()
-    sizes = [process.pipe.post(wire.Received("wire", 1, b"y" * 9000)) for _ in range(2)]
+    sizes = [process.pipe.post(messages.BytesReceived("wire", 1, b"y" * 9000)) for _ in range(2)]
     for _ in sizes:
         assert await house.guard.transports["wire"].receive() == b"y" * 9000
-    assert (await process.hears(3))[-1] == wire.Credit("wire", 1, sum(sizes))
+    assert (await process.hears(3))[-1] == messages.FlowCredit("wire", 1, sum(sizes))
 
 
 async def test_end_lets_the_guard_stop_what_moves(house: House) -> None:
@@ -364,7 +367,7 @@ async def test_deaf_guard_is_killed(house: House, monkeypatch: pytest.MonkeyPatc
     assert process.is_killed
 
 
-class StubDoor(Door):
+class StubDoor(GuardAcceptor):
     """One to which a guard comes when it is told to, or never."""
 
     def __init__(self) -> None:
@@ -383,7 +386,7 @@ async def test_guard_comes_to_its_door(house: House, monkeypatch: pytest.MonkeyP
     doors: list[StubDoor] = []
     lines: list[socket.socket] = []
 
-    def launch(*, is_inherited: bool) -> tuple[Process, Door]:
+    def launch(*, is_inherited: bool) -> tuple[Process, GuardAcceptor]:
         process, line = house.launch(is_inherited=is_inherited)
         lines.append(line)
         doors.append(StubDoor())
@@ -399,8 +402,8 @@ async def test_guard_comes_to_its_door(house: House, monkeypatch: pytest.MonkeyP
     await asyncio.sleep(0)
     assert not opening.done()
     doors[1].coming.set_result(lines[1])
-    assert await second.hears(2) == [MAKE, wire.Open("wire", 1, BOUND_S)]
-    second.pipe.post(wire.Opened("wire", 1, "robot:1", {}))
+    assert await second.hears(2) == [MAKE, messages.OpenLine("wire", 1, BOUND_S)]
+    second.pipe.post(messages.LineOpened("wire", 1, "robot:1", {}))
     await opening
     assert first.heard == []
     lines[0].close()
@@ -460,10 +463,10 @@ async def test_guard_that_falls_silent_is_replaced(
 ) -> None:
     """It is looked at again and again, as long as it lives."""
     monkeypatch.setattr(pipe_channel, "_LOOK_S", 0.02)
-    monkeypatch.setattr(pipe_channel, "standing", lambda pid: Standing())
+    monkeypatch.setattr(pipe_channel, "standing", lambda pid: ProcessState())
     monkeypatch.setattr(pipe_channel, "_START_LOOKS", 3)
     first = house.begin()
-    first.pipe.post(wire.Beat(0.0))
+    first.pipe.post(messages.Heartbeat(0.0))
     second = await house.nth(2)
     assert first.is_killed
     await house.nth(3)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from urc.guard import process
-from urc.guard.process import TOKEN_BYTES, Door, launch, reap
+from urc.guard.process import TOKEN_BYTES, GuardAcceptor, launch, reap
 
 pytestmark = [
     pytest.mark.anyio,
@@ -69,7 +69,7 @@ def test_guard_inherits_its_end_of_the_pipe(started: Started) -> None:
 def test_guard_is_told_the_word_where_nobody_can_read_it(started: Started) -> None:
     child, door = launch(is_inherited=False)
     assert child is started  # type: ignore[comparison-overlap]
-    assert isinstance(door, Door)
+    assert isinstance(door, GuardAcceptor)
     place = f"door:{door.port}"
     assert started.command == [sys.executable, "-P", "-m", "urc.guard", place]
     assert started.options["stdin"] == subprocess.PIPE
@@ -88,7 +88,7 @@ def test_guard_that_cannot_be_started_leaves_nothing_open(
 
 
 async def test_door_lets_the_guard_in_and_nobody_after_it() -> None:
-    door = Door()
+    door = GuardAcceptor()
     admitted = asyncio.ensure_future(door.admitted())
     with socket.create_connection(("127.0.0.1", door.port)) as guard:
         guard.sendall(door.token[:7])
@@ -105,7 +105,7 @@ async def test_door_lets_the_guard_in_and_nobody_after_it() -> None:
 
 
 def test_doors_of_two_robots_are_apart() -> None:
-    first, second = Door(), Door()
+    first, second = GuardAcceptor(), GuardAcceptor()
     assert first.port != second.port
     assert first.token != second.token
     for door in (first, second):
@@ -114,7 +114,7 @@ def test_doors_of_two_robots_are_apart() -> None:
 
 @pytest.mark.parametrize("word", [b"", b"guess", b"0" * TOKEN_BYTES, b"0" * (TOKEN_BYTES + 9)])
 async def test_door_turns_a_stranger_away(word: bytes) -> None:
-    door = Door()
+    door = GuardAcceptor()
     admitted = asyncio.ensure_future(door.admitted())
     with socket.create_connection(("127.0.0.1", door.port)) as stranger:
         stranger.sendall(word)
@@ -137,7 +137,7 @@ async def test_stranger_who_says_nothing_keeps_the_guard_out_for_a_moment_only(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(process, "_SAY_S", 0.01)
-    door = Door()
+    door = GuardAcceptor()
     admitted = asyncio.ensure_future(door.admitted())
     with (
         socket.create_connection(("127.0.0.1", door.port)),
@@ -152,7 +152,7 @@ async def test_stranger_who_says_nothing_keeps_the_guard_out_for_a_moment_only(
 
 async def test_door_is_closed_when_nobody_comes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process, "_ADMIT_S", 0.01)
-    door = Door()
+    door = GuardAcceptor()
     with pytest.raises(TimeoutError):
         await door.admitted()
     assert door._listener.fileno() == -1

@@ -4,10 +4,10 @@ import asyncio
 
 import pytest
 
-from urc.guard import wire
-from urc.guard.line import WINDOW_BYTES
+from urc.guard import messages
+from urc.guard.guarded_connection import WINDOW_BYTES
 from urc.guard.proxy import GuardedTransport
-from urc.model.codec import Count, Counted, Envelope, Numbered, Payload
+from urc.model.payload import Count, CountedFrame, Envelope, Numbered, Payload
 from urc.testing.clock import settle
 from urc.transports.base import ConnectFailed, PeerClosed, Prompt, TransportError
 
@@ -18,23 +18,23 @@ class Guard:
     """Answers as it is told."""
 
     def __init__(self, *, is_there: bool = True) -> None:
-        self.said: list[wire.ToGuard] = []
+        self.said: list[messages.ToGuard] = []
         self.is_there = is_there
         self.answers = True
         self.line = GuardedTransport(
             "wire", "tcp robot:1", self.post, self.ready, lambda line, stand, is_settled: None
         )
 
-    def post(self, said: wire.ToGuard) -> None:
+    def post(self, said: messages.ToGuard) -> None:
         self.said.append(said)
         if not self.answers:
             return
-        if isinstance(said, wire.Open):
-            self.tell(wire.Opened("wire", said.turn, "tcp robot:2", {}))
-        elif isinstance(said, wire.Close):
-            self.tell(wire.Closed("wire", said.turn))
+        if isinstance(said, messages.OpenLine):
+            self.tell(messages.LineOpened("wire", said.turn, "tcp robot:2", {}))
+        elif isinstance(said, messages.CloseLine):
+            self.tell(messages.LineClosed("wire", said.turn))
 
-    def tell(self, said: wire.FromGuard, size: int = 0) -> None:
+    def tell(self, said: messages.FromGuard, size: int = 0) -> None:
         self.line.take(said, size)
 
     async def ready(self) -> None:
@@ -42,7 +42,7 @@ class Guard:
             await asyncio.Event().wait()
 
     def credits(self) -> list[int]:
-        return [said.amount for said in self.said if isinstance(said, wire.Credit)]
+        return [said.amount for said in self.said if isinstance(said, messages.FlowCredit)]
 
 
 async def test_opening_tells_where_it_leads() -> None:
@@ -58,7 +58,7 @@ async def test_refusal_is_told_in_the_robots_words() -> None:
     opening = asyncio.ensure_future(guard.line.open(1.0))
     await asyncio.sleep(0)
     await asyncio.sleep(0)
-    guard.tell(wire.OpenFailed("wire", 1, "nothing listens on robot:1"))
+    guard.tell(messages.OpenFailed("wire", 1, "nothing listens on robot:1"))
     with pytest.raises(ConnectFailed, match="nothing listens on robot:1"):
         await opening
 
@@ -75,17 +75,17 @@ async def test_old_connections_say_nothing() -> None:
     await guard.line.open(1.0)
     await guard.line.close()
     await guard.line.open(1.0)
-    guard.tell(wire.Received("wire", 1, b"old"), 3)
-    guard.tell(wire.Lost("wire", 1, "old"))
-    guard.tell(wire.Received("wire", 2, b"new"), 3)
+    guard.tell(messages.BytesReceived("wire", 1, b"old"), 3)
+    guard.tell(messages.LineLost("wire", 1, "old"))
+    guard.tell(messages.BytesReceived("wire", 2, b"new"), 3)
     assert await guard.line.receive() == b"new"
 
 
 async def test_what_came_before_the_end_is_still_given() -> None:
     guard = Guard()
     await guard.line.open(1.0)
-    guard.tell(wire.Received("wire", 1, b"last words"), 10)
-    guard.tell(wire.Lost("wire", 1, "the robot closed the connection"))
+    guard.tell(messages.BytesReceived("wire", 1, b"last words"), 10)
+    guard.tell(messages.LineLost("wire", 1, "the robot closed the connection"))
     assert await guard.line.receive() == b"last words"
     with pytest.raises(PeerClosed, match="the robot closed the connection"):
         await guard.line.receive()
@@ -98,8 +98,8 @@ async def test_guard_is_told_what_was_taken() -> None:
     guard = Guard()
     await guard.line.open(1.0)
     size = WINDOW_BYTES // 8
-    guard.tell(wire.Received("wire", 1, b"a"), size)
-    guard.tell(wire.Received("wire", 1, b"b"), size)
+    guard.tell(messages.BytesReceived("wire", 1, b"a"), size)
+    guard.tell(messages.BytesReceived("wire", 1, b"b"), size)
     assert guard.credits() == []
     await guard.line.receive()
     assert guard.credits() == []
@@ -117,7 +117,7 @@ async def test_what_the_sink_takes_is_told_too() -> None:
         return True
 
     guard.line.divert(sink)
-    guard.tell(wire.Received("wire", 1, b"a"), WINDOW_BYTES)
+    guard.tell(messages.BytesReceived("wire", 1, b"a"), WINDOW_BYTES)
     assert seen == [b"a"]
     assert guard.credits() == [WINDOW_BYTES]
 
@@ -128,7 +128,7 @@ async def test_sending_waits_until_it_was_handed_over() -> None:
     sending = asyncio.ensure_future(guard.line.send(b"x"))
     await asyncio.sleep(0)
     assert not sending.done()
-    guard.tell(wire.Sent("wire", 1, 1))
+    guard.tell(messages.SendDone("wire", 1, 1))
     await sending
 
 
@@ -137,7 +137,7 @@ async def test_what_cannot_be_sent_is_told_to_the_sender() -> None:
     await guard.line.open(1.0)
     sending = asyncio.ensure_future(guard.line.send(b"x"))
     await asyncio.sleep(0)
-    guard.tell(wire.Refused("wire", 1, 1, "too many bytes for one datagram", False))
+    guard.tell(messages.SendRefused("wire", 1, 1, "too many bytes for one datagram", False))
     with pytest.raises(TransportError, match="too many bytes"):
         await sending
 
@@ -149,9 +149,9 @@ async def test_offers_have_an_end() -> None:
     taken = sum(guard.line.offer(b"x" * 1024) for _ in range(1000))
     assert 0 < taken < 100
     assert guard.line.is_clogged
-    guard.tell(wire.Sent("wire", 1, taken))
+    guard.tell(messages.SendDone("wire", 1, taken))
     assert guard.line.offer(b"x")
-    guard.tell(wire.Sent("wire", 1, taken + 1))
+    guard.tell(messages.SendDone("wire", 1, taken + 1))
     await guard.line.close()
 
 
@@ -188,14 +188,14 @@ async def test_line_is_closed_before_and_after() -> None:
         if is_used:
             await guard.line.open(1.0)
             assert guard.line.is_open
-            guard.tell(wire.Received("wire", 1, b"unread"), 3)
+            guard.tell(messages.BytesReceived("wire", 1, b"unread"), 3)
             await guard.line.close()
         assert not guard.line.is_open
         assert not guard.line.offer(b"x")
         for use in (guard.line.send(b"x"), guard.line.receive()):
             with pytest.raises(PeerClosed, match="the connection is closed"):
                 await use
-    assert guard.said == [wire.Open("wire", 1, 1.0), wire.Close("wire", 1)]
+    assert guard.said == [messages.OpenLine("wire", 1, 1.0), messages.CloseLine("wire", 1)]
 
 
 async def test_refused_opening_is_called_off_once() -> None:
@@ -204,15 +204,15 @@ async def test_refused_opening_is_called_off_once() -> None:
     guard.answers = False
     opening = asyncio.ensure_future(guard.line.open(1.0))
     await settle()
-    guard.tell(wire.Opened("wire", 7, "tcp robot:9", {}))
-    guard.tell(wire.OpenFailed("wire", 7, "of another turn"))
+    guard.tell(messages.LineOpened("wire", 7, "tcp robot:9", {}))
+    guard.tell(messages.OpenFailed("wire", 7, "of another turn"))
     await settle()
     assert not opening.done()
-    guard.tell(wire.OpenFailed("wire", 1, "nothing listens"))
+    guard.tell(messages.OpenFailed("wire", 1, "nothing listens"))
     with pytest.raises(ConnectFailed, match="nothing listens"):
         await opening
     await guard.line.close()
-    assert guard.said == [wire.Open("wire", 1, 1.0), wire.Close("wire", 1)]
+    assert guard.said == [messages.OpenLine("wire", 1, 1.0), messages.CloseLine("wire", 1)]
 
 
 async def test_guard_that_dies_while_a_line_is_opened_says_so() -> None:
@@ -231,7 +231,7 @@ async def test_sender_is_told_whether_the_line_is_closed(is_closed: bool) -> Non
     await guard.line.open(1.0)
     sending = asyncio.ensure_future(guard.line.send(b"x"))
     await settle()
-    guard.tell(wire.Refused("wire", 1, 1, "no", is_closed))
+    guard.tell(messages.SendRefused("wire", 1, 1, "no", is_closed))
     with pytest.raises(TransportError, match="no") as refused:
         await sending
     assert isinstance(refused.value, PeerClosed) is is_closed
@@ -245,7 +245,7 @@ async def test_what_nobody_waited_for_ends_the_line_when_it_is_refused() -> None
     sending = asyncio.ensure_future(guard.line.send(b"b"))
     await settle()
     assert guard.line.offer(b"c")
-    guard.tell(wire.Refused("wire", 1, 3, "no route", True))
+    guard.tell(messages.SendRefused("wire", 1, 3, "no route", True))
     await sending
     with pytest.raises(PeerClosed, match="no route"):
         await guard.line.receive()
@@ -259,10 +259,10 @@ async def test_senders_who_gave_up_do_not_hide_those_after_them() -> None:
     await settle()
     sends[0].cancel()
     await settle()
-    guard.tell(wire.Sent("wire", 1, 4))
+    guard.tell(messages.SendDone("wire", 1, 4))
     await settle()
     assert [one.done() for one in sends] == [True, True, True]
-    numbers = [(one.number, one.data) for one in guard.said if isinstance(one, wire.Send)]
+    numbers = [(one.number, one.data) for one in guard.said if isinstance(one, messages.SendBytes)]
     assert numbers == [(1, b"offered"), (2, b"\0"), (3, b"\1"), (4, b"\2")]
 
 
@@ -286,7 +286,7 @@ async def test_bounds_of_what_is_offered_are_exact() -> None:
         assert guard.line.is_clogged
         assert guard.line.offer(b"x" * (65536 - 4097))
         assert not guard.line.offer(b"x")
-        guard.tell(wire.Sent("wire", turn, 2))
+        guard.tell(messages.SendDone("wire", turn, 2))
         assert guard.line.offer(b"x" * 4096)
         assert not guard.line.offer(b"x")
 
@@ -295,10 +295,10 @@ async def test_what_was_taken_is_told_to_the_byte() -> None:
     guard = Guard()
     await guard.line.open(1.0)
     for _ in range(4):
-        guard.tell(wire.Received("wire", 1, b"a"), WINDOW_BYTES // 4)
+        guard.tell(messages.BytesReceived("wire", 1, b"a"), WINDOW_BYTES // 4)
         await guard.line.receive()
-    told = [one for one in guard.said if isinstance(one, wire.Credit)]
-    assert told == [wire.Credit("wire", 1, WINDOW_BYTES // 4)] * 4
+    told = [one for one in guard.said if isinstance(one, messages.FlowCredit)]
+    assert told == [messages.FlowCredit("wire", 1, WINDOW_BYTES // 4)] * 4
 
 
 async def test_frames_whose_numbers_were_used_up_are_sent_in_a_round_of_their_own() -> None:
@@ -309,14 +309,14 @@ async def test_frames_whose_numbers_were_used_up_are_sent_in_a_round_of_their_ow
     await guard.line.open(1.0)
     for number in (1, 2):
         assert guard.line.offer(b"a")
-        guard.tell(wire.Stale("wire", 1, number, {"n": number}))
-    rounds = [(one.number, one.round) for one in guard.said if isinstance(one, wire.Send)]
+        guard.tell(messages.SendStale("wire", 1, number, {"n": number}))
+    rounds = [(one.number, one.round) for one in guard.said if isinstance(one, messages.SendBytes)]
     assert rounds == [(1, 0), (1, 1), (2, 1), (2, 2)]
     assert stands == [("wire", {}, True), ("wire", {"n": 1}, True), ("wire", {"n": 2}, True)]
     await guard.line.open(1.0)
     guard.said.clear()
     assert guard.line.offer(b"b")
-    assert guard.said == [wire.Send("wire", 2, 1, b"b")]
+    assert guard.said == [messages.SendBytes("wire", 2, 1, b"b")]
 
 
 async def test_numbers_count_when_their_frame_has_left() -> None:
@@ -326,11 +326,11 @@ async def test_numbers_count_when_their_frame_has_left() -> None:
     gone: list[Payload] = []
     for number in (1, 2):
         count = Count({"n": number - 1}, {"n": number})
-        counted = Counted(Numbered(b"%d go" % number, count), lambda: None)
+        counted = CountedFrame(Numbered(b"%d go" % number, count), lambda: None)
         assert guard.line.offer_counted(counted, gone.append)
-    guard.tell(wire.Sent("wire", 1, 1))
+    guard.tell(messages.SendDone("wire", 1, 1))
     assert gone == [b"1 go"]
-    guard.tell(wire.Refused("wire", 1, 2, "no room", False))
+    guard.tell(messages.SendRefused("wire", 1, 2, "no room", False))
     assert gone == [b"1 go"]
 
 
@@ -342,20 +342,20 @@ async def test_frame_without_a_next_number_is_given_up() -> None:
     first = Numbered(b"1 go", Count({"n": 0}, {"n": 1}))
     again = Numbered(b"3 on", Count({"n": 2}, {"n": 3}))
     sending = asyncio.ensure_future(
-        guard.line.send_counted(Counted(first, lambda: None), gone.append)
+        guard.line.send_counted(CountedFrame(first, lambda: None), gone.append)
     )
     await settle()
-    assert guard.line.offer_counted(Counted(first, lambda: again), gone.append)
-    guard.tell(wire.Stale("wire", 1, 1, {"n": 2}))
-    guard.tell(wire.Sent("wire", 1, 2))
+    assert guard.line.offer_counted(CountedFrame(first, lambda: again), gone.append)
+    guard.tell(messages.SendStale("wire", 1, 1, {"n": 2}))
+    guard.tell(messages.SendDone("wire", 1, 2))
     await sending
     assert gone == [b"3 on"]
 
 
-def counted(number: int) -> Counted:
+def counted(number: int) -> CountedFrame:
     """Return a frame that is made in vain again."""
     count = Count({"n": number - 1}, {"n": number})
-    return Counted(Numbered(b"%d go" % number, count), lambda: None)
+    return CountedFrame(Numbered(b"%d go" % number, count), lambda: None)
 
 
 async def test_frame_with_a_counter_is_taken_while_there_is_room() -> None:
@@ -377,7 +377,7 @@ async def test_sender_of_a_frame_with_a_counter_is_told_what_has_left() -> None:
     await guard.line.open(1.0)
     sending = asyncio.ensure_future(guard.line.send_counted(counted(1), gone.append))
     await settle()
-    guard.tell(wire.Sent("wire", 1, 1))
+    guard.tell(messages.SendDone("wire", 1, 1))
     await sending
     assert gone == [b"1 go"]
 
@@ -389,11 +389,11 @@ async def test_counters_are_settled_when_all_their_frames_have_left() -> None:
     stands: list[tuple[str, dict[str, int], bool]] = []
     guard.line._stands = lambda *told: stands.append(told)  # type: ignore[arg-type]
     assert guard.line.offer(b"poll")
-    guard.tell(wire.Counted("wire", 1, 0, {"n": 1}, []))
+    guard.tell(messages.CountersAdvanced("wire", 1, 0, {"n": 1}, []))
     for number in (2, 3):
         assert guard.line.offer_counted(counted(number), lambda data: None)
-    guard.tell(wire.Counted("wire", 1, 2, {"n": 2}, []))
-    guard.tell(wire.Counted("wire", 1, 3, {"n": 3}, []))
+    guard.tell(messages.CountersAdvanced("wire", 1, 2, {"n": 2}, []))
+    guard.tell(messages.CountersAdvanced("wire", 1, 3, {"n": 3}, []))
     assert stands == [("wire", {"n": 1}, True), ("wire", {"n": 2}, False), ("wire", {"n": 3}, True)]
 
 
@@ -406,7 +406,7 @@ async def test_line_is_closed_once() -> None:
     guard.said.clear()
     await guard.line.close()
     await guard.line.close()
-    assert guard.said == [wire.Close("wire", 1)]
+    assert guard.said == [messages.CloseLine("wire", 1)]
     with pytest.raises(PeerClosed, match="the connection is closed"):
         await sending
 
@@ -417,6 +417,6 @@ async def test_second_word_about_an_opening_changes_nothing() -> None:
     opening = asyncio.ensure_future(guard.line.open(1.0))
     await settle()
     for _ in range(2):
-        guard.tell(wire.Opened("wire", 1, "tcp robot:2", {}))
+        guard.tell(messages.LineOpened("wire", 1, "tcp robot:2", {}))
     await opening
     assert guard.line.is_open

@@ -6,9 +6,9 @@ from collections.abc import AsyncIterator
 import pytest
 
 from tests.unit.guard.lines import STOP, TERMS, Bench, CountedWire, GatedWire, Prompter, Wire
-from urc.guard import wire
-from urc.guard.line import WINDOW_BYTES
-from urc.model.codec import Envelope
+from urc.guard import messages
+from urc.guard.guarded_connection import WINDOW_BYTES
+from urc.model.payload import Envelope
 from urc.testing.clock import settle
 from urc.transports.base import PeerClosed, TransportError
 
@@ -34,16 +34,16 @@ async def bench(benches: list[Bench]) -> Bench:
     return benches[-1]
 
 
-def send(number: int, data: bytes | Envelope, turn: int = 1) -> wire.Send:
-    return wire.Send("wire", turn, number, data)
+def send(number: int, data: bytes | Envelope, turn: int = 1) -> messages.SendBytes:
+    return messages.SendBytes("wire", turn, number, data)
 
 
 async def test_what_is_taken_at_once_is_told_once(bench: Bench) -> None:
     """Of all that came together the newest number stands for the others."""
     bench.tell(send(1, b"a"), send(2, b"b"))
     assert bench.robot.written == [b"a", b"b"]
-    assert bench.heard() == [wire.Sent("wire", 1, 2)]
-    bench.tell(wire.Credit("wire", 1, 1))
+    assert bench.heard() == [messages.SendDone("wire", 1, 2)]
+    bench.tell(messages.FlowCredit("wire", 1, 1))
     assert bench.heard() == []
 
 
@@ -60,11 +60,11 @@ async def test_what_has_to_wait_is_told_when_it_is_out(bench: Bench) -> None:
     robot.let_through(2)
     await settle()
     assert robot.written == [b"a", b"b"]
-    assert bench.heard() == [wire.Sent("wire", 1, 1), wire.Sent("wire", 1, 2)]
+    assert bench.heard() == [messages.SendDone("wire", 1, 1), messages.SendDone("wire", 1, 2)]
     robot.let_through()
     await settle()
     assert robot.written == [b"a", b"b", HELLO]
-    assert bench.heard() == [wire.Sent("wire", 1, 3)]
+    assert bench.heard() == [messages.SendDone("wire", 1, 3)]
 
 
 async def test_clogged_line_is_waited_for(bench: Bench) -> None:
@@ -78,18 +78,18 @@ async def test_clogged_line_is_waited_for(bench: Bench) -> None:
     robot.let_through()
     await settle()
     assert robot.written == [b"a", b""]
-    assert bench.heard() == [wire.Sent("wire", 1, 1)]
+    assert bench.heard() == [messages.SendDone("wire", 1, 1)]
 
 
 async def test_stop_goes_before_what_waits_and_behind_what_moves(bench: Bench) -> None:
     robot = bench.robot
     assert isinstance(robot, Prompter)
-    bench.tell(wire.Arm("wire", "drive", TERMS))
+    bench.tell(messages.ArmControl("wire", "drive", TERMS))
     robot.is_prompt = False
     bench.tick(b"go 1")
     bench.tell(send(1, b"hello"))
     robot.is_prompt = True
-    bench.tell(wire.Release("drive"))
+    bench.tell(messages.ReleaseControl("drive"))
     bench.tell(send(2, b"again"))
     robot.let_through(9)
     await settle()
@@ -100,7 +100,7 @@ async def test_message_waits_behind_motion(bench: Bench) -> None:
     """An envelope is never offered as bytes are."""
     robot = bench.robot
     assert isinstance(robot, Prompter)
-    bench.tell(wire.Arm("wire", "drive", TERMS), send(1, HELLO))
+    bench.tell(messages.ArmControl("wire", "drive", TERMS), send(1, HELLO))
     bench.tick(b"go 1")
     assert robot.written == [b"go 1"]
     robot.let_through()
@@ -126,24 +126,24 @@ async def test_what_cannot_be_sent_is_told(benches: list[Bench]) -> None:
         await settle()
     strange = "the transport failed in an unexpected way (KeyError: 'bug')"
     assert bench.heard() == [
-        wire.Refused("wire", 1, 1, "too long", is_closed=False),
-        wire.Refused("wire", 1, 2, "gone", is_closed=True),
-        wire.Refused("wire", 1, 3, strange, is_closed=True),
+        messages.SendRefused("wire", 1, 1, "too long", is_closed=False),
+        messages.SendRefused("wire", 1, 2, "gone", is_closed=True),
+        messages.SendRefused("wire", 1, 3, strange, is_closed=True),
     ]
 
 
 async def test_earlier_connection_is_nobodys(bench: Bench) -> None:
-    bench.tell(wire.Close("wire", 1))
+    bench.tell(messages.CloseLine("wire", 1))
     await settle()
-    assert bench.heard() == [wire.Closed("wire", 1)]
+    assert bench.heard() == [messages.LineClosed("wire", 1)]
     bench.tell(send(1, b"late"))
     await bench.open(2)
     bench.tell(send(2, b"old", turn=1), send(1, b"new", turn=2))
     assert bench.robot.written == [b"new"]
-    assert bench.heard() == [wire.Sent("wire", 2, 1)]
-    bench.tell(wire.Close("wire", 1))
+    assert bench.heard() == [messages.SendDone("wire", 2, 1)]
+    bench.tell(messages.CloseLine("wire", 1))
     await settle()
-    assert bench.heard() == [wire.Closed("wire", 1)]
+    assert bench.heard() == [messages.LineClosed("wire", 1)]
     assert bench.robot.is_open
 
 
@@ -156,7 +156,7 @@ async def test_what_arrives_is_passed_on(bench: Bench) -> None:
     robot.arriving.put_nowait(b"in turn")
     await settle()
     assert bench.heard() == [
-        wire.Received("wire", 1, b"at once"), wire.Received("wire", 1, b"in turn"),
+        messages.BytesReceived("wire", 1, b"at once"), messages.BytesReceived("wire", 1, b"in turn"),
     ]  # fmt: skip
 
 
@@ -170,18 +170,18 @@ async def test_robot_is_not_read_while_the_engine_takes_nothing(bench: Bench) ->
     await settle()
     assert len(bench.heard()) == 1
     assert not robot.sink(b"z")
-    bench.tell(wire.Credit("wire", 2, 100), wire.Credit("wire", 0, 100))
+    bench.tell(messages.FlowCredit("wire", 2, 100), messages.FlowCredit("wire", 0, 100))
     await settle()
     assert bench.heard() == []
-    bench.tell(wire.Credit("wire", 1, 1))
+    bench.tell(messages.FlowCredit("wire", 1, 1))
     await settle()
-    assert bench.heard() == [wire.Received("wire", 1, b"y")]
+    assert bench.heard() == [messages.BytesReceived("wire", 1, b"y")]
     robot.arriving.put_nowait(b"z")
     await settle()
     assert bench.heard() == []
-    bench.tell(wire.Credit("wire", 1, 2))
+    bench.tell(messages.FlowCredit("wire", 1, 2))
     await settle()
-    assert bench.heard() == [wire.Received("wire", 1, b"z")]
+    assert bench.heard() == [messages.BytesReceived("wire", 1, b"z")]
 
 
 async def test_what_the_engine_may_be_behind_is_bounded_to_the_byte(bench: Bench) -> None:
@@ -196,18 +196,18 @@ async def test_what_the_engine_may_be_behind_is_bounded_to_the_byte(bench: Bench
     robot.arriving.put_nowait(b"later")
     await settle()
     assert len(bench.heard()) == 3, "it was waited for already"
-    bench.tell(wire.Credit("wire", 1, 5), wire.Credit("wire", 1, 2))
+    bench.tell(messages.FlowCredit("wire", 1, 5), messages.FlowCredit("wire", 1, 2))
     await settle()
     assert bench.heard() == []
-    bench.tell(wire.Credit("wire", 1, 1))
+    bench.tell(messages.FlowCredit("wire", 1, 1))
     await settle()
-    assert bench.heard() == [wire.Received("wire", 1, b"later")]
+    assert bench.heard() == [messages.BytesReceived("wire", 1, b"later")]
 
 
 async def test_end_of_a_line_is_told_in_the_robots_words(bench: Bench) -> None:
     bench.robot.cut("cable pulled")
     await settle()
-    assert bench.heard() == [wire.Lost("wire", 1, "cable pulled")]
+    assert bench.heard() == [messages.LineLost("wire", 1, "cable pulled")]
     assert not bench.robot.is_open
     await bench.open(2)
 
@@ -222,7 +222,10 @@ async def test_bug_of_a_transport_ends_its_line(
     bench.robot.arriving.put_nowait(b"last")
     await settle()
     strange = "the transport failed in an unexpected way (KeyError: 'bug')"
-    assert bench.heard() == [wire.Received("wire", 1, b"last"), wire.Lost("wire", 1, strange)]
+    assert bench.heard() == [
+        messages.BytesReceived("wire", 1, b"last"),
+        messages.LineLost("wire", 1, strange),
+    ]
 
 
 async def test_body_that_no_message_carries_ends_the_line(
@@ -230,9 +233,9 @@ async def test_body_that_no_message_carries_ends_the_line(
 ) -> None:
     benches.append(bench := Bench(Wire()))
 
-    def refuse(said: wire.FromGuard) -> int:
+    def refuse(said: messages.FromGuard) -> int:
         bench.said.append(said)
-        if isinstance(said, wire.Received):
+        if isinstance(said, messages.BytesReceived):
             raise TypeError("a set")
         return 0
 
@@ -241,7 +244,7 @@ async def test_body_that_no_message_carries_ends_the_line(
     bench.robot.arriving.put_nowait(b"strange")
     await settle()
     assert bench.heard()[1:] == [
-        wire.Lost("wire", 1, "what the robot sent cannot be passed on (a set)")
+        messages.LineLost("wire", 1, "what the robot sent cannot be passed on (a set)")
     ]
 
 
@@ -262,9 +265,9 @@ async def test_refusal_is_told(benches: list[Bench], fault: Exception | None, wo
             raise fault
 
         bench.robot.open = broken  # type: ignore[method-assign]
-    bench.tell(wire.Open("wire", 3, 1.0))
+    bench.tell(messages.OpenLine("wire", 3, 1.0))
     await settle()
-    assert bench.heard() == [wire.OpenFailed("wire", 3, words)]
+    assert bench.heard() == [messages.OpenFailed("wire", 3, words)]
 
 
 async def test_line_at_rest_is_closed_at_once(benches: list[Bench]) -> None:
@@ -272,13 +275,13 @@ async def test_line_at_rest_is_closed_at_once(benches: list[Bench]) -> None:
     for robot in (CountedWire(), Prompter(), Wire()):
         benches.append(bench := Bench(robot))
         await bench.drive()
-        bench.tell(wire.Release("drive"))
+        bench.tell(messages.ReleaseControl("drive"))
         await settle()
         assert robot.written == [b"go 1", STOP]
         bench.heard()
-        bench.tell(wire.Close("wire", 1))
+        bench.tell(messages.CloseLine("wire", 1))
         await settle()
-        assert bench.heard()[-1:] == [wire.Closed("wire", 1)], type(robot)
+        assert bench.heard()[-1:] == [messages.LineClosed("wire", 1)], type(robot)
         assert not robot.is_open
         assert robot.aborts == 0
 
@@ -289,10 +292,10 @@ async def test_closing_stops_at_once_and_repeats_it_where_it_may_be_lost(
     """Within the time of the repeats; a tick meanwhile moves nothing."""
     benches.append(bench := Bench(CountedWire()))
     await bench.drive(TERMS._replace(is_lossy=True))
-    bench.tell(wire.Arm("wire", "turn", TERMS._replace(stop=b"halt")))
-    bench.tell(wire.Close("wire", 1))
+    bench.tell(messages.ArmControl("wire", "turn", TERMS._replace(stop=b"halt")))
+    bench.tell(messages.CloseLine("wire", 1))
     assert bench.robot.written == [b"go 1", STOP]
-    assert bench.heard() == [wire.Stopped("drive", "revoked", 1)]
+    assert bench.heard() == [messages.StopWritten("drive", "revoked", 1)]
     for control in ("turn", "drive"):
         bench.tick(b"go on", control=control, number=2)
     await bench.clock.advance(0.3)

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from tests.unit.guard.lines import STOP, TERMS, CountedWire, Rig, ScatteredWire, SlowWire
-from urc.model.codec import Envelope, Payload
+from urc.model.payload import Envelope, Payload
 from urc.motion.stall import AFRESH_S, SHORTEST_CUT_S, STALLED_S, STOP_WITHIN_S
 from urc.testing.clock import settle
 from urc.transports.base import PeerClosed

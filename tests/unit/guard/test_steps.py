@@ -3,12 +3,12 @@
 import pytest
 
 from tests.unit.guard.lines import CountedWire, Rig, ScatteredWire
-from urc.motion.hold import Terms
+from urc.motion.hold_to_run import HoldTerms
 from urc.testing.clock import settle
 
 pytestmark = pytest.mark.anyio
 
-STEPS = Terms(b"", period_s=0.1, is_lossy=True)
+STEPS = HoldTerms(b"", period_s=0.1, is_lossy=True)
 
 
 async def driven(rigs: list[Rig], line: CountedWire | None = None) -> Rig:

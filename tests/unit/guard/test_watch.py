@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from urc.guard import pipe_channel, wire
+from urc.guard import messages, pipe_channel
 from urc.guard.guard_client import GuardClient
 from urc.guard.pipe_channel import PipeChannel
-from urc.guard.process import Standing, standing
+from urc.guard.process import ProcessState, standing
 
 
 class FakePipe:
@@ -49,17 +49,19 @@ class Watched(PipeChannel):
 
 
 @pytest.fixture
-def stands(monkeypatch: pytest.MonkeyPatch) -> list[Standing]:
+def stands(monkeypatch: pytest.MonkeyPatch) -> list[ProcessState]:
     """How the process stands: what was put here last."""
-    said = [Standing()]
-    monkeypatch.setattr(pipe_channel, "standing", lambda pid: said[-1] if pid == 0 else Standing())
+    said = [ProcessState()]
+    monkeypatch.setattr(
+        pipe_channel, "standing", lambda pid: said[-1] if pid == 0 else ProcessState()
+    )
     return said
 
 
 @pytest.mark.anyio
-async def test_one_that_is_silent_for_half_a_second_has_hung(stands: list[Standing]) -> None:
+async def test_one_that_is_silent_for_half_a_second_has_hung(stands: list[ProcessState]) -> None:
     """It sleeps, was stopped, or runs in a circle: whoever could speak does."""
-    for standing_ in (Standing(), Standing(wants_to_run=False, ran_s=7.0)):
+    for standing_ in (ProcessState(), ProcessState(wants_to_run=False, ran_s=7.0)):
         stands.append(standing_)
         guard = Watched()
         guard.looks(5)
@@ -68,15 +70,15 @@ async def test_one_that_is_silent_for_half_a_second_has_hung(stands: list[Standi
         assert guard.deaths == 1
     guard = Watched()
     for number in range(6):
-        stands.append(Standing(wants_to_run=True, ran_s=1.0 + number * 0.1))
+        stands.append(ProcessState(wants_to_run=True, ran_s=1.0 + number * 0.1))
         guard.looks(1)
     assert guard.deaths == 1, "it had all the time there was"
 
 
 @pytest.mark.anyio
-async def test_one_that_is_let_run_by_nobody_is_waited_for(stands: list[Standing]) -> None:
+async def test_one_that_is_let_run_by_nobody_is_waited_for(stands: list[ProcessState]) -> None:
     """Another one would get no more of the machine; but not for ever, and not after it spoke."""
-    stands.append(Standing(wants_to_run=True, ran_s=3.0))
+    stands.append(ProcessState(wants_to_run=True, ran_s=3.0))
     guard = Watched()
     guard.looks(20)
     assert guard.deaths == 0
@@ -86,26 +88,26 @@ async def test_one_that_is_let_run_by_nobody_is_waited_for(stands: list[Standing
 
 @pytest.mark.anyio
 async def test_one_that_runs_for_less_than_half_the_time_is_waited_for(
-    stands: list[Standing],
+    stands: list[ProcessState],
 ) -> None:
     guard = Watched()
     for number in range(10):
-        stands.append(Standing(wants_to_run=True, ran_s=number * 0.4 * pipe_channel._LOOK_S))
+        stands.append(ProcessState(wants_to_run=True, ran_s=number * 0.4 * pipe_channel._LOOK_S))
         guard.looks(1)
     assert guard.deaths == 0
 
 
 @pytest.mark.anyio
-async def test_one_that_speaks_now_and_then_is_alive(stands: list[Standing]) -> None:
+async def test_one_that_speaks_now_and_then_is_alive(stands: list[ProcessState]) -> None:
     guard = Watched()
     for _ in range(4):
         guard.looks(5)
-        guard._hear(wire.Beat(0.0))
+        guard._hear(messages.Heartbeat(0.0))
     assert guard.deaths == 0
 
 
 @pytest.mark.anyio
-async def test_one_that_starts_has_ten_seconds(stands: list[Standing]) -> None:
+async def test_one_that_starts_has_ten_seconds(stands: list[ProcessState]) -> None:
     """A busy machine may take long until Python runs."""
     guard = Watched()
     guard._was_heard = False
@@ -128,10 +130,10 @@ def test_a_process_tells_whether_it_would_run(tmp_path: Path) -> None:
             sleeper.kill()
     assert not stopped.wants_to_run
     assert stopped.ran_s > 0
-    assert standing(sleeper.pid) == Standing()
+    assert standing(sleeper.pid) == ProcessState()
     (tmp_path / "5").mkdir()
     (tmp_path / "5" / "stat").write_text("5 (a) S (b) R 1 2 3")
     (tmp_path / "5" / "schedstat").write_text("1500000000 2 3")
-    assert standing(5, tmp_path) == Standing(wants_to_run=True, ran_s=1.5)
+    assert standing(5, tmp_path) == ProcessState(wants_to_run=True, ran_s=1.5)
     (tmp_path / "5" / "stat").write_text("5 (gone) X 1 2 3")
     assert not standing(5, tmp_path).wants_to_run

@@ -5,28 +5,28 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
 from tests.effort import examples
-from urc.motion.lease import Changed, Client, Lease, LeaseState, Refused, Role
+from urc.motion.lease import Lease, LeaseChanged, LeaseRefused, LeaseState, Operator, Role
 
-ANNA = Client("a", "Anna")
-BERT = Client("b", "Bert")
-CARL = Client("c", "Carl", role="engineer")
-EVE = Client("e", "Eve", role="viewer")
+ANNA = Operator("a", "Anna")
+BERT = Operator("b", "Bert")
+CARL = Operator("c", "Carl", role="engineer")
+EVE = Operator("e", "Eve", role="viewer")
 
 
 def test_whoever_comes_first_drives_and_the_others_are_told_who() -> None:
     lease = Lease()
     taken = lease.take(ANNA, 0.0)
-    assert isinstance(taken, Changed)
+    assert isinstance(taken, LeaseChanged)
     assert taken.must_stop
-    assert lease.take(BERT, 0.0) == Refused("Anna has the controls")
+    assert lease.take(BERT, 0.0) == LeaseRefused("Anna has the controls")
     assert lease.refusal("a", taken.state.epoch) == ""
     assert lease.refusal("b", taken.state.epoch) == "Anna has the controls"
 
 
 def test_a_driver_without_a_name_is_somebody() -> None:
     lease = Lease()
-    lease.take(Client("a"), 0.0)
-    assert lease.take(BERT, 1.0) == Refused("somebody else has the controls")
+    lease.take(Operator("a"), 0.0)
+    assert lease.take(BERT, 1.0) == LeaseRefused("somebody else has the controls")
 
 
 def test_an_input_of_an_earlier_lease_is_refused() -> None:
@@ -56,7 +56,7 @@ def test_the_holder_may_keep_the_controls() -> None:
     lease.ask(BERT, 1.0)
     lease.touch(1.0)
     kept = lease.answer("a", 2.0, is_granted=False)
-    assert isinstance(kept, Changed)
+    assert isinstance(kept, LeaseChanged)
     assert not kept.must_stop
     assert lease.expire(11.0) is None
     assert lease.state.holder == ANNA
@@ -67,8 +67,8 @@ def test_a_request_that_was_declined_leaves_no_trace() -> None:
     lease.take(ANNA, 0.0)
     before = lease.state
     asked = before._replace(asked_by=BERT, asked_until=11.0)
-    assert lease.ask(BERT, 1.0) == Changed(asked, must_stop=False)
-    assert lease.answer("a", 2.0, is_granted=False) == Changed(before, must_stop=False)
+    assert lease.ask(BERT, 1.0) == LeaseChanged(asked, must_stop=False)
+    assert lease.answer("a", 2.0, is_granted=False) == LeaseChanged(before, must_stop=False)
 
 
 def test_only_the_holder_answers_a_request() -> None:
@@ -79,21 +79,21 @@ def test_only_the_holder_answers_a_request() -> None:
     for who in ("b", "c"):
         for is_granted in (True, False):
             answered = lease.answer(who, 2.0, is_granted=is_granted)
-            assert answered == Refused("nobody asks you for the controls")
+            assert answered == LeaseRefused("nobody asks you for the controls")
     assert (lease.state.holder, lease.state.asked_by) == (ANNA, BERT)
     lease.answer("a", 2.0, is_granted=False)
     late = lease.answer("a", 3.0, is_granted=True)
-    assert late == Refused("nobody asks you for the controls")
+    assert late == LeaseRefused("nobody asks you for the controls")
 
 
 def test_one_asks_at_a_time_and_may_ask_again() -> None:
     lease = Lease()
     lease.take(ANNA, 0.0)
     lease.ask(BERT, 1.0)
-    assert lease.ask(CARL, 2.0) == Refused("Bert asks for the controls already")
-    assert lease.ask(EVE, 2.0) == Refused("viewers cannot drive")
+    assert lease.ask(CARL, 2.0) == LeaseRefused("Bert asks for the controls already")
+    assert lease.ask(EVE, 2.0) == LeaseRefused("viewers cannot drive")
     again = lease.ask(BERT, 3.0)
-    assert isinstance(again, Changed)
+    assert isinstance(again, LeaseChanged)
     assert (again.state.asked_by, again.state.asked_until) == (BERT, 13.0)
 
 
@@ -108,30 +108,30 @@ def test_a_request_lasts_3_to_60_seconds() -> None:
 def test_only_an_engineer_takes_the_controls_by_force() -> None:
     lease = Lease()
     lease.take(ANNA, 0.0)
-    assert isinstance(lease.force(BERT, 1.0), Refused)
+    assert isinstance(lease.force(BERT, 1.0), LeaseRefused)
     taken = lease.force(CARL, 1.0)
-    assert isinstance(taken, Changed)
+    assert isinstance(taken, LeaseChanged)
     assert taken.must_stop
     assert taken.state.holder == CARL
 
 
 def test_a_viewer_stops_the_robot_and_cannot_drive_or_reset_it() -> None:
     lease = Lease()
-    assert isinstance(lease.take(EVE, 0.0), Refused)
+    assert isinstance(lease.take(EVE, 0.0), LeaseRefused)
     assert lease.stop(EVE.name).must_stop
-    assert isinstance(lease.reset(EVE), Refused)
+    assert isinstance(lease.reset(EVE), LeaseRefused)
 
 
 def test_stop_latches_until_somebody_resets_it_on_purpose() -> None:
     lease = Lease()
     lease.take(ANNA, 0.0)
     lease.stop("Eve")
-    assert lease.take(ANNA, 1.0) == Refused("stopped by Eve: reset it first")
-    assert lease.force(CARL, 1.0) == Refused("stopped by Eve: reset it first")
+    assert lease.take(ANNA, 1.0) == LeaseRefused("stopped by Eve: reset it first")
+    assert lease.force(CARL, 1.0) == LeaseRefused("stopped by Eve: reset it first")
     reset = lease.reset(ANNA)
-    assert isinstance(reset, Changed)
+    assert isinstance(reset, LeaseChanged)
     assert reset.state.holder is None
-    assert isinstance(lease.take(ANNA, 2.0), Changed)
+    assert isinstance(lease.take(ANNA, 2.0), LeaseChanged)
 
 
 def test_a_stop_stays_that_of_the_first_who_pressed_it() -> None:
@@ -188,7 +188,7 @@ def test_a_request_goes_with_the_client_that_made_it() -> None:
     lease.ask(BERT, 1.0)
     assert lease.leave("c") is None
     assert lease.state.asked_by == BERT
-    assert lease.leave("b") == Changed(before, must_stop=False)
+    assert lease.leave("b") == LeaseChanged(before, must_stop=False)
     assert lease.state == before
 
 
@@ -202,16 +202,16 @@ def test_returned_controls_are_free() -> None:
     lease = Lease()
     lease.take(ANNA, 0.0)
     left = lease.leave("a")
-    assert left == Changed(LeaseState(lease.state.epoch), must_stop=True)
+    assert left == LeaseChanged(LeaseState(lease.state.epoch), must_stop=True)
 
 
 def test_only_a_stop_can_be_reset_and_a_reset_stops_nothing() -> None:
     lease = Lease()
     assert lease.latched == ""
-    assert lease.reset(ANNA) == Refused("nothing is stopped")
+    assert lease.reset(ANNA) == LeaseRefused("nothing is stopped")
     lease.stop("Eve")
     assert lease.latched == "stopped by Eve: reset it first"
-    assert lease.reset(ANNA) == Changed(lease.state, must_stop=False)
+    assert lease.reset(ANNA) == LeaseChanged(lease.state, must_stop=False)
     assert lease.latched == ""
 
 
@@ -232,8 +232,8 @@ class ThreeClients(RuleBasedStateMachine):
         self.on_wire: tuple[str, int] | None = None
         """Whose motion the robot obeys, as of the last change that began with a stop."""
 
-    def note(self, outcome: Changed | Refused | None) -> None:
-        if not isinstance(outcome, Changed):
+    def note(self, outcome: LeaseChanged | LeaseRefused | None) -> None:
+        if not isinstance(outcome, LeaseChanged):
             return
         holder = outcome.state.holder
         now = None if holder is None else (holder.id, outcome.state.epoch)
@@ -245,7 +245,7 @@ class ThreeClients(RuleBasedStateMachine):
           verb=st.sampled_from(["take", "ask", "force", "leave", "stop", "reset", "yes", "no",
                                 "wait", "touch", "restart"]))  # fmt: skip
     def step(self, who: int, role: Role, wait: float, verb: str) -> None:
-        client, lease = Client(f"c{who}", f"C{who}", role), self.lease
+        client, lease = Operator(f"c{who}", f"C{who}", role), self.lease
         self.now += wait
         match verb:
             case "take":

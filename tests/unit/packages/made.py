@@ -7,15 +7,15 @@ from typing import Any
 import msgspec
 
 from urc.packages.archive import PACKAGE, write_archive
-from urc.packages.index import Entry
+from urc.packages.index import IndexEntry
 from urc.packages.install import plan_file
 from urc.packages.lock import Lock
 from urc.packages.package import Package, open_package, sha256
 from urc.packages.signature import Signature
 from urc.packages.sources import FileSource
 from urc.packages.store import Store
-from urc.runtime.kept import Kept
-from urc.web.fleet.garage import Garage, Workshop
+from urc.runtime.settings_store import StoredSettings
+from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
 
 __all__ = [
     "DOCUMENTS",
@@ -105,10 +105,10 @@ def write_package(
     return home
 
 
-def entry(key: str, version: str, needs: Mapping[str, str] | None = None) -> Entry:
+def entry(key: str, version: str, needs: Mapping[str, str] | None = None) -> IndexEntry:
     """Return what an index says, of an archive that nobody looks at."""
     folder, _, name = key.partition("/")
-    return Entry(folder[:-1], name, version, "0" * 64, 1, needs=dict(needs or {}))
+    return IndexEntry(folder[:-1], name, version, "0" * 64, 1, needs=dict(needs or {}))
 
 
 def install(
@@ -133,9 +133,9 @@ def keep_settings(data: Path, name: str, settings: Mapping[str, str]) -> None:
     def unused(*_: object) -> Any:
         raise AssertionError("no robot is made or tried here")
 
-    garage = Garage(Workshop(data, unused, unused, lambda _: {}))
+    garage = RobotFactory(RobotOptions(data, unused, unused, lambda _: {}))
     lock = garage.parked()[name][-1]
-    kept = Kept(settings=dict(settings), package=lock.root)
+    kept = StoredSettings(settings=dict(settings), package=lock.root)
     place = garage.filled(garage.profile(lock), kept).destination
     garage.kept(name).save(msgspec.structs.replace(kept, destination=place))
 

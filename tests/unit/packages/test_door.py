@@ -12,15 +12,15 @@ from starlette.testclient import TestClient
 
 from tests.unit.packages.made import package, write_package
 from tests.unit.packages.test_archive import HOSTILE, hostile
-from urc.packages import disk, server
+from urc.packages import atomic_files, server
 from urc.packages.archive import PACKAGE
 from urc.packages.index import INDEX, read_index
-from urc.packages.keeper import make_index
-from urc.packages.names import Key, PackageError
+from urc.packages.index_builder import make_index
+from urc.packages.names import PackageError, PackageId
 from urc.packages.package import Package
 from urc.packages.server import repository_app
 from urc.packages.signature import SIGNATURE, Signature, Signer, new_signer
-from urc.packages.tokens import Tokens, read_token
+from urc.packages.tokens import UploadTokens, read_token
 
 DIAL = package("widget", "dial")
 DIAL_2 = package("widget", "dial", "1.1.0")
@@ -40,7 +40,7 @@ class Lab:
         self.folder = folder / "lab"
         self.folder.mkdir()
         make_index(self.folder, "Lab", fine)
-        self.tokens = Tokens(folder / "tokens.json")
+        self.tokens = UploadTokens(folder / "tokens.json")
         self.token = self.tokens.add("ci", ("widgets/*", "drivers/bot*"))
         self.examine: Callable[[Path], list[str]] = fine
         app = repository_app(self.folder, self.tokens, lambda document: self.examine(document))
@@ -233,8 +233,8 @@ def test_a_widget_of_urcs_own_name_is_refused(lab: Lab) -> None:
 
 def test_a_signature_is_checked_and_listed(lab: Lab, anna: Signer) -> None:
     """And cannot be changed for another; one can be added to what has none."""
-    signature = anna.sign(Key("widget", "dial"), "1.0.0", DIAL.digest)
-    wrong = anna.sign(Key("widget", "dial"), "1.0.0", DIAL_2.digest)
+    signature = anna.sign(PackageId("widget", "dial"), "1.0.0", DIAL.digest)
+    wrong = anna.sign(PackageId("widget", "dial"), "1.0.0", DIAL_2.digest)
     assert lab.puts(DIAL, wrong)[0] == 422
     assert lab.puts(DIAL)[0] == 201
     assert lab.puts(DIAL, signature)[0] == 201
@@ -243,7 +243,7 @@ def test_a_signature_is_checked_and_listed(lab: Lab, anna: Signer) -> None:
     (entry,) = read_index(lab.client.get(INDEX).content, "").packages
     assert entry.signed == signature
     anna.by = "Somebody else"
-    status, told = lab.puts(DIAL, anna.sign(Key("widget", "dial"), "1.0.0", DIAL.digest))
+    status, told = lab.puts(DIAL, anna.sign(PackageId("widget", "dial"), "1.0.0", DIAL.digest))
     assert status == 409
     assert told.startswith("widgets/dial 1.0.0 is already listed, signed by Anna (SHA256:")
     make_index(lab.folder, "Lab", fine)  # the keeper lists anew: nothing is lost
@@ -286,7 +286,7 @@ def test_a_server_that_ends_at_any_moment_leaves_the_repository_whole(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """At every file that is written; what was cut off can be published again."""
-    real: Callable[..., Any] = disk.put_file
+    real: Callable[..., Any] = atomic_files.put_file
     lab.puts(DIAL)
     signer = new_signer("Anna", lab.folder.parent / "key.pem")
     deaths = 0
@@ -303,7 +303,7 @@ def test_a_server_that_ends_at_any_moment_leaves_the_repository_whole(
 
         before = lab.lists()
         with monkeypatch.context() as patch:
-            patch.setattr(disk, "put_file", put)
+            patch.setattr(atomic_files, "put_file", put)
             status, told = lab.puts(made, signature)
         if status == 201:
             break
@@ -327,7 +327,7 @@ def test_what_the_keeper_writes_lives_beside_what_is_published(lab: Lab) -> None
 
 def test_tokens_are_shown_once_and_kept_as_digests(tmp_path: Path) -> None:
     """Each has a name, and what it may do."""
-    tokens = Tokens(tmp_path / "tokens.json")
+    tokens = UploadTokens(tmp_path / "tokens.json")
     assert tokens.all() == ()
     text = tokens.add("ci", ("drivers/puppet*", "widgets/dial"))
     assert text not in tokens.file.read_text()
@@ -336,8 +336,8 @@ def test_tokens_are_shown_once_and_kept_as_digests(tmp_path: Path) -> None:
     found = tokens.find(text)
     assert found is not None
     may = {str(key): found.allows(key) for key in (
-        Key("driver", "puppet"), Key("driver", "puppet-2"), Key("driver", "pup"),
-        Key("widget", "dial"), Key("widget", "dial-2"), Key("robot", "puppet"),
+        PackageId("driver", "puppet"), PackageId("driver", "puppet-2"), PackageId("driver", "pup"),
+        PackageId("widget", "dial"), PackageId("widget", "dial-2"), PackageId("robot", "puppet"),
     )}  # fmt: skip
     assert [name for name, is_allowed in may.items() if is_allowed] == [
         "drivers/puppet", "drivers/puppet-2", "widgets/dial",
@@ -353,7 +353,7 @@ def test_tokens_are_shown_once_and_kept_as_digests(tmp_path: Path) -> None:
 def test_what_a_token_may_is_checked(tmp_path: Path, may: str) -> None:
     """A pattern that means nothing would be a surprise later."""
     with pytest.raises(PackageError, match="names no packages; drivers/puppet"):
-        Tokens(tmp_path / "tokens.json").add("ci", (may,))
+        UploadTokens(tmp_path / "tokens.json").add("ci", (may,))
 
 
 @pytest.mark.parametrize("text", ["", "{", '{"format":1,"tokens":[{"name":"x"}]}', "\xff"])

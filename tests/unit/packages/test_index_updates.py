@@ -9,19 +9,19 @@ import msgspec
 import pytest
 
 from tests.unit.packages.made import entry
-from urc.packages import disk, repositories
-from urc.packages.head import HEAD, read_head
-from urc.packages.index import INDEX, Entry, read_index
-from urc.packages.keeper import write_index
+from urc.packages import atomic_files, repositories
+from urc.packages.http_repository import HttpResponse
+from urc.packages.index import INDEX, IndexEntry, read_index
+from urc.packages.index_builder import write_index
+from urc.packages.index_head import HEAD, read_head
 from urc.packages.names import PackageError
 from urc.packages.package import sha256
-from urc.packages.remote import Answer
 from urc.packages.repositories import Repository
 
 URL = "http://lab/"
 
 
-def entries(count: int) -> list[Entry]:
+def entries(count: int) -> list[IndexEntry]:
     return [entry(f"widgets/w{number}", "1.0.0") for number in range(count)]
 
 
@@ -35,21 +35,21 @@ class Web:
         self.instead: dict[str, bytes | None] = {}
         """Path → what is given out instead of the file; None: nothing."""
 
-    def ask(self, url: str, most: int, etag: str = "", *, may_lack: bool = False) -> Answer:
+    def ask(self, url: str, most: int, etag: str = "", *, may_lack: bool = False) -> HttpResponse:
         path = url.removeprefix(URL)
         self.asked.append(path)
         file = self.folder / path
         body = self.instead.get(path, file.read_bytes() if file.is_file() else None)
         if body is None:
             if may_lack:
-                return Answer(404, "", b"")
+                return HttpResponse(404, "", b"")
             raise PackageError(f"{url}: the server answers 404, not 200")
         tag = hashlib.md5(body).hexdigest()  # noqa: S324 (an ETag is no secret)
         if etag == tag:
-            return Answer(304, etag, b"")
+            return HttpResponse(304, etag, b"")
         self.sent += len(body)
         assert len(body) <= most
-        return Answer(200, tag, body)
+        return HttpResponse(200, tag, body)
 
 
 class Lab:
@@ -61,7 +61,7 @@ class Lab:
         self.said: list[str] = []
         self.client = Repository(URL, folder.parent / "client", self.said.append)
 
-    def write(self, listed: list[Entry], name: str = "Lab") -> int:
+    def write(self, listed: list[IndexEntry], name: str = "Lab") -> int:
         return write_index(self.folder, name, listed, self.folder / ".work").number
 
     def asks(self) -> list[str]:
@@ -184,7 +184,7 @@ def test_a_keeper_killed_at_any_moment_leaves_a_repository_to_read(
     """Clients get the index before or after, and the next one that is written mends the rest."""
     lab.write(entries(1))
     lab.asks()
-    real: Callable[..., Any] = disk.put_file
+    real: Callable[..., Any] = atomic_files.put_file
     for files in range(3):
         lab.write(entries(files + 1))
         lab.asks()
@@ -197,7 +197,7 @@ def test_a_keeper_killed_at_any_moment_leaves_a_repository_to_read(
             real(*words)
 
         with monkeypatch.context() as patch:
-            patch.setattr(disk, "put_file", put)
+            patch.setattr(atomic_files, "put_file", put)
             if files < 2:
                 with pytest.raises(KeyboardInterrupt):
                     lab.write(entries(files + 2))

@@ -4,7 +4,7 @@ import pytest
 
 from tests.unit.packages.made import files_of
 from urc.packages.manifest import parse_manifest
-from urc.packages.names import Key, PackageError
+from urc.packages.names import PackageError, PackageId
 
 GOOD = files_of("driver", "puppet", "1.2.0", {"widgets/dial": "^1.0"})["package.yaml"].decode()
 
@@ -12,7 +12,7 @@ GOOD = files_of("driver", "puppet", "1.2.0", {"widgets/dial": "^1.0"})["package.
 def test_a_manifest_is_read() -> None:
     """Everything it says, checked."""
     said = parse_manifest(GOOD.encode(), "package.yaml")
-    assert (said.key, said.version, said.licence) == (Key("driver", "puppet"), "1.2.0", "MIT")
+    assert (said.key, said.version, said.licence) == (PackageId("driver", "puppet"), "1.2.0", "MIT")
     assert (said.authors, said.needs) == (("A. Author",), {"widgets/dial": "^1.0"})
     assert said.main == "driver.yaml"
 

@@ -5,14 +5,14 @@ from collections.abc import Mapping
 import pytest
 
 from tests.unit.packages.made import entry
-from urc.packages.index import Entry
-from urc.packages.names import Key, PackageError, Wish, parse_key
+from urc.packages.index import IndexEntry
+from urc.packages.names import PackageError, PackageId, PackageRequirement, parse_key
 from urc.packages.resolver import choose, resolve
 
 World = dict[str, Mapping[str, Mapping[str, str]]]
 
 
-def entries(world: World) -> dict[Key, list[Entry]]:
+def entries(world: World) -> dict[PackageId, list[IndexEntry]]:
     return {
         parse_key(key): [entry(key, version, needs) for version, needs in versions.items()]
         for key, versions in world.items()
@@ -93,8 +93,8 @@ def test_what_nobody_has_is_told() -> None:
 
 def test_a_package_for_another_language_version_is_passed_over() -> None:
     """And named when it is the only one."""
-    key = Key("widget", "dial")
-    later = Entry("widget", "dial", "2.0.0", "0" * 64, 1, language=2)
+    key = PackageId("widget", "dial")
+    later = IndexEntry("widget", "dial", "2.0.0", "0" * 64, 1, language=2)
     found = resolve(key, "*", {key: [later, entry("widgets/dial", "1.0.0")]})
     assert found[key].version == "1.0.0"
     with pytest.raises(PackageError, match="every version is for another URC"):
@@ -104,10 +104,10 @@ def test_a_package_for_another_language_version_is_passed_over() -> None:
 def test_a_name_means_the_one_package_that_has_it() -> None:
     """Else it is asked which."""
     known = entries({"drivers/bot": {"1.0.0": {}}, "robots/bot": {"1.0.0": {}}})
-    assert choose(known, Wish("robot", "bot")) == Key("robot", "bot")
+    assert choose(known, PackageRequirement("robot", "bot")) == PackageId("robot", "bot")
     with pytest.raises(
         PackageError, match="'bot' is ambiguous; write one of drivers/bot, robots/bot"
     ):
-        choose(known, Wish("", "bot"))
+        choose(known, PackageRequirement("", "bot"))
     with pytest.raises(PackageError, match="no repository has bod; did you mean 'bot'"):
-        choose(known, Wish("", "bod"))
+        choose(known, PackageRequirement("", "bod"))

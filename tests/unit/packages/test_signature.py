@@ -8,7 +8,7 @@ import pytest
 
 from tests.unit.packages.made import assert_whole, install, package
 from urc.packages.install import plan_file
-from urc.packages.names import Key, PackageError, parse_wish
+from urc.packages.names import PackageError, PackageId, parse_wish
 from urc.packages.package import Package
 from urc.packages.signature import Signature, Signer, new_signer, read_signer
 from urc.packages.sources import FileSource
@@ -16,7 +16,7 @@ from urc.packages.store import Store
 
 DIAL = package("widget", "dial", "1.0.0")
 DIAL_2 = package("widget", "dial", "1.1.0")
-PACKAGE = Key("widget", "dial")
+PACKAGE = PackageId("widget", "dial")
 
 
 @pytest.fixture
@@ -45,8 +45,8 @@ def test_a_signature_is_of_one_package_one_version_and_its_bytes(anna: Signer) -
     signature.check(PACKAGE, "1.0.0", DIAL.digest)
     assert signature == anna.sign(PACKAGE, "1.0.0", DIAL.digest)
     for said in (
-        (Key("driver", "dial"), "1.0.0", DIAL.digest),
-        (Key("widget", "dia"), "1.0.0", DIAL.digest),
+        (PackageId("driver", "dial"), "1.0.0", DIAL.digest),
+        (PackageId("widget", "dia"), "1.0.0", DIAL.digest),
         (PACKAGE, "1.0.1", DIAL.digest),
         (PACKAGE, "1.0.0", DIAL_2.digest),
     ):
@@ -201,4 +201,4 @@ def test_forgetting_what_is_not_kept_is_told(store: Store, anna: Signer) -> None
         pytest.raises(PackageError, match="there are keys for: widgets/dial"),
         store.changing() as change,
     ):
-        change.forget_key(Key("driver", "dial"))
+        change.forget_key(PackageId("driver", "dial"))

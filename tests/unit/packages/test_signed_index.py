@@ -10,10 +10,10 @@ from starlette.testclient import TestClient
 from tests.unit.packages.made import entry, write_package
 from tests.unit.packages.test_index_updates import URL, Web, entries
 from urc.packages import repositories
-from urc.packages.head import HEAD, VALID_S, Head, Seal, read_head
 from urc.packages.index import INDEX
-from urc.packages.keeper import make_index, renew, withdraw, write_index
-from urc.packages.names import Key, PackageError
+from urc.packages.index_builder import make_index, renew, withdraw, write_index
+from urc.packages.index_head import HEAD, VALID_S, IndexHead, IndexSigner, read_head
+from urc.packages.names import PackageError, PackageId
 from urc.packages.repositories import Repository
 from urc.packages.server import repository_app
 from urc.packages.signature import Signer, new_signer
@@ -35,10 +35,10 @@ class Signed:
 
     def write(self, count: int, signer: Signer | None = None) -> None:
         """List some packages, signed with the keeper's key or another one."""
-        seal = Seal(signer or self.key, VALID_S, lambda: self.now)
+        seal = IndexSigner(signer or self.key, VALID_S, lambda: self.now)
         write_index(self.folder, "Lab", entries(count), self.folder / ".work", seal)
 
-    def head(self) -> Head:
+    def head(self) -> IndexHead:
         return read_head((self.folder / HEAD).read_bytes(), HEAD)
 
     def refuses(self, told: str) -> None:
@@ -61,7 +61,7 @@ def test_the_first_key_is_kept_and_no_other_is_believed(lab: Signed) -> None:
     lab.write(2)
     lab.client.refresh()
     assert lab.client.keeper == str(lab.key)
-    unsigned = Head(1, 2, "0" * 64).to_bytes()
+    unsigned = IndexHead(1, 2, "0" * 64).to_bytes()
     (lab.folder / HEAD).unlink()
     lab.write(3, lab.other)
     for instead in (None, (lab.folder / HEAD).read_bytes(), unsigned, b"{"):
@@ -99,7 +99,7 @@ def test_a_head_is_signed_anew_when_half_of_its_time_is_over(lab: Signed) -> Non
     lab.write(2)
     assert lab.head() == first
     lab.now += 120
-    renew(lab.folder, Seal(lab.key, VALID_S, lambda: lab.now))
+    renew(lab.folder, IndexSigner(lab.key, VALID_S, lambda: lab.now))
     assert lab.head().number == first.number
     assert lab.head().left_s(lab.now) == VALID_S
 
@@ -133,7 +133,7 @@ def test_who_has_not_the_key_changes_no_signed_index(lab: Signed, signs: bool) -
     """Clients would not believe it; nothing is written."""
     lab.write(1)
     before = {file: file.read_bytes() for file in lab.folder.rglob("*.json")}
-    seal = Seal(lab.other, VALID_S, lambda: lab.now) if signs else None
+    seal = IndexSigner(lab.other, VALID_S, lambda: lab.now) if signs else None
     with pytest.raises(PackageError, match=r"the index is signed by Keeper .*: name that key"):
         write_index(lab.folder, "Lab", entries(2), lab.folder / ".work", seal)
     assert {file: file.read_bytes() for file in lab.folder.rglob("*.json")} == before
@@ -158,7 +158,7 @@ def test_a_head_that_says_nonsense_is_none(head: bytes) -> None:
 def test_a_server_gives_out_the_signed_head(lab: Signed) -> None:
     """Also of a version that is withdrawn: signed anew, and still there for who has a lock."""
     write_package(lab.folder, "widget", "dial")
-    seal = Seal(lab.key, VALID_S, lambda: lab.now)
+    seal = IndexSigner(lab.key, VALID_S, lambda: lab.now)
     listed = make_index(lab.folder, "Lab", lambda document: [], seal).listed
     client = TestClient(repository_app(lab.folder))
     assert client.get(f"/{HEAD}").content == (lab.folder / HEAD).read_bytes()
@@ -175,7 +175,7 @@ def test_a_server_gives_out_the_signed_head(lab: Signed) -> None:
     (again,) = make_index(lab.folder, "Lab", lambda document: [], seal).listed.packages
     assert again.why_withdrawn == "It sticks."
     with pytest.raises(PackageError, match=r"widgets/dial 2.0.0 is not listed; .* 1.0.0"):
-        withdraw(lab.folder, Key("widget", "dial"), "2.0.0", "", seal)
+        withdraw(lab.folder, PackageId("widget", "dial"), "2.0.0", "", seal)
     assert withdraw(lab.folder, dial.key, "1.0.0", "", seal) == dial
     assert client.get("/widgets").json() == ["/widgets/dial/"]
 

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from tests.unit.packages.made import assert_whole, install, package
-from urc.packages import disk
+from urc.packages import atomic_files
+from urc.packages.install_plan import InstallPlan
 from urc.packages.lock import LOCK, read_lock
 from urc.packages.names import PackageError, parse_wish
-from urc.packages.plan import Plan
 from urc.packages.sources import FileSource
 from urc.packages.store import Store, ecosystem_of
 from urc.packages.update import plan_update
@@ -136,7 +136,7 @@ def test_bytes_that_are_not_those_of_the_lock_are_refused(store: Store) -> None:
         pytest.raises(PackageError, match="the bytes differ from those in the lock"),
         store.changing() as change,
     ):
-        change.stage(Plan(lock, {BOT.digest: BOT.data, DIAL.digest: DIAL_2.data}, {}, {}))
+        change.stage(InstallPlan(lock, {BOT.digest: BOT.data, DIAL.digest: DIAL_2.data}, {}, {}))
     assert store.installed() == ()
     assert files_below(store.folder) == ["changing"]
 
@@ -145,7 +145,7 @@ def test_what_was_staged_but_not_agreed_to_is_gone(store: Store) -> None:
     """Somebody looked at the permissions and said no."""
     lock = install(Store(store.folder.parent / "other"), BOT, DIAL)
     with store.changing() as change:
-        plan = Plan(lock, {BOT.digest: BOT.data, DIAL.digest: DIAL.data}, {}, {})
+        plan = InstallPlan(lock, {BOT.digest: BOT.data, DIAL.digest: DIAL.data}, {}, {})
         assert change.stage(plan).is_dir()
     assert files_below(store.folder) == ["changing"]
 
@@ -258,8 +258,8 @@ def test_a_disk_that_gets_full_at_any_moment_changes_nothing(
         shutil.copytree(first.folder, store.folder)
         full = _FullDisk(changes)
         with monkeypatch.context() as patch:
-            patch.setattr(disk, "os", full)
-            patch.setattr(disk, "mkdtemp", full.limited(disk.mkdtemp))
+            patch.setattr(atomic_files, "os", full)
+            patch.setattr(atomic_files, "mkdtemp", full.limited(atomic_files.mkdtemp))
             try:
                 ACTS[act](store)
                 outcomes.add("done")
@@ -278,7 +278,7 @@ def test_a_disk_that_gets_full_at_any_moment_changes_nothing(
 
 def test_a_second_process_is_kept_out(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """After a bounded wait, in one line."""
-    monkeypatch.setattr(disk, "_WAIT_S", 0.0)
+    monkeypatch.setattr(atomic_files, "_WAIT_S", 0.0)
     with (
         store.changing(),
         pytest.raises(PackageError, match="another urc is changing packages; try again"),

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from tests.unit.packages.made import assert_whole, install, package
-from urc.packages.index import Entry
+from urc.packages.index import IndexEntry
 from urc.packages.install import plan_wish
 from urc.packages.lock import Lock
 from urc.packages.names import PackageError, parse_wish
@@ -190,7 +190,7 @@ def test_an_index_that_tells_other_needs_than_the_package_is_found_out(store: St
     """Here it leaves out what the driver needs."""
 
     class Liar(FileSource):
-        def entries(self) -> tuple[Entry, ...]:
+        def entries(self) -> tuple[IndexEntry, ...]:
             return tuple(msgspec.structs.replace(one, needs={}) for one in super().entries())
 
     liar = Liar("lab", [BOT], [BOT.manifest.key])

@@ -5,27 +5,27 @@ from typing import Any
 
 from tests.unit.protocol.framing_samples_sized import SIZED, Sample, wire
 from tests.unit.protocol.framing_samples_text import TEXT
+from urc.config.node import Node, Problems
 from urc.config.parse.framing import parse_framing
-from urc.config.part import Findings, Part
 from urc.model.driver import FramingSpec
 from urc.problems import to_text
-from urc.protocol.framing import FRAMINGS, build_framing
-from urc.protocol.framings.base import Framing
-from urc.registry import Catalog, Table
+from urc.protocol.framing.base import Framing
+from urc.protocol.framing.table import FRAMINGS, build_framing
+from urc.registry import Registries, Table
 from urc.source import parse_document
 
 __all__ = ["SAMPLES", "Sample", "framing", "spec", "wire"]
 
-CATALOG = Catalog(transports=Table("none", {}), framings=FRAMINGS)
+CATALOG = Registries(transports=Table("none", {}), framings=FRAMINGS)
 
 
 @cache
 def spec(text: str, encoding: str = "latin-1") -> FramingSpec:
     """Return the framing that a document declares with `text`; it must have no finding."""
     document = parse_document(f"framing: {text}\n", "sample.yaml")
-    findings = Findings()
+    findings = Problems()
     data: Any = document.data
-    part = Part(document, ("framing",), data["framing"])
+    part = Node(document, ("framing",), data["framing"])
     parsed = parse_framing(part, encoding, findings, CATALOG)
     assert [to_text(one) for one in findings] == []
     return parsed

@@ -3,11 +3,11 @@
 import pytest
 
 from tests.dialogue import Dialogue, driver_of
-from urc.cli.failures import Misuse
+from urc.cli.error_report import Misuse
 from urc.cli.send import _arguments
 from urc.model.driver import Command
-from urc.protocol.encode import BadArgument, check_arguments
-from urc.simulator.echo import typed_arguments
+from urc.protocol.requests.encode import BadArgument, check_arguments
+from urc.simulator.reply_echo import typed_arguments
 
 ARM = """
 commands:

@@ -5,8 +5,8 @@ import pytest
 from tests.unit.protocol.framing_samples import spec
 from urc.model.driver import Driver, Message, TransportSpec
 from urc.protocol.engine import Engine
-from urc.protocol.events import Fault
-from urc.protocol.framing import build_framing
+from urc.protocol.events import Violation
+from urc.protocol.framing.table import build_framing
 from urc.testing.profile import regex
 from urc.testing.struct import struct_read
 
@@ -39,4 +39,4 @@ def test_bytes_are_no_faulty_text_where_nobody_wants_text(
     message = Message("hello", "wire", read)  # type: ignore[arg-type]
     engine = Engine(Driver(transports={"wire": line}, messages={"hello": message}), {})
     engine.start("wire", 0.0)
-    assert engine.receive("wire", b"\x13\x02\xff\x01", 0.1) == [Fault("wire", *fault)]
+    assert engine.receive("wire", b"\x13\x02\xff\x01", 0.1) == [Violation("wire", *fault)]

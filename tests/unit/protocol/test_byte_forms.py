@@ -7,24 +7,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.effort import examples
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext
 from urc.config.parse.forms import bytes as bytes_form
 from urc.config.parse.forms import hex as hex_form
 from urc.config.parse.forms import json_text
-from urc.config.part import Findings, Part
 from urc.expressions import ExpressionError
-from urc.protocol.codec import CodecContext, Frame, NotWritable, Writer
-from urc.protocol.forms import build_writer
+from urc.protocol.forms.table import build_writer
+from urc.protocol.values.payload import CodecContext, Frame, NotWritable, PayloadWriter
 from urc.source import parse_document
 
 FORMS = {"hex": hex_form, "bytes": bytes_form, "json": json_text}
 
 
-def writer(source: str, encoding: str = "utf-8") -> Writer:
+def writer(source: str, encoding: str = "utf-8") -> PayloadWriter:
     """Return what writes the form in `source`: ``hex: …``, ``bytes: …`` or ``json: …``."""
     document = parse_document(source, "test.yaml")
-    part = Part(document, (), document.data)
-    findings = Findings()
+    part = Node(document, (), document.data)
+    findings = Problems()
     ((key, inner),) = part.entries().items()
     spec = FORMS[key].parse_write(inner, findings, FormContext(encoding))
     assert spec is not None, list(findings)

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from tests.effort import examples
 from tests.unit.protocol.framing_samples import NMEA, framing, spec
-from urc._sums import NAMED, build_algorithm
+from urc._checksum_math import NAMED, build_algorithm
+from urc.config.node import Node, Problems
 from urc.config.parse.checksum import parse_checksum
-from urc.config.part import Findings, Part
 from urc.expressions import compile_template
-from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command, Driver, TransportSpec
 from urc.model.framing import FOLDED, PLAIN_CHECKSUMS, CrcSpec, FoldSpec
+from urc.model.payload import WriteSpec
 from urc.problems import to_text
 from urc.protocol.engine import Engine
 from urc.protocol.events import Request, Send
@@ -30,9 +30,9 @@ CHECK = b"123456789"
 def algorithm(text: str) -> CrcSpec | FoldSpec | str:
     """Return the algorithm that a document declares with `text`; it must have no finding."""
     document = parse_document(f"checksum: {{ algorithm: {text} }}\n", "sample.yaml")
-    findings = Findings()
+    findings = Problems()
     assert isinstance(document.data, dict)
-    part = Part(document, ("checksum",), document.data["checksum"])
+    part = Node(document, ("checksum",), document.data["checksum"])
     written = parse_checksum(part, "latin-1", findings)
     assert [to_text(one) for one in findings] == []
     assert written is not None

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urc.model.values import Conversion, Signal
-from urc.protocol.convert import BadValue, build_conversion, build_inverse
-from urc.protocol.decode import build_converter, build_raw
+from urc.protocol.values.convert import BadValue, build_conversion, build_inverse
+from urc.protocol.values.decode import build_converter, build_raw
 
 BATTERY = ((3.3, 0.0), (3.7, 50.0), (4.2, 100.0))
 TABLE = [

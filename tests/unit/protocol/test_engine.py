@@ -14,24 +14,24 @@ from urc.model.driver import (
     Timeouts,
     TransportSpec,
 )
-from urc.model.values import Limits, Sample, Signal
+from urc.model.values import AlarmLimits, Sample, Signal
 from urc.patterns import compile_pattern
 from urc.protocol.engine import Engine
 from urc.protocol.events import (
     Close,
     Event,
     Failed,
-    Fault,
     Open,
     Replied,
     Request,
     Samples,
     Send,
+    Violation,
 )
 from urc.testing.profile import regex, text
 
 LINES = FramingSpec("delimiter", {"tx": b"\n", "rx": b"\n"}, 64)
-BATTERY = Signal("battery", "integer", min=0, max=100, limits=Limits(low=20, hysteresis=2))
+BATTERY = Signal("battery", "integer", min=0, max=100, limits=AlarmLimits(low=20, hysteresis=2))
 TIMEOUTS = Timeouts(connect_s=3.0, reply_s=0.5)
 
 
@@ -72,7 +72,7 @@ def opened(*polls: Poll, **wire: object) -> Engine:
 
 def codes(events: list[Event]) -> list[str]:
     """The codes of faults and failures, in order."""
-    return [event.code for event in events if isinstance(event, (Fault, Failed))]
+    return [event.code for event in events if isinstance(event, (Violation, Failed))]
 
 
 def test_a_poll_asks_and_its_answer_is_a_sample_with_its_alarm() -> None:

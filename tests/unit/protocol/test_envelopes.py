@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from urc.model.codec import Envelope
+from urc.model.payload import Envelope
 from urc.model.profile import Profile
 from urc.protocol.engine import Engine
-from urc.protocol.events import Event, Failed, Fault, Replied, Request, Samples, Send
-from urc.protocol.topics import listened, matches
+from urc.protocol.events import Event, Failed, Replied, Request, Samples, Send, Violation
+from urc.protocol.forms.topics import listened, matches
 from urc.runtime.scripting import load
 
 DOCUMENT = """
@@ -104,7 +104,7 @@ def test_a_message_sets_signals_when_it_comes_on_its_topic(engine: Engine) -> No
 def test_the_same_message_on_another_topic_is_a_fault(engine: Engine) -> None:
     body = {"pose": {"pose": {"position": {"x": 1.5}}}}
     (fault,) = engine.receive("ros", message("/odom", body), 1.0)
-    assert isinstance(fault, Fault)
+    assert isinstance(fault, Violation)
     assert fault.code == "no-match"
     assert "/odom" in fault.message
 

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.dialogue import Dialogue
-from urc.protocol.encode import BadArgument
+from urc.protocol.requests.encode import BadArgument
 
 GUARDED = """
 signals:

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.dialogue import Dialogue, driver_of
-from urc.protocol.bounds import longest_s
+from urc.protocol.requests.bounds import longest_s
 
 ARMING = """
 signals:

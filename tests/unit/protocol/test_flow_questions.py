@@ -3,9 +3,9 @@
 import pytest
 
 from tests.dialogue import Dialogue, driver_of
-from urc.model.flow import Confirm
-from urc.protocol.commands import questions
+from urc.model.exchange import Confirm
 from urc.protocol.events import Request
+from urc.protocol.sequences.commands import questions
 
 BEAM = """
 signals: { mode: { type: string } }

@@ -3,7 +3,7 @@
 import pytest
 
 from tests.dialogue import Dialogue
-from urc.protocol.gate import Bucket, Counters
+from urc.protocol.requests.rate import Counters, GcraLimiter
 
 MOVES = """
 commands:
@@ -159,7 +159,7 @@ commands:
 )
 def test_bucket_has_one_period_of_tolerance(times: tuple[float, ...], gone: int) -> None:
     """Of one a second, by the times at which somebody tries."""
-    bucket, count = Bucket(1.0), 0
+    bucket, count = GcraLimiter(1.0), 0
     for now in times:
         if bucket.free_at <= now:
             bucket.take(now)

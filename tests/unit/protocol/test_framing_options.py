@@ -3,7 +3,7 @@
 import pytest
 
 from tests.unit.protocol.framing_samples import HEARTBEAT, MAVLINK, UBX_POLL, framing, wire
-from urc.protocol.framings.base import FrameFault, FramingError
+from urc.protocol.framing.base import FrameFault, FramingError
 from urc.testing.framing import feed_three_ways
 
 UNKNOWN = wire("fd 01 00 00 00 01 01 07 00 00 55 12 34")

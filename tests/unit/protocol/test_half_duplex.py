@@ -1,7 +1,7 @@
 """A line on which one side talks at a time: motion waits for answers, shortly, and they for it."""
 
 from tests.dialogue import Dialogue
-from urc.protocol.held_replies import LONGEST_WAIT_S
+from urc.protocol.requests.hold_replies import LONGEST_WAIT_S
 
 DRIVER = """
 wire: duplex: half

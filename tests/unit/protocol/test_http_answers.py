@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from urc.model.codec import Envelope
+from urc.model.payload import Envelope
 from urc.protocol.engine import Engine
 from urc.protocol.events import Event, Failed, Replied, Request, Samples, Send
 from urc.runtime.scripting import load

@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.effort import examples
-from urc.model.framing import FOLDED, ChecksumSpec, CrcSpec, FrameLayout, Window
-from urc.protocol.frame import BadFrame, Seal
+from urc.model.framing import FOLDED, ByteRange, ChecksumSpec, CrcSpec, FrameLayout
+from urc.protocol.framing.frame import BadFrame, FrameCodec
 
 CRCS = [
     CrcSpec(16, 0x1021),
@@ -26,7 +26,7 @@ def layouts(draw: st.DrawFn) -> FrameLayout:
     at = -size - end
     stop = draw(st.sampled_from([at, at - 1]))
     spec = ChecksumSpec(
-        algorithm, bits, Window(draw(st.sampled_from([0, head])), stop), at, draw(st.booleans())
+        algorithm, bits, ByteRange(draw(st.sampled_from([0, head])), stop), at, draw(st.booleans())
     )
     return FrameLayout(
         end=b"\3\4"[:end], head=head, tail=size + end, checksum=draw(st.sampled_from([spec, None]))
@@ -39,7 +39,7 @@ def test_generated_and_general_agree(
     layout: FrameLayout, payload: bytes, noise: bytes, data: st.DataObject
 ) -> None:
     """Of whole frames, of frames with a changed byte, of short ones and of noise."""
-    seal = Seal(layout)
+    seal = FrameCodec(layout)
     frame = seal.close(payload)
     assert seal.open(frame) == payload
     place = data.draw(st.integers(0, len(frame) - 1))
@@ -48,7 +48,7 @@ def test_generated_and_general_agree(
         assert outcome(seal, one, is_general=False) == outcome(seal, one, is_general=True)
 
 
-def outcome(seal: Seal, frame: bytes, *, is_general: bool) -> bytes | str:
+def outcome(seal: FrameCodec, frame: bytes, *, is_general: bool) -> bytes | str:
     """Return the payload, or the words of the refusal."""
     try:
         return seal._open(frame) if is_general else seal.open(frame)

@@ -3,8 +3,8 @@
 import pytest
 
 from urc.expressions import compile_template
-from urc.protocol.codec import NotWritable
-from urc.protocol.envelope_form import place_writer
+from urc.protocol.forms.envelope import place_writer
+from urc.protocol.values.payload import NotWritable
 from urc.transports.http_client import leads_up
 
 NAMES = {"what": "", "n": 7, "settings": {"base": "/api/v2", "space": "lab/rover"}}

@@ -4,10 +4,12 @@ import pytest
 
 from tests.dialogue import Dialogue
 from urc.expressions import compile_expression
-from urc.model.values import Conversion, Limits, Sample, Signal
-from urc.protocol.readings import Readings
+from urc.model.values import AlarmLimits, Conversion, Sample, Signal
+from urc.protocol.readings.readings import Readings
 
-VOLTS = Signal("volts", limits=Limits(lolo=10, low=12, hysteresis=1, for_s=3.0), stale_after_s=3)
+VOLTS = Signal(
+    "volts", limits=AlarmLimits(lolo=10, low=12, hysteresis=1, for_s=3.0), stale_after_s=3
+)
 
 
 def signal(name: str, value: str = "", **more: object) -> Signal:
@@ -26,7 +28,7 @@ def values(samples: list[Sample]) -> dict[str, object]:
     return {sample.signal: sample.value for sample in samples}
 
 
-def alarms(limits: Limits, *readings_at: tuple[float, object]) -> list[str]:
+def alarms(limits: AlarmLimits, *readings_at: tuple[float, object]) -> list[str]:
     """Return the alarm of each of some readings in turn."""
     made = readings(Signal("v", "array" if limits.for_s < 0 else "number", limits=limits))
     return [made.put({"v": value}, time)[0][0].alarm for time, value in readings_at]
@@ -34,13 +36,13 @@ def alarms(limits: Limits, *readings_at: tuple[float, object]) -> list[str]:
 
 def test_a_limit_is_passed_at_its_very_value_and_left_past_the_hysteresis() -> None:
     """The words of the schema: at or below it is a warning."""
-    found = alarms(Limits(low=20, hysteresis=2), (0, 20), (1, 21.9), (2, 22), (3, 21))
+    found = alarms(AlarmLimits(low=20, hysteresis=2), (0, 20), (1, 21.9), (2, 22), (3, 21))
     assert found == ["low", "low", "", ""]
 
 
 def test_the_graver_alarm_goes_first_and_leaves_the_lighter_one() -> None:
     """Coming back from lolo, low holds as if it had been there all the time."""
-    limits = Limits(lolo=10, low=20, high=80, hihi=90, hysteresis=2)
+    limits = AlarmLimits(lolo=10, low=20, high=80, hihi=90, hysteresis=2)
     values_in_turn = (5, 11, 13, 21, 23, 95, 89, 81, 77)
     found = alarms(limits, *enumerate(values_in_turn))
     assert found == ["lolo", "lolo", "low", "low", "", "hihi", "hihi", "high", ""]
@@ -48,7 +50,7 @@ def test_the_graver_alarm_goes_first_and_leaves_the_lighter_one() -> None:
 
 def test_an_alarm_begins_only_when_the_value_has_stayed() -> None:
     """Each limit has its own time; one good reading begins it anew."""
-    limits = Limits(lolo=10, low=20, for_s=3)
+    limits = AlarmLimits(lolo=10, low=20, for_s=3)
     found = alarms(limits, (0, 15), (2, 15), (3, 15), (4, 5), (6.9, 5), (7, 5), (8, 30), (9, 5))
     assert found == ["", "", "low", "low", "low", "lolo", "", ""]
 
@@ -65,7 +67,7 @@ def test_an_alarm_begins_without_a_further_reading() -> None:
 
 def test_an_array_is_judged_by_its_worst_element() -> None:
     """One cell that is flat is a flat battery."""
-    made = readings(Signal("cells", "array", limits=Limits(low=3.2, high=4.3)))
+    made = readings(Signal("cells", "array", limits=AlarmLimits(low=3.2, high=4.3)))
     assert made.put({"cells": [3.9, 3.1, None]}, 0.0)[0][0].alarm == "low"
     assert made.put({"cells": [3.9, 4.4]}, 1.0)[0][0].alarm == "high"
     assert made.put({"cells": [None]}, 2.0)[0][0].alarm == ""
@@ -125,7 +127,7 @@ def test_a_computed_signal_is_as_old_as_the_first_of_its_inputs_to_grow_old() ->
 
 def test_a_computed_signal_has_its_own_limits() -> None:
     """With the newest values of its inputs."""
-    made = readings(signal("power", "volts * 2", limits=Limits(high=10)), signal("volts"))
+    made = readings(signal("power", "volts * 2", limits=AlarmLimits(high=10)), signal("volts"))
     assert made.put({"volts": 6}, 0.0)[0][1] == Sample("power", 12, 0.0, "high")
 
 
@@ -142,7 +144,7 @@ def test_orientation_to_angles() -> None:
 
 def test_a_frame_that_two_kinds_set_shares_the_alarm() -> None:
     """The state belongs to the signal, not to the frame."""
-    made = readings(Signal("v", limits=Limits(low=20, hysteresis=2)))
+    made = readings(Signal("v", limits=AlarmLimits(low=20, hysteresis=2)))
     first, second = made.decoder(("v",)), made.decoder(("v", "_x"))
     assert first({"v": 19}, 0.0)[0][0].alarm == "low"
     assert second({"v": 21, "_x": 1}, 1.0)[0][0].alarm == "low"

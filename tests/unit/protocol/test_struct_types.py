@@ -5,7 +5,7 @@ from pathlib import Path
 from tests.dialogue import Dialogue
 from urc.config.load import check
 from urc.problems import to_text
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 
 MODBUS = """
 transports:

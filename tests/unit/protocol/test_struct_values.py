@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from urc.protocol.codec import BadItem, NotWritable
+from urc.protocol.values.payload import BadItem, NotWritable
 from urc.testing.struct import frame, reader, struct_write, writer
 
 READ: list[tuple[str, str, dict[str, Any] | None]] = [

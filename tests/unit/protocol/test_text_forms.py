@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.effort import examples
-from urc.protocol.codec import BadText, CodecContext, Frame, NotWritable
-from urc.protocol.forms import build_reader
-from urc.protocol.json_paths import JsonReader
+from urc.protocol.forms.json_paths import JsonReader
+from urc.protocol.forms.table import build_reader
+from urc.protocol.values.payload import BadText, CodecContext, Frame, NotWritable
 from urc.testing.reading import read_spec, reader_of
 
 SIGNALS = ("bat", "baro", "mode")

@@ -3,14 +3,14 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from urc.model.codec import Payload, WriteSpec
 from urc.model.driver import Argument, Command, Driver, TransportSpec
-from urc.model.flow import Hold
+from urc.model.exchange import Hold
+from urc.model.payload import Payload, WriteSpec
 from urc.model.values import Reading
-from urc.motion.fresh import Input
-from urc.motion.hold import Reason, Terms
-from urc.motion.lease import Client, LeaseState
-from urc.runtime.motion import MotionDesk
+from urc.motion.freshness import ControlInput
+from urc.motion.hold_to_run import HoldTerms, Reason
+from urc.motion.lease import LeaseState, Operator
+from urc.runtime.motion_controller import MotionController
 from urc.testing.movers import FakeFrames
 
 __all__ = ["DRIVER", "Movers", "Scene", "held"]
@@ -39,10 +39,10 @@ class Movers:
 
     def __init__(self) -> None:
         self.told: list[str] = []
-        self.terms: dict[str, Terms] = {}
+        self.terms: dict[str, HoldTerms] = {}
         self.is_up = True
 
-    def arm(self, command: str, terms: Terms) -> None:
+    def arm(self, command: str, terms: HoldTerms) -> None:
         self.told.append(f"arm {command}")
         self.terms[command] = terms
 
@@ -83,14 +83,14 @@ class Scene:
         is_attached: bool = True,
         driver: Driver = DRIVER,
     ) -> None:
-        self.desk = MotionDesk(driver, kept=kept, is_owed=is_owed)
+        self.desk = MotionController(driver, kept=kept, is_owed=is_owed)
         self.movers = Movers()
         self.frames = FakeFrames(driver)
         if is_attached:
             self.desk.attach(self.frames, self.movers)
         for name, role in {"ann": "driver", "bob": "driver", "eve": "engineer"}.items():
-            self.desk.join(Client(name, name, role))  # type: ignore[arg-type]
-        self.desk.join(Client("vic", "vic", "viewer"))
+            self.desk.join(Operator(name, name, role))  # type: ignore[arg-type]
+        self.desk.join(Operator("vic", "vic", "viewer"))
         self.now = 100.0
         self._number = 0
 
@@ -99,7 +99,7 @@ class Scene:
         self._number += 1
         self.now += 0.05
         echo = self.desk.beat(who, self.now)
-        given = Input(self.desk.lease.state.epoch, self._number, echo)
+        given = ControlInput(self.desk.lease.state.epoch, self._number, echo)
         return self.desk.tick(who, command, arguments, given, self.now)
 
     def drive(self, who: str, verb: str, **more: Any) -> str:

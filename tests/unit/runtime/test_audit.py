@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from urc.runtime.audit import AuditLog, Entry, check, read, shown
+from urc.runtime.audit import AuditEntry, AuditLog, check, read, shown
 
 
 @pytest.fixture(autouse=True)
@@ -22,8 +22,8 @@ def file(tmp_path: Path) -> Path:
     return tmp_path / "folder" / "audit.sqlite"
 
 
-def entry(number: int, robot: str = "puppet", text: str = "") -> Entry:
-    return Entry(1000.0 + number, robot, "moved", "screen 1", "driver", "s1", 7, "go", text)
+def entry(number: int, robot: str = "puppet", text: str = "") -> AuditEntry:
+    return AuditEntry(1000.0 + number, robot, "moved", "screen 1", "driver", "s1", 7, "go", text)
 
 
 @pytest.fixture

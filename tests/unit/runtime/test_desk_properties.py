@@ -12,21 +12,21 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, rule
 
 from tests.effort import examples
-from urc.model.codec import Payload, WriteSpec
 from urc.model.driver import Argument, Command, Driver, TransportSpec
-from urc.model.flow import Hold
-from urc.motion.fresh import Input
-from urc.motion.hold import Mover, Reason, Terms
-from urc.motion.lease import Client
-from urc.runtime.motion import MotionDesk
+from urc.model.exchange import Hold
+from urc.model.payload import Payload, WriteSpec
+from urc.motion.freshness import ControlInput
+from urc.motion.hold_to_run import HoldTerms, HoldToRun, Reason
+from urc.motion.lease import Operator
+from urc.runtime.motion_controller import MotionController
 from urc.testing.movers import FakeFrames
 
 SPEED = Argument("speed", min=-1.0, max=1.0, default=0.0, is_required=False)
 STEPS = 10_000
 SCREENS = (
-    Client("s0", "screen 0", "driver"),
-    Client("s1", "screen 1", "driver"),
-    Client("s2", "screen 2", "engineer"),
+    Operator("s0", "screen 0", "driver"),
+    Operator("s1", "screen 1", "driver"),
+    Operator("s2", "screen 2", "engineer"),
 )
 COMMANDS = ("drive", "lift")
 VERBS = ("take", "ask", "yes", "no", "force", "leave", "reset")
@@ -51,13 +51,13 @@ class Line:
     """Real movers, and what they write."""
 
     def __init__(self) -> None:
-        self.movers: dict[str, Mover] = {}
+        self.movers: dict[str, HoldToRun] = {}
         self.written: list[str] = []
         self.reported: list[tuple[str, Reason]] = []
         self.is_up = True
         self.now = 0.0
 
-    def arm(self, command: str, terms: Terms) -> None:
+    def arm(self, command: str, terms: HoldTerms) -> None:
         self._mover(command, terms).arm()
 
     def tick(self, command: str, data: Payload) -> None:
@@ -79,7 +79,7 @@ class Line:
 
     def stop(self, stops: Mapping[str, Payload]) -> None:
         for command, frame in stops.items():
-            mover = self._mover(command, Terms(frame, period_s=0.05))
+            mover = self._mover(command, HoldTerms(frame, period_s=0.05))
             mover.stop("stopped", self.now)
             if not self.is_up:
                 mover.cut()
@@ -87,10 +87,10 @@ class Line:
     async def stops(self) -> Sequence[tuple[str, Reason]]:
         raise NotImplementedError
 
-    def _mover(self, command: str, terms: Terms) -> Mover:
+    def _mover(self, command: str, terms: HoldTerms) -> HoldToRun:
         mover = self.movers.get(command)
         if mover is None:
-            mover = self.movers[command] = Mover(terms)
+            mover = self.movers[command] = HoldToRun(terms)
         else:
             mover.renew(terms)
         return mover
@@ -123,7 +123,7 @@ class World:
     def __init__(self) -> None:
         self.line = Line()
         self.frames = FakeFrames(DRIVER)
-        self.desk = MotionDesk(DRIVER)
+        self.desk = MotionController(DRIVER)
         self.desk.attach(self.frames, self.line)
         self.is_attached = True
         for screen in SCREENS:
@@ -170,14 +170,14 @@ class World:
         desk.expire(self.line.now)
         self.look()
 
-    def tick(self, screen: Client, who: int, command: str, now: float) -> None:
+    def tick(self, screen: Operator, who: int, command: str, now: float) -> None:
         """Send sampled input, as a page does that believes it has the controls."""
         self.numbers += 1
         epoch = self.desk.lease.state.epoch
-        given = Input(epoch, self.numbers, self.echoes[screen.id])
+        given = ControlInput(epoch, self.numbers, self.echoes[screen.id])
         self.desk.tick(screen.id, command, {"speed": (who + 1) / 10}, given, now)
 
-    def hold(self, screen: Client, who: int, command: str) -> None:
+    def hold(self, screen: Operator, who: int, command: str) -> None:
         """Do as a page does whose hand is on a control: a sample every 50 ms, each answering."""
         for _ in range(4):
             now = self.line.now

@@ -6,9 +6,9 @@ import pytest
 
 from urc.config.load import check
 from urc.problems import to_text
-from urc.runtime.catalog import built_in_catalog
 from urc.runtime.coverage import measure
-from urc.runtime.selftest import exercise
+from urc.runtime.document_tests import exercise
+from urc.runtime.registries import built_in_catalog
 
 DRIVER = r"""
 urc: 1
@@ -376,6 +376,6 @@ def test_time_without_end_is_told_and_not_waited_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A poll of every second for a day is more than a test may ask."""
-    monkeypatch.setattr("urc.runtime.trial._MOST_TICKS", 2000)
+    monkeypatch.setattr("urc.runtime.test_engine._MOST_TICKS", 2000)
     test = "ready: true\npolls: [beat]\nsteps:\n  - { wait: 24h, fails: x }"
     assert outcome(tmp_path, test)[0] == ["4:9 1: more than 2000 deadlines are due within 86400 s"]

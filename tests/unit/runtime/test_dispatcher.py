@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from urc.protocol.events import Event, Failed, Fault, Replied, Request
+from urc.protocol.events import Event, Failed, Replied, Request, Violation
 from urc.runtime.dispatcher import MAX_WAITING, Dispatcher
 from urc.runtime.hub import Hub
 from urc.testing.clock import FakeClock
@@ -68,7 +68,7 @@ class Port:
 
     def heard(self) -> None: ...
 
-    def count(self, fault: Fault) -> None: ...
+    def count(self, fault: Violation) -> None: ...
 
     def publish(self) -> None: ...
 

@@ -7,26 +7,26 @@ from urc.expressions import compile_template
 from urc.guard.guard_client import GuardClient, HeldSpec
 from urc.guard.local_channel import LocalChannel
 from urc.guard.pipe_channel import PipeChannel
-from urc.model.codec import ReadSpec
 from urc.model.driver import Driver, Message, TransportSpec
-from urc.motion.hold import LEASE_S, Terms
+from urc.model.payload import ReadSpec
+from urc.motion.hold_to_run import LEASE_S, HoldTerms
 from urc.motion.stall import STALLED_S, WAITED_S
 from urc.registry import Table
 from urc.runtime import guarding
 from urc.runtime.guarding import take_reins
 from urc.testing.clock import FakeClock
-from urc.transports.base import Setup
+from urc.transports.base import TransportSetup
 
 HELD = {
-    "drive": HeldSpec("wire", Terms(b"", 0.05, LEASE_S, is_lossy=False)),
-    "lift": HeldSpec("air", Terms(b"", 0.05, LEASE_S, is_lossy=True)),
+    "drive": HeldSpec("wire", HoldTerms(b"", 0.05, LEASE_S, is_lossy=False)),
+    "lift": HeldSpec("air", HoldTerms(b"", 0.05, LEASE_S, is_lossy=True)),
 }
 
 
 class Stub:
     """A transport that is never opened."""
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: TransportSetup) -> None:
         self.setup = setup
         self.address = f"stub {setup.name}"
 

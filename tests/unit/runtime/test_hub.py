@@ -8,12 +8,12 @@ import pytest
 
 from urc.model.values import Sample, Signal
 from urc.runtime import hub as hub_module
-from urc.runtime.hub import Hub, LinkStatus, Moved, Note, Tapped, Traffic
+from urc.runtime.hub import Hub, LinkStatus, LogEntry, MotionRecord, Tapped, Traffic
 
 pytestmark = pytest.mark.anyio
 
 SIGNALS = {name: Signal(name) for name in ("a", "b", "c")}
-NOTE = Note(1.0, "warning", "wire", "the robot hung up")
+NOTE = LogEntry(1.0, "warning", "wire", "the robot hung up")
 TRAFFIC = Traffic(1.0, "wire", "received", b"42\n")
 
 
@@ -140,7 +140,10 @@ def test_tap_gives_everything_in_order(hub: Hub) -> None:
 
 def test_tap_hears_of_lines_and_of_what_people_did(hub: Hub) -> None:
     """Nobody else does: who drove is no news to pages."""
-    live, moved = LinkStatus("wire", "live", "tcp x:1", 0.0), Moved(1.0, "drive", {"speed": 1})
+    live, moved = (
+        LinkStatus("wire", "live", "tcp x:1", 0.0),
+        MotionRecord(1.0, "drive", {"speed": 1}),
+    )
     assert not hub.is_tapped
     with hub.tap() as tap, hub.subscribe() as subscription:
         assert hub.is_tapped

@@ -6,10 +6,10 @@ from urllib.parse import quote
 
 import pytest
 
-from urc.model.codec import Envelope
+from urc.model.payload import Envelope
 from urc.model.values import Sample, Signal
-from urc.runtime.blanking import Blanker
-from urc.runtime.hub import Hub, LinkStatus, Moved, Note, Tapped, Traffic
+from urc.runtime.hub import Hub, LinkStatus, LogEntry, MotionRecord, Tapped, Traffic
+from urc.runtime.redaction import Redactor
 
 WORD = 'pa"ss\\wörd é'
 FORMS = {
@@ -25,7 +25,7 @@ FORMS = {
 def hub_of(*secrets: str) -> Hub:
     """A hub of a robot with these secrets, and one line that is a stream."""
     names = ("word", "dump", "pose", "pin")
-    return Hub({name: Signal(name) for name in names}, Blanker(secrets), ["wire"])
+    return Hub({name: Signal(name) for name in names}, Redactor(secrets), ["wire"])
 
 
 def shown(hub: Hub, *events: Tapped) -> str:
@@ -35,13 +35,13 @@ def shown(hub: Hub, *events: Tapped) -> str:
             match event:
                 case Sample():
                     hub.put([event])
-                case Note():
+                case LogEntry():
                     hub.note(event)
                 case Traffic():
                     hub.saw(event)
                 case LinkStatus():
                     hub.set_link(event)
-                case Moved():
+                case MotionRecord():
                     hub.tell(event)
         hub.tell_rest(9.0)
         told = tap.take()
@@ -65,9 +65,9 @@ def _text(event: Tapped) -> str:
             return event.data.decode("utf-8", "replace") + body
         case LinkStatus():
             return event.address + event.detail
-        case Note():
+        case LogEntry():
             return event.text
-        case Moved():
+        case MotionRecord():
             return " ".join(map(str, event.arguments.values()))
     return ""
 
@@ -81,11 +81,11 @@ def test_a_secret_is_kept_out_of_all_that_comes_in(form: str) -> None:
         Sample("word", f"it is {form}", 1.0),
         Sample("dump", data, 1.0),
         Sample("pose", {"in": form, form: 1}, 1.0),
-        Note(1.0, "warning", "wire", f"no-match: nothing declared matches '{form}'"),
+        LogEntry(1.0, "warning", "wire", f"no-match: nothing declared matches '{form}'"),
         LinkStatus("wire", "lost", f"tcp {form}", 1.0, f"refused {form}"),
         Traffic(1.0, "wire", "received", data),
         Traffic(1.0, "air", "received", data, Envelope("message", {"topic": "/a"}, form)),
-        Moved(1.0, "say", {"word": form}),
+        MotionRecord(1.0, "say", {"word": form}),
     )
     assert form not in found
     assert "it is " in found
@@ -105,7 +105,9 @@ def test_a_secret_that_comes_in_pieces_is_kept_out(form: str, size: int) -> None
 @pytest.mark.parametrize("end", ["...", "'...", "'", "", " …"])
 def test_a_secret_that_a_note_cuts_off_is_no_more_shown(end: str) -> None:
     """Faults quote the first letters of what came."""
-    note = Note(1.0, "warning", "wire", f"no-match: nothing declared matches 'pw hunter2-a{end}")
+    note = LogEntry(
+        1.0, "warning", "wire", f"no-match: nothing declared matches 'pw hunter2-a{end}"
+    )
     found = shown(hub_of("hunter2-and-3"), note)
     assert "hunt" not in found
     assert "nothing declared matches 'pw ‹secret›" in found
@@ -114,7 +116,7 @@ def test_a_secret_that_a_note_cuts_off_is_no_more_shown(end: str) -> None:
 def test_a_word_that_only_begins_like_a_secret_is_shown() -> None:
     """Where it goes on otherwise."""
     text = "the hunter is gone"
-    assert text in shown(hub_of("hunter2-and-3"), Note(1.0, "info", "wire", text))
+    assert text in shown(hub_of("hunter2-and-3"), LogEntry(1.0, "info", "wire", text))
 
 
 def test_a_secret_number_is_not_available() -> None:
@@ -141,6 +143,6 @@ def test_a_secret_of_two_letters_blanks_what_it_stands_in_alone() -> None:
     hub = hub_of("42")
     picture = bytes(range(256)) * 4 + b"42"
     hub.put([Sample("dump", picture, 1.0), Sample("word", "PIN 42", 1.0)])
-    hub.note(Note(1.0, "info", "wire", "connecting to tcp 10.0.0.1:4242"))
+    hub.note(LogEntry(1.0, "info", "wire", "connecting to tcp 10.0.0.1:4242"))
     assert [one.value for one in hub.changed_since(0)] == [picture, "‹secret›"]
     assert hub.notes[0].text == "connecting to tcp 10.0.0.1:4242"

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from urc.motion.lease import Client, LeaseState
-from urc.runtime.latch import Latch, LatchFile
+from urc.motion.lease import LeaseState, Operator
+from urc.runtime.latch import Latch, LatchStore
 
 pytestmark = pytest.mark.anyio
 
@@ -18,18 +18,18 @@ BEFORE = ", before a restart"
 
 async def test_what_was_kept_is_found_again(tmp_path: Path) -> None:
     """The latch and the epoch; nobody keeps the controls over a restart."""
-    file = LatchFile(tmp_path / "new" / "folder", "puppet")
+    file = LatchStore(tmp_path / "new" / "folder", "puppet")
     assert file.load() == Latch(LeaseState())
-    file.keep(Latch(LeaseState(7, Client("a"), None, 0.0, "ann")))
+    file.keep(Latch(LeaseState(7, Operator("a"), None, 0.0, "ann")))
     await file.settle()
-    found = LatchFile(tmp_path / "new" / "folder", "puppet").load()
+    found = LatchStore(tmp_path / "new" / "folder", "puppet").load()
     assert found == Latch(LeaseState(7, latched_by=f"ann{BEFORE}"))
     assert len(list((tmp_path / "new" / "folder").iterdir())) == 1, "no half file is left behind"
 
 
 async def test_who_stopped_it_in_another_run_is_none_of_this_ones_screens(tmp_path: Path) -> None:
     """They are numbered from one again: screen 1 of now stopped nothing. However many runs ago."""
-    file = LatchFile(tmp_path, "puppet")
+    file = LatchStore(tmp_path, "puppet")
     kept = Latch(LeaseState(7, latched_by="screen 1"))
     for _ in range(3):
         file.keep(kept)
@@ -41,7 +41,7 @@ async def test_who_stopped_it_in_another_run_is_none_of_this_ones_screens(tmp_pa
 @pytest.mark.parametrize("is_owed", [True, False])
 async def test_whether_the_robot_heard_of_the_stop_is_kept(tmp_path: Path, is_owed: bool) -> None:
     """Whether it is latched or was reset since."""
-    file = LatchFile(tmp_path, "puppet")
+    file = LatchStore(tmp_path, "puppet")
     for by in ("ann", ""):
         file.keep(Latch(LeaseState(7, latched_by=by), is_owed))
         await file.settle()
@@ -52,12 +52,12 @@ async def test_whether_the_robot_heard_of_the_stop_is_kept(tmp_path: Path, is_ow
 def test_a_record_of_an_older_urc_does_not_say_so(tmp_path: Path, by: str, is_owed: bool) -> None:
     """The robot hears a latched stop once more."""
     (tmp_path / "puppet.latch.json").write_text(json.dumps({"epoch": 3, "latched_by": by}))
-    assert LatchFile(tmp_path, "puppet").load().is_owed is is_owed
+    assert LatchStore(tmp_path, "puppet").load().is_owed is is_owed
 
 
 async def test_of_many_states_the_newest_is_kept(tmp_path: Path) -> None:
     """A slow disk writes fewer of them, and the last one."""
-    file = LatchFile(tmp_path, "puppet")
+    file = LatchStore(tmp_path, "puppet")
     for epoch in range(200):
         file.keep(Latch(LeaseState(epoch)))
     await file.settle()
@@ -66,7 +66,7 @@ async def test_of_many_states_the_newest_is_kept(tmp_path: Path) -> None:
 
 def test_a_robot_that_was_never_driven_is_not_stopped(tmp_path: Path) -> None:
     (tmp_path / "puppet.latch.json").write_text('{"epoch": 0, "latched_by": ""}')
-    assert LatchFile(tmp_path, "puppet").load().state == LeaseState(0)
+    assert LatchStore(tmp_path, "puppet").load().state == LeaseState(0)
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_a_robot_that_was_never_driven_is_not_stopped(tmp_path: Path) -> None:
 def test_a_file_that_says_nothing_means_stopped(tmp_path: Path, text: str) -> None:
     """Nobody knows whether it was latched, so it is."""
     (tmp_path / "puppet.latch.json").write_text(text)
-    found = LatchFile(tmp_path, "puppet").load()
+    found = LatchStore(tmp_path, "puppet").load()
     assert "cannot be read" in found.state.latched_by
     assert found.is_owed, "nor does anybody know whether the robot heard of it"
 
@@ -91,7 +91,7 @@ async def test_a_full_disk_is_told_and_harms_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The old file stays whole, and the next write that can be made is made."""
-    file, told = LatchFile(tmp_path, "puppet"), list[str]()
+    file, told = LatchStore(tmp_path, "puppet"), list[str]()
     file.on_fault = told.append
     file.keep(Latch(LeaseState(1, latched_by="ann")))
     await file.settle()
@@ -118,7 +118,7 @@ async def test_a_fault_without_a_number_is_told_in_its_own_words(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is kept here as well, for want of a listener."""
-    file = LatchFile(tmp_path, "puppet")
+    file = LatchStore(tmp_path, "puppet")
 
     def broken(descriptor: int) -> None:
         raise OSError("the card was pulled out")
@@ -135,7 +135,7 @@ async def test_what_could_not_be_written_is_tried_again(
     """A stop that was latched while the disk was full survives a restart after all."""
     monkeypatch.setattr("urc.runtime.latch.RETRY_S", 0.0)
     well = asyncio.Event()
-    file = LatchFile(tmp_path, "puppet")
+    file = LatchStore(tmp_path, "puppet")
     file.on_fault = lambda fault: None if fault else well.set()
 
     faults = [OSError(errno.ENOSPC, "No space left on device")]

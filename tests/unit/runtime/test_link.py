@@ -9,7 +9,7 @@ import pytest
 from urc.model.driver import Backoff, Timeouts
 from urc.model.profile import Profile
 from urc.runtime.link import SLICE_BYTES
-from urc.runtime.outgoing import MAX_QUEUED_BYTES
+from urc.runtime.output_buffer import MAX_QUEUED_BYTES
 from urc.runtime.session import CommandFailed, Session
 from urc.testing.clock import FakeClock, settle
 from urc.testing.profile import line_profile

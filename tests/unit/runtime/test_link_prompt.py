@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from tests.unit.runtime.test_link import ASK, opened, says_42, state_of, value_of
-from urc.runtime.outgoing import STUCK_S
+from urc.runtime.output_buffer import STUCK_S
 from urc.testing.clock import FakeClock
 from urc.testing.profile import line_profile
 from urc.testing.transport import MemoryTransport

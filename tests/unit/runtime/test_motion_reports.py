@@ -1,11 +1,11 @@
 """What the desk makes of the movers' reports, and which stops it owes."""
 
 from tests.unit.runtime.desks import DRIVER, Scene, held
-from urc.model.codec import Payload, WriteSpec
 from urc.model.driver import Command, Driver
-from urc.motion.lease import Client
+from urc.model.payload import Payload, WriteSpec
+from urc.motion.lease import Operator
 from urc.problems import UrcError
-from urc.runtime.motion import LET_GO, MOST_SCREENS
+from urc.runtime.motion_controller import LET_GO, MOST_SCREENS
 
 HALT = Command("halt", "wire", WriteSpec("text", {}), stops=True)
 
@@ -59,7 +59,7 @@ def test_a_screen_that_is_gone_is_no_screen_any_more() -> None:
     assert it.heard() == ["stop drive"]
     assert "ann" not in it.desk._screens
     for number in range(MOST_SCREENS - 3):
-        it.desk.join(Client(f"more {number}"))
+        it.desk.join(Operator(f"more {number}"))
 
 
 def test_the_report_of_a_stop_that_was_pressed_closes_no_later_gesture() -> None:

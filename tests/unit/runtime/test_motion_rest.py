@@ -1,7 +1,7 @@
 """The desk and a robot at rest: an engine that was held up, and hands that change."""
 
 from tests.unit.runtime.desks import Scene
-from urc.runtime.motion import LET_GO
+from urc.runtime.motion_controller import LET_GO
 
 
 def test_an_engine_that_was_held_up_stops_what_moves() -> None:

@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 
 from tests.unit.runtime.desks import DRIVER, Scene
-from urc.model.codec import Count, Counted, Numbered, Payload
+from urc.model.payload import Count, CountedFrame, Numbered, Payload
 from urc.model.sequence import WaitStep
 from urc.model.values import Reading
-from urc.motion.lease import Client
+from urc.motion.lease import Operator
 
 
 def test_a_request_lasts_as_long_as_it_says_and_may_be_declined() -> None:
@@ -16,7 +16,7 @@ def test_a_request_lasts_as_long_as_it_says_and_may_be_declined() -> None:
     assert it.desk.lease.state.asked_until == it.now + 5
     assert it.drive("ann", "no") == ""
     state = it.desk.lease.state
-    assert (state.holder, state.asked_by) == (Client("ann", "ann", "driver"), None)
+    assert (state.holder, state.asked_by) == (Operator("ann", "ann", "driver"), None)
 
 
 def test_a_new_session_owes_no_stop_to_what_rests() -> None:
@@ -62,7 +62,7 @@ def test_the_audit_has_a_frame_as_it_was_made_also_where_it_carries_a_number() -
     it = Scene()
     ticked: list[object] = []
     audited: list[object] = []
-    frame = Counted(Numbered(b"7 left", Count({}, {"n": 7})), lambda: None)
+    frame = CountedFrame(Numbered(b"7 left", Count({}, {"n": 7})), lambda: None)
     it.frames.motion_frame = lambda *_: frame  # type: ignore[method-assign,misc,assignment]
     it.movers.tick = lambda *what: ticked.append(what)  # type: ignore[method-assign,misc,assignment]
     it.desk.on_moved = lambda *what: audited.append(what[4])

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from tests.unit.runtime.desks import DRIVER, Scene, held
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.model.values import Reading
 from urc.problems import UrcError
 

@@ -9,10 +9,10 @@ from urc.cli.main import main
 from urc.cli.packages import RISKS_FLAG
 from urc.config.load import check
 from urc.packages.store import Store
-from urc.runtime.apart import look_apart
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.look import risks_of
-from urc.runtime.shelves import shelf_of
+from urc.runtime.isolation import look_apart
+from urc.runtime.package_preview import risks_of
+from urc.runtime.registries import built_in_catalog
+from urc.runtime.widget_registry import shelf_of
 
 ATTACK = Path(__file__).parents[2] / "attacks" / "drivers" / "key-user"
 RISKS = [

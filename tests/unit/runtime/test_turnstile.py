@@ -5,7 +5,7 @@ from contextlib import suppress
 
 import pytest
 
-from urc.runtime.session import Turnstile
+from urc.runtime.session import FifoEvent
 
 pytestmark = pytest.mark.anyio
 
@@ -19,7 +19,7 @@ class Door:
 
     def __init__(self) -> None:
         self.event = asyncio.Event()
-        self.turnstile = Turnstile(self.event)
+        self.turnstile = FifoEvent(self.event)
         self.through: list[str] = []
 
     async def go(self, name: str) -> None:

@@ -10,9 +10,9 @@ import pytest
 from urc.config.load import load_profile
 from urc.model.profile import Profile
 from urc.protocol.engine import Engine
-from urc.protocol.events import Event, Failed, Fault, Open, Replied, Request, Samples, Send
-from urc.runtime.catalog import built_in_catalog
-from urc.simulator.twin import Twin, TwinLine
+from urc.protocol.events import Event, Failed, Open, Replied, Request, Samples, Send, Violation
+from urc.runtime.registries import built_in_catalog
+from urc.simulator.emulated_robot import EmulatedConnection, EmulatedRobot
 
 HEAD = """
 urc: 1
@@ -37,8 +37,8 @@ class Dialogue:
     def __init__(self, profile: Profile, start_s: float = 0.0) -> None:
         self.now = start_s
         self.engine = Engine(profile.driver, {})
-        self.twin = Twin(profile, {})
-        self.line: TwinLine = self.twin.line("wire")
+        self.twin = EmulatedRobot(profile, {})
+        self.line: EmulatedConnection = self.twin.line("wire")
         self.values: dict[str, object] = {}
         self.replies: list[Event] = []
         self.faults: list[str] = []
@@ -61,7 +61,7 @@ class Dialogue:
                     self.values.update((one.signal, one.value) for one in event.samples)
                 case Replied() | Failed():
                     self.replies.append(event)
-                case Fault():
+                case Violation():
                     self.faults.append(event.message)
 
     def wait(self, seconds: float, step_s: float = 0.05) -> None:
@@ -182,7 +182,7 @@ commands:
   get: { send: "GET", reply: { equals: got } }
   set: { send: "SET {{ a }}", args: { a: { type: integer } }, reply: { equals: set } }
 """
-    line = Twin(profile_of(tmp_path, body), {}).line("wire")
+    line = EmulatedRobot(profile_of(tmp_path, body), {}).line("wire")
     assert line.receive(b"GET\r", 0.0) == [b"got\n"]
     assert line.receive(b"SET 3\r", 0.0) == [b"any\n"]  # both give it; the first one declared
     assert line.receive(b"hello\r", 0.0) == [b"any\n"]
@@ -237,7 +237,7 @@ simulator:
     - { match: '^ask$', send: "V 7" }
     - { match: '^mute$' }
 """
-    line = Twin(profile_of(tmp_path, body), {}).line("wire")
+    line = EmulatedRobot(profile_of(tmp_path, body), {}).line("wire")
     assert line.receive(b"ask\rother\rmute\r", 0.0) == [b"V 7\n", b"pong\n"]
     assert line.due_in_s is None
     assert line.faults == 0
@@ -277,7 +277,7 @@ polls:
 commands:
   ask: { send: "ask", reply: { json: { volts: "max(cells)" } } }
 """
-    line = Twin(profile_of(tmp_path, body), {}).line("wire")
+    line = EmulatedRobot(profile_of(tmp_path, body), {}).line("wire")
     why = "no reply can be built as json: nothing to write, or two paths exclude each other"
     for asked, label, trigger in (
         (b"volts?", "polls.0", "match: …"),
@@ -384,7 +384,7 @@ commands:
     reply: { struct: [header, u8 6, u16be 1, u16be _level], match: _id == seq.id }
 """,
     )
-    line = Twin(profile, {"unit": 17}).line("wire")
+    line = EmulatedRobot(profile, {"unit": 17}).line("wire")
     ask = bytes.fromhex("0005 0000 0006 11 03 0001 0001")
     assert line.receive(ask, 0.0)[0][:-1] == bytes.fromhex("0005 0000 0005 11 03 02 00")
     write = bytes.fromhex("0006 0000 0006 11 06 0001 0004")

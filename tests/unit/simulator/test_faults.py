@@ -7,9 +7,9 @@ import pytest
 
 from urc.config.load import load_profile
 from urc.problems import UrcError
-from urc.runtime.catalog import built_in_catalog
-from urc.simulator.faults import MOST_LATE, Late, parse_fault
-from urc.simulator.twin import Twin, TwinLine
+from urc.runtime.registries import built_in_catalog
+from urc.simulator.emulated_robot import EmulatedConnection, EmulatedRobot
+from urc.simulator.faults import MOST_LATE, DelayLine, parse_fault
 
 ROVER = r"""
 urc: 1
@@ -50,14 +50,14 @@ simulator:
 
 
 @pytest.fixture
-def rover(tmp_path: Path) -> Twin:
+def rover(tmp_path: Path) -> EmulatedRobot:
     """A rover 3 m before a wall."""
     file = tmp_path / "rover.yaml"
     file.write_text(ROVER)
-    return Twin(load_profile(file, built_in_catalog()), {})
+    return EmulatedRobot(load_profile(file, built_in_catalog()), {})
 
 
-def test_late_is_whole_and_in_order(rover: Twin) -> None:
+def test_late_is_whole_and_in_order(rover: EmulatedRobot) -> None:
     """Nothing before its time, and then everything."""
     line = rover.line("wire")
     assert line.step(0.1, 0.1) == []
@@ -72,7 +72,7 @@ def test_late_is_whole_and_in_order(rover: Twin) -> None:
 
 def test_what_is_late_is_bounded() -> None:
     """Beyond it the newest are lost, and counted."""
-    late = Late()
+    late = DelayLine()
     late.put([b"x"] * (MOST_LATE + 3), 1.0)
     assert late.lost == 3
     assert late.take(0.9) == []
@@ -80,7 +80,7 @@ def test_what_is_late_is_bounded() -> None:
     assert late.due_s == math.inf
 
 
-def answers(line: TwinLine, count: int) -> int:
+def answers(line: EmulatedConnection, count: int) -> int:
     """Return how many of so many questions, fifty a second, are answered."""
     return sum(bool(line.receive(b"L?\n", place / 50)) for place in range(count))
 
@@ -92,7 +92,7 @@ def test_lost_is_a_share_of_both_directions_and_the_same_ones_again(tmp_path: Pa
     profile = load_profile(file, built_in_catalog())
     shares = []
     for _ in range(2):
-        robot = Twin(profile, {})
+        robot = EmulatedRobot(profile, {})
         robot.inject("loss=20%", 0.0)
         shares.append(answers(robot.line("wire"), 1000) / 1000)
     assert shares[0] == pytest.approx(0.8**2, abs=0.05)
@@ -101,7 +101,7 @@ def test_lost_is_a_share_of_both_directions_and_the_same_ones_again(tmp_path: Pa
     assert answers(robot.line("wire"), 50) == 50
 
 
-def test_a_silent_robot_hears(rover: Twin) -> None:
+def test_a_silent_robot_hears(rover: EmulatedRobot) -> None:
     """It says nothing at all, and does what it is told."""
     line = rover.line("wire")
     rover.inject("silent", 0.0)
@@ -111,7 +111,7 @@ def test_a_silent_robot_hears(rover: Twin) -> None:
     assert line.step(1.0, 2.0)[0] == b"AT 1\n"
 
 
-def test_noise_is_so_many_times_as_loud(rover: Twin) -> None:
+def test_noise_is_so_many_times_as_loud(rover: EmulatedRobot) -> None:
     """Ranges about 3 m: a hundred times as noisy is far off."""
     line = rover.line("wire")
 
@@ -127,7 +127,7 @@ def test_noise_is_so_many_times_as_loud(rover: Twin) -> None:
     assert rover.faults == ("noise=10x",)
 
 
-def test_a_signal_that_drops_out_is_not_told(rover: Twin) -> None:
+def test_a_signal_that_drops_out_is_not_told(rover: EmulatedRobot) -> None:
     """Neither by a message, nor by an answer, nor by a rule of its own; all others are."""
     line = rover.line("wire")
     rover.inject("dropout=level", 0.0)
@@ -145,7 +145,7 @@ def test_what_a_rule_reads_of_a_sensor_that_failed_is_not_told(tmp_path: Path) -
     """Without a fault: the robot has nothing to say. Whatever else goes wrong is still told."""
     file = tmp_path / "rover.yaml"
     file.write_text(ROVER.replace('"R {{ range }}"', '"G {{ world.gps.fix }}"'))
-    robot = Twin(load_profile(file, built_in_catalog()), {})
+    robot = EmulatedRobot(load_profile(file, built_in_catalog()), {})
     line = robot.line("wire")
     assert line.step(1.0, 1.0)[1] == b"G 3\n"
     robot.inject("dropout=gps", 1.0)
@@ -155,7 +155,7 @@ def test_what_a_rule_reads_of_a_sensor_that_failed_is_not_told(tmp_path: Path) -
     assert len(line.step(1.0, 3.0)) == 2
 
 
-def test_a_signal_that_is_stuck_stays(rover: Twin) -> None:
+def test_a_signal_that_is_stuck_stays(rover: EmulatedRobot) -> None:
     """As it was when it began, whatever becomes of the robot."""
     line = rover.line("wire")
     line.receive(b"GO 0.5\n", 0.0)
@@ -166,7 +166,7 @@ def test_a_signal_that_is_stuck_stays(rover: Twin) -> None:
     assert line.step(1.0, 3.0)[0] != first
 
 
-def test_a_low_battery_is_low_at_once(rover: Twin) -> None:
+def test_a_low_battery_is_low_at_once(rover: EmulatedRobot) -> None:
     """And stays so."""
     line = rover.line("wire")
     assert line.receive(b"L?\n", 0.0) == [b"L 90\n"]
@@ -187,7 +187,7 @@ def test_a_low_battery_is_low_at_once(rover: Twin) -> None:
         ("stuck=y", "fault stuck: there is no signal 'y'"),
     ],
 )
-def test_what_is_no_fault_is_refused_in_one_line(rover: Twin, text: str, why: str) -> None:
+def test_what_is_no_fault_is_refused_in_one_line(rover: EmulatedRobot, text: str, why: str) -> None:
     """It says what was found and what there is; nothing becomes wrong."""
     with pytest.raises(UrcError) as caught:
         rover.inject(text, 0.0)
@@ -200,7 +200,7 @@ def test_a_robot_without_a_world_has_no_noise(tmp_path: Path) -> None:
     """Nor a battery that could be low."""
     file = tmp_path / "rover.yaml"
     file.write_text(ROVER.partition("simulator:")[0])
-    robot = Twin(load_profile(file, built_in_catalog()), {})
+    robot = EmulatedRobot(load_profile(file, built_in_catalog()), {})
     for text in ("noise=2x", "low-battery"):
         with pytest.raises(UrcError, match="this robot has no world"):
             robot.inject(text, 0.0)

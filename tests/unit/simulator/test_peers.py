@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from tests.unit.simulator.test_auto import profile_of
-from urc.model.codec import Envelope
-from urc.simulator.twin import Twin
+from urc.model.payload import Envelope
+from urc.simulator.emulated_robot import EmulatedRobot
 
 ROS = """
 transports:
@@ -26,7 +26,7 @@ messages:
 
 def drive(folder: Path, body: object) -> tuple[int, object]:
     """Return the faults of a message, and the speed after it."""
-    twin = Twin(profile_of(folder, ROS), {})
+    twin = EmulatedRobot(profile_of(folder, ROS), {})
     line = twin.line("ros")
     line.receive(Envelope("publish", {"topic": "/cmd_vel"}, body), 0.0)
     return line.faults, twin.readings(0.0)["v"]
@@ -64,7 +64,7 @@ def test_a_document_is_in_the_order_of_the_driver_and_knows_the_robots_state(
     tmp_path: Path,
 ) -> None:
     """Clients of gpsd look at the first key; `_major` is what the state calls `major`."""
-    line = Twin(profile_of(tmp_path, GREETING), {}).line("wire")
+    line = EmulatedRobot(profile_of(tmp_path, GREETING), {}).line("wire")
     said = [one for one in line.step(1.0, 1.0) if isinstance(one, bytes)]
     assert said == [b'{"class":"VERSION","release":"3.25","major":7}\n'] or said == [
         b'{"class":"VERSION","release":"3.25","major":7}\r'

@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 
 from tests.effort import examples
 from urc.config.load import check
-from urc.model.codec import Envelope
+from urc.model.payload import Envelope
 from urc.problems import to_text
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.selftest import sample_settings
-from urc.simulator.twin import MOST_COURSES, Twin, TwinLine
+from urc.runtime.document_tests import sample_settings
+from urc.runtime.registries import built_in_catalog
+from urc.simulator.emulated_robot import MOST_COURSES, EmulatedConnection, EmulatedRobot
 
 DRIVER = r"""
 urc: 1
@@ -50,7 +50,7 @@ MORE = {
 """Rule → command that would take the frames of other dialogues."""
 
 
-def twin(tmp_path: Path, rules: str) -> Twin:
+def twin(tmp_path: Path, rules: str) -> EmulatedRobot:
     """Return the emulated robot with `rules` under ``simulator:``."""
     file = tmp_path / "cart.yaml"
     text = DRIVER
@@ -61,10 +61,10 @@ def twin(tmp_path: Path, rules: str) -> Twin:
     checked = check(file, built_in_catalog())
     assert [to_text(one) for one in checked.problems if one.severity == "error"] == []
     assert checked.profile is not None
-    return Twin(checked.profile, sample_settings(checked.profile.settings))
+    return EmulatedRobot(checked.profile, sample_settings(checked.profile.settings))
 
 
-def talk(line: TwinLine, dialogue: list[tuple[object, list[bytes]]]) -> None:
+def talk(line: EmulatedConnection, dialogue: list[tuple[object, list[bytes]]]) -> None:
     """Say bytes, or let seconds pass, and compare what the robot says."""
     now_s = 0.0
     for what, expected in dialogue:
@@ -287,7 +287,7 @@ FRAMES = st.sampled_from(
 
 
 @pytest.fixture(scope="module")
-def robot_of_all_forms(tmp_path_factory: pytest.TempPathFactory) -> Twin:
+def robot_of_all_forms(tmp_path_factory: pytest.TempPathFactory) -> EmulatedRobot:
     return twin(tmp_path_factory.mktemp("rules"), ALL_FORMS.lstrip("\n"))
 
 
@@ -296,7 +296,7 @@ def robot_of_all_forms(tmp_path_factory: pytest.TempPathFactory) -> Twin:
 )
 @settings(max_examples=examples(300), deadline=None)
 def test_nothing_that_a_client_says_breaks_the_robot(
-    robot_of_all_forms: Twin, pieces: list[bytes]
+    robot_of_all_forms: EmulatedRobot, pieces: list[bytes]
 ) -> None:
     """On any line, by any rule, at any time: it answers, or counts a fault."""
     for name in ("wire", "pad"):
@@ -313,7 +313,7 @@ def test_messages_are_taken_and_answered_by_rules(tmp_path: Path) -> None:
     checked = check(file, built_in_catalog())
     assert [to_text(one) for one in checked.problems if one.severity == "error"] == []
     assert checked.profile is not None
-    robot = Twin(checked.profile, {})
+    robot = EmulatedRobot(checked.profile, {})
     web, ros = robot.line("web"), robot.line("ros")
     put = Envelope("request", {"method": "PUT", "path": "/level/9", "id": 3})
     assert web.receive(put, 0.0) == [

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 
 import pytest
 
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.problems import UrcError
+from urc.simulator.emulated_robot import EmulatedRobot
 from urc.simulator.servers.base import ServerContext, option_port
 from urc.simulator.servers.clients import ClientConnection, Clients, converse
-from urc.simulator.twin import Twin
 from urc.testing.profile import QUESTION, line_profile
 
 pytestmark = pytest.mark.anyio
@@ -19,7 +19,7 @@ ASK = f"{QUESTION}\n".encode()
 
 def context(*, is_per_request: bool = False, **options: object) -> ServerContext:
     profile = line_profile(is_per_request=is_per_request)
-    twin = Twin(profile, {})
+    twin = EmulatedRobot(profile, {})
     spec = profile.driver.transports["wire"]
     return ServerContext("wire", spec, options, "127.0.0.1", lambda: twin.line("wire"), lambda: 7.0)
 

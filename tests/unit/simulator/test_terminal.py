@@ -5,12 +5,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urc.model.driver import FramingSpec, TransportSpec
-from urc.simulator.servers.terminal import Keys, echo_of
+from urc.simulator.servers.terminal import TerminalInput, echo_of
 
 
-def keys(tx: bytes, *, kind: str = "delimiter") -> Keys:
+def keys(tx: bytes, *, kind: str = "delimiter") -> TerminalInput:
     framing = FramingSpec(kind, {"tx": tx, "rx": b"\n"})
-    return Keys(TransportSpec("wire", "telnet", framing=framing))
+    return TerminalInput(TransportSpec("wire", "telnet", framing=framing))
 
 
 @pytest.mark.parametrize("typed", [b"go\r", b"go\n", b"go\r\n"])

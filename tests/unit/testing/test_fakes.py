@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from urc.model.driver import FramingSpec
-from urc.protocol.framing import build_framing
+from urc.protocol.framing.table import build_framing
 from urc.testing.clock import FakeClock, settle
 from urc.testing.framing import feed_three_ways
 from urc.testing.transport import MemoryTransport

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urc.transports.http_events import Event, EventCutter, LineCutter
+from urc.transports.http_events import Event, EventStreamParser, LineSplitter
 
 # The examples are those of the HTML standard, section 9.2.6.
 STREAMS = {
@@ -37,14 +37,14 @@ def test_events_are_read_as_the_standard_says(
     stream: bytes, events: list[Event], size: int
 ) -> None:
     """Whole and in pieces."""
-    cutter = EventCutter(1000)
+    cutter = EventStreamParser(1000)
     pieces = [stream[start : start + size] for start in range(0, len(stream), size)]
     assert [event for piece in pieces for event in cutter.feed(piece)] == events
 
 
 def test_retry_and_last_id_are_kept() -> None:
     """They are what the next connection goes by; an id counts with its event's end."""
-    cutter = EventCutter(1000, "7")
+    cutter = EventStreamParser(1000, "7")
     assert cutter.last_id == "7"
     cutter.feed(b"id: 8\ndata: x\n")
     assert cutter.last_id == "7"
@@ -54,7 +54,7 @@ def test_retry_and_last_id_are_kept() -> None:
 
 def test_event_that_is_too_long_is_left_out() -> None:
     """The next one is read again."""
-    cutter = EventCutter(10)
+    cutter = EventStreamParser(10)
     events = cutter.feed(b"data: 12345\ndata: 67890\n\ndata: 1234567890\n\ndata: " + b"x" * 500)
     assert events == [Event("", b"1234567890", "")]
     assert cutter.feed(b"x\ndata: y\n\ndata: ok\n\n") == [Event("", b"ok", "")]
@@ -63,7 +63,7 @@ def test_event_that_is_too_long_is_left_out() -> None:
 
 def test_lines_end_as_they_like() -> None:
     """CR LF, LF and CR; the last one needs no end."""
-    cutter = LineCutter(100)
+    cutter = LineSplitter(100)
     assert cutter.feed(b"one\r") == [b"one"]
     assert cutter.feed(b"\ntwo\nthree\rfour\n\nfi") == [b"two", b"three", b"four", b""]
     assert cutter.feed(b"ve") == []
@@ -72,7 +72,7 @@ def test_lines_end_as_they_like() -> None:
 
 def test_line_that_is_too_long_is_left_out() -> None:
     """Whatever is before and after it comes."""
-    cutter = LineCutter(5)
+    cutter = LineSplitter(5)
     assert cutter.feed(b"a\n123456\nb\n12345") == [b"a", b"b"]
     assert cutter.feed(b"6") == []
     assert cutter.feed(b"7\nc\n") == [b"c"]
@@ -82,7 +82,7 @@ def test_line_that_is_too_long_is_left_out() -> None:
 @given(st.binary(max_size=80), st.lists(st.integers(1, 9), min_size=1))
 def test_pieces_make_no_difference(body: bytes, sizes: list[int]) -> None:
     """Any bytes, cut anywhere."""
-    whole, pieced = LineCutter(20), LineCutter(20)
+    whole, pieced = LineSplitter(20), LineSplitter(20)
     expected = [*whole.feed(body), whole.end()]
     found: list[bytes] = []
     turn = 0

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urc.transports.http_multipart import MultipartCutter, MultipartFault, boundary_of
+from urc.transports.http_multipart import MultipartFault, MultipartParser, boundary_of
 
 JPEG = b"\xff\xd8 \r\n a picture --\xff\xd9"
 OTHER = b"\xff\xd8 another\r\n--one \xff\xd9"
@@ -21,7 +21,7 @@ BODIES = {
 
 
 def cut(data: bytes, size: int | None = None, most: int = 1000) -> list[bytes]:
-    cutter = MultipartCutter(b"B", most)
+    cutter = MultipartParser(b"B", most)
     step = size or len(data)
     return [
         part
@@ -56,7 +56,7 @@ def test_part_without_any_header() -> None:
 
 def test_nothing_counts_after_the_end() -> None:
     """The closing boundary has two more dashes."""
-    cutter = MultipartCutter(b"B", 100)
+    cutter = MultipartParser(b"B", 100)
     body = b"--B\r\nContent-Length: 1\r\n\r\nx\r\n--B--\r\n--B\r\nContent-Length: 1\r\n\r\ny"
     assert cutter.feed(body) == [b"x"]
     assert cutter.feed(b"--B\r\nContent-Length: 1\r\n\r\nz") == []
@@ -73,7 +73,7 @@ def test_pieces_make_no_difference(parts: list[bytes], sizes: list[int], counted
     body = (
         b"".join(b"--B\r\n" + length(part) + b"\r\n" + part + b"\r\n" for part in parts) + b"--B--"
     )
-    cutter = MultipartCutter(b"B", 100)
+    cutter = MultipartParser(b"B", 100)
     found: list[bytes] = []
     turn = 0
     while body:
@@ -86,7 +86,7 @@ def test_pieces_make_no_difference(parts: list[bytes], sizes: list[int], counted
 @given(st.lists(st.binary(max_size=300), max_size=6))
 def test_anything_at_all_ends_in_parts_or_a_fault(pieces: list[bytes]) -> None:
     """Nothing else is raised, and no part is larger than allowed."""
-    cutter = MultipartCutter(b"B", 50)
+    cutter = MultipartParser(b"B", 50)
     try:
         parts = [part for piece in pieces for part in cutter.feed(b"--B\r\n" + piece)]
     except MultipartFault:

@@ -2,8 +2,8 @@
 
 import pytest
 
-from urc.transports.base import Setup, TransportError
-from urc.transports.ssh import Program, from_setup, read_program, read_target
+from urc.transports.base import TransportError, TransportSetup
+from urc.transports.ssh import RemoteProgram, from_setup, read_program, read_target
 from urc.transports.ssh_login import Login
 from urc.transports.telnet import from_setup as telnet_from_setup
 
@@ -13,26 +13,28 @@ PIN = "SHA256:JeYcKNp6EW5kp431CgbezSP+f+P3DNnckAtJioFcWEI"
 
 def test_least_that_ssh_needs() -> None:
     """Port 22, and a shell with a terminal."""
-    setup = Setup("jump", GOOD)
+    setup = TransportSetup("jump", GOOD)
     target = read_target(setup)
     assert (target.address.text, target.login) == ("10.0.0.5:22", Login("robot"))
     assert (target.keepalive_s, target.keys.is_pinned) == (2.0, False)
-    assert read_program(setup) == Program("shell", "", True, ())
+    assert read_program(setup) == RemoteProgram("shell", "", True, ())
     assert from_setup(setup).address == "ssh 10.0.0.5:22"
 
 
 def test_command_has_no_terminal_unless_it_is_wanted() -> None:
     """Its output is to be what it writes."""
     exec_ = GOOD | {"mode": "exec", "command": "cat", "environment": {"LANG": "C"}}
-    assert read_program(Setup("x", exec_)) == Program("exec", "cat", False, (("LANG", "C"),))
-    assert read_program(Setup("x", exec_ | {"pty": True})).has_pty
+    assert read_program(TransportSetup("x", exec_)) == RemoteProgram(
+        "exec", "cat", False, (("LANG", "C"),)
+    )
+    assert read_program(TransportSetup("x", exec_ | {"pty": True})).has_pty
 
 
 def test_secrets_stay_out_of_what_is_printed() -> None:
     """A login may end up in a traceback."""
     login = Login("robot", password="sesame", key="-----BEGIN", passphrase="horse")  # noqa: S106
     assert repr(login) == "Login('robot')"
-    assert "sesame" not in f"{login} {login!s} {read_target(Setup('x', GOOD))}"
+    assert "sesame" not in f"{login} {login!s} {read_target(TransportSetup('x', GOOD))}"
 
 
 @pytest.mark.parametrize(
@@ -63,7 +65,7 @@ def test_secrets_stay_out_of_what_is_printed() -> None:
 def test_bad_option_of_ssh_is_told(options: dict[str, object], complaint: str) -> None:
     """In one line, and a secret is not repeated."""
     with pytest.raises(TransportError) as told:
-        from_setup(Setup("jump", GOOD | options))
+        from_setup(TransportSetup("jump", GOOD | options))
     assert str(told.value) == complaint
 
 
@@ -82,5 +84,5 @@ def test_bad_option_of_ssh_is_told(options: dict[str, object], complaint: str) -
 def test_bad_option_of_telnet_is_told(options: dict[str, object], complaint: str) -> None:
     """In one line."""
     with pytest.raises(TransportError) as told:
-        telnet_from_setup(Setup("console", {"host": "10.0.0.5"} | options))
+        telnet_from_setup(TransportSetup("console", {"host": "10.0.0.5"} | options))
     assert str(told.value) == complaint

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from urc.transports.base import ConnectFailed, Setup
+from urc.transports.base import ConnectFailed, TransportSetup
 from urc.transports.ssh import read_target
 from urc.transports.ssh_dial import dial
 
@@ -83,7 +83,7 @@ class Curt:
 
 async def refusal(server: Curt) -> str:
     given = {"host": "10.0.0.7", "username": "robot", "password": "x", "host_key": PINNED}
-    target = read_target(Setup("gauge", given))
+    target = read_target(TransportSetup("gauge", given))
     with pytest.raises(ConnectFailed) as told:
         await dial(target, server, 5.0)  # type: ignore[arg-type] # all of it that is used
     return str(told.value)

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from urc.transports.ssh_wire import UNTAKEN_BYTES, Wire
+from urc.transports.ssh_wire import UNTAKEN_BYTES, SshSocket
 
 pytestmark = pytest.mark.anyio
 
@@ -48,8 +48,8 @@ class Polite(asyncio.Protocol):
         self._line.write(data)
 
 
-def asked(line: Line, times: int) -> Wire:
-    wire = Wire(Polite())
+def asked(line: Line, times: int) -> SshSocket:
+    wire = SshSocket(Polite())
     wire.connection_made(line)
     for _ in range(times):
         if not line.is_cut:

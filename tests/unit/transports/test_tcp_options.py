@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from urc.model.values import Value
-from urc.transports.base import Setup, TransportError
+from urc.transports.base import TransportError, TransportSetup
 from urc.transports.table import TRANSPORTS
 
 ADDRESSES = [
@@ -29,21 +29,21 @@ WRONG: list[tuple[dict[str, Value], str]] = [
 @pytest.mark.parametrize(("options", "address"), ADDRESSES)
 def test_address_is_for_people(options: dict[str, Value], address: str) -> None:
     """An IPv6 address stands in brackets."""
-    assert TRANSPORTS["tcp"].load()(Setup("wire", options)).address == address
+    assert TRANSPORTS["tcp"].load()(TransportSetup("wire", options)).address == address
 
 
 @pytest.mark.parametrize(("options", "message"), WRONG)
 def test_unusable_options_are_one_line(options: dict[str, Value], message: str) -> None:
     """Found when the transport is made, not when it is opened."""
     with pytest.raises(TransportError) as told:
-        TRANSPORTS["tcp"].load()(Setup("wire", options))
+        TRANSPORTS["tcp"].load()(TransportSetup("wire", options))
     assert str(told.value) == message
 
 
 def test_catalog_imports_no_transport() -> None:
     """What only reads documents does not pay for an event loop."""
     code = (
-        "import sys; from urc.runtime.catalog import built_in_catalog; built_in_catalog();"
+        "import sys; from urc.runtime.registries import built_in_catalog; built_in_catalog();"
         "print(sorted({'asyncio', 'socket', 'urc.transports.tcp'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=30)

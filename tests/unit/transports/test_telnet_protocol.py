@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urc.transports.telnet_protocol import BINARY, ECHO, NAWS, SGA, TTYPE, TelnetTalk
+from urc.transports.telnet_protocol import BINARY, ECHO, NAWS, SGA, TTYPE, TelnetNegotiation
 
 IAC, SE, SB, WILL, WONT, DO, DONT = 255, 240, 250, 251, 252, 253, 254
 LINEMODE, STATUS = 34, 5
@@ -16,8 +16,8 @@ def said(*parts: int | bytes) -> bytes:
     return b"".join(bytes((one,)) if isinstance(one, int) else one for one in parts)
 
 
-def client(**options: object) -> TelnetTalk:
-    return TelnetTalk(**options)  # type: ignore[arg-type]
+def client(**options: object) -> TelnetNegotiation:
+    return TelnetNegotiation(**options)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

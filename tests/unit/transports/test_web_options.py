@@ -2,7 +2,7 @@
 
 import pytest
 
-from urc.transports.base import Setup, Subscription, TransportError
+from urc.transports.base import TopicSubscription, TransportError, TransportSetup
 from urc.transports.http_streams import streams_of
 from urc.transports.table import TRANSPORTS
 
@@ -71,14 +71,14 @@ BESIDE: list[tuple[dict[str, object], str]] = [
 @pytest.mark.parametrize(("kind", "url", "address"), ADDRESSES)
 def test_address_is_for_people(kind: str, url: str, address: str) -> None:
     """With the port, also where it is the usual one."""
-    assert TRANSPORTS[kind].load()(Setup("web", {"url": url})).address == address
+    assert TRANSPORTS[kind].load()(TransportSetup("web", {"url": url})).address == address
 
 
 @pytest.mark.parametrize(("kind", "options", "message"), WRONG)
 def test_unusable_url_is_one_line(kind: str, options: dict[str, object], message: str) -> None:
     """Found when the transport is made, not when it is opened."""
     with pytest.raises(TransportError) as told:
-        TRANSPORTS[kind].load()(Setup("web", options))
+        TRANSPORTS[kind].load()(TransportSetup("web", options))
     assert str(told.value) == message
 
 
@@ -86,7 +86,7 @@ def test_unusable_url_is_one_line(kind: str, options: dict[str, object], message
 def test_unusable_options_are_one_line(options: dict[str, object], message: str) -> None:
     """The value of a header, which may be a secret, is not shown."""
     with pytest.raises(TransportError) as told:
-        TRANSPORTS["http"].load()(Setup("web", {"url": "http://robot", **options}))
+        TRANSPORTS["http"].load()(TransportSetup("web", {"url": "http://robot", **options}))
     assert str(told.value) == message
 
 
@@ -94,41 +94,46 @@ def test_events_of_one_path_share_a_stream() -> None:
     """Each path is asked for once, whoever listens to what of it."""
     found = streams_of(
         [
-            Subscription("/events#battery", {"stream": "sse"}),
-            Subscription("/events", {"stream": "sse"}),
-            Subscription("/cam", {"stream": "mjpeg"}),
+            TopicSubscription("/events#battery", {"stream": "sse"}),
+            TopicSubscription("/events", {"stream": "sse"}),
+            TopicSubscription("/cam", {"stream": "mjpeg"}),
         ]
     )
     assert [(one.kind, one.path) for one in found] == [("sse", "/events"), ("mjpeg", "/cam")]
     assert found[0].topics == {"/events#battery", "/events"}
 
 
-STREAMS: list[tuple[list[Subscription], str]] = [
+STREAMS: list[tuple[list[TopicSubscription], str]] = [
     (
-        [Subscription("/cam")],
+        [TopicSubscription("/cam")],
         "http needs mjpeg, stills, sse or lines as stream of '/cam', not None",
     ),
     (
-        [Subscription("/cam#x", {"stream": "mjpeg"})],
+        [TopicSubscription("/cam#x", {"stream": "mjpeg"})],
         "http has named events only in streams of sse: '/cam#x'",
     ),
     (
-        [Subscription("/s", {"stream": "stills", "every": 0.001})],
+        [TopicSubscription("/s", {"stream": "stills", "every": 0.001})],
         "http needs every from 10ms to 1h for '/s', not 0.001",
     ),
     (
-        [Subscription("/s#a", {"stream": "sse"}), Subscription("/s", {"stream": "lines"})],
+        [
+            TopicSubscription("/s#a", {"stream": "sse"}),
+            TopicSubscription("/s", {"stream": "lines"}),
+        ],
         "http cannot listen to '/s' in two ways",
     ),
     (
-        [Subscription(f"/{n}", {"stream": "lines"}) for n in range(17)],
+        [TopicSubscription(f"/{n}", {"stream": "lines"}) for n in range(17)],
         "http listens to at most 16 paths",
     ),
 ]
 
 
 @pytest.mark.parametrize(("subscriptions", "message"), STREAMS)
-def test_unusable_subscription_is_one_line(subscriptions: list[Subscription], message: str) -> None:
+def test_unusable_subscription_is_one_line(
+    subscriptions: list[TopicSubscription], message: str
+) -> None:
     """Found when the transport is made."""
     with pytest.raises(TransportError) as told:
         streams_of(subscriptions)

@@ -7,7 +7,7 @@ from urc.model.values import Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, HERE
 from urc.web.app import build_app
-from urc.web.feed.line import SocketFlow
+from urc.web.feed.client_socket import SocketFlow
 from urc.web.fleet.robots import Glimpse, Robot
 from urc.web.show.card import VALUES, small_values
 

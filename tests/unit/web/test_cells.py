@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from urc.config.parse.widget import Shelf
+from urc.config.parse.widget import WidgetFolder
 from urc.shipped import shipped
 from urc.web.show.cells import widget_cell
 from urc.web.show.demos import demo_states
@@ -23,7 +23,7 @@ def test_it_says_in_which_line(tmp_path: Path, template: str, error: str) -> Non
     """And what Jinja says of it; the page goes on without this cell."""
     shutil.copytree(shipped("widgets") / "value", tmp_path / "value")
     (tmp_path / "value" / "template.html.j2").write_text(template, "utf-8")
-    widget = Shelf(tmp_path).get("value")
+    widget = WidgetFolder(tmp_path).get("value")
     assert widget is not None
     state = next(one for one in demo_states(widget) if one.name == "none")
     cell = widget_cell(0, state.use, state.profile)

@@ -13,13 +13,20 @@ from urc.model.driver import Command
 from urc.model.profile import Setting
 from urc.motion.lease import Role
 from urc.protocol.events import Replied
-from urc.runtime.audit import Entry
+from urc.runtime.audit import AuditEntry
+from urc.runtime.audit_recorder import AuditRecorder
 from urc.runtime.session import CommandFailed
-from urc.runtime.trail import Trail
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.fleet.robots import Robot, Station
-from urc.web.socket import BAD_MESSAGES, MESSAGES_PER_S, TICKS_PER_S, Allowance, Client, Guest
+from urc.web.fleet.robots import Robot, RobotService
+from urc.web.page_socket import (
+    BAD_MESSAGES,
+    MESSAGES_PER_S,
+    TICKS_PER_S,
+    BrowserClient,
+    SocketPeer,
+    TokenBucket,
+)
 from urc.web.wire.messages import CLOSE_TOO_FAST
 
 pytestmark = pytest.mark.anyio
@@ -103,14 +110,14 @@ class Scene:
     """A client that is connected to a fake robot."""
 
     def __init__(
-        self, station: Station, robot: FakeRobot, clock: FakeClock, role: Role = "driver"
+        self, station: RobotService, robot: FakeRobot, clock: FakeClock, role: Role = "driver"
     ) -> None:
         self.robot = robot
         self.clock = clock
         self.station = station
-        self.audit: list[Entry] = []
+        self.audit: list[AuditEntry] = []
         self.line = FakeLine()
-        self.client = Client(self.line, station, self.line, Guest("", role))
+        self.client = BrowserClient(self.line, station, self.line, SocketPeer("", role))
         self.task = asyncio.create_task(self.client.serve())
 
 
@@ -124,9 +131,9 @@ async def scene(
     """Serve one client; it and the station are gone after the test."""
     clock = FakeClock()
     robot = FakeRobot(dashboard_profile(settings=settings, commands=commands), clock)
-    audit: list[Entry] = []
-    trail = Trail("puppet", audit.append, utc=lambda: 99.0)
-    station = Station(Robot(robot.profile, {}, robot.open), clock=clock, trail=trail)
+    audit: list[AuditEntry] = []
+    trail = AuditRecorder("puppet", audit.append, utc=lambda: 99.0)
+    station = RobotService(Robot(robot.profile, {}, robot.open), clock=clock, trail=trail)
     running = asyncio.create_task(station.run())
     made = Scene(station, robot, clock, role)
     made.audit = audit
@@ -249,7 +256,7 @@ async def test_too_many_messages_close_the_line() -> None:
 
 def test_the_allowance_comes_back_with_time() -> None:
     """A second's worth at once, then the rate."""
-    allowance = Allowance(100, 0.0)
+    allowance = TokenBucket(100, 0.0)
     assert [allowance.take(0.0) for _ in range(101)] == [True] * 100 + [False]
     assert [allowance.take(0.011) for _ in range(2)] == [True, False]
     assert sum(allowance.take(100.0) for _ in range(500)) == 100

@@ -7,17 +7,17 @@ from contextlib import asynccontextmanager
 import pytest
 
 from tests.unit.web.test_client import FakeLine
-from urc.model.codec import WriteSpec
 from urc.model.driver import Command
-from urc.model.flow import Confirm
+from urc.model.exchange import Confirm
+from urc.model.payload import WriteSpec
 from urc.motion.lease import Role
-from urc.runtime.audit import Entry
-from urc.runtime.trail import Trail
+from urc.runtime.audit import AuditEntry
+from urc.runtime.audit_recorder import AuditRecorder
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.drive.consent import TOKEN_S, WAIT_S
-from urc.web.fleet.robots import Robot, Station
-from urc.web.socket import Client, Guest
+from urc.web.drive.two_person import TOKEN_S, WAIT_S
+from urc.web.fleet.robots import Robot, RobotService
+from urc.web.page_socket import BrowserClient, SocketPeer
 
 pytestmark = pytest.mark.anyio
 
@@ -35,9 +35,9 @@ BEAM = Command(
 class Screens:
     """Some screens that look at one robot."""
 
-    def __init__(self, station: Station, robot: FakeRobot, clock: FakeClock) -> None:
+    def __init__(self, station: RobotService, robot: FakeRobot, clock: FakeClock) -> None:
         self.station, self.robot, self.clock = station, robot, clock
-        self.audit: list[Entry] = []
+        self.audit: list[AuditEntry] = []
         self.lines: list[FakeLine] = []
         self._tasks: list[asyncio.Task[None]] = []
 
@@ -45,7 +45,7 @@ class Screens:
         """Let one more look."""
         line = FakeLine()
         self.lines.append(line)
-        client = Client(line, self.station, line, Guest("", role))
+        client = BrowserClient(line, self.station, line, SocketPeer("", role))
         self._tasks.append(asyncio.create_task(client.serve()))
         await settle()
         return line
@@ -65,9 +65,9 @@ async def screens() -> AsyncIterator[Screens]:
     clock = FakeClock()
     commands = {"dock": DOCK, "beam": BEAM, "erase": ERASE}
     robot = FakeRobot(dashboard_profile(commands=commands), clock)
-    audit: list[Entry] = []
-    trail = Trail("puppet", audit.append, utc=lambda: 99.0)
-    station = Station(Robot(robot.profile, {}, robot.open), clock=clock, trail=trail)
+    audit: list[AuditEntry] = []
+    trail = AuditRecorder("puppet", audit.append, utc=lambda: 99.0)
+    station = RobotService(Robot(robot.profile, {}, robot.open), clock=clock, trail=trail)
     running = asyncio.create_task(station.run())
     made = Screens(station, robot, clock)
     made.audit = audit

@@ -11,13 +11,13 @@ import pytest
 
 from tests.unit.runtime.desks import DRIVER
 from urc.motion.lease import Role
-from urc.runtime.audit import Entry
+from urc.runtime.audit import AuditEntry
+from urc.runtime.audit_recorder import AuditRecorder
 from urc.runtime.hub import Hub
-from urc.runtime.latch import LatchFile
-from urc.runtime.trail import Trail
+from urc.runtime.latch import LatchStore
 from urc.testing.clock import FakeClock, settle
-from urc.testing.movers import FakeFrames, FakeMovers
-from urc.web.drive.controls import BEAT_S, THINNED_S, Controls, Seat
+from urc.testing.movers import FakeFrames, FakeMotionBackend
+from urc.web.drive.control_service import BEAT_S, THINNED_S, ControlService, OperatorSession
 from urc.web.wire import drive as wire
 
 pytestmark = pytest.mark.anyio
@@ -26,13 +26,13 @@ pytestmark = pytest.mark.anyio
 class Scene:
     """Controls with a robot that is connected."""
 
-    def __init__(self, file: LatchFile | None = None) -> None:
+    def __init__(self, file: LatchStore | None = None) -> None:
         self.clock = FakeClock()
-        self.audit: list[Entry] = []
-        trail = Trail("rover", self.audit.append, utc=lambda: 99.0)
-        self.controls = Controls(DRIVER, self.clock, file, trail)
+        self.audit: list[AuditEntry] = []
+        trail = AuditRecorder("rover", self.audit.append, utc=lambda: 99.0)
+        self.controls = ControlService(DRIVER, self.clock, file, trail)
         self.frames = FakeFrames(DRIVER)
-        self.movers = FakeMovers(self.clock)
+        self.movers = FakeMotionBackend(self.clock)
         self.hub = Hub({})
         self.told: dict[str, list[dict[str, Any]]] = {}
         self.beats: dict[str, int] = {}
@@ -41,14 +41,14 @@ class Scene:
     def latch(self, reason: str) -> None:
         """Take why nothing may be begun that moves by itself."""
 
-    def sit(self, place: str = "", role: Role = "driver") -> Seat:
+    def sit(self, place: str = "", role: Role = "driver") -> OperatorSession:
         """Sit down, and read what is told at once."""
         seat = self.controls.sit(place, role, lambda: None)
         self.told[seat.client.id] = []
         self.read(seat)
         return seat
 
-    def read(self, seat: Seat) -> list[dict[str, Any]]:
+    def read(self, seat: OperatorSession) -> list[dict[str, Any]]:
         """Return what a screen is told now, beats apart."""
         messages = [json.loads(text) for text in self.controls.take(seat)]
         for message in messages:
@@ -56,12 +56,12 @@ class Scene:
                 self.beats[seat.client.id] = message["n"]
         return [message for message in messages if message["t"] != "beat"]
 
-    def say(self, seat: Seat, verb: wire.Verb) -> None:
+    def say(self, seat: OperatorSession, verb: wire.Verb) -> None:
         """Want something of the controls."""
         self.controls.hear(seat, wire.Drive(verb))
         self.read(seat)
 
-    def tick(self, seat: Seat, speed: Any = 0.5, command: str = "drive") -> None:
+    def tick(self, seat: OperatorSession, speed: Any = 0.5, command: str = "drive") -> None:
         """Tick as a page does."""
         self.read(seat)
         self._numbers += 1
@@ -71,7 +71,7 @@ class Scene:
 
 
 @asynccontextmanager
-async def scene(file: LatchFile | None = None) -> AsyncIterator[Scene]:
+async def scene(file: LatchStore | None = None) -> AsyncIterator[Scene]:
     """Attach the robot; it is gone after the test."""
     it = Scene(file)
     task = asyncio.create_task(it.controls.serve(it))  # type: ignore[arg-type]  # it has all
@@ -309,7 +309,7 @@ async def test_an_audit_that_breaks_keeps_nobody_from_driving_and_stopping() -> 
     """Whatever is wrong with it."""
     async with scene() as it:
 
-        def broken(entry: Entry) -> None:
+        def broken(entry: AuditEntry) -> None:
             raise OSError("the disk is on fire")
 
         it.controls.trail._note = broken
@@ -326,7 +326,7 @@ async def test_a_latch_that_cannot_be_written_is_told_and_stops_all_the_same(
     tmp_path: Path,
 ) -> None:
     """In the log of the page, and to everybody at a screen, once; and when all is well again."""
-    file = LatchFile(tmp_path / "latches", "rover")
+    file = LatchStore(tmp_path / "latches", "rover")
     async with scene(file) as it:
         (tmp_path / "latches").write_text("a file where the folder should be")
         ann, bob = it.sit(), it.sit()
@@ -353,13 +353,13 @@ async def test_a_stop_that_is_owed_stays_so_with_another_driver_and_after_a_rest
     tmp_path: Path,
 ) -> None:
     """It was pressed while the robot was away: whoever connects it next lets it hear of it."""
-    file = LatchFile(tmp_path, "rover")
+    file = LatchStore(tmp_path, "rover")
     controls = Scene(file).controls
     controls.stop("ann")
     controls.renew(DRIVER, file)
     await file.settle()
     assert not controls.desk.is_confirmed
-    async with scene(LatchFile(tmp_path, "rover")) as it:
+    async with scene(LatchStore(tmp_path, "rover")) as it:
         assert it.movers.texts == ["drive stop", "lift stop"]
         assert it.controls.desk.is_confirmed
     await file.settle()

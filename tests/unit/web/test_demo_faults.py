@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from urc.model.widget import Port, Widget
+from urc.model.widget import Widget, WidgetPort
 from urc.problems import ProblemsError
 from urc.web.show.demos import demo_states
 
@@ -26,12 +26,12 @@ states:
 def lamp(folder: Path) -> Widget:
     """Return the widget of the demo."""
     inputs = {
-        "level": Port("level"),
-        "series": Port("series", is_multiple=True),
-        "extra": Port("extra", is_required=False),
+        "level": WidgetPort("level"),
+        "series": WidgetPort("series", is_multiple=True),
+        "extra": WidgetPort("extra", is_required=False),
     }
     options = {"label": {"type": "string", "maxLength": 8}}
-    return Widget("lamp", "Lamp", folder, inputs, {"press": Port("press")}, options)
+    return Widget("lamp", "Lamp", folder, inputs, {"press": WidgetPort("press")}, options)
 
 
 def told(folder: Path, demo: str) -> str:

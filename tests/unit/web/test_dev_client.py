@@ -10,18 +10,18 @@ import pytest
 
 from tests.unit.web.test_client import FakeLine
 from urc.model.driver import Command, FramingSpec, TransportSpec
-from urc.model.flow import Hold
+from urc.model.exchange import Hold
 from urc.model.profile import Profile, Setting
-from urc.motion.lease import Client as Screen
+from urc.motion.lease import Operator as Screen
 from urc.problems import Problem, UrcError
 from urc.runtime.hub import Traffic
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.profile import text
 from urc.web.dev.client import BAD_MESSAGES, MESSAGES_PER_S, ROWS_KEPT, Backlog, DevClient
-from urc.web.dev.rows import Row
-from urc.web.dev.watch import Examined, ProfileWatch
-from urc.web.fleet.robots import Robot, Station
+from urc.web.dev.rows import TrafficRow
+from urc.web.dev.watch import CheckedProfile, ProfileWatch
+from urc.web.fleet.robots import Robot, RobotService
 
 pytestmark = pytest.mark.anyio
 
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.anyio
 class Scene:
     """A dev page on a fake robot."""
 
-    def __init__(self, station: Station, robot: FakeRobot, clock: FakeClock) -> None:
+    def __init__(self, station: RobotService, robot: FakeRobot, clock: FakeClock) -> None:
         self.station = station
         self.robot = robot
         self.clock = clock
@@ -57,7 +57,7 @@ async def scene(profile: Profile | None = None, secret: str = "") -> AsyncIterat
     """Serve one dev page; it and the station are gone after the test."""
     clock = FakeClock()
     robot = FakeRobot(profile or dashboard_profile(), clock)
-    station = Station(Robot(robot.profile, {"password": secret}, robot.open), clock=clock)
+    station = RobotService(Robot(robot.profile, {"password": secret}, robot.open), clock=clock)
     running = asyncio.create_task(station.run())
     made = Scene(station, robot, clock)
     await settle()
@@ -127,7 +127,7 @@ def test_a_backlog_is_bounded_in_bytes_as_well() -> None:
     """A thousand pictures would be too much."""
     backlog = Backlog()
     for number in range(100):
-        backlog.put(Row(0, float(number), "received", "cam", data=bytes(40_000)))
+        backlog.put(TrafficRow(0, float(number), "received", "cam", data=bytes(40_000)))
     assert len(backlog) < 30
     assert backlog.first == 100 - len(backlog)
     assert backlog.take()[-1].n == 99
@@ -255,6 +255,6 @@ async def test_a_broken_version_is_told_in_the_terminal(caplog: pytest.LogCaptur
     """In one line with its place: nobody need have the dev page open."""
     async with scene(with_commands("old")) as it:
         problems = (Problem("unknown-key", "'sumary' is not a key", "lamp/widget.yaml", 5),)
-        it.watch._judge(Examined(None, problems, ()))
+        it.watch._judge(CheckedProfile(None, problems, ()))
         assert it.watch.state == "broken"
         assert "lamp/widget.yaml:5:1: error unknown-key" in caplog.text

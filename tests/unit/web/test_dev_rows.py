@@ -1,6 +1,6 @@
 """Rows of the wire log of the dev page."""
 
-from urc.model.codec import Envelope
+from urc.model.payload import Envelope
 from urc.runtime.hub import Traffic
 from urc.web.dev.rows import traffic_row
 

@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 
 from urc.config.load import load_profile
-from urc.model.codec import Envelope
 from urc.model.driver import Driver
+from urc.model.payload import Envelope
 from urc.problems import UrcError
-from urc.runtime.catalog import built_in_catalog
+from urc.runtime.registries import built_in_catalog
 from urc.web.dev.preview import preview
-from urc.web.dev.tryout import MOST_PIECES, Taker, pasted_bytes, try_out
+from urc.web.dev.tryout import MOST_PIECES, FrameConsumer, pasted_bytes, try_out
 
 WIRE = """
 urc: 1
@@ -109,7 +109,9 @@ def test_frames_are_shown_with_their_takers(robot: Driver) -> None:
     ]
     assert found.left == 5
     assert found.pieces[0].takers == (
-        Taker("message", ("message level",), {"battery": "12"}, (("battery", 12.0, "low"),), ()),
+        FrameConsumer(
+            "message", ("message level",), {"battery": "12"}, (("battery", 12.0, "low"),), ()
+        ),
     )
     (reply,) = found.pieces[1].takers
     assert (reply.kind, reply.names) == ("reply", ("reply to arm", "reply to stop"))

@@ -8,9 +8,9 @@ import pytest
 
 from tests.unit.web.test_client import frames_in
 from urc.model.values import Sample, Signal
-from urc.runtime.hub import STREAM_KEPT, Hub, Note
+from urc.runtime.hub import STREAM_KEPT, Hub, LogEntry
 from urc.testing.clock import FakeClock, settle
-from urc.web.feed.fanout import Fanout, Known, Pacer, Place
+from urc.web.feed.fanout import Fanout, FanoutPosition, Pacer, Place
 
 pytestmark = pytest.mark.anyio
 
@@ -181,7 +181,7 @@ def test_lines_of_the_log_are_never_lost_silently() -> None:
     hub, fanout = robot(clock)
     place = Place()
     for number in range(700):
-        hub.note(Note(clock.now(), "info", "wire", f"line {number}"))
+        hub.note(LogEntry(clock.now(), "info", "wire", f"line {number}"))
     fanout.flush()
     log = messages_in(fanout.take(place))[0]
     assert (log["first"], len(log["lines"])) == (200, 500)
@@ -197,7 +197,7 @@ def test_lines_of_the_log_come_while_values_stream() -> None:
     put(hub, clock, a=1)
     fanout.flush()
     for value in (2, 3):
-        hub.note(Note(clock.now(), "warning", "wire", f"line {value}"))
+        hub.note(LogEntry(clock.now(), "warning", "wire", f"line {value}"))
         put(hub, clock, a=value)
         fanout.flush()
     said = [[message["t"] for message in messages_in(frames)] for frames in client.frames]
@@ -219,7 +219,7 @@ def test_a_newcomer_gets_the_last_lines_of_the_log() -> None:
     clock = FakeClock()
     hub, fanout = robot(clock)
     for number in range(80):
-        hub.note(Note(clock.now(), "info", "wire", f"line {number}"))
+        hub.note(LogEntry(clock.now(), "info", "wire", f"line {number}"))
     log = messages_in(fanout.take(Watcher(fanout).place))[0]
     assert (log["first"], len(log["lines"])) == (30, 50)
 
@@ -275,4 +275,4 @@ def test_a_flood_is_let_through_at_the_rate() -> None:
 
 def test_a_place_starts_at_nothing() -> None:
     """A fresh place has seen no revision and no link."""
-    assert Place() == Place(Known(revision=0, links=0, progress=0, notes=0))
+    assert Place() == Place(FanoutPosition(revision=0, links=0, progress=0, notes=0))

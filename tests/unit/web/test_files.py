@@ -8,10 +8,10 @@ from starlette.testclient import TestClient
 
 from tests.unit.config.folder import WIRE, head
 from urc.config.load import check
-from urc.config.parse.widget import Shelf
+from urc.config.parse.widget import WidgetFolder
 from urc.model.interface import WidgetUse
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.look import permissions
+from urc.runtime.package_preview import permissions
+from urc.runtime.registries import built_in_catalog
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, HERE
@@ -31,7 +31,7 @@ def robot_in(folder: Path, options: str, *, name: str = "robot") -> WidgetUse | 
     """Return the slot of a robot whose document stands in `folder`, or what is wrong with it."""
     file = folder / f"{name}.yaml"
     file.write_text(head("robot", name) + ARM + SLOT.format(options), "utf-8")
-    checked = check(file, built_in_catalog(), Shelf(shipped("widgets")))
+    checked = check(file, built_in_catalog(), WidgetFolder(shipped("widgets")))
     if checked.profile is None:
         return [problem.message for problem in checked.problems if problem.severity == "error"]
     return checked.profile.slots["arm"]
@@ -136,7 +136,7 @@ def page_in(folder: Path, options: str) -> WidgetUse:
     file = folder / "robot.yaml"
     slot = f"widgets:\n  arm: {{ use: iframe, options: {options} }}\n"
     file.write_text(head("robot", "robot") + ARM + slot, "utf-8")
-    checked = check(file, built_in_catalog(), Shelf(shipped("widgets")))
+    checked = check(file, built_in_catalog(), WidgetFolder(shipped("widgets")))
     assert checked.profile is not None, checked.problems
     return checked.profile.slots["arm"]
 

@@ -7,7 +7,7 @@ import pytest
 
 from urc.testing.dashboard import FakeRobot, dashboard_profile, plain_widget
 from urc.web.fleet.fleet import Fleet
-from urc.web.fleet.robots import Robot, SessionFailed, Station
+from urc.web.fleet.robots import Robot, RobotService, SessionFailed
 
 pytestmark = pytest.mark.anyio
 
@@ -21,7 +21,7 @@ def fleet(*robots: FakeRobot) -> Fleet:
     """Return a fleet, each robot with a station of its own."""
     return Fleet(
         {one.profile.name: served(one) for one in robots},
-        lambda _, robot: Station(robot, linger_s=0.0),
+        lambda _, robot: RobotService(robot, linger_s=0.0),
     )
 
 

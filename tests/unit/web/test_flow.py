@@ -2,7 +2,7 @@
 
 from typing import Any, cast
 
-from urc.web.feed.line import SocketFlow
+from urc.web.feed.client_socket import SocketFlow
 
 
 class Line:

@@ -5,7 +5,7 @@ from random import Random
 import pytest
 from websockets.frames import Frame, Opcode
 
-from urc.web.serve.frames import Frames, text_of
+from urc.web.serve.frames import WebSocketFrames, text_of
 
 
 def masked(text: bytes, opcode: Opcode = Opcode.TEXT, *, fin: bool = True) -> bytes:
@@ -16,7 +16,7 @@ def masked(text: bytes, opcode: Opcode = Opcode.TEXT, *, fin: bool = True) -> by
 @pytest.mark.parametrize("size", [0, 1, 3, 4, 125, 126, 4000, 65535])
 def test_a_whole_text_is_found(size: int) -> None:
     text = bytes(Random(size).randbytes(size))  # noqa: S311 - it is no secret
-    frames = Frames()
+    frames = WebSocketFrames()
     assert frames.whole(masked(text)) == text
     assert frames.whole(b"\x81\x80\0\0\0\0") == b""
 
@@ -42,12 +42,12 @@ def test_a_whole_text_is_found(size: int) -> None:
     ],
 )
 def test_what_is_anything_else_is_left_to_the_library(data: bytes) -> None:
-    assert Frames().whole(data) is None
+    assert WebSocketFrames().whole(data) is None
 
 
 def test_a_text_within_a_message_of_parts_is_not_taken() -> None:
     """It breaks the protocol: the library must see it."""
-    frames = Frames()
+    frames = WebSocketFrames()
     assert frames.whole(masked(b"part", fin=False)) is None
     assert frames.whole(masked(b"ping", Opcode.PING)) is None
     assert frames.whole(masked(b"text")) is None
@@ -56,7 +56,7 @@ def test_a_text_within_a_message_of_parts_is_not_taken() -> None:
 
 def test_texts_that_came_together_are_found_up_to_what_is_none() -> None:
     """A page that floods is read seldom, and then brings many at once."""
-    frames = Frames()
+    frames = WebSocketFrames()
     texts = [b"one", b"two" * 100, b""]
     data = b"".join(map(masked, texts))
     rest = masked(b"ping", Opcode.PING) + masked(b"three") + masked(b"half")[:3]
@@ -83,7 +83,7 @@ def test_however_the_stream_is_cut_only_frames_that_came_whole_are_found() -> No
         stream, ends = b"".join(pieces), {0}
         for piece in pieces:
             ends.add(max(ends) + len(piece))
-        frames, at = Frames(), 0
+        frames, at = WebSocketFrames(), 0
         while at < len(stream):
             nearest = min(end for end in ends if end > at)
             step = nearest - at if dice.random() < 0.5 else dice.randrange(1, 400)

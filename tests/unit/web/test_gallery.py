@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
-from urc.config.parse.widget import Shelf
-from urc.model.widget import Port, Widget
+from urc.config.parse.widget import WidgetFolder
+from urc.model.widget import Widget, WidgetPort
 from urc.problems import UrcError
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import ACCESS, HERE
 from urc.web.app import Robot, build_app
 from urc.web.load.assets import MOST_FILES, widget_assets
-from urc.web.show.demos import DemoState, colour_bars, demo_states
+from urc.web.show.demos import WidgetState, colour_bars, demo_states
 
 DEMO = """
 signals:
@@ -40,12 +40,17 @@ states:
 def made(folder: Path, demo: str = DEMO) -> Widget:
     """Return a widget of a folder with this demo."""
     (folder / "demo.yaml").write_text(demo, "utf-8")
-    inputs = {name: Port(name, is_multiple=name == "series") for name in ("level", "series", "eye")}
-    outputs = {"moved": Port("moved", is_held=True, arguments=("x",)), "press": Port("press")}
+    inputs = {
+        name: WidgetPort(name, is_multiple=name == "series") for name in ("level", "series", "eye")
+    }
+    outputs = {
+        "moved": WidgetPort("moved", is_held=True, arguments=("x",)),
+        "press": WidgetPort("press"),
+    }
     return Widget("lamp", "Lamp", folder, inputs, outputs)
 
 
-def states(folder: Path, demo: str = DEMO) -> dict[str, DemoState]:
+def states(folder: Path, demo: str = DEMO) -> dict[str, WidgetState]:
     """Return the states of that demo."""
     return {state.name: state for state in demo_states(made(folder, demo))}
 
@@ -134,7 +139,7 @@ def client() -> TestClient:
 def test_the_gallery_lists_every_widget_and_the_menu_leads_there(client: TestClient) -> None:
     """With its title and what it is for."""
     page = client.get("/widgets").text
-    shelf = Shelf(shipped("widgets"))
+    shelf = WidgetFolder(shipped("widgets"))
     for name in shelf.names():
         assert f'href="/widgets/{name}/"' in page
     assert 'href="/widgets"' in client.get("/").text
@@ -145,7 +150,7 @@ def test_a_page_shows_each_state_of_the_widgets_that_it_names(client: TestClient
     page = client.get("/widgets/value+button/")
     assert page.status_code == 200
     for name in ("value", "button"):
-        widget = Shelf(shipped("widgets")).get(name)
+        widget = WidgetFolder(shipped("widgets")).get(name)
         assert widget is not None
         assert page.text.count(f'data-widget="{name}"') == len(demo_states(widget))
         assert client.get(f"/widgets/{name}/widget.js").status_code == 200
@@ -208,7 +213,7 @@ def test_a_widget_of_a_robot_stands_before_the_shipped_one(tmp_path: Path) -> No
     folder.mkdir()
     (folder / "template.html.j2").write_text("<p>mine</p>", "utf-8")
     (folder / "demo.yaml").write_text("states: { normal: { values: {} } }", "utf-8")
-    own = Widget("battery", "Mine", folder, {"level": Port("level")})
+    own = Widget("battery", "Mine", folder, {"level": WidgetPort("level")})
     robot = FakeRobot(dashboard_profile(widgets=[own]))
     app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, access=ACCESS)
     page = TestClient(app, base_url="http://localhost", cookies=HERE).get("/widgets/battery/").text
@@ -236,7 +241,7 @@ def lamp_beside_a_robot(folder: Path, *, is_dev: bool = True) -> TestClient:
     (lamp / "widget.yaml").write_text(MANIFEST, "utf-8")
     (lamp / "template.html.j2").write_text("<p>lamp</p>", "utf-8")
     (lamp / "demo.yaml").write_text(LAMP_DEMO, "utf-8")
-    widget = Shelf(lamp.parent).get("lamp")
+    widget = WidgetFolder(lamp.parent).get("lamp")
     assert widget is not None
     profile = dashboard_profile(widgets=[widget])._replace(file=str(folder / "robot.yaml"))
     robot = FakeRobot(profile)

@@ -2,12 +2,12 @@
 
 import pytest
 
-from urc.config.parse.widget import Shelf
+from urc.config.parse.widget import WidgetFolder
 from urc.shipped import shipped
 from urc.web.show.cells import widget_context
 from urc.web.show.demos import demo_states
 
-SHELF = Shelf(shipped("widgets"))
+SHELF = WidgetFolder(shipped("widgets"))
 
 
 @pytest.mark.parametrize(

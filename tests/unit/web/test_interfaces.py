@@ -2,10 +2,10 @@
 
 import json
 
-from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command, Driver
-from urc.model.flow import Confirm, Hold
+from urc.model.exchange import Confirm, Hold
 from urc.model.interface import Interface, Tab
+from urc.model.payload import WriteSpec
 from urc.model.profile import Profile
 from urc.model.values import Signal
 from urc.web.show.interfaces import DEBUGGING, choices, chosen, debug_part, page_tabs

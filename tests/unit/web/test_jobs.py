@@ -7,7 +7,7 @@ import pytest
 from anyio import to_thread
 
 from tests.unit.packages.made import package
-from urc.packages.index import Entry, entry_of
+from urc.packages.index import IndexEntry, entry_of
 from urc.packages.names import parse_wish
 from urc.packages.package import Package
 from urc.packages.sources import FileSource
@@ -45,11 +45,11 @@ class Stalled:
         self.asked = threading.Event()
         self.goes_on = threading.Event()
 
-    def entries(self) -> tuple[Entry, ...]:
+    def entries(self) -> tuple[IndexEntry, ...]:
         """Return the one package."""
         return (entry_of(self.wanted),)
 
-    def fetch(self, _: Entry) -> bytes:
+    def fetch(self, _: IndexEntry) -> bytes:
         """Give it out when it is told to, which is too late."""
         self.asked.set()
         self.goes_on.wait(60)

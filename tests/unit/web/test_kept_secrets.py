@@ -15,11 +15,11 @@ from tests.unit.packages.made import DOCUMENTS, install, package
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.packages.store import Store
-from urc.runtime.kept import Kept, KeptFile
+from urc.runtime.settings_store import SettingsStore, StoredSettings
 from urc.testing.dashboard import FakeRobot
 from urc.testing.entry import ACCESS, HERE
 from urc.web.app import build_app
-from urc.web.fleet.garage import Workshop
+from urc.web.fleet.robot_factory import RobotOptions
 from urc.web.fleet.robots import Robot
 
 ADDRESS = "http://localhost:8080"
@@ -52,7 +52,7 @@ def served(
     data: Path, wire: Wire, given: Mapping[str, Value] | None = None
 ) -> Iterator[TestClient]:
     """Serve what is installed to a browser at this machine."""
-    workshop = Workshop(
+    workshop = RobotOptions(
         data,
         make=wire.robot,
         tried=wire.session,
@@ -88,7 +88,7 @@ def test_a_kept_secret_does_not_follow_a_changed_host(tmp_path: Path) -> None:
     """Neither when it is tried nor when it is saved; nothing is lost, and the page says why."""
     stock(tmp_path)
     wire = Wire()
-    file = KeptFile(tmp_path / "robots", "rover")
+    file = SettingsStore(tmp_path / "robots", "rover")
     with served(tmp_path, wire) as client:
         assert fill_in(client, host="10.0.0.5", key=PASSWORD)["isSaved"]
         stolen = fill_in(client, test=True, host="203.0.113.66", key=None)
@@ -134,7 +134,7 @@ def test_a_secret_goes_with_its_package(tmp_path: Path) -> None:
     """Another package of that name, and one that comes after it, do not get it."""
     stock(tmp_path)
     wire = Wire()
-    file = KeptFile(tmp_path / "robots", "rover")
+    file = SettingsStore(tmp_path / "robots", "rover")
     with served(tmp_path, wire) as client:
         fill_in(client, host="10.0.0.5", key=PASSWORD)
         told = client.post("/api/v1/packages/remove", json={"package": "rover"}).json()
@@ -182,8 +182,8 @@ def test_an_update_that_leads_elsewhere_asks_again(tmp_path: Path) -> None:
 def test_a_file_of_an_earlier_version_is_asked_for_again(tmp_path: Path) -> None:
     """It noted no place. The secret stays in the file until it is entered again or forgotten."""
     stock(tmp_path)
-    file = KeptFile(tmp_path / "robots", "rover")
-    file.save(Kept(settings={"host": "10.0.0.5", "key": PASSWORD}))
+    file = SettingsStore(tmp_path / "robots", "rover")
+    file.save(StoredSettings(settings={"host": "10.0.0.5", "key": PASSWORD}))
     wire = Wire()
     with served(tmp_path, wire) as client:
         page = client.get("/").text

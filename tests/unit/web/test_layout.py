@@ -2,7 +2,7 @@
 
 import pytest
 
-from urc.model.interface import Grid, Interface, Slot, Tab
+from urc.model.interface import Interface, Layout, Slot, Tab
 from urc.web.show.layout import LEFT_HAND, grid_css, needs_turning
 
 MARGIN = "minmax(0,.12fr)"
@@ -10,14 +10,14 @@ ROW = "minmax(8rem,1fr)"
 COLUMN = "minmax(0,1fr)"
 
 
-def css(*grids: tuple[str, Grid], slots: tuple[str, ...]) -> str:
+def css(*grids: tuple[str, Layout], slots: tuple[str, ...]) -> str:
     """Return the rules for an interface of those grids."""
     return grid_css(Interface("i", layouts=dict(grids)), slots)
 
 
 def test_the_picture_keeps_its_margins_on_a_wide_screen() -> None:
     """Rows and columns without a slot stay where they are, and are small."""
-    text = css(("landscape", Grid(2, 3, (Slot("battery", 1, 2),))), slots=("battery",))
+    text = css(("landscape", Layout(2, 3, (Slot("battery", 1, 2),))), slots=("battery",))
     wide = text.split("@media")[0]
     assert f"grid-template-rows:{MARGIN} {ROW};" in wide
     assert f"grid-template-columns:{MARGIN} {MARGIN} {COLUMN}}}" in wide
@@ -26,7 +26,7 @@ def test_the_picture_keeps_its_margins_on_a_wide_screen() -> None:
 
 def test_a_phone_gets_no_margins() -> None:
     """The one cell fills the phone."""
-    text = css(("landscape", Grid(2, 3, (Slot("battery", 1, 2),))), slots=("battery",))
+    text = css(("landscape", Layout(2, 3, (Slot("battery", 1, 2),))), slots=("battery",))
     phone = text.split("@media (max-width: 599.98px)")[1]
     assert f"grid-template-rows:{ROW};grid-template-columns:{COLUMN}}}" in phone
     assert "grid-area:1/1/2/2" in phone
@@ -35,7 +35,7 @@ def test_a_phone_gets_no_margins() -> None:
 def test_more_than_two_columns_are_stacked_on_a_phone_in_reading_order() -> None:
     """Unless the author drew a phone grid."""
     slots = (Slot("c", 1, 0, 1, 3), Slot("a", 0, 0), Slot("b", 0, 2), Slot("m", 0, 1))
-    text = css(("landscape", Grid(2, 3, slots)), slots=("a", "m", "b", "c"))
+    text = css(("landscape", Layout(2, 3, slots)), slots=("a", "m", "b", "c"))
     phone = text.split("@media (max-width: 599.98px)")[1]
     for index, row in enumerate((1, 2, 3, 4)):
         assert f'[data-cell="{index}"]{{display:grid;grid-area:{row}/1/{row + 1}/2}}' in phone
@@ -43,8 +43,8 @@ def test_more_than_two_columns_are_stacked_on_a_phone_in_reading_order() -> None
 
 def test_a_drawn_phone_grid_is_kept_and_hides_what_it_leaves_out() -> None:
     """A slot that the phone grid does not have is not shown on a phone."""
-    wide = Grid(1, 3, (Slot("a", 0, 0), Slot("b", 0, 1), Slot("c", 0, 2)))
-    phone = Grid(1, 3, (Slot("c", 0, 0), Slot("a", 0, 1, 1, 2)))
+    wide = Layout(1, 3, (Slot("a", 0, 0), Slot("b", 0, 1), Slot("c", 0, 2)))
+    phone = Layout(1, 3, (Slot("c", 0, 0), Slot("a", 0, 1, 1, 2)))
     text = css(("landscape", wide), ("phone_portrait", phone), slots=("a", "b", "c"))
     rules = text.split("@media (max-width: 599.98px)")[1]
     assert '[data-cell="0"]{display:grid;grid-area:1/2/2/4}' in rules
@@ -53,8 +53,8 @@ def test_a_drawn_phone_grid_is_kept_and_hides_what_it_leaves_out() -> None:
 
 def test_a_low_screen_has_a_picture_of_its_own_where_one_is_drawn() -> None:
     """Without its margins; else it shows the wide one, in lower rows."""
-    wide = Grid(3, 1, (Slot("a", 0, 0), Slot("b", 1, 0), Slot("c", 2, 0)))
-    low = Grid(1, 3, (Slot("c", 0, 0), Slot("a", 0, 2)))
+    wide = Layout(3, 1, (Slot("a", 0, 0), Slot("b", 1, 0), Slot("c", 2, 0)))
+    low = Layout(1, 3, (Slot("c", 0, 0), Slot("a", 0, 2)))
     rule = "@media (max-height: 479.98px)"
     drawn = css(("landscape", wide), ("phone_landscape", low), slots=("a", "b", "c")).split(rule)[1]
     assert '[data-cell="0"]{display:grid;grid-area:1/2/2/3}' in drawn
@@ -66,20 +66,20 @@ def test_a_low_screen_has_a_picture_of_its_own_where_one_is_drawn() -> None:
 
 def test_slots_that_nobody_fills_take_no_room() -> None:
     """One interface serves many drivers."""
-    wide = Grid(1, 2, (Slot("a", 0, 0), Slot("camera", 0, 1)))
+    wide = Layout(1, 2, (Slot("a", 0, 0), Slot("camera", 0, 1)))
     text = css(("landscape", wide), slots=("a",))
     assert f"grid-template-columns:{COLUMN} {MARGIN}}}" in text
 
 
 def test_the_rules_hold_nothing_out_of_a_document() -> None:
     """A slot's name cannot end the style element."""
-    text = css(("landscape", Grid(1, 1, (Slot("</style><b>", 0, 0),))), slots=("</style><b>",))
+    text = css(("landscape", Layout(1, 1, (Slot("</style><b>", 0, 0),))), slots=("</style><b>",))
     assert "<" not in text.replace("minmax", "")
 
 
 def test_the_left_hand_gets_the_columns_the_other_way_round() -> None:
     """Only for who asked for it; what is stacked stays in reading order."""
-    wide = Grid(1, 3, (Slot("a", 0, 0, 1, 2), Slot("b", 0, 2)))
+    wide = Layout(1, 3, (Slot("a", 0, 0, 1, 2), Slot("b", 0, 2)))
     text = css(("landscape", wide), slots=("a", "b"))
     right, left = text.split(LEFT_HAND, 1)
     assert '[data-cell="0"]{display:grid;grid-area:1/1/2/3}' in right
@@ -91,11 +91,11 @@ def test_the_left_hand_gets_the_columns_the_other_way_round() -> None:
 
 def test_an_author_may_forbid_it_or_draw_it() -> None:
     """A picture for the left hand goes before the mirrored one, screen by screen."""
-    wide = Grid(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))
-    tall = Grid(2, 1, (Slot("a", 0, 0), Slot("b", 1, 0)))
+    wide = Layout(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))
+    tall = Layout(2, 1, (Slot("a", 0, 0), Slot("b", 1, 0)))
     fixed = Interface("i", layouts={"landscape": wide}, is_mirrored=False)
     assert LEFT_HAND not in grid_css(fixed, ("a", "b"))
-    own = Grid(1, 2, (Slot("b", 0, 0, 1, 2),))
+    own = Layout(1, 2, (Slot("b", 0, 0, 1, 2),))
     drawn = Interface(
         "i", layouts={"landscape": wide, "portrait": tall}, left_handed={"landscape": own}
     )
@@ -106,8 +106,8 @@ def test_an_author_may_forbid_it_or_draw_it() -> None:
 
 def test_each_page_places_the_cells_that_all_pages_share() -> None:
     """A cell that is in two pages stays the same; one that is not in a page is hidden there."""
-    first = Tab("one", "One", {"landscape": Grid(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))})
-    second = Tab("two", "Two", {"landscape": Grid(1, 1, (Slot("b", 0, 0),))})
+    first = Tab("one", "One", {"landscape": Layout(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))})
+    second = Tab("two", "Two", {"landscape": Layout(1, 1, (Slot("b", 0, 0),))})
     both = Interface("i", tabs={"one": first, "two": second})
     text = grid_css(both, both.shown)
     assert '.urc-grid[data-page="0"] [data-cell="1"]{display:grid;grid-area:1/2/2/3}' in text
@@ -117,7 +117,7 @@ def test_each_page_places_the_cells_that_all_pages_share() -> None:
 
 def test_over_a_background_what_is_empty_keeps_its_size() -> None:
     """Through it the background is seen, on a phone above what is stacked."""
-    wide = Grid(2, 3, (Slot("a", 0, 0), Slot("b", 0, 2)))
+    wide = Layout(2, 3, (Slot("a", 0, 0), Slot("b", 0, 2)))
     text = grid_css(Interface("i", layouts={"landscape": wide}, background="v"), ("v", "a", "b"))
     assert MARGIN not in text.split("@media (max-height: 479.98px)")[0]
     phone = text.split("@media (max-width: 599.98px)")[1]
@@ -127,7 +127,7 @@ def test_over_a_background_what_is_empty_keeps_its_size() -> None:
 
 def test_on_a_low_screen_an_empty_row_gives_way_to_those_with_controls() -> None:
     """Else what steers lies below the edge; the columns between them show the background."""
-    wide = Grid(3, 3, (Slot("a", 0, 0), Slot("b", 2, 2)))
+    wide = Layout(3, 3, (Slot("a", 0, 0), Slot("b", 2, 2)))
     text = grid_css(Interface("i", layouts={"landscape": wide}, background="v"), ("v", "a", "b"))
     low = text.split("@media (max-height: 479.98px)")[1]
     rows = "grid-template-rows:minmax(6.5rem,1fr) minmax(0,.12fr) minmax(6.5rem,1fr)"
@@ -137,8 +137,8 @@ def test_on_a_low_screen_an_empty_row_gives_way_to_those_with_controls() -> None
 
 def test_a_phone_upright_falls_back_on_the_tall_picture() -> None:
     """It is nearer to it than the wide one."""
-    wide = Grid(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))
-    tall = Grid(2, 1, (Slot("b", 0, 0), Slot("a", 1, 0)))
+    wide = Layout(1, 2, (Slot("a", 0, 0), Slot("b", 0, 1)))
+    tall = Layout(2, 1, (Slot("b", 0, 0), Slot("a", 1, 0)))
     phone = css(("landscape", wide), ("portrait", tall), slots=("a", "b"))
     rules = phone.split("@media (max-width: 599.98px)")[1]
     assert '[data-cell="0"]{display:grid;grid-area:2/1/3/2}' in rules
@@ -156,14 +156,14 @@ def test_only_a_picture_that_is_stacked_asks_for_turning(
     grids: tuple[str, ...], is_turned: bool
 ) -> None:
     """Who has drawn the phone upright needs no hint."""
-    wide = Grid(1, 3, (Slot("a", 0, 0), Slot("b", 0, 1), Slot("c", 0, 2)))
+    wide = Layout(1, 3, (Slot("a", 0, 0), Slot("b", 0, 1), Slot("c", 0, 2)))
     page = Tab(layouts=dict.fromkeys(grids, wide))
     assert needs_turning(page, ("a", "b", "c")) is is_turned
 
 
 def test_the_hint_to_turn_is_for_the_pages_that_need_it() -> None:
     """Another page of the same interface may be drawn for a phone."""
-    wide = Grid(1, 3, (Slot("a", 0, 0), Slot("b", 0, 1), Slot("c", 0, 2)))
+    wide = Layout(1, 3, (Slot("a", 0, 0), Slot("b", 0, 1), Slot("c", 0, 2)))
     drawn = Tab(name="two", layouts={"landscape": wide, "phone_portrait": wide})
     both = Interface("i", tabs={"one": Tab(name="one", layouts={"landscape": wide}), "two": drawn})
     rules = grid_css(both, ("a", "b", "c"))

@@ -13,25 +13,25 @@ from tests.unit.packages.made import DOCUMENTS, install, keep_settings, package
 from urc.model.profile import Profile, Setting
 from urc.packages.package import Package
 from urc.packages.store import Store
-from urc.runtime.kept import Kept, KeptFile
+from urc.runtime.settings_store import SettingsStore, StoredSettings
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import HERE, MANAGER, OPEN
 from urc.web.app import build_app
-from urc.web.fleet.garage import Workshop
+from urc.web.fleet.robot_factory import RobotOptions
 from urc.web.fleet.robots import Robot
-from urc.web.manage.catalogue import Catalogue
-from urc.web.manage.given import given_source
+from urc.web.manage.catalogue import PackageCatalog
+from urc.web.manage.upload_source import given_source
 
 ADDRESS = "http://localhost:8080"
 
 
-def workshop(data: Path, **more: Any) -> Workshop:
+def workshop(data: Path, **more: Any) -> RobotOptions:
     """Return what makes robots that are not there."""
 
     def untried(*_: object) -> Any:
         raise AssertionError("nothing is tried here")
 
-    return Workshop(
+    return RobotOptions(
         data,
         make=lambda profile, values: Robot(profile, values, FakeRobot(profile).open),
         tried=untried,
@@ -121,7 +121,7 @@ def test_only_pages_of_ours_have_repositories_asked(
 ) -> None:
     """A picture in a foreign page is a GET, and a GET sends nothing to anybody."""
     asked: list[bool] = []
-    monkeypatch.setattr(Catalogue, "ask", lambda self, force=False: asked.append(force))
+    monkeypatch.setattr(PackageCatalog, "ask", lambda self, force=False: asked.append(force))
     with served(tmp_path) as client:
         for query in ("", "?anew", "?force=true"):
             assert client.get(f"/api/v1/packages{query}").status_code == 200
@@ -154,7 +154,7 @@ def test_texts_of_documents_are_text_on_these_pages(tmp_path: Path) -> None:
     settings = {"host": Setting("host", "host", title=evil, description=evil, default=evil)}
     profile = dashboard_profile(settings=settings)._replace(title=evil, file=evil)
     with served(tmp_path, profile) as client:
-        KeptFile(tmp_path / "robots", "puppet").save(Kept(settings={"host": evil}))
+        SettingsStore(tmp_path / "robots", "puppet").save(StoredSettings(settings={"host": evil}))
         for page in ("/", "/drivers", "/interfaces", "/robots/puppet/settings"):
             answer = client.get(page)
             assert answer.status_code == 200
@@ -229,7 +229,7 @@ def send(client: TestClient, **said: object) -> dict[str, Any]:
 def test_settings_are_checked_kept_and_used(tmp_path: Path) -> None:
     """One line for each field that is wrong; nothing is kept of a form with one."""
     stock(tmp_path)
-    file = KeptFile(tmp_path / "robots", "rover")
+    file = SettingsStore(tmp_path / "robots", "rover")
     with served(tmp_path) as client:
         wrong = send(client, settings={"host": "http://x", "key": "open sesame"})
         assert wrong["faults"] == {"host": "'http://x' is not a host name or an address"}
@@ -262,7 +262,7 @@ def test_what_was_given_at_the_start_is_not_changed(tmp_path: Path) -> None:
 
 def test_a_damaged_file_of_settings_is_told_and_replaced(tmp_path: Path) -> None:
     stock(tmp_path)
-    file = KeptFile(tmp_path / "robots", "rover")
+    file = SettingsStore(tmp_path / "robots", "rover")
     file.file.parent.mkdir(parents=True)
     file.file.write_text("rubbish", encoding="utf-8")
     with served(tmp_path) as client:

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 from typing import Any
 
 from urc.web.manage.manager import Manager
-from urc.web.manage.wire import Place
+from urc.web.manage.wire import RepositoryInfo
 
-LAB = Place("http://lab/", "Lab", 0, "", False, True)
+LAB = RepositoryInfo("http://lab/", "Lab", 0, "", False, True)
 
 
 class Catalogue:
@@ -14,10 +14,10 @@ class Catalogue:
 
     def __init__(self) -> None:
         self.is_asking = True
-        self._places: tuple[Place, ...] = ()
+        self._places: tuple[RepositoryInfo, ...] = ()
 
     @property
-    def places(self) -> tuple[Place, ...]:
+    def places(self) -> tuple[RepositoryInfo, ...]:
         """Return them as they were; then they have come."""
         before, self._places, self.is_asking = self._places, (LAB,), False
         return before

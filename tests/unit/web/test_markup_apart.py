@@ -5,14 +5,14 @@ from pathlib import Path
 import pytest
 
 from tests.unit.packages.made import write_package
-from urc.config.parse.widget import Shelf
+from urc.config.parse.widget import WidgetFolder
 from urc.model.interface import WidgetUse
 from urc.testing.dashboard import dashboard_profile
 from urc.web import words
-from urc.web.load.foreign import Border
-from urc.web.show import markup_apart
+from urc.web.load.widget_trust import WidgetTrust
+from urc.web.show import isolated_markup
 from urc.web.show.cells import render_foreign, widget_cell
-from urc.web.show.markup_apart import markup_of
+from urc.web.show.isolated_markup import markup_of
 
 BOMBS = Path(__file__).parents[2] / "attacks" / "widgets"
 NAMES = sorted(folder.name for folder in BOMBS.iterdir())
@@ -22,11 +22,9 @@ WELL = ("<b>{{ title }}</b>", {"title": "A & B"})
 @pytest.fixture(autouse=True)
 def _bare(monkeypatch: pytest.MonkeyPatch) -> None:
     """Render everything anew, with less time than there is, so that no test waits long."""
-    monkeypatch.setattr(markup_apart, "_made", {})
-    less = (
-        "from urc.web.show import markup_apart; markup_apart.PROCESSOR_S = 1; markup_apart._main()"
-    )
-    monkeypatch.setattr(markup_apart, "_COMMAND", ("-P", "-c", less))
+    monkeypatch.setattr(isolated_markup, "_made", {})
+    less = "from urc.web.show import isolated_markup; isolated_markup.PROCESSOR_S = 1; isolated_markup._main()"
+    monkeypatch.setattr(isolated_markup, "_COMMAND", ("-P", "-c", less))
 
 
 def bomb(name: str) -> tuple[str, dict[str, object]]:
@@ -52,7 +50,7 @@ def test_what_was_rendered_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
         assert markup_of(wanted[:1])[0].html == "Verbinden"
     finally:
         words.language.reset(token)
-    monkeypatch.setattr(markup_apart, "_COMMAND", ("-c", "raise SystemExit(1)"))
+    monkeypatch.setattr(isolated_markup, "_COMMAND", ("-c", "raise SystemExit(1)"))
     assert markup_of(wanted) == before
 
 
@@ -63,16 +61,16 @@ def test_a_cell_of_a_foreign_widget_is_rendered_apart(
     text = "{{ title }}: {{ inputs.level.unit }} {{ inputs.level.limits.lolo }}"
     home = write_package(tmp_path, "widget", "dial")
     (home / "template.html.j2").write_text(text, encoding="utf-8")
-    widget = Shelf(home.parent).get("dial")
+    widget = WidgetFolder(home.parent).get("dial")
     assert widget is not None
     profile = dashboard_profile()
     signal = next(iter(profile.driver.signals))
     use = WidgetUse("dial", "dial", inputs={"level": signal})
     profile = profile._replace(widgets={**profile.widgets, "dial": widget})
-    border = Border()
+    border = WidgetTrust()
     render_foreign([(use, profile)], border)
-    monkeypatch.setattr(markup_apart, "_COMMAND", ("-c", "raise SystemExit(1)"))
+    monkeypatch.setattr(isolated_markup, "_COMMAND", ("-c", "raise SystemExit(1)"))
     there = widget_cell(0, use, profile, border)
-    here = widget_cell(0, use, profile, Border.of(["dial"]))
+    here = widget_cell(0, use, profile, WidgetTrust.of(["dial"]))
     assert (there.html, there.error) == (here.html, "")
     assert here.html

@@ -6,13 +6,13 @@ import pytest
 
 from tests.unit.web.test_client import FakeLine, scene
 from urc.expressions import compile_expression
-from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command
+from urc.model.payload import WriteSpec
 from urc.model.sequence import WaitStep
 from urc.protocol.events import Replied
 from urc.runtime.session import CommandFailed
 from urc.testing.clock import settle
-from urc.web.socket import Client
+from urc.web.page_socket import BrowserClient
 from urc.web.wire.drive import Drive
 
 pytestmark = pytest.mark.anyio
@@ -138,7 +138,7 @@ async def test_a_stop_that_is_latched_holds_in_the_next_session() -> None:
         assert not it.robot.is_open
         it.robot.latched.clear()
         line = FakeLine()
-        task = asyncio.create_task(Client(line, it.station, line).serve())
+        task = asyncio.create_task(BrowserClient(line, it.station, line).serve())
         await settle()
         assert it.robot.latched == ["stopped by screen 1: reset it first"]
         line.leave()

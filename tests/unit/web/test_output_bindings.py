@@ -3,12 +3,12 @@
 from typing import Any
 
 from urc.expressions import compile_expression
-from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command, Driver, TransportSpec
-from urc.model.flow import Confirm
-from urc.model.interface import Given, WidgetUse
+from urc.model.exchange import Confirm
+from urc.model.interface import OutputBinding, WidgetUse
+from urc.model.payload import WriteSpec
 from urc.model.sequence import RunStep, WaitStep
-from urc.model.widget import Port, Widget
+from urc.model.widget import Widget, WidgetPort
 from urc.shipped import shipped
 from urc.web.show.outputs import output_config
 
@@ -16,9 +16,9 @@ VOLTS = Argument("volts", unit="V", min=0, max=10)
 CHANNEL = Argument("channel", "integer", default=1)
 
 
-def config(command: Command, given: Given | None = None) -> dict[str, Any]:
+def config(command: Command, given: OutputBinding | None = None) -> dict[str, Any]:
     """Return what a page gets for an output that gives one value."""
-    port = Port("change", arguments=("value",))
+    port = WidgetPort("change", arguments=("value",))
     widget = Widget("slider", "Slider", shipped("widgets") / "slider", {}, {"change": port})
     use = WidgetUse("slot", "slider", {}, {"change": command.name})
     if given is not None:
@@ -36,20 +36,20 @@ def test_the_only_value_goes_to_the_only_argument_that_is_not_set() -> None:
     """Whatever it is called, and as it is: only what is held is scaled."""
     assert config(put(VOLTS))["names"] == {"volts": "value"}
     assert config(put(VOLTS))["ranges"] == {}
-    fixed = Given(fixed={"channel": 2})
+    fixed = OutputBinding(fixed={"channel": 2})
     assert config(put(VOLTS, CHANNEL), fixed)["names"] == {"volts": "value"}
 
 
 def test_between_several_arguments_the_binding_chooses() -> None:
     """Nobody guesses."""
     assert config(put(VOLTS, CHANNEL))["names"] == {}
-    chosen = Given(names={"channel": "value"})
+    chosen = OutputBinding(names={"channel": "value"})
     assert config(put(VOLTS, CHANNEL), chosen)["names"] == {"channel": "value"}
 
 
 def test_a_page_knows_the_bounds_of_what_it_may_set() -> None:
     """And nothing of what is set already."""
-    told = config(put(VOLTS, CHANNEL), Given(fixed={"channel": 2}))["arguments"]
+    told = config(put(VOLTS, CHANNEL), OutputBinding(fixed={"channel": 2}))["arguments"]
     assert list(told) == ["volts"]
     assert (told["volts"]["min"], told["volts"]["max"], told["volts"]["unit"]) == (0, 10, "V")
 
@@ -60,8 +60,8 @@ def test_a_page_knows_what_moves_whatever_is_given_to_it() -> None:
     stairs = put(climb, moves=True, moves_if=compile_expression("climb"))
     assert config(put(climb, moves=True))["moves"]
     assert not config(stairs)["moves"]
-    assert config(stairs, Given(fixed={"climb": True}))["moves"]
-    assert not config(stairs, Given(fixed={"climb": False}))["moves"]
+    assert config(stairs, OutputBinding(fixed={"climb": True}))["moves"]
+    assert not config(stairs, OutputBinding(fixed={"climb": False}))["moves"]
 
 
 def test_a_page_knows_what_people_are_asked() -> None:

@@ -1,6 +1,6 @@
 """Lines of lower floors, said in the reader's language."""
 
-from urc._phrases import joined, phrase
+from urc._translatable import joined, phrase
 from urc.web.words import language, spoken
 
 

@@ -15,12 +15,12 @@ from urc.runtime.hub import Hub
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.feed.fanout import Fanout, Place
-from urc.web.feed.picture_shelf import SHARED_FOR_S, Looks, PictureShelf
-from urc.web.fleet.robots import Robot, Station
+from urc.web.feed.image_cache import SHARED_FOR_S, ImageCache, ImageSubscription
+from urc.web.fleet.robots import Robot, RobotService
+from urc.web.page_socket import BrowserClient
 from urc.web.show.demos import colour_bars
-from urc.web.socket import Client
 from urc.web.wire import messages as wire
-from urc.web.wire.picture import Show, as_frame, encode_picture
+from urc.web.wire.picture import ImageSelection, as_frame, encode_picture
 
 pytestmark = pytest.mark.anyio
 
@@ -28,18 +28,18 @@ USE = WidgetUse("cam", "camera", {"image": "cam"})
 JPEG = b"\xff\xd8\xff\xe0 and so on"
 
 
-def robot() -> tuple[Hub, PictureShelf, FakeClock]:
+def robot() -> tuple[Hub, ImageCache, FakeClock]:
     """Return a hub with two cameras and a number, and its shelf."""
     clock = FakeClock()
     hub = Hub(
         {"a": Signal("a"), "left": Signal("left", "image"), "right": Signal("right", "image")}
     )
-    return hub, PictureShelf(hub, clock), clock
+    return hub, ImageCache(hub, clock), clock
 
 
-def looking_at(*names: str) -> Looks:
+def looking_at(*names: str) -> ImageSubscription:
     """Return a client that shows these."""
-    looks = Looks()
+    looks = ImageSubscription()
     looks.show(names)
     return looks
 
@@ -172,10 +172,12 @@ async def test_a_slow_line_drops_images_and_costs_nobody_else_any() -> None:
     clock = FakeClock()
     profile = dashboard_profile(signals={"cam": Signal("cam", "image")}, uses=[USE])
     robot = FakeRobot(profile, clock)
-    station = Station(Robot(profile, {}, robot.open), clock=clock)
+    station = RobotService(Robot(profile, {}, robot.open), clock=clock)
     running = asyncio.create_task(station.run())
     quick, slow = FakeLine(), FakeLine()
-    tasks = [asyncio.create_task(Client(line, station, line).serve()) for line in (quick, slow)]
+    tasks = [
+        asyncio.create_task(BrowserClient(line, station, line).serve()) for line in (quick, slow)
+    ]
     try:
         await settle()
         for line in (quick, slow):
@@ -210,7 +212,7 @@ async def test_a_slow_line_drops_images_and_costs_nobody_else_any() -> None:
 def test_a_page_may_ask_for_so_many_images_and_no_more() -> None:
     """What it says is bounded, like all that comes from outside."""
     names = [f"s{number}" for number in range(64)]
-    assert wire.decode(json.dumps({"t": "show", "signals": names})) == Show(tuple(names))
+    assert wire.decode(json.dumps({"t": "show", "signals": names})) == ImageSelection(tuple(names))
     for bad in ([*names, "one more"], ["x" * 257], "left", [1]):
         with pytest.raises(wire.BadMessage):
             wire.decode(json.dumps({"t": "show", "signals": bad}))

@@ -6,10 +6,10 @@ import pytest
 
 from urc.testing.clock import FakeClock
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.feed.line import Guest
-from urc.web.fleet.robots import KNOWN_SEATS, SEATS, Robot, Station
+from urc.web.feed.client_socket import SocketPeer
+from urc.web.fleet.robots import KNOWN_SEATS, SEATS, Robot, RobotService
 from urc.web.serve.access import STRANGER, Visitor
-from urc.web.serve.crowd import KNOWN_PLACES, PLACES, Places, is_stop
+from urc.web.serve.connection_quota import KNOWN_PLACES, PLACES, ConnectionQuota, is_stop
 
 HOLDER = Visitor("here", "browser 1")
 
@@ -17,7 +17,7 @@ HOLDER = Visitor("here", "browser 1")
 @pytest.mark.parametrize(("visitor", "most"), [(STRANGER, PLACES), (HOLDER, KNOWN_PLACES)])
 def test_one_visitor_has_a_bounded_number_of_places(visitor: Visitor, most: int) -> None:
     """Those of others are not touched, and what ends makes room."""
-    places = Places()
+    places = ConnectionQuota()
     with ExitStack() as open_ones:
         for _ in range(most):
             assert open_ones.enter_context(places.taken(visitor, "192.0.2.7"))
@@ -32,7 +32,7 @@ def test_one_visitor_has_a_bounded_number_of_places(visitor: Visitor, most: int)
 
 def test_who_has_a_key_is_counted_by_it_and_not_by_the_address() -> None:
     """Behind one address there may be a whole lab."""
-    places = Places()
+    places = ConnectionQuota()
     with ExitStack() as open_ones:
         for _ in range(PLACES):
             open_ones.enter_context(places.taken(STRANGER, "192.0.2.7"))
@@ -43,13 +43,15 @@ def test_who_has_a_key_is_counted_by_it_and_not_by_the_address() -> None:
 @pytest.mark.parametrize(
     ("guest", "seats"),
     [
-        (Guest("192.0.2.7", "driver", "at 192.0.2.7"), SEATS),
-        (Guest("", "engineer", "here browser 1", True), KNOWN_SEATS),
+        (SocketPeer("192.0.2.7", "driver", "at 192.0.2.7"), SEATS),
+        (SocketPeer("", "engineer", "here browser 1", True), KNOWN_SEATS),
     ],
 )
-def test_one_visitor_has_a_bounded_number_of_seats_at_a_robot(guest: Guest, seats: int) -> None:
+def test_one_visitor_has_a_bounded_number_of_seats_at_a_robot(
+    guest: SocketPeer, seats: int
+) -> None:
     profile = dashboard_profile()
-    station = Station(Robot(profile, {}, FakeRobot(profile).open), clock=FakeClock())
+    station = RobotService(Robot(profile, {}, FakeRobot(profile).open), clock=FakeClock())
     with ExitStack() as open_ones:
         for _ in range(seats):
             assert station.has_seat_for(guest)

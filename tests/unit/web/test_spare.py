@@ -10,8 +10,14 @@ import pytest
 from tests.unit.web.test_client import FakeLine
 from tests.unit.web.test_controls import Scene, scene
 from urc.testing.clock import settle
-from urc.web.drive.seat import Seat
-from urc.web.drive.spare import CLOSE_NO_SEAT, CLOSE_NOT_TAKEN, KEY_WITHIN_S, MESSAGES_PER_S, Spare
+from urc.web.drive.operator_session import OperatorSession
+from urc.web.drive.redundant_socket import (
+    CLOSE_NO_SEAT,
+    CLOSE_NOT_TAKEN,
+    KEY_WITHIN_S,
+    MESSAGES_PER_S,
+    RedundantSocket,
+)
 from urc.web.wire import drive as wire
 
 pytestmark = pytest.mark.anyio
@@ -20,7 +26,7 @@ pytestmark = pytest.mark.anyio
 class Doubled(Scene):
     """A page that drives, `ann`, and a second line of hers."""
 
-    def __init__(self, it: Scene, ann: Seat, line: FakeLine) -> None:
+    def __init__(self, it: Scene, ann: OperatorSession, line: FakeLine) -> None:
         self.__dict__.update(it.__dict__)
         self.ann, self.line = ann, line
 
@@ -53,7 +59,7 @@ class Doubled(Scene):
 async def opened(it: Scene) -> AsyncIterator[FakeLine]:
     """Open a line that has said nothing yet."""
     line = FakeLine()
-    task = asyncio.create_task(Spare(line, it.controls, it.clock, line).serve())
+    task = asyncio.create_task(RedundantSocket(line, it.controls, it.clock, line).serve())
     yield line
     line.leave()
     await settle()

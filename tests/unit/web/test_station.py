@@ -8,10 +8,10 @@ import pytest
 
 from urc.model.profile import Setting
 from urc.problems import UrcError
-from urc.runtime.clock import Alarm
+from urc.runtime.clock import Timer
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
-from urc.web.fleet.robots import Robot, SessionFailed, Station, missing_settings
+from urc.web.fleet.robots import Robot, RobotService, SessionFailed, missing_settings
 
 pytestmark = pytest.mark.anyio
 
@@ -19,10 +19,10 @@ pytestmark = pytest.mark.anyio
 @asynccontextmanager
 async def stationed(
     robot: FakeRobot, clock: FakeClock, opener: object = None
-) -> AsyncIterator[Station]:
+) -> AsyncIterator[RobotService]:
     """Run a station for the fake robot."""
     open_session = opener or robot.open
-    station = Station(
+    station = RobotService(
         Robot(robot.profile, {"host": "127.0.0.1"}, open_session),  # type: ignore[arg-type]
         clock=clock,
     )
@@ -152,7 +152,7 @@ async def test_a_robot_that_is_held_off_is_let_go_of_and_comes_back() -> None:
         assert robot.opened == 2
 
 
-async def _hold(station: Station, release: asyncio.Event) -> None:
+async def _hold(station: RobotService, release: asyncio.Event) -> None:
     async with station.held_off():
         await release.wait()
 
@@ -160,7 +160,7 @@ async def _hold(station: Station, release: asyncio.Event) -> None:
 class HastyClock(FakeClock):
     """A clock whose alarms ring a little before their time, as those of some event loops do."""
 
-    def call_at(self, when_s: float, callback: Callable[[], object]) -> Alarm:
+    def call_at(self, when_s: float, callback: Callable[[], object]) -> Timer:
         """Ring half a millisecond early."""
         return super().call_at(when_s - 0.0005, callback)
 

@@ -10,19 +10,21 @@ from starlette.responses import Response
 from starlette.routing import Route
 from starlette.testclient import TestClient
 
-from urc.runtime.audit import AuditLog, Entry
+from urc.runtime.audit import AuditEntry, AuditLog
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import HERE, OPEN
 from urc.web.app import build_app
+from urc.web.dev.timeline import timeline
 from urc.web.fleet.robots import Robot
-from urc.web.timeline import timeline
 
 
 @pytest.fixture
 def client(tmp_path: Path) -> Iterator[TestClient]:
     with AuditLog(tmp_path / "audit.sqlite") as log:
         for number in range(5):
-            log.note(Entry(1000.0 + number, "rover" if number % 2 else "puppet", "moved", "Ann"))
+            log.note(
+                AuditEntry(1000.0 + number, "rover" if number % 2 else "puppet", "moved", "Ann")
+            )
         yield asking(log)
 
 

@@ -8,8 +8,8 @@ import pytest
 from urc.expressions import compile_expression
 from urc.model.driver import Driver, Message, Poll, Reply
 from urc.model.profile import Profile
-from urc.model.values import Limits, Sample, Signal
-from urc.runtime.hub import LinkStatus, Note
+from urc.model.values import AlarmLimits, Sample, Signal
+from urc.runtime.hub import LinkStatus, LogEntry
 from urc.testing.profile import regex, text
 from urc.web.wire import messages as wire
 
@@ -65,7 +65,9 @@ def test_hello_says_what_each_signal_means_and_where_it_comes_from() -> None:
     reply = Reply(regex(r"^(?P<volts>\d+)$"))
     driver = Driver(
         signals={
-            "volts": Signal("volts", "number", unit="V", limits=Limits(low=11), stale_after_s=3),
+            "volts": Signal(
+                "volts", "number", unit="V", limits=AlarmLimits(low=11), stale_after_s=3
+            ),
             "note": Signal("note", "string", states=(("0", "off"),), stale_after_s=2),
         },
         messages={"m": Message("m", "radio", regex(r"(?P<note>.*)"))},
@@ -128,12 +130,12 @@ def test_links_log_replies_and_pongs() -> None:
              "detail": "refused", "attempts": 3, "faults": 4}
         ],
     }  # fmt: skip
-    assert json.loads(wire.encode_log([Note(1.0, "error", "wire", "no")], 7, 2.0)) == {
+    assert json.loads(wire.encode_log([LogEntry(1.0, "error", "wire", "no")], 7, 2.0)) == {
         "t": "log",
         "first": 7,
         "lines": [{"age": 1000, "level": "error", "source": "wire", "text": "no"}],
     }
-    run = wire.Run(5, "go")
+    run = wire.CommandRequest(5, "go")
     assert json.loads(wire.encode_reply(run, values={"x": 1})) == {
         "t": "reply", "id": 5, "ok": True, "values": {"x": 1},
     }  # fmt: skip
@@ -147,10 +149,10 @@ def test_links_log_replies_and_pongs() -> None:
     ("text", "message"),
     [
         ('{"t":"ping","c":12.5}', wire.Ping(12.5)),
-        ('{"t":"run","id":1,"command":"go"}', wire.Run(1, "go")),
+        ('{"t":"run","id":1,"command":"go"}', wire.CommandRequest(1, "go")),
         (
             '{"t":"run","id":1,"command":"go","arguments":{"v":1.5,"s":"x","__proto__":null}}',
-            wire.Run(1, "go", {"v": 1.5, "s": "x", "__proto__": None}),
+            wire.CommandRequest(1, "go", {"v": 1.5, "s": "x", "__proto__": None}),
         ),
     ],
 )

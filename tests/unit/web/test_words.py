@@ -62,7 +62,7 @@ def test_requests_at_the_same_time_keep_their_own_language() -> None:
 
     async def ask(header: bytes) -> None:
         scope = {"type": "http", "headers": [(b"accept-language", header)]}
-        await words.Reader(answer)(scope, None, None)  # type: ignore[arg-type]
+        await words.LanguageMiddleware(answer)(scope, None, None)  # type: ignore[arg-type]
 
     async def all_at_once() -> None:
         await asyncio.gather(ask(b"de"), ask(b"fr"), ask(b"it"))

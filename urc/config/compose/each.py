@@ -13,11 +13,18 @@ from itertools import product
 from math import prod
 from typing import Any, Final, NamedTuple
 
-from urc.config.compose.fill import Budget, Names, TooMuch, fill, fill_key, report_unquoted
+from urc.config.compose.fill import (
+    ExpansionBudget,
+    ExpansionTooLarge,
+    Names,
+    fill,
+    fill_key,
+    report_unquoted,
+)
 from urc.config.compose.merge import Tree, children, count_nodes, item_name, mark_inside, merge
-from urc.config.part import Findings, Part
+from urc.config.node import Node, Problems
 from urc.config.schemas import fits
-from urc.config.suggest import did_you_mean
+from urc.config.spelling_suggestions import did_you_mean
 from urc.source import Document, Mark, Path
 
 __all__ = ["expand"]
@@ -36,7 +43,7 @@ class _Copy(NamedTuple):
 class Expander:
     """An expander for the `each` of all items of one document."""
 
-    def __init__(self, document: Document, findings: Findings, budget: Budget) -> None:
+    def __init__(self, document: Document, findings: Problems, budget: ExpansionBudget) -> None:
         self.document = document
         self.findings = findings
         self.budget = budget
@@ -101,7 +108,7 @@ class Expander:
         name = str(copy.name)
         if name in made:
             self.findings.error(
-                Part(self.document, path, None),
+                Node(self.document, path, None),
                 "duplicate-key",
                 f"'each' creates {name!r} twice",
                 at="each",
@@ -137,7 +144,7 @@ class Expander:
         each: dict[str, list[object]] = inner.value["each"]
         if not fits("driver.schema.json#/$defs/each", each):
             return None
-        part = Part(self.document, (*path, "each"), each)
+        part = Node(self.document, (*path, "each"), each)
         unlike = [variable for variable, values in each.items() if not _are_alike(values)]
         if unlike:
             self.findings.error(
@@ -162,7 +169,7 @@ class Expander:
             return None
         return each
 
-    def _check_variables(self, part: Part) -> None:
+    def _check_variables(self, part: Node) -> None:
         for variable in part.data:
             if variable in _RESERVED:
                 self.findings.error(
@@ -187,7 +194,7 @@ class _First:
         is_mapping = isinstance(first, dict)
         plain = f"its values are plain: write {{{name}}}"
         self._expander.findings.error(
-            Part(self._expander.document, path, None),
+            Node(self._expander.document, path, None),
             "unknown-variable",
             f"{name!r} has no {word!r}" if word else f"{name!r} has several values; name one",
             offset=offset,
@@ -197,7 +204,7 @@ class _First:
 
     def unquoted(self, path: Path, text: str) -> None:
         """Report a name in braces that YAML reads as a mapping."""
-        report_unquoted(Part(self._expander.document, path, None), text, self._expander.findings)
+        report_unquoted(Node(self._expander.document, path, None), text, self._expander.findings)
 
 
 class _Rest:
@@ -262,20 +269,22 @@ _LISTED: Final = ("polls", "tests")
 _BY_NAME: Final = ("simulator", "rules")
 
 
-def expand(document: Document, findings: Findings) -> Document:
+def expand(document: Document, findings: Problems) -> Document:
     """Return the document with every `each` expanded."""
     everywhere = list(_places(document.data))
     _check_names(document, everywhere, findings)
     places = [path for path in everywhere if _has_each(_at(document.data, path))]
     if places:
-        expander = Expander(document, findings, Budget(_NODES_MOST - count_nodes(document.data)))
+        expander = Expander(
+            document, findings, ExpansionBudget(_NODES_MOST - count_nodes(document.data))
+        )
         tree = Tree(document.data, document.mark, document)
         try:
             for path in places:
                 tree = _replaced(tree, path, expander.collection)
-        except TooMuch:
+        except ExpansionTooLarge:
             findings.error(
-                Part(document, expander.path, None),
+                Node(document, expander.path, None),
                 "too-many-nodes",
                 f"more than {_NODES_MOST} keys and values after expansion of every 'each'",
                 at="each",
@@ -285,7 +294,7 @@ def expand(document: Document, findings: Findings) -> Document:
     return _without_removals(document, everywhere, findings)
 
 
-def _without_removals(document: Document, places: list[Path], findings: Findings) -> Document:
+def _without_removals(document: Document, places: list[Path], findings: Problems) -> Document:
     """Report and drop removals of missing items; the merge has applied the other removals."""
     tree = Tree(document.data, document.mark, document)
     for path in places:
@@ -297,7 +306,7 @@ def _without_removals(document: Document, places: list[Path], findings: Findings
         )
         for place in idle:
             findings.error(
-                Part(document, (*path, place), None),
+                Node(document, (*path, place), None),
                 "nothing-to-remove",
                 f"there is no {item_name(item_at(document.data, (*path, place)))!r} to remove",
                 at="remove",
@@ -323,14 +332,14 @@ def _document(document: Document, tree: Tree) -> Document:
     )
 
 
-def _check_names(document: Document, places: list[Path], findings: Findings) -> None:
+def _check_names(document: Document, places: list[Path], findings: Problems) -> None:
     """Report names with braces that remain; the schemas allow braces."""
     for path in places:
         named = _at(document.data, path)
         for name, item in named.items() if isinstance(named, dict) else ():
             if "{" in name and not (isinstance(item, dict) and "each" in item):
                 findings.error(
-                    Part(document, (*path, name), item),
+                    Node(document, (*path, name), item),
                     "bad-name",
                     f"{name!r} is not a valid name here",
                     key=True,

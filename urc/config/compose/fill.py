@@ -10,16 +10,24 @@ from collections.abc import Mapping
 from typing import Final, Protocol
 
 from urc.config.compose.merge import Tree, mark_inside, merge
-from urc.config.part import Findings, Part
-from urc.source import Mark, Path, Written
+from urc.config.node import Node, Problems
+from urc.source import Mark, Path, UnfilledText
 
-__all__ = ["Budget", "Listener", "Names", "TooMuch", "fill", "fill_key", "report_unquoted"]
+__all__ = [
+    "ExpansionBudget",
+    "PlaceholderReporter",
+    "Names",
+    "ExpansionTooLarge",
+    "fill",
+    "fill_key",
+    "report_unquoted",
+]
 
 Names = Mapping[str, object]
 """Name → a plain value, or a mapping of plain values."""
 
 
-class Listener(Protocol):
+class PlaceholderReporter(Protocol):
     """A receiver for the names that cannot be filled in."""
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
@@ -37,11 +45,11 @@ _NAME: Final = re.compile(
 _CHARACTERS_MOST: Final = 4 << 20
 
 
-class TooMuch(Exception):
+class ExpansionTooLarge(Exception):
     """An expansion that exceeds the limits of a document."""
 
 
-class Budget:
+class ExpansionBudget:
     """The remaining nodes and characters of an expansion."""
 
     def __init__(self, nodes: int) -> None:
@@ -49,15 +57,17 @@ class Budget:
         self._characters = _CHARACTERS_MOST
 
     def spend(self, nodes: int, characters: int = 0) -> None:
-        """Count new nodes and characters; raise `TooMuch` beyond the limit."""
+        """Count new nodes and characters; raise `ExpansionTooLarge` beyond the limit."""
         self._nodes -= nodes
         self._characters -= characters
         if self._nodes < 0 or self._characters < 0:
-            raise TooMuch
+            raise ExpansionTooLarge
 
 
 class _Filler:
-    def __init__(self, names: Names, budget: Budget, listener: Listener | None) -> None:
+    def __init__(
+        self, names: Names, budget: ExpansionBudget, listener: PlaceholderReporter | None
+    ) -> None:
         self.names = names
         self.budget = budget
         self.listener = listener
@@ -121,7 +131,7 @@ class _Filler:
         }
         return Tree([item.value for item in items], tree.mark.copy(marks), tree.home)
 
-    def text(self, text: str, path: Path) -> tuple[object, Written | None]:
+    def text(self, text: str, path: Path) -> tuple[object, UnfilledText | None]:
         """Return the text with its names filled in, and the edits for the places of problems."""
         if "{" not in text:
             return text, None
@@ -133,7 +143,7 @@ class _Filler:
             if not is_known:
                 continue
             if found.span() == (0, len(text)):
-                return value, Written(text, ((0, len(text), len(_written(value))),))
+                return value, UnfilledText(text, ((0, len(text), len(_written(value))),))
             piece = _written(value)
             self.budget.spend(0, len(piece))
             edits.append((found.start(), len(found[0]), len(piece)))
@@ -142,7 +152,7 @@ class _Filler:
         if not edits:
             return text, None
         self.budget.spend(0, len(text))
-        return "".join((*pieces, text[end:])), Written(text, tuple(edits))
+        return "".join((*pieces, text[end:])), UnfilledText(text, tuple(edits))
 
     def _value(self, found: re.Match[str], path: Path) -> tuple[bool, object]:
         name, word = found[1], found[2]
@@ -164,17 +174,19 @@ def _item(tree: Tree, key: str | int, item: object) -> Tree:
     return Tree(item, mark, mark.origin or tree.home)
 
 
-def fill(tree: Tree, path: Path, names: Names, budget: Budget, listener: Listener) -> Tree:
+def fill(
+    tree: Tree, path: Path, names: Names, budget: ExpansionBudget, listener: PlaceholderReporter
+) -> Tree:
     """Return `tree` with every name filled in; parts without names are shared, not copied."""
     return _Filler(names, budget, listener).tree(tree, path)
 
 
-def fill_key(key: str, names: Names, budget: Budget) -> str:
+def fill_key(key: str, names: Names, budget: ExpansionBudget) -> str:
     """Return a key with every name filled in."""
     return str(_Filler(names, budget, None).text(key, ())[0])
 
 
-def report_unquoted(part: Part, text: str, findings: Findings) -> None:
+def report_unquoted(part: Node, text: str, findings: Problems) -> None:
     """Report a name in braces that YAML reads as a mapping."""
     findings.error(
         part,

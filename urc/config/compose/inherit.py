@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 
 from urc.config.compose.library import Library
 from urc.config.compose.merge import Tree, children, count_nodes, merge
-from urc.config.part import Part
+from urc.config.node import Node
 from urc.config.schemas import fits, kind_of
 from urc.source import Document, Path
 
@@ -54,7 +54,7 @@ def compose(document: Document, library: Library) -> Composed:
     return Composed(whole, tuple(composer.sources.values()))
 
 
-def override(document: Document, overrides: Part) -> Document:
+def override(document: Document, overrides: Node) -> Document:
     """Return a driver with the changes under a robot's `overrides`."""
     mark = overrides.document.at(overrides.path)
     if mark is None:
@@ -98,7 +98,7 @@ class _Composer:
         self.sources.setdefault(document.file, document)
         if not all(fits(_SCHEMA.format(key), data[key]) for key in _BUILDING if key in data):
             return None  # the shape pass reports it
-        root = Part(document, (), data)
+        root = Node(document, (), data)
         base, includes = self._sources(root, chain)
         is_sound = None not in (*base, *includes)
         layers = [one for one in base if one is not None]
@@ -119,7 +119,7 @@ class _Composer:
         )
 
     def _sources(
-        self, root: Part, chain: tuple[str, ...]
+        self, root: Node, chain: tuple[str, ...]
     ) -> tuple[list[Tree | None], list[Tree | None]]:
         """Return the base, if any, and the includes; None for invalid ones."""
         kind = kind_of(root.document)
@@ -133,7 +133,7 @@ class _Composer:
         )
 
     def _source(
-        self, reference: Part, kinds: tuple[str, ...], chain: tuple[str, ...], without: Path
+        self, reference: Node, kinds: tuple[str, ...], chain: tuple[str, ...], without: Path
     ) -> Tree | None:
         """Return the composed document that `reference` names, without the keys in `without`."""
         target = self._library.follow(reference, kinds)

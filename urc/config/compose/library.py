@@ -7,9 +7,9 @@ import os
 import re
 from typing import Final
 
-from urc.config.part import Findings, Part
+from urc.config.node import Node, Problems
 from urc.config.schemas import kind_of
-from urc.config.suggest import did_you_mean
+from urc.config.spelling_suggestions import did_you_mean
 from urc.problems import ProblemsError
 from urc.shipped import shipped
 from urc.source import Document, read_document, similar_file
@@ -32,7 +32,7 @@ class Library:
     def __init__(self) -> None:
         self.files: dict[str, None] = {}
         """Each requested file, existing or not."""
-        self.findings = Findings()
+        self.findings = Problems()
         self._documents: dict[str, Document | None] = {}
 
     def read(self, path: str) -> Document:
@@ -44,7 +44,7 @@ class Library:
         self.files[path] = None
         return read_document(path)
 
-    def follow(self, reference: Part, kinds: tuple[str, ...]) -> Document | None:
+    def follow(self, reference: Node, kinds: tuple[str, ...]) -> Document | None:
         """Return the document that a reference names, or None after a problem."""
         here = reference.document.source_of(reference.path).file
         if _NAME.fullmatch(reference.data):
@@ -78,7 +78,7 @@ class Library:
         )
         return None
 
-    def _report_name(self, reference: Part, kinds: tuple[str, ...]) -> None:
+    def _report_name(self, reference: Node, kinds: tuple[str, ...]) -> None:
         known = [name for kind in kinds for name in _names(kind)]
         hint = did_you_mean(reference.data, known, f"{kinds[0]}s that ship")
         if not hint.startswith("did"):
@@ -90,7 +90,7 @@ class Library:
             hint=hint,
         )
 
-    def _open(self, reference: Part, target: str) -> Document | None:
+    def _open(self, reference: Node, target: str) -> Document | None:
         try:
             document = self.read(target)
         except ProblemsError as error:

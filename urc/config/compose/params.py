@@ -6,11 +6,11 @@ They are filled in while the documents are loaded. Settings, in contrast, belong
 from collections.abc import Mapping
 from typing import Any, Final
 
-from urc.config.compose.fill import Budget, TooMuch, fill, report_unquoted
+from urc.config.compose.fill import ExpansionBudget, ExpansionTooLarge, fill, report_unquoted
 from urc.config.compose.merge import Tree, count_nodes
-from urc.config.part import Findings, Part
+from urc.config.node import Node, Problems
 from urc.config.schemas import fits
-from urc.config.suggest import did_you_mean
+from urc.config.spelling_suggestions import did_you_mean
 from urc.config.values import check_range, check_within, fit, fit_hint
 from urc.model.values import Value
 from urc.source import Document, Mark, Path
@@ -24,7 +24,7 @@ _SAMPLES: Final[Mapping[str, Value]] = {
 
 
 def fill_params(
-    document: Document, given: Part | None, use: Part | None, findings: Findings
+    document: Document, given: Node | None, use: Node | None, findings: Problems
 ) -> Document:
     """Return a driver's document with its params filled in.
 
@@ -41,7 +41,7 @@ def fill_params(
         return document
     if not fits("driver.schema.json#/$defs/params", data["params"]):
         return document  # the shape pass reports it
-    part = Part(document, (), data).must("params")
+    part = Node(document, (), data).must("params")
     values = _values(part, given, use, findings)
     filler = _Filler(document, values, findings)
     result = filler.document()
@@ -58,7 +58,7 @@ def fill_params(
 
 
 def _values(
-    part: Part, given: Part | None, use: Part | None, findings: Findings
+    part: Node, given: Node | None, use: Node | None, findings: Problems
 ) -> dict[str, Value]:
     gifts = given.entries() if given is not None else {}
     for name, gift in gifts.items():
@@ -90,7 +90,7 @@ def _values(
     return values
 
 
-def _report_unknown(gift: Part, known: Mapping[str, Any] | tuple[()], findings: Findings) -> None:
+def _report_unknown(gift: Node, known: Mapping[str, Any] | tuple[()], findings: Problems) -> None:
     findings.error(
         gift,
         "unknown-param",
@@ -101,11 +101,11 @@ def _report_unknown(gift: Part, known: Mapping[str, Any] | tuple[()], findings: 
 
 
 def _checked(
-    part: Part,
+    part: Node,
     kind: str,
     bounds: tuple[float | None, float | None],
     choices: list[Value],
-    findings: Findings,
+    findings: Problems,
 ) -> Value:
     if any(type(part.data) is type(one) and part.data == one for one in choices):
         return part.data  # type: ignore[no-any-return]  # choices may have several types
@@ -141,7 +141,7 @@ def _sample(kind: str, bounds: tuple[float | None, float | None], choices: list[
 class _Filler:
     """A filler for the params of one document, which records their use."""
 
-    def __init__(self, document: Document, values: Mapping[str, Value], findings: Findings) -> None:
+    def __init__(self, document: Document, values: Mapping[str, Value], findings: Problems) -> None:
         self.used: set[str] = set()
         self._document = document
         self._values = values
@@ -151,7 +151,7 @@ class _Filler:
         """Return the document with everything filled in."""
         document, data = self._document, self._document.data
         assert isinstance(data, dict)  # noqa: S101 - checked by the caller
-        budget = Budget(_NODES_MOST - count_nodes(data) + len(data))
+        budget = ExpansionBudget(_NODES_MOST - count_nodes(data) + len(data))
         value: dict[str, object] = {}
         marks: dict[str | int, Mark] = {}
         for key, item in data.items():
@@ -160,9 +160,9 @@ class _Filler:
                 try:
                     names = {"params": _Watched(self._values, self.used)}
                     tree = fill(tree, (key,), names, budget, self)
-                except TooMuch:
+                except ExpansionTooLarge:
                     self._findings.error(
-                        Part(document, (key,), item),
+                        Node(document, (key,), item),
                         "too-large",
                         "this is too long after the params are filled in",
                         key=True,
@@ -175,13 +175,13 @@ class _Filler:
 
     def unquoted(self, path: Path, text: str) -> None:
         """Report a name in braces that YAML reads as a mapping."""
-        report_unquoted(Part(self._document, path, None), text, self._findings)
+        report_unquoted(Node(self._document, path, None), text, self._findings)
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
         """Report a param that the driver does not declare."""
         place: dict[str, Any] = {"offset": offset, "length": len(name) + len(word) + bool(word)}
         self._findings.error(
-            Part(self._document, path, None),
+            Node(self._document, path, None),
             "unknown-param",
             f"there is no param {word!r}" if word else "'params' has all params; name one of them",
             hint=did_you_mean(word, self._values, "params"),

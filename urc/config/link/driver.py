@@ -15,22 +15,22 @@ from urc.config.link.frames import check_frames
 from urc.config.link.messages import check_messages, check_via
 from urc.config.link.signals import link_signals
 from urc.config.link.steps import link_sequences
+from urc.config.node import Node, Problems
 from urc.config.parse.form import read_form, write_form
-from urc.config.parse.line import option_templates
 from urc.config.parse.reply import refuse
-from urc.config.parse.simulator import Simulated
-from urc.config.part import Findings, Part
+from urc.config.parse.simulator import SimulatorSpec
+from urc.config.parse.transport import option_templates
 from urc.config.schemas import read_schema
 from urc.config.sources import Sources
-from urc.config.suggest import did_you_mean
+from urc.config.spelling_suggestions import did_you_mean
 from urc.expressions import COUNTERS, NONCE, Template
-from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import Driver
+from urc.model.payload import ReadSpec, WriteSpec
 from urc.model.profile import Setting
 from urc.model.values import NOTHING, Reading
 from urc.model.world import WorldSpec
 
-__all__ = ["Uses", "link_driver", "link_simulator"]
+__all__ = ["NameUses", "link_driver", "link_simulator"]
 
 
 _ONE_SETTING: Final = re.compile(r"\{\{\s*settings\.([a-z]\w*)\s*\}\}")
@@ -38,7 +38,7 @@ _NUMBERS: Final = ("port", "integer", "number")
 
 
 def check_option(
-    part: Part, kind: str, template: Template, settings: Mapping[str, Setting], findings: Findings
+    part: Node, kind: str, template: Template, settings: Mapping[str, Setting], findings: Problems
 ) -> None:
     """Report a setting of the wrong type.
 
@@ -65,7 +65,7 @@ def check_option(
     )
 
 
-class Uses:
+class NameUses:
     """The names in use; rules report the unused names."""
 
     def __init__(self) -> None:
@@ -76,13 +76,13 @@ class Uses:
 
 
 class _Linker:
-    def __init__(self, driver: Driver, settings: Mapping[str, Setting], findings: Findings) -> None:
+    def __init__(self, driver: Driver, settings: Mapping[str, Setting], findings: Problems) -> None:
         self.driver = driver
         self.settings = settings
         self.findings = findings
-        self.uses = Uses()
+        self.uses = NameUses()
 
-    def transport(self, part: Part, key: str, name: str) -> None:
+    def transport(self, part: Node, key: str, name: str) -> None:
         """Check the transport that `part` names under `key`, or omits."""
         if name in self.driver.transports:
             self.uses.transports.add(name)
@@ -99,7 +99,7 @@ class _Linker:
                 hint=did_you_mean("", names, "transports"),
             )
 
-    def fields(self, part: Part, read: ReadSpec) -> None:
+    def fields(self, part: Node, read: ReadSpec) -> None:
         """Check that each field of a reply or message is a signal, or local to the document."""
         found = read_form(part)
         if found is None:
@@ -117,7 +117,7 @@ class _Linker:
                 self.field(place, field, where)
         self._beside(part, read)
 
-    def field(self, part: Part, name: str, place: Mapping[str, int | bool]) -> None:
+    def field(self, part: Node, name: str, place: Mapping[str, int | bool]) -> None:
         """Check one name of a signal that is set at `part`."""
         if name in self.driver.signals:
             self.uses.signals.add(name)
@@ -130,7 +130,7 @@ class _Linker:
                 **place,
             )
 
-    def _beside(self, part: Part, read: ReadSpec) -> None:
+    def _beside(self, part: Node, read: ReadSpec) -> None:
         """Check the names in the keys next to a form."""
         known = [
             name for name in read.fields if name not in read.sets and name not in read.collects
@@ -157,13 +157,13 @@ class _Linker:
                 if template is not None:
                     self.template(inner.must(key), template, (*known, *read.sets))
 
-    def templates(self, part: Part, spec: WriteSpec, known: Iterable[str] = ()) -> None:
+    def templates(self, part: Node, spec: WriteSpec, known: Iterable[str] = ()) -> None:
         """Check the names in every template under ``send:``."""
         inner, form = write_form(part)
         for place, template in form.templates(inner, spec):
             self.template(place, template, known)
 
-    def template(self, part: Part, template: Template, known: Iterable[str] = ()) -> None:
+    def template(self, part: Node, template: Template, known: Iterable[str] = ()) -> None:
         """Check the names in a template."""
         allowed = {*known, "settings"}
         for used in sorted(template.names - allowed):
@@ -179,7 +179,7 @@ class _Linker:
             )
         signals = self.driver.signals
         if any(name in signals and signals[name].states for name in template.names & allowed):
-            from urc.config.link.words import check_words
+            from urc.config.link.states import check_words
 
             check_words(self.findings, part, template, signals)
         if "world" in template.names and "world" not in self.driver.signals:
@@ -222,7 +222,7 @@ class _Linker:
 
     def _unknown(
         self,
-        part: Part,
+        part: Node,
         template: Template,
         pattern: str,
         name: str,
@@ -236,8 +236,8 @@ class _Linker:
 
 
 def link_driver(
-    part: Part, driver: Driver, settings: Mapping[str, Setting], findings: Findings
-) -> Uses:
+    part: Node, driver: Driver, settings: Mapping[str, Setting], findings: Problems
+) -> NameUses:
     """Check every name in the driver at `part`; return the names in use."""
     linker = _Linker(driver, settings, findings)
     answered = {one.transport for one in driver.commands.values() if one.reply}
@@ -275,7 +275,7 @@ def link_driver(
     return linker.uses
 
 
-def _check_poll_names(part: Part, driver: Driver, findings: Findings) -> None:
+def _check_poll_names(part: Node, driver: Driver, findings: Problems) -> None:
     """Report a name of two polls, or of a poll and a command, which a test could not tell apart."""
     seen: set[str] = set(driver.commands)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
@@ -291,7 +291,7 @@ def _check_poll_names(part: Part, driver: Driver, findings: Findings) -> None:
         seen.add(poll.name)
 
 
-def _check_arguments_used(part: Part, send: WriteSpec, findings: Findings) -> None:
+def _check_arguments_used(part: Node, send: WriteSpec, findings: Problems) -> None:
     for name, inner in part.named("args").items():
         if name not in send.names:
             findings.warn(
@@ -306,9 +306,9 @@ def _check_arguments_used(part: Part, send: WriteSpec, findings: Findings) -> No
 def link_simulator(
     sources: Sources,
     driver: Driver,
-    simulated: Simulated,
+    simulated: SimulatorSpec,
     settings: Mapping[str, Setting],
-    findings: Findings,
+    findings: Problems,
 ) -> tuple[Mapping[str, Reading], WorldSpec | None]:
     """Check every name in the emulated robot; return its initial values and its world."""
     if not sources.simulator and not sources.rules:

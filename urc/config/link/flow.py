@@ -3,14 +3,14 @@
 from collections.abc import Iterable, Mapping
 from typing import Protocol
 
-from urc.config.moving import link_moves, refuse_moving, runs_what_moves
-from urc.config.part import Findings, Part
-from urc.config.suggest import did_you_mean
+from urc.config.autonomous_motion import link_moves, refuse_moving, runs_what_moves
+from urc.config.node import Node, Problems
+from urc.config.spelling_suggestions import did_you_mean
 from urc.config.values import check_within, fit_argument, fit_hint, known_argument
 from urc.expressions import COUNTERS, NONCE, NOW, Template
-from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import Argument, Command, Driver, Poll, Reply
-from urc.model.flow import Asides, ErrorReply
+from urc.model.exchange import ErrorReply, ProvisionalReplies
+from urc.model.payload import ReadSpec, WriteSpec
 
 __all__ = [
     "Linker",
@@ -30,25 +30,25 @@ class Linker(Protocol):
     """The parts of the link pass that flow needs."""
 
     driver: Driver
-    findings: Findings
+    findings: Problems
 
-    def transport(self, part: Part, key: str, name: str) -> None:
+    def transport(self, part: Node, key: str, name: str) -> None:
         """Check the transport that `part` names under `key`, or omits."""
 
-    def fields(self, part: Part, read: ReadSpec) -> None:
+    def fields(self, part: Node, read: ReadSpec) -> None:
         """Check that each field is a signal, or local to the document."""
 
-    def field(self, part: Part, name: str, place: Mapping[str, int | bool]) -> None:
+    def field(self, part: Node, name: str, place: Mapping[str, int | bool]) -> None:
         """Check one name of a signal that is set at `part`."""
 
-    def template(self, part: Part, template: Template, known: Iterable[str] = ()) -> None:
+    def template(self, part: Node, template: Template, known: Iterable[str] = ()) -> None:
         """Check the names in a template."""
 
-    def templates(self, part: Part, spec: WriteSpec, known: Iterable[str] = ()) -> None:
+    def templates(self, part: Node, spec: WriteSpec, known: Iterable[str] = ()) -> None:
         """Check the names in every template under ``send:``."""
 
 
-def link_command(linker: Linker, part: Part, command: Command) -> None:
+def link_command(linker: Linker, part: Node, command: Command) -> None:
     """Check the keys of a command, except its frame."""
     known = {*linker.driver.signals, *command.arguments}
     if command.reply is not None and "reply" in part.data:
@@ -72,7 +72,7 @@ def link_command(linker: Linker, part: Part, command: Command) -> None:
             )
 
 
-def _link_slew(findings: Findings, slew: Mapping[str, Part], command: Command) -> None:
+def _link_slew(findings: Problems, slew: Mapping[str, Node], command: Command) -> None:
     """Check that `slew` limits only numbers without choices."""
     for name, inner in slew.items():
         argument = known_argument(name, inner, command, findings)
@@ -86,14 +86,14 @@ def _link_slew(findings: Findings, slew: Mapping[str, Part], command: Command) -
             findings.error(inner, "wrong-type", text, key=True, hint=hint)
 
 
-def link_requirements(linker: Linker, part: Part, command: Command) -> None:
+def link_requirements(linker: Linker, part: Node, command: Command) -> None:
     """Check the names in the conditions of a command or sequence."""
     known = {*linker.driver.signals, *command.arguments}
     for inner, one in zip(part.listed("requires"), command.requires, strict=True):
         linker.template(inner.must("expr"), one.condition, known)
 
 
-def refuse_two_person(linker: Linker, part: Part, command: Command) -> None:
+def refuse_two_person(linker: Linker, part: Node, command: Command) -> None:
     """Report a command that needs two people at a place where it runs automatically."""
     if _needs_two(command):
         linker.findings.error(
@@ -110,7 +110,7 @@ def _needs_two(command: Command) -> bool:
     return any(one.is_two_person for one in asked)
 
 
-def link_poll(linker: Linker, part: Part, poll: Poll) -> None:
+def link_poll(linker: Linker, part: Node, poll: Poll) -> None:
     """Check the command, transport and period of a poll."""
     if poll.when is not None:
         linker.template(part.must("when"), poll.when, linker.driver.signals)
@@ -137,7 +137,7 @@ def link_poll(linker: Linker, part: Part, poll: Poll) -> None:
 
 
 def link_reply(
-    linker: Linker, part: Part, reply: Reply, arguments: Iterable[str], send: WriteSpec
+    linker: Linker, part: Node, reply: Reply, arguments: Iterable[str], send: WriteSpec
 ) -> None:
     """Check every stage, the error replies and the correlation."""
     stages = part.listed("stages")
@@ -169,7 +169,7 @@ def link_reply(
         )
 
 
-def link_asides(linker: Linker, part: Part, asides: Asides) -> None:
+def link_asides(linker: Linker, part: Node, asides: ProvisionalReplies) -> None:
     """Check the provisional replies, in any form."""
     for key, read in (("resend", asides.resend), ("extend", asides.extend)):
         inner = part.get(key)
@@ -177,7 +177,7 @@ def link_asides(linker: Linker, part: Part, asides: Asides) -> None:
             linker.fields(inner, read)
 
 
-def link_refusals(linker: Linker, part: Part, faults: tuple[ErrorReply, ...]) -> None:
+def link_refusals(linker: Linker, part: Node, faults: tuple[ErrorReply, ...]) -> None:
     """Check the error replies of any form under ``errors:``."""
     for inner, fault in zip(_refusal_parts(part), faults, strict=True):
         linker.fields(inner, fault.read)
@@ -191,7 +191,7 @@ def said_on(driver: Driver, transport: str) -> Iterable[str]:
     return (COUNTERS, NONCE, NOW, *learnt)
 
 
-def link_keepalives(linker: Linker, part: Part) -> None:
+def link_keepalives(linker: Linker, part: Node) -> None:
     """Check the keepalive commands of the transports."""
     for name, inner in part.named("transports").items():
         keepalive = linker.driver.transports[name].keepalive
@@ -211,7 +211,7 @@ def link_keepalives(linker: Linker, part: Part) -> None:
             refuse_moving(linker.findings, place.must("run"), command, {})
 
 
-def _link_counting(linker: Linker, part: Part, transport: str) -> None:
+def _link_counting(linker: Linker, part: Node, transport: str) -> None:
     """Check a command that counts as traffic for a keepalive."""
     command = find_command(linker, part, str(part.data))
     if command is not None and (command.steps or command.transport != transport):
@@ -224,7 +224,7 @@ def _link_counting(linker: Linker, part: Part, transport: str) -> None:
         )
 
 
-def find_command(linker: Linker, part: Part, name: str) -> Command | None:
+def find_command(linker: Linker, part: Node, name: str) -> Command | None:
     """Return the command or sequence that `part` names, or report its absence."""
     command = linker.driver.commands.get(name)
     if command is None:
@@ -233,7 +233,7 @@ def find_command(linker: Linker, part: Part, name: str) -> Command | None:
 
 
 def link_arguments(
-    findings: Findings, part: Part, command: Command, given: Mapping[str, Part], at: str
+    findings: Problems, part: Node, command: Command, given: Mapping[str, Node], at: str
 ) -> None:
     """Check plain values for the arguments of `command`.
 
@@ -259,7 +259,7 @@ def link_arguments(
         )
 
 
-def check_value(part: Part, argument: Argument, findings: Findings) -> None:
+def check_value(part: Node, argument: Argument, findings: Problems) -> None:
     """Check a plain value at `part` for an argument."""
     value = part.data
     try:
@@ -276,5 +276,5 @@ def check_value(part: Part, argument: Argument, findings: Findings) -> None:
             findings.error(part, "unknown-word", text, hint=hint)
 
 
-def _refusal_parts(part: Part) -> list[Part]:
+def _refusal_parts(part: Node) -> list[Node]:
     return [inner for inner in part.listed("errors") if isinstance(inner.data, dict)]

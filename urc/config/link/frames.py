@@ -6,17 +6,17 @@ Frames with expressions are checked when they are built.
 from collections.abc import Iterable
 from typing import cast
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import write_form
-from urc.config.part import Findings, Part
 from urc.expressions import ExpressionError, Template
-from urc.model.codec import WriteSpec, each_of
 from urc.model.driver import Driver, FramingSpec, TransportSpec
 from urc.model.framing import FrameLayout
+from urc.model.payload import WriteSpec, each_of
 
 __all__ = ["check_frames"]
 
 
-def check_frames(part: Part, driver: Driver, findings: Findings) -> None:
+def check_frames(part: Node, driver: Driver, findings: Problems) -> None:
     """Report constant texts under ``send:`` that would become two frames, or none."""
     for name, inner in part.named("commands").items():
         command = driver.commands.get(name)
@@ -26,7 +26,7 @@ def check_frames(part: Part, driver: Driver, findings: Findings) -> None:
         _check(inner, poll.send, driver.transports.get(poll.transport), findings)
 
 
-def _check(part: Part, send: WriteSpec, spec: TransportSpec | None, findings: Findings) -> None:
+def _check(part: Node, send: WriteSpec, spec: TransportSpec | None, findings: Problems) -> None:
     written = part.get("send")
     if spec is None or written is None:
         return
@@ -35,7 +35,7 @@ def _check(part: Part, send: WriteSpec, spec: TransportSpec | None, findings: Fi
         _check_one(place, one, spec, findings)
 
 
-def _check_one(part: Part, send: WriteSpec, spec: TransportSpec, findings: Findings) -> None:
+def _check_one(part: Node, send: WriteSpec, spec: TransportSpec, findings: Problems) -> None:
     inner, form = write_form(part)
     if send.form == "text":
         _check_end(inner, findings)
@@ -65,7 +65,7 @@ def _check_one(part: Part, send: WriteSpec, spec: TransportSpec, findings: Findi
         )
 
 
-def _text(templates: Iterable[tuple[Part, Template]], encoding: str) -> bytes | None:
+def _text(templates: Iterable[tuple[Node, Template]], encoding: str) -> bytes | None:
     """Return the bytes of a constant text, or None; other code reports its mistakes."""
     found = [template for _, template in templates]
     if len(found) != 1 or not found[0].is_constant:
@@ -87,7 +87,7 @@ def _what(send: WriteSpec) -> str:
     return "the text has" if send.form == "text" else "the frame has"
 
 
-def _check_end(part: Part, findings: Findings) -> None:
+def _check_end(part: Node, findings: Problems) -> None:
     """Warn of a text that ends with a backslash and a letter, as if it were a line end."""
     if isinstance(part.data, str) and part.data.endswith(("\\n", "\\r")):
         findings.warn(

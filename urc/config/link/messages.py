@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 
 from urc.config.form_table import WRITE_FORMS
 from urc.config.messaging import BYTE_LINES, CARRIERS, MESSAGING
-from urc.config.part import Findings, Part
-from urc.config.suggest import did_you_mean
+from urc.config.node import Node, Problems
+from urc.config.spelling_suggestions import did_you_mean
 from urc.model.driver import Driver, TransportSpec
 
 __all__ = ["check_messages", "check_via"]
@@ -14,7 +14,7 @@ _VERBS = {verb for one in MESSAGING.values() for verb in one.verbs}
 _ANSWERED = ("call", "goal", "request")
 
 
-def check_messages(part: Part, driver: Driver, findings: Findings) -> None:
+def check_messages(part: Node, driver: Driver, findings: Problems) -> None:
     """Report messages that a transport cannot carry, and messages without a source."""
     for name, inner in part.named("messages").items():
         spec = driver.transports.get(driver.messages[name].transport)
@@ -40,7 +40,7 @@ def check_messages(part: Part, driver: Driver, findings: Findings) -> None:
                     is_asked = isinstance(data, dict) and not data.keys().isdisjoint(_ANSWERED)
 
 
-def _check_answer(part: Part | None, spec: TransportSpec | None, findings: Findings) -> None:
+def _check_answer(part: Node | None, spec: TransportSpec | None, findings: Problems) -> None:
     """Report a reply whose form expects a reply itself."""
     verb = _check_send(part, spec, findings)
     if part is not None and verb in _ANSWERED:
@@ -54,7 +54,7 @@ def _check_answer(part: Part | None, spec: TransportSpec | None, findings: Findi
         )
 
 
-def _requests(part: Part) -> Iterator[tuple[tuple[str, int | str], Part]]:
+def _requests(part: Node) -> Iterator[tuple[tuple[str, int | str], Node]]:
     for name, inner in part.named("commands").items():
         yield ("commands", name), inner
     for place, inner in enumerate(part.listed("polls")):
@@ -69,7 +69,7 @@ def _target(place: tuple[str, int | str], driver: Driver) -> str:
 
 
 def _check_step(
-    part: Part, spec: TransportSpec | None, findings: Findings, *, wants_topic: bool
+    part: Node, spec: TransportSpec | None, findings: Problems, *, wants_topic: bool
 ) -> None:
     _check_send(part.get("send"), spec, findings)
     expect = part.get("expect")
@@ -77,7 +77,7 @@ def _check_step(
         _check_read(expect, spec, findings, wants_topic=wants_topic)
 
 
-def _check_send(part: Part | None, spec: TransportSpec | None, findings: Findings) -> str:
+def _check_send(part: Node | None, spec: TransportSpec | None, findings: Problems) -> str:
     """Report a form that the transport cannot carry; return the form's key."""
     if part is None or spec is None:
         return ""
@@ -106,7 +106,7 @@ def _check_send(part: Part | None, spec: TransportSpec | None, findings: Finding
     return form
 
 
-def _check_ros(part: Part, findings: Findings) -> None:
+def _check_ros(part: Node, findings: Problems) -> None:
     """Report messages that a ROS bridge cannot pass on: it carries JSON, and needs the type."""
     for key in ("text", "hex", "bytes", "struct"):
         if key in part.data:
@@ -129,7 +129,7 @@ def _check_ros(part: Part, findings: Findings) -> None:
 
 
 def _check_read(
-    part: Part, spec: TransportSpec | None, findings: Findings, *, wants_topic: bool
+    part: Node, spec: TransportSpec | None, findings: Problems, *, wants_topic: bool
 ) -> None:
     if spec is None:
         return
@@ -169,7 +169,7 @@ def _check_read(
             )
 
 
-def _answers(part: Part) -> list[Part]:
+def _answers(part: Node) -> list[Node]:
     """Return a received frame, its stages, and the error replies of each."""
     stages = part.listed("stages") if "stages" in part.data else []
     given = [one for one in (part, *stages) if "errors" in one.data]
@@ -177,7 +177,7 @@ def _answers(part: Part) -> list[Part]:
     return [part, *stages, *(inner for inner in refusals if isinstance(inner.data, dict))]
 
 
-def _check_head(part: Part, spec: TransportSpec, findings: Findings) -> None:
+def _check_head(part: Node, spec: TransportSpec, findings: Problems) -> None:
     """Report headers on a transport whose replies have none."""
     if "head" in part.data and spec.type != "http" and spec.type in (*MESSAGING, *BYTE_LINES):
         findings.error(
@@ -191,7 +191,7 @@ def _check_head(part: Part, spec: TransportSpec, findings: Findings) -> None:
 
 
 def check_via(
-    parts: Mapping[str, Part], transports: Mapping[str, TransportSpec], findings: Findings
+    parts: Mapping[str, Node], transports: Mapping[str, TransportSpec], findings: Problems
 ) -> set[str]:
     """Report each `tunnel` that cannot carry its transport; return all tunnels."""
     carriers: set[str] = set()

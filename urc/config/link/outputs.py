@@ -4,14 +4,14 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from urc.config.link.flow import check_value
-from urc.config.part import Findings, Part
-from urc.config.suggest import listed
+from urc.config.node import Node, Problems
+from urc.config.spelling_suggestions import listed
 from urc.config.values import known_argument
 from urc.model.binding import targets
 from urc.model.driver import Argument, Command, Driver
-from urc.model.interface import Given
+from urc.model.interface import OutputBinding
 from urc.model.units import are_apart
-from urc.model.widget import Port, Widget
+from urc.model.widget import Widget, WidgetPort
 
 __all__ = ["link_output", "takes"]
 
@@ -25,8 +25,8 @@ _GIVERS: Final = {
 
 
 def link_output(
-    part: Part, port: Port, widget: Widget, driver: Driver | None, findings: Findings
-) -> tuple[str, Given]:
+    part: Node, port: WidgetPort, widget: Widget, driver: Driver | None, findings: Problems
+) -> tuple[str, OutputBinding]:
     """Return the command that an output is bound to, and the arguments for its values.
 
     `part` is the value in ``bind``: a name, or a mapping. Without a driver, the interface is
@@ -34,7 +34,7 @@ def link_output(
     """
     is_short = isinstance(part.data, str)
     name = part.data if is_short else part.text("command")
-    given = Given() if is_short else _given(part, port, widget, findings)
+    given = OutputBinding() if is_short else _given(part, port, widget, findings)
     if driver is None:
         return name, given
     command = driver.commands.get(name)
@@ -50,7 +50,7 @@ def link_output(
     return name, given
 
 
-def _given(part: Part, port: Port, widget: Widget, findings: Findings) -> Given:
+def _given(part: Node, port: WidgetPort, widget: Widget, findings: Problems) -> OutputBinding:
     names: dict[str, str] = {}
     for source, inner in part.named("args").items():
         if source not in port.arguments:
@@ -79,11 +79,11 @@ def _given(part: Part, port: Port, widget: Widget, findings: Findings) -> Given:
                 key=True,
                 hint="each argument takes one value",
             )
-    return Given(names, {name: inner.data for name, inner in fixed.items()})
+    return OutputBinding(names, {name: inner.data for name, inner in fixed.items()})
 
 
 def _check_hold(
-    part: Part, port: Port, widget: Widget, command: Command, findings: Findings
+    part: Node, port: WidgetPort, widget: Widget, command: Command, findings: Problems
 ) -> bool:
     """Return whether a hold-to-run output has a held command."""
     if port.is_held and command.hold is None:
@@ -105,7 +105,7 @@ def _check_hold(
     return port.is_held is (command.hold is not None)
 
 
-def _check_targets(part: Part, command: Command, findings: Findings) -> bool:
+def _check_targets(part: Node, command: Command, findings: Problems) -> bool:
     """Check the named arguments and their constants; return whether all of them exist."""
     is_known = True
     for inner in part.named("args").values():
@@ -120,7 +120,12 @@ def _check_targets(part: Part, command: Command, findings: Findings) -> bool:
 
 
 def _check_values(
-    part: Part, port: Port, widget: Widget, command: Command, given: Given, findings: Findings
+    part: Node,
+    port: WidgetPort,
+    widget: Widget,
+    command: Command,
+    given: OutputBinding,
+    findings: Problems,
 ) -> None:
     """Report required arguments without a value, and values that do not fit their argument."""
     if port.types and not port.arguments:
@@ -153,7 +158,7 @@ def _check_values(
             )
 
 
-def takes(command: Command, port: Port) -> bool:
+def takes(command: Command, port: WidgetPort) -> bool:
     """Return whether a command may be bound to an output, possibly with `args`."""
     if port.is_held is not (command.hold is not None):
         return False
@@ -162,7 +167,9 @@ def takes(command: Command, port: Port) -> bool:
     return any(not _misfit(port, one) for one in command.arguments.values())
 
 
-def _remedy(command: Command, port: Port, taken: Mapping[str, str], missing: Sequence[str]) -> str:
+def _remedy(
+    command: Command, port: WidgetPort, taken: Mapping[str, str], missing: Sequence[str]
+) -> str:
     free = [name for name in port.arguments if name not in taken.values()]
     wrong = [name for name in missing if not _is_of_type(port, command.arguments[name])]
     if free and wrong:
@@ -180,7 +187,12 @@ def _giver(argument: Argument) -> str:
 
 
 def _check_nothing(
-    part: Part, port: Port, widget: Widget, command: Command, given: Given, findings: Findings
+    part: Node,
+    port: WidgetPort,
+    widget: Widget,
+    command: Command,
+    given: OutputBinding,
+    findings: Problems,
 ) -> None:
     """Report an output whose values all have no effect."""
     what = f"{port.name!r} of widget {widget.name!r} gives {listed(port.arguments)}"
@@ -198,7 +210,7 @@ def _check_nothing(
         findings.warn(part, "nothing-given", f"{what}, {where}", hint=hint)
 
 
-def _stands_still(command: Command, given: Given) -> bool:
+def _stands_still(command: Command, given: OutputBinding) -> bool:
     """Return whether a held command sends the same values while held as on release."""
     release = command.hold.release if command.hold is not None else {}
     return bool(command.arguments) and all(
@@ -207,13 +219,13 @@ def _stands_still(command: Command, given: Given) -> bool:
     )
 
 
-def _is_of_type(port: Port, argument: Argument) -> bool:
+def _is_of_type(port: WidgetPort, argument: Argument) -> bool:
     types = ("number",) if port.is_held else port.types
     fitting = (*types, "integer") if "number" in types else types
     return not types or argument.type in fitting
 
 
-def _misfit(port: Port, argument: Argument) -> str:
+def _misfit(port: WidgetPort, argument: Argument) -> str:
     """Return why an argument cannot take the value of an output, or "" when it can."""
     if not _is_of_type(port, argument):
         given = "number" if port.is_held else " or ".join(port.types)
@@ -223,7 +235,7 @@ def _misfit(port: Port, argument: Argument) -> str:
     return ""
 
 
-def _place(part: Part, source: str) -> Part:
+def _place(part: Node, source: str) -> Node:
     """Return the place of a value in the `args` of a binding, or the binding itself."""
     args = part.get("args") if isinstance(part.data, dict) else None
     return (args.get(source) if args is not None else None) or part

@@ -14,7 +14,7 @@ from pathlib import Path as FilePath
 from pathlib import PurePosixPath
 from typing import Final
 
-from urc.config.part import Findings, Part
+from urc.config.node import Node, Problems
 from urc.model.widget import Widget
 
 __all__ = ["FILE_TYPES", "LONGEST_URL", "MOST_BYTES", "link_files", "link_pages", "named_texts"]
@@ -40,7 +40,7 @@ _NUMBER: Final = re.compile(r"[0-9]+|0[xX][0-9A-Fa-f]*", re.ASCII)
 _LAST_PORT: Final = 65535
 
 
-def link_files(options: Part, widget: Widget, findings: Findings) -> dict[str, str]:
+def link_files(options: Node, widget: Widget, findings: Problems) -> dict[str, str]:
     """Return file names in the options → paths.
 
     The options of the slot fit their schema. The widget's manifest marks the options that name
@@ -66,8 +66,8 @@ def link_files(options: Part, widget: Widget, findings: Findings) -> dict[str, s
 
 
 def named_texts(
-    options: Part, schemas: Mapping[str, object], keyword: str
-) -> Iterator[tuple[str, Part]]:
+    options: Node, schemas: Mapping[str, object], keyword: str
+) -> Iterator[tuple[str, Node]]:
     """Yield the name and text of each option whose schema has `keyword: true`."""
     for name, part in options.entries().items():
         schema = schemas.get(name)
@@ -93,7 +93,7 @@ def _is_below(place: FilePath, folder: FilePath) -> bool:
     return place.resolve().is_relative_to(folder.resolve())
 
 
-def link_pages(options: Part, widget: Widget, findings: Findings) -> dict[str, tuple[str, ...]]:
+def link_pages(options: Node, widget: Widget, findings: Problems) -> dict[str, tuple[str, ...]]:
     """Return options that may name pages → their URLs.
 
     The options of the slot fit their schema. The widget's manifest marks the options that name

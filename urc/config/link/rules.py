@@ -3,12 +3,12 @@
 from collections.abc import Iterable, Mapping
 
 from urc.config.link.flow import Linker, find_command
-from urc.config.part import Findings, Part
-from urc.config.suggest import did_you_mean
+from urc.config.node import Node, Problems
+from urc.config.spelling_suggestions import did_you_mean
 from urc.config.values import check_within, fit, fit_hint, shown
 from urc.expressions import COUNTERS, Template
-from urc.model.codec import ReadSpec
 from urc.model.driver import Driver
+from urc.model.payload import ReadSpec
 from urc.model.profile import Reaction, SimulatorRule
 from urc.model.values import Reading, Signal, Value
 from urc.model.world import WorldSpec
@@ -17,7 +17,7 @@ __all__ = ["link_rules", "link_values", "settable"]
 
 
 def link_values(
-    parts: Mapping[str, Part], driver: Driver, findings: Findings
+    parts: Mapping[str, Node], driver: Driver, findings: Problems
 ) -> dict[str, Reading]:
     """Return the initial values of the emulated robot, in the types of the signals.
 
@@ -40,7 +40,7 @@ def link_values(
     return values
 
 
-def settable(name: str, part: Part, driver: Driver, findings: Findings) -> Signal | None:
+def settable(name: str, part: Node, driver: Driver, findings: Problems) -> Signal | None:
     """Return the signal for a value at `part`; report a signal that cannot be set."""
     signal = driver.signals.get(name)
     if signal is None:
@@ -55,7 +55,7 @@ def settable(name: str, part: Part, driver: Driver, findings: Findings) -> Signa
     return signal
 
 
-def _value(part: Part, signal: Signal, findings: Findings) -> Reading:
+def _value(part: Node, signal: Signal, findings: Problems) -> Reading:
     data = part.data
     if data is None:
         return None
@@ -73,7 +73,7 @@ def _value(part: Part, signal: Signal, findings: Findings) -> Reading:
     return _single(part, signal, signal.type, findings)
 
 
-def _single(part: Part, signal: Signal, kind: str, findings: Findings) -> Value:
+def _single(part: Node, signal: Signal, kind: str, findings: Problems) -> Value:
     value: Value = part.data
     if signal.states:
         words = [word for _, word in signal.states]
@@ -95,7 +95,7 @@ def _single(part: Part, signal: Signal, kind: str, findings: Findings) -> Value:
 
 def link_rules(
     linker: Linker,
-    part: Part,
+    part: Node,
     rules: Iterable[SimulatorRule],
     state: Iterable[str],
     world: WorldSpec | None = None,
@@ -117,7 +117,7 @@ def link_rules(
         _check_answers(linker, places, rule)
 
 
-def _given(linker: Linker, part: Part, rule: SimulatorRule) -> set[str]:
+def _given(linker: Linker, part: Node, rule: SimulatorRule) -> set[str]:
     """Return the names from the frame of a rule; check the request that it names."""
     match = rule.match
     if isinstance(match, ReadSpec):
@@ -141,7 +141,7 @@ def _given(linker: Linker, part: Part, rule: SimulatorRule) -> set[str]:
     return set()
 
 
-def _of_command(linker: Linker, part: Part, rule: SimulatorRule) -> set[str]:
+def _of_command(linker: Linker, part: Node, rule: SimulatorRule) -> set[str]:
     inner = part.must("command")
     command = find_command(linker, inner, rule.request)
     if command is None:
@@ -159,7 +159,7 @@ def _of_command(linker: Linker, part: Part, rule: SimulatorRule) -> set[str]:
     return set(command.arguments)
 
 
-def _check_poll(linker: Linker, part: Part, rule: SimulatorRule) -> None:
+def _check_poll(linker: Linker, part: Node, rule: SimulatorRule) -> None:
     inner = part.must("poll")
     polls = {poll.name: poll for poll in linker.driver.polls}
     poll = polls.get(rule.request)
@@ -175,7 +175,7 @@ def _check_poll(linker: Linker, part: Part, rule: SimulatorRule) -> None:
         _elsewhere(linker, inner, rule, poll.transport)
 
 
-def _elsewhere(linker: Linker, part: Part, rule: SimulatorRule, transport: str) -> None:
+def _elsewhere(linker: Linker, part: Node, rule: SimulatorRule, transport: str) -> None:
     if transport not in linker.driver.transports:
         return  # reported at the request
     text = f"{rule.request!r} goes to {transport!r}, and this rule is for {rule.transport!r}"
@@ -183,7 +183,7 @@ def _elsewhere(linker: Linker, part: Part, rule: SimulatorRule, transport: str) 
 
 
 def _link_reaction(
-    linker: Linker, part: Part, reaction: Reaction, known: set[str], state: set[str]
+    linker: Linker, part: Node, reaction: Reaction, known: set[str], state: set[str]
 ) -> None:
     for name, inner in part.named("set").items():
         if name not in state and name not in linker.driver.signals:
@@ -208,7 +208,7 @@ def _link_reaction(
         linker.findings.error(part, "unknown-message", text, at="message", hint=hint)
 
 
-def _check_told(linker: Linker, part: Part, told: frozenset[str]) -> None:
+def _check_told(linker: Linker, part: Node, told: frozenset[str]) -> None:
     """Report values for signals that the world sets."""
     for name, inner in part.named("set").items():
         if name in told:
@@ -217,16 +217,16 @@ def _check_told(linker: Linker, part: Part, told: frozenset[str]) -> None:
             linker.findings.error(inner, "two-sources", text, key=True, hint=hint)
 
 
-def _check_word(linker: Linker, part: Part, value: Template) -> None:
+def _check_word(linker: Linker, part: Node, value: Template) -> None:
     """Check a plain text for a signal: a word, or a value that should be an expression."""
     signal = linker.driver.signals[part.name]
     if signal.formula is None and (signal.states or signal.type != "string"):
         text = value.evaluate({})
         if isinstance(text, str) or signal.states:
-            _single(Part(part.document, part.path, text), signal, signal.type, linker.findings)
+            _single(Node(part.document, part.path, text), signal, signal.type, linker.findings)
 
 
-def _check_answers(linker: Linker, places: tuple[Part, ...], rule: SimulatorRule) -> None:
+def _check_answers(linker: Linker, places: tuple[Node, ...], rule: SimulatorRule) -> None:
     """Report `auto` replies of periodic rules, and replies to a request that has none."""
     if rule.every_s is None:
         return

@@ -3,18 +3,18 @@
 from collections.abc import Callable, Iterable, Mapping
 
 from urc.config.link.cycles import cycle_from
-from urc.config.part import Findings, Part
-from urc.config.suggest import did_you_mean
+from urc.config.node import Node, Problems
+from urc.config.spelling_suggestions import did_you_mean
 from urc.expressions import Template
 from urc.model.driver import Driver
 from urc.model.values import Signal
 
 __all__ = ["link_signals"]
 
-_Check = Callable[[Part, Template, Iterable[str]], None]
+_Check = Callable[[Node, Template, Iterable[str]], None]
 
 
-def link_signals(part: Part, driver: Driver, check: _Check, findings: Findings) -> None:
+def link_signals(part: Node, driver: Driver, check: _Check, findings: Problems) -> None:
     """Check every computed signal of the driver at `part`; `check` checks a template's names."""
     set_by_frames = _set_by_frames(driver)
     for name, inner in part.named("signals").items():

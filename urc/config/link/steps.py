@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from urc.config.autonomous_motion import refuse_moving
 from urc.config.link.cycles import cycle_from
 from urc.config.link.flow import (
     Linker,
@@ -11,8 +12,7 @@ from urc.config.link.flow import (
     link_requirements,
     refuse_two_person,
 )
-from urc.config.moving import refuse_moving
-from urc.config.part import Part
+from urc.config.node import Node
 from urc.expressions import COUNTERS, NONCE, NOW, Template
 from urc.model import sequence
 from urc.model.driver import Driver
@@ -20,12 +20,12 @@ from urc.model.driver import Driver
 __all__ = ["link_sequences", "steps_of"]
 
 
-def steps_of(part: Part) -> Part:
+def steps_of(part: Node) -> Node:
     """Return the list of steps of the sequence at `part`, in either notation."""
     return part.must("steps") if isinstance(part.data, dict) else part
 
 
-def link_sequences(linker: Linker, part: Part) -> None:
+def link_sequences(linker: Linker, part: Node) -> None:
     """Check the steps of every sequence and transport of the driver at `part`."""
     commands = part.named("commands")
     for name, inner in part.named("sequences").items():
@@ -70,11 +70,11 @@ class _Walk:
         """Whether the steps run after the login, and know the values from it."""
         self._known: set[str] = set(linker.driver.signals)
 
-    def steps(self, part: Part, steps: tuple[sequence.Step, ...]) -> None:
+    def steps(self, part: Node, steps: tuple[sequence.Step, ...]) -> None:
         for inner, step in zip(part.items(), steps, strict=True):
             self._step(inner, step)
 
-    def _step(self, part: Part, step: sequence.Step) -> None:
+    def _step(self, part: Node, step: sequence.Step) -> None:
         match step:
             case sequence.SendStep():
                 self._transport(part, "to", step.transport)
@@ -107,7 +107,7 @@ class _Walk:
             case sequence.FailStep(text):
                 self._template(part.must("fail"), text)
 
-    def _expect(self, part: Part, step: sequence.ExpectStep) -> None:
+    def _expect(self, part: Node, step: sequence.ExpectStep) -> None:
         self._transport(part, "from", step.transport)
         inner = part.must("expect")
         self._must_last(inner, step.transport)
@@ -120,7 +120,7 @@ class _Walk:
                 self._linker.field(inner, name, {"offset": offset, "length": len(name)})
         self._known |= {name for name in step.read.fields if name.startswith("_")}
 
-    def _repeat(self, part: Part, step: sequence.RepeatStep) -> None:
+    def _repeat(self, part: Node, step: sequence.RepeatStep) -> None:
         self.steps(part.must("repeat"), step.body)
         if step.until is not None:
             self._template(part.must("until"), step.until)
@@ -140,7 +140,7 @@ class _Walk:
                         hint="use a loop in only one of the two",
                     )
 
-    def _run(self, part: Part, step: sequence.RunStep) -> None:
+    def _run(self, part: Node, step: sequence.RunStep) -> None:
         command = find_command(self._linker, part.must("run"), step.command)
         given = part.named("args")
         for name, inner in given.items():
@@ -163,20 +163,20 @@ class _Walk:
             else frozenset()
         )
 
-    def _otherwise(self, part: Part, steps: tuple[sequence.Step, ...] | None) -> None:
+    def _otherwise(self, part: Node, steps: tuple[sequence.Step, ...] | None) -> None:
         inner = part.get("else")
         if inner is not None and steps:
             self.steps(inner, steps)
 
-    def _template(self, part: Part, template: object) -> None:
+    def _template(self, part: Node, template: object) -> None:
         if isinstance(template, Template):
             self._linker.template(part, template, self._known)
 
-    def _transport(self, part: Part, key: str, name: str) -> None:
+    def _transport(self, part: Node, key: str, name: str) -> None:
         if self._is_named:
             self._linker.transport(part, key, name)
 
-    def _must_last(self, part: Part, transport: str) -> None:
+    def _must_last(self, part: Node, transport: str) -> None:
         """Report steps that wait for a frame on a transport that cannot receive it."""
         spec = self._linker.driver.transports.get(transport)
         if self._is_named and spec is not None and spec.connection == "per_request":

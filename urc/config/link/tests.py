@@ -3,23 +3,23 @@
 from collections.abc import Mapping
 from typing import Final
 
+from urc.config.node import Node, Problems
 from urc.config.parse.profile import setting_value
-from urc.config.part import Findings, Part
-from urc.config.suggest import did_you_mean
+from urc.config.spelling_suggestions import did_you_mean
 from urc.config.values import check_within, fit, fit_argument, fit_hint, known_argument
 from urc.model.driver import Command, Driver
-from urc.model.profile import DialogueStep, DocumentTest, Expected, Setting, State
-from urc.model.values import Limits, Signal, Value
+from urc.model.profile import DialogueStep, DocumentTest, Expected, ExpectedState, Setting
+from urc.model.values import AlarmLimits, Signal, Value
 
 __all__ = ["link_test"]
 
 
 def link_test(
-    part: Part,
+    part: Node,
     test: DocumentTest,
     driver: Driver,
     settings: Mapping[str, Setting],
-    findings: Findings,
+    findings: Problems,
 ) -> DocumentTest:
     """Return the test with values in the signals' types, and with the index of its poll."""
     if test.steps:
@@ -41,7 +41,7 @@ def link_test(
     )
 
 
-def _check_purpose(part: Part, test: DocumentTest, driver: Driver, findings: Findings) -> None:
+def _check_purpose(part: Node, test: DocumentTest, driver: Driver, findings: Problems) -> None:
     text = ""
     if not test.feed and test.run is None and test.reply_to is None:
         text = "'feed' or 'run' is missing, so this test does nothing"
@@ -65,7 +65,7 @@ _GOES: Final = ("publish", "call", "goal", "cancel", "request")
 """Kinds of messages that a test feeds, and kinds that it expects to be sent."""
 
 
-def _check_transports(part: Part, driver: Driver, findings: Findings) -> None:
+def _check_transports(part: Node, driver: Driver, findings: Problems) -> None:
     for key, verbs in (("feed", _COMES), ("sent", _GOES)):
         for name, inner in part.named(key).items():
             _check_transport(name, inner, driver, findings, key=True)
@@ -73,7 +73,7 @@ def _check_transports(part: Part, driver: Driver, findings: Findings) -> None:
                 _check_verb(one, verbs, f"is never {'fed' if key == 'feed' else key}", findings)
 
 
-def _check_verb(part: Part, verbs: tuple[str, ...], why_not: str, findings: Findings) -> None:
+def _check_verb(part: Node, verbs: tuple[str, ...], why_not: str, findings: Problems) -> None:
     if isinstance(part.data, dict):
         for verb in part.data.keys() - {"hex", *verbs}:
             hint = did_you_mean(verb, verbs, "kinds")
@@ -83,13 +83,13 @@ def _check_verb(part: Part, verbs: tuple[str, ...], why_not: str, findings: Find
 
 
 def _check_transport(
-    name: str, part: Part, driver: Driver, findings: Findings, *, key: bool = False
+    name: str, part: Node, driver: Driver, findings: Problems, *, key: bool = False
 ) -> None:
     if name not in driver.transports:
         findings.unknown(part, "unknown-transport", name, driver.transports, key=key)
 
 
-def _check_polls(part: Part, driver: Driver, findings: Findings) -> None:
+def _check_polls(part: Node, driver: Driver, findings: Problems) -> None:
     names = [poll.name for poll in driver.polls]
     for inner in part.listed("polls"):
         if inner.data not in names:
@@ -102,7 +102,7 @@ _CHECKS: Final = ("sent", "expect", "reply", "fails", "closed")
 
 
 def _link_steps(
-    part: Part, steps: tuple[DialogueStep, ...], driver: Driver, findings: Findings
+    part: Node, steps: tuple[DialogueStep, ...], driver: Driver, findings: Problems
 ) -> tuple[DialogueStep, ...]:
     parts = part.listed("steps")
     if not any(key in inner.data for inner in parts for key in _CHECKS):
@@ -132,19 +132,19 @@ def _link_steps(
     return tuple(linked)
 
 
-def _link_expect(part: Part, driver: Driver, findings: Findings) -> dict[str, Expected]:
+def _link_expect(part: Node, driver: Driver, findings: Problems) -> dict[str, Expected]:
     """Return the expected values, with the types of their signals."""
     return {
         name: _state(name, inner, driver, findings) for name, inner in part.named("expect").items()
     }
 
 
-def _state(name: str, part: Part, driver: Driver, findings: Findings) -> Expected:
+def _state(name: str, part: Node, driver: Driver, findings: Problems) -> Expected:
     if not isinstance(part.data, dict):
         return _expected(name, part, driver, findings)
     signal = driver.signals.get(name)
     alarm = part.text("alarm")
-    if signal is not None and alarm not in ("", "none") and signal.limits == Limits():
+    if signal is not None and alarm not in ("", "none") and signal.limits == AlarmLimits():
         text = f"signal {name!r} has no limits"
         findings.error(part, "misplaced-key", text, at="alarm", hint="give it limits")
     if "value" in part.data and part.text("age") == "never":
@@ -152,7 +152,7 @@ def _state(name: str, part: Part, driver: Driver, findings: Findings) -> Expecte
         findings.error(part, "misplaced-key", text, at="value", key=True)
     inner = part.get("value")
     value = _expected(name, inner if inner else part, driver, findings, is_part=inner is None)
-    return State(
+    return ExpectedState(
         has_value=inner is not None,
         value=value,
         alarm=None if not alarm else "" if alarm == "none" else alarm,  # type: ignore[arg-type]  # the schema's enum
@@ -160,7 +160,7 @@ def _state(name: str, part: Part, driver: Driver, findings: Findings) -> Expecte
     )
 
 
-def _setting(part: Part, settings: Mapping[str, Setting], findings: Findings) -> Value:
+def _setting(part: Node, settings: Mapping[str, Setting], findings: Problems) -> Value:
     setting = settings.get(part.name)
     if setting is None:
         findings.unknown(part, "unknown-setting", part.name, settings, key=True)
@@ -171,7 +171,7 @@ def _setting(part: Part, settings: Mapping[str, Setting], findings: Findings) ->
 
 
 def _expected(
-    name: str, part: Part, driver: Driver, findings: Findings, *, is_part: bool = False
+    name: str, part: Node, driver: Driver, findings: Problems, *, is_part: bool = False
 ) -> Value | tuple[Value, ...]:
     """Return the value at `part`, or None for a `part` of an expected value."""
     signal = driver.signals.get(name)
@@ -190,7 +190,7 @@ def _expected(
     return _fitting(part, signal, signal.type, findings)
 
 
-def _fitting(part: Part, signal: Signal, kind: str, findings: Findings) -> Value:
+def _fitting(part: Node, signal: Signal, kind: str, findings: Problems) -> Value:
     value: Value = part.data
     if value is None or (isinstance(value, str) and value in dict(signal.states).values()):
         return value
@@ -207,7 +207,7 @@ def _fitting(part: Part, signal: Signal, kind: str, findings: Findings) -> Value
 
 
 def _reply_to(
-    part: Part, test: DocumentTest, driver: Driver, findings: Findings
+    part: Node, test: DocumentTest, driver: Driver, findings: Problems
 ) -> int | str | None:
     waiting = test.reply_to
     if waiting is None:
@@ -252,11 +252,11 @@ def _reply_to(
 
 
 def _check_run(
-    part: Part,
+    part: Node,
     run: str | None,
     arguments: Mapping[str, object],
     driver: Driver,
-    findings: Findings,
+    findings: Problems,
     *,
     may_fail: bool,
 ) -> None:
@@ -285,7 +285,7 @@ def _check_run(
 
 
 def _check_argument(
-    name: str, part: Part, command: Command, findings: Findings, *, may_fail: bool
+    name: str, part: Node, command: Command, findings: Problems, *, may_fail: bool
 ) -> None:
     argument = known_argument(name, part, command, findings)
     if argument is None or may_fail:

@@ -6,8 +6,8 @@ from typing import Final
 
 from urc.config.link.flow import Linker
 from urc.config.link.rules import settable
-from urc.config.part import Findings, Part
-from urc.config.suggest import did_you_mean
+from urc.config.node import Node, Problems
+from urc.config.spelling_suggestions import did_you_mean
 from urc.expressions import Template
 from urc.model.driver import Driver
 from urc.model.world import READINGS, Failsafe, WorldSpec
@@ -19,7 +19,7 @@ _READING: Final = re.compile(r"_item\(ns\['world'\], '(\w+)'\)(?:, '(\w+)'\))?")
 
 
 def link_world(
-    linker: Linker, part: Part, spec: WorldSpec, state: Iterable[str], parts: Mapping[str, Part]
+    linker: Linker, part: Node, spec: WorldSpec, state: Iterable[str], parts: Mapping[str, Node]
 ) -> WorldSpec:
     """Check every name in a world; return it with the commands that reset its watchdog.
 
@@ -38,7 +38,7 @@ def link_world(
     return spec._replace(failsafe=_link_failsafe(part.must("failsafe"), spec.failsafe, linker, own))
 
 
-def check_readings(findings: Findings, part: Part, template: Template) -> None:
+def check_readings(findings: Problems, part: Node, template: Template) -> None:
     """Report unknown readings of the world in a template."""
     for name, inner in _READING.findall(template.python):
         if name not in READINGS:
@@ -50,7 +50,7 @@ def check_readings(findings: Findings, part: Part, template: Template) -> None:
             findings.error(part, "unknown-name", text, hint=hint)
 
 
-def _templates(part: Part, spec: WorldSpec) -> Iterator[tuple[Part, Template]]:
+def _templates(part: Node, spec: WorldSpec) -> Iterator[tuple[Node, Template]]:
     for key, values in (("drive", spec.drive), ("signals", spec.senses)):
         for name, inner in part.named(key).items():
             value = values.get(name)
@@ -68,7 +68,7 @@ def _templates(part: Part, spec: WorldSpec) -> Iterator[tuple[Part, Template]]:
 
 
 def _link_signals(
-    part: Part, driver: Driver, findings: Findings, parts: Mapping[str, Part]
+    part: Node, driver: Driver, findings: Problems, parts: Mapping[str, Node]
 ) -> None:
     begun = parts["signals"].data if "signals" in parts else {}
     for name, inner in part.named("signals").items():
@@ -78,7 +78,7 @@ def _link_signals(
             findings.error(parts["signals"], "two-sources", text, at=name, key=True, hint=hint)
 
 
-def _link_failsafe(part: Part, spec: Failsafe, linker: Linker, state: set[str]) -> Failsafe:
+def _link_failsafe(part: Node, spec: Failsafe, linker: Linker, state: set[str]) -> Failsafe:
     driver, findings = linker.driver, linker.findings
     for place, name in enumerate(spec.without):
         if name not in driver.commands:

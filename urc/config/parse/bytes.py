@@ -3,7 +3,7 @@
 import re
 from typing import Final
 
-from urc.config.part import Findings, Part
+from urc.config.node import Node, Problems
 
 __all__ = ["CONTROL_NAMES", "parse_bytes"]
 
@@ -23,7 +23,7 @@ _BACKSLASH = re.compile(r"\\(?:x[0-9A-Fa-f]{2}|[abefnrtv0])")
 _SPELT = {r"\r": "CR", r"\n": "LF", r"\t": "TAB", r"\0": "NUL", r"\e": "ESC", r"\x1b": "ESC"}
 
 
-def parse_bytes(part: Part | None, encoding: str, findings: Findings) -> bytes | None:
+def parse_bytes(part: Node | None, encoding: str, findings: Problems) -> bytes | None:
     """Return the bytes of `part`: none without a part, None when reported."""
     if part is None:
         return b""
@@ -41,7 +41,7 @@ def parse_bytes(part: Part | None, encoding: str, findings: Findings) -> bytes |
     return _literal(text, part, encoding, findings)
 
 
-def _literal(text: str, part: Part, encoding: str, findings: Findings) -> bytes | None:
+def _literal(text: str, part: Node, encoding: str, findings: Problems) -> bytes | None:
     template = _TEMPLATE.search(text)
     if template is not None:
         findings.error(

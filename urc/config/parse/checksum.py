@@ -5,21 +5,21 @@ The framing resolves places that depend on the rest of the frame (`at: end`, `ov
 
 from typing import Any, Final, NamedTuple
 
-from urc._sums import algorithm_names, algorithm_of
+from urc._checksum_math import algorithm_names, algorithm_of
+from urc.config.node import Node, Problems
 from urc.config.parse.bytes import parse_bytes
-from urc.config.part import Findings, Part
-from urc.config.suggest import did_you_mean
+from urc.config.spelling_suggestions import did_you_mean
 from urc.model.framing import (
     PLAIN_CHECKSUMS,
+    ByteRange,
     CrcSpec,
     FoldSpec,
     Salt,
     Spelling,
-    Window,
     spelt_size,
 )
 
-__all__ = ["WrittenChecksum", "parse_checksum", "values_of"]
+__all__ = ["DeclaredChecksum", "parse_checksum", "values_of"]
 
 
 _TRAIL_KEYS: Final = frozenset(("after", "each", "leading_zeros", "optional", "skip"))
@@ -29,7 +29,7 @@ _NEEDED: Final = {
 }
 
 
-class WrittenTrail(NamedTuple):
+class DeclaredTrailer(NamedTuple):
     """The declared place of a checksum after a text or after each of its lines."""
 
     mark: bytes
@@ -39,13 +39,13 @@ class WrittenTrail(NamedTuple):
     skip: int
 
 
-class WrittenChecksum(NamedTuple):
+class DeclaredChecksum(NamedTuple):
     """A checksum as declared, before its place is resolved."""
 
-    part: Part
+    part: Node
     algorithm: CrcSpec | FoldSpec | str
     bits: int
-    over: Window | str
+    over: ByteRange | str
     """``payload``, ``frame``, or a range of the frame."""
     at: int | None
     """Index of the first byte; None for the end of the frame."""
@@ -55,7 +55,7 @@ class WrittenChecksum(NamedTuple):
     is_from_hex: bool
     closes: bool
     before: bytes
-    trail: "WrittenTrail | None" = None
+    trail: "DeclaredTrailer | None" = None
     """Place after a text; `at` is then None."""
 
     @property
@@ -64,12 +64,12 @@ class WrittenChecksum(NamedTuple):
         return spelt_size(self.bits, self.spelling)
 
 
-def parse_checksum(part: Part, encoding: str, findings: Findings) -> WrittenChecksum | None:
+def parse_checksum(part: Node, encoding: str, findings: Problems) -> DeclaredChecksum | None:
     """Return the checksum at `part`, or None when it was reported."""
     algorithm = _algorithm(part.must("algorithm"), findings)
     salt = _salt(part.get("salt"), encoding, findings)
     over, at = part.get("over"), part.get("at")
-    window: Window | str = "payload"
+    window: ByteRange | str = "payload"
     if over is not None:
         window = str(over.data) if isinstance(over.data, str) else _window(over, findings)
     spelling: Any = part.text("as", "raw")
@@ -81,7 +81,7 @@ def parse_checksum(part: Part, encoding: str, findings: Findings) -> WrittenChec
     if algorithm is None or salt is None:
         return None
     place = None if at is None or isinstance(at.data, str) else int(at.data)
-    return WrittenChecksum(
+    return DeclaredChecksum(
         part,
         algorithm,
         _bits(algorithm),
@@ -106,7 +106,7 @@ def values_of(algorithm: CrcSpec | FoldSpec | str) -> frozenset[int]:
     return frozenset((one & mask) + algorithm.added & 0xFF | algorithm.ored for one in every)
 
 
-def _trail(part: Part, encoding: str, findings: Findings) -> WrittenTrail | None:
+def _trail(part: Node, encoding: str, findings: Problems) -> DeclaredTrailer | None:
     """Return the place of the checksum at `part` after a text; None for a fixed place."""
     mark = parse_bytes(part.get("after"), encoding, findings) or b""
     each = parse_bytes(part.get("each"), encoding, findings) or b""
@@ -130,7 +130,7 @@ def _trail(part: Part, encoding: str, findings: Findings) -> WrittenTrail | None
         findings.error(part, "misplaced-key", text, at="leading_zeros", key=True, hint=hint)
     if not mark and not each:
         return None
-    return WrittenTrail(
+    return DeclaredTrailer(
         mark, is_padded, part.flag("optional", default=False), each, part.integer("skip") or 0
     )
 
@@ -141,13 +141,13 @@ def _bits(algorithm: CrcSpec | FoldSpec | str) -> int:
     return algorithm.width if isinstance(algorithm, CrcSpec) else algorithm.bits
 
 
-def _algorithm(part: Part, findings: Findings) -> CrcSpec | FoldSpec | str | None:
+def _algorithm(part: Node, findings: Problems) -> CrcSpec | FoldSpec | str | None:
     if isinstance(part.data, str):
         return _named(part, findings)
     return _fold(part, findings) if "fold" in part.data else _crc(part, findings)
 
 
-def _named(part: Part, findings: Findings) -> CrcSpec | FoldSpec | str | None:
+def _named(part: Node, findings: Problems) -> CrcSpec | FoldSpec | str | None:
     name: str = part.data
     algorithm = algorithm_of(name)
     if algorithm is not None:
@@ -159,7 +159,7 @@ def _named(part: Part, findings: Findings) -> CrcSpec | FoldSpec | str | None:
     return None
 
 
-def _crc(part: Part, findings: Findings) -> CrcSpec | None:
+def _crc(part: Node, findings: Problems) -> CrcSpec | None:
     width = part.integer("width") or 8
     numbers = {name: part.integer(name) or 0 for name in ("poly", "init", "xorout")}
     refin, refout = part.flag("refin", default=False), part.flag("refout", default=False)
@@ -179,7 +179,7 @@ def _crc(part: Part, findings: Findings) -> CrcSpec | None:
     return CrcSpec(width, numbers["poly"], numbers["init"], refin, refout, numbers["xorout"])
 
 
-def _fold(part: Part, findings: Findings) -> FoldSpec | None:
+def _fold(part: Node, findings: Problems) -> FoldSpec | None:
     operation, complement = part.text("fold"), part.text("complement", "none")
     bits, of = part.integer("bits") or 8, part.integer("of") or 8
     mask, ored = part.integer("mask"), part.integer("or") or 0
@@ -213,7 +213,7 @@ def _fold(part: Part, findings: Findings) -> FoldSpec | None:
     )
 
 
-def _window(part: Part, findings: Findings) -> Window | str:
+def _window(part: Node, findings: Problems) -> ByteRange | str:
     start, stop = part.integer("from") or 0, part.integer("to")
     if stop is not None and (start < 0) == (stop < 0) and start >= stop:
         findings.error(
@@ -223,10 +223,10 @@ def _window(part: Part, findings: Findings) -> Window | str:
             hint="places count from 0; negative places count back from the end of the frame",
         )
         return "payload"
-    return Window(start, stop)
+    return ByteRange(start, stop)
 
 
-def _salt(part: Part | None, encoding: str, findings: Findings) -> Salt | None:
+def _salt(part: Node | None, encoding: str, findings: Problems) -> Salt | None:
     if part is None:
         return Salt()
     if not isinstance(part.data, dict):

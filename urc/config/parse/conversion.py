@@ -5,7 +5,7 @@ from itertools import pairwise
 from math import isfinite
 from typing import Final
 
-from urc.config.part import Findings, Part
+from urc.config.node import Node, Problems
 from urc.config.values import fraction_of
 from urc.model.values import Conversion
 
@@ -17,7 +17,7 @@ _A_NUMBER: Final = re.compile(r"[+-]?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]{1
 _OF_NUMBERS: Final = ("base", "scale", "offset", "polynomial", "points")
 
 
-def parse_conversion(part: Part, findings: Findings, kind: str = "number") -> Conversion:
+def parse_conversion(part: Node, findings: Problems, kind: str = "number") -> Conversion:
     """Return the conversion among the keys of `part`, without its states.
 
     `kind` is the type of the converted value. Strings and booleans have no arithmetic.
@@ -55,7 +55,7 @@ def _numbers_in(absent: object) -> tuple[float, ...]:
     return (number,) if isfinite(number) else ()
 
 
-def parse_states(part: Part, kind: str, findings: Findings) -> tuple[tuple[str, str], ...]:
+def parse_states(part: Node, kind: str, findings: Problems) -> tuple[tuple[str, str], ...]:
     """Return the states of a signal or conversion, by their raw texts."""
     states = part.named("states")
     if kind in ("integer", "number"):
@@ -73,7 +73,7 @@ def parse_states(part: Part, kind: str, findings: Findings) -> tuple[tuple[str, 
     return tuple((raw, str(inner.data)) for raw, inner in states.items())
 
 
-def _polynomial(part: Part, findings: Findings) -> tuple[float, ...]:
+def _polynomial(part: Node, findings: Problems) -> tuple[float, ...]:
     written = part.get("scale")
     is_fraction = written is not None and isinstance(written.data, str)
     scale = fraction_of(part.text("scale")) if is_fraction else part.number("scale")
@@ -103,7 +103,7 @@ def _polynomial(part: Part, findings: Findings) -> tuple[float, ...]:
     return (offset or 0, 1 if scale is None else scale)
 
 
-def _points(part: Part | None, findings: Findings) -> tuple[tuple[float, float], ...]:
+def _points(part: Node | None, findings: Problems) -> tuple[tuple[float, float], ...]:
     if part is None:
         return ()
     pairs = part.items()

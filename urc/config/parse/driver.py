@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from urc.config.moving import with_moving_steps
-from urc.config.parse.beside_form import with_collected
+from urc.config.autonomous_motion import with_moving_steps
+from urc.config.node import Node, Problems
 from urc.config.parse.flow import (
     NOTHING_SENT,
     aged_by_lines,
@@ -15,19 +15,19 @@ from urc.config.parse.flow import (
     poll_with_flow,
 )
 from urc.config.parse.form import FormContext, parse_read, parse_write
-from urc.config.parse.line import parse_transport
+from urc.config.parse.form_options import with_collected
 from urc.config.parse.reply import implied_reply, parse_reply
 from urc.config.parse.signal import parse_signal, with_ages
-from urc.config.part import Findings, Part
+from urc.config.parse.transport import parse_transport
 from urc.config.values import check_range, check_within, element_of, fit, fit_hint, shown
 from urc.model.driver import Argument, Command, Driver, Message, Poll, TransportSpec
 from urc.model.values import NOTHING, Reading, Value
-from urc.registry import Catalog
+from urc.registry import Registries
 
 __all__ = ["parse_driver", "spoken_name"]
 
 
-def parse_driver(part: Part, findings: Findings, catalog: Catalog) -> Driver:
+def parse_driver(part: Node, findings: Problems, catalog: Registries) -> Driver:
     """Return the driver in the mapping at `part`; report mistakes and use defaults."""
     transports = {
         name: parse_transport(inner, findings, catalog)
@@ -64,18 +64,18 @@ def parse_driver(part: Part, findings: Findings, catalog: Catalog) -> Driver:
     )
 
 
-def _discovery(part: Part | None) -> tuple[str, ...]:
+def _discovery(part: Node | None) -> tuple[str, ...]:
     """Return the types of services."""
     return () if part is None else tuple(str(one.data) for one in part.listed("mdns"))
 
 
-def _set_by_frames(part: Part) -> frozenset[str]:
+def _set_by_frames(part: Node) -> frozenset[str]:
     """Return the signals that are not computed."""
     signals = part.named("signals").items()
     return frozenset(name for name, inner in signals if "value" not in inner.data)
 
 
-def _sequences(part: Part, lines: "_Lines", findings: Findings) -> dict[str, Command]:
+def _sequences(part: Node, lines: "_Lines", findings: Problems) -> dict[str, Command]:
     context = lines.context(lines.only)
     return {
         name: parse_sequence(inner, spoken_name(name), lines.only, context, findings)
@@ -83,7 +83,7 @@ def _sequences(part: Part, lines: "_Lines", findings: Findings) -> dict[str, Com
     }
 
 
-def _types(part: Part, findings: Findings) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+def _types(part: Node, findings: Problems) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
     """Return the driver's ``types:`` and ``enums:``."""
     if "types" not in part.data and "enums" not in part.data:
         return NOTHING, NOTHING
@@ -107,7 +107,7 @@ class _Lines:
         own = own or list(transports)
         self.only = own[0] if len(own) == 1 else ""
 
-    def name(self, part: Part, key: str) -> str:
+    def name(self, part: Node, key: str) -> str:
         """Return the transport that `part` names under `key`, or the default."""
         return part.text(key, self.only)
 
@@ -124,7 +124,7 @@ def spoken_name(name: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def _message(part: Part, lines: _Lines, findings: Findings) -> Message:
+def _message(part: Node, lines: _Lines, findings: Problems) -> Message:
     transport = lines.name(part, "from")
     context, answer = lines.context(transport), part.get("acknowledge")
     read = with_collected(part, parse_read(part, findings, context), findings)
@@ -132,7 +132,7 @@ def _message(part: Part, lines: _Lines, findings: Findings) -> Message:
     return Message(part.name, transport, read, sent)
 
 
-def _poll(part: Part, lines: _Lines, commands: dict[str, Command], findings: Findings) -> Poll:
+def _poll(part: Node, lines: _Lines, commands: dict[str, Command], findings: Problems) -> Poll:
     transport = lines.name(part, "to")
     context = lines.context(transport)
     send = part.get("send")
@@ -148,7 +148,7 @@ def _poll(part: Part, lines: _Lines, commands: dict[str, Command], findings: Fin
     return poll_with_flow(poll, part, commands, findings)
 
 
-def _command(part: Part, lines: _Lines, findings: Findings) -> Command:
+def _command(part: Node, lines: _Lines, findings: Problems) -> Command:
     transport = lines.name(part, "to")
     context = lines.context(transport)
     send = parse_write(part.must("send"), findings, context)
@@ -164,7 +164,7 @@ def _command(part: Part, lines: _Lines, findings: Findings) -> Command:
     return command_with_flow(command, part, findings)
 
 
-def _argument(part: Part, findings: Findings) -> Argument:
+def _argument(part: Node, findings: Problems) -> Argument:
     kind = part.text("type", "number")
     of = element_of(part, kind, findings)
     low, high = check_range(part, of, findings)
@@ -197,7 +197,7 @@ def _argument(part: Part, findings: Findings) -> Argument:
     return parse_choice_questions(part, argument, findings)
 
 
-def _check_argument(part: Part, kind: str, of: str, findings: Findings) -> None:
+def _check_argument(part: Node, kind: str, of: str, findings: Problems) -> None:
     """Report a reserved name, and keys without effect for the type."""
     if part.name in ("settings", "pi"):
         what = "the settings" if part.name == "settings" else "the number"
@@ -218,7 +218,7 @@ def _check_argument(part: Part, kind: str, of: str, findings: Findings) -> None:
         )
 
 
-def _default(inner: Part, argument: Part, kind: str, findings: Findings) -> Reading:
+def _default(inner: Node, argument: Node, kind: str, findings: Problems) -> Reading:
     """Return the default; for an array, a list of its size."""
     if kind != "array":
         return _fitting(inner, kind, findings)
@@ -233,7 +233,7 @@ def _default(inner: Part, argument: Part, kind: str, findings: Findings) -> Read
     return tuple(_fitting(one, argument.text("items", "number"), findings) for one in inner.items())
 
 
-def _fitting(part: Part, kind: str, findings: Findings) -> Value:
+def _fitting(part: Node, kind: str, findings: Problems) -> Value:
     try:
         return fit(part.data, kind)
     except ValueError as error:

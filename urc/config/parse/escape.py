@@ -3,15 +3,15 @@
 from collections.abc import Mapping
 from typing import Any
 
+from urc.config.node import Node, Problems
 from urc.config.parse.bytes import parse_bytes
-from urc.config.part import Findings, Part
 from urc.model.framing import EscapeSpec, FrameLayout
 
 __all__ = ["parse_escape"]
 
 
 def parse_escape(
-    part: Part, layout: FrameLayout, options: Mapping[str, Any], encoding: str, findings: Findings
+    part: Node, layout: FrameLayout, options: Mapping[str, Any], encoding: str, findings: Problems
 ) -> EscapeSpec | None:
     """Return ``escape`` of the framing at `part`, or None."""
     if "escape" not in part.data:
@@ -37,13 +37,13 @@ def parse_escape(
     return spec._replace(is_of_payload=is_of_payload)
 
 
-def _marks(part: Part, layout: FrameLayout, options: Mapping[str, Any]) -> tuple[bytes, ...]:
+def _marks(part: Node, layout: FrameLayout, options: Mapping[str, Any]) -> tuple[bytes, ...]:
     ends = (options.get("tx", layout.end), options.get("rx", layout.end))
     is_measured = part.text("type") == "length"
     return (layout.start, *(() if is_measured else ends))
 
 
-def _one(part: Part, encoding: str, findings: Findings) -> int | None:
+def _one(part: Node, encoding: str, findings: Problems) -> int | None:
     """Return the byte at `part`."""
     found = parse_bytes(part, encoding, findings)
     if found is None or len(found) == 1:
@@ -52,7 +52,7 @@ def _one(part: Part, encoding: str, findings: Findings) -> int | None:
     return None
 
 
-def _inserted(part: Part, encoding: str, findings: Findings) -> EscapeSpec | None:
+def _inserted(part: Node, encoding: str, findings: Problems) -> EscapeSpec | None:
     after = parse_bytes(part.must("after"), encoding, findings)
     insert_part = part.get("insert")
     if after == b"":
@@ -70,7 +70,7 @@ def _inserted(part: Part, encoding: str, findings: Findings) -> EscapeSpec | Non
 
 
 def _escaped(
-    part: Part, way: str, marks: tuple[bytes, ...], encoding: str, findings: Findings
+    part: Node, way: str, marks: tuple[bytes, ...], encoding: str, findings: Problems
 ) -> EscapeSpec | None:
     byte_part = part.get("byte")
     if byte_part is None:
@@ -98,7 +98,7 @@ def _escaped(
 
 
 def _table(
-    part: Part, byte: int, marks: tuple[bytes, ...], encoding: str, findings: Findings
+    part: Node, byte: int, marks: tuple[bytes, ...], encoding: str, findings: Problems
 ) -> EscapeSpec | None:
     table: dict[int, int] = {}
     for key, inner in part.must("table").entries().items():
@@ -119,7 +119,7 @@ def _table(
     return EscapeSpec(byte, table)
 
 
-def _check_hidden(part: Part, at: str, table: Mapping[int, int], findings: Findings) -> None:
+def _check_hidden(part: Node, at: str, table: Mapping[int, int], findings: Problems) -> None:
     """Report a replacement for an escaped byte that would need an escape itself."""
     wrong = next((one for one in table.values() if one in table), None)
     if wrong is not None:
@@ -127,7 +127,7 @@ def _check_hidden(part: Part, at: str, table: Mapping[int, int], findings: Findi
         findings.error(part, "overlap", text, at=at)
 
 
-def _check_doubled(part: Part, byte: int, marks: tuple[bytes, ...], findings: Findings) -> None:
+def _check_doubled(part: Node, byte: int, marks: tuple[bytes, ...], findings: Problems) -> None:
     for mark in marks:
         if mark and mark[0] != byte:
             shown = mark.hex(" ")

@@ -4,18 +4,17 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Final, Literal, cast
 
+from urc.config.autonomous_motion import parse_moves
 from urc.config.messaging import MESSAGING
-from urc.config.moving import parse_moves
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext, parse_write
 from urc.config.parse.reply import parse_errors, refuse
 from urc.config.parse.steps import StepContext, parse_steps
-from urc.config.part import Findings, Part
-from urc.config.suggest import did_you_mean
+from urc.config.spelling_suggestions import did_you_mean
 from urc.config.values import given
 from urc.expressions import compile_template
-from urc.model.codec import WriteSpec
 from urc.model.driver import Argument, Command, Message, Poll, TransportSpec
-from urc.model.flow import (
+from urc.model.exchange import (
     Confirm,
     Hold,
     Keepalive,
@@ -26,6 +25,7 @@ from urc.model.flow import (
     Retry,
     Verify,
 )
+from urc.model.payload import WriteSpec
 from urc.model.sequence import MAX_STEP_S, ExpectStep, PromptStep, SendStep, all_steps
 from urc.model.values import Reading, Signal, Value
 
@@ -44,7 +44,7 @@ NOTHING_SENT: Final = WriteSpec("text", {"template": compile_template("")})
 
 
 def line_with_flow(
-    spec: TransportSpec, part: Part, context: FormContext, findings: Findings
+    spec: TransportSpec, part: Node, context: FormContext, findings: Problems
 ) -> TransportSpec:
     """Return the transport with its queue, keepalive, timeouts and steps."""
     queue = part.get("queue")
@@ -99,7 +99,7 @@ def aged_by_lines(
     }
 
 
-def command_with_flow(command: Command, part: Part, findings: Findings) -> Command:
+def command_with_flow(command: Command, part: Node, findings: Problems) -> Command:
     """Return the command with its queueing, conditions, motion and retries."""
     hold, confirm, verify = part.get("hold"), part.get("confirm"), part.get("verify")
     retries, retry = _retries(part.get("retries"), findings)
@@ -144,14 +144,14 @@ def command_with_flow(command: Command, part: Part, findings: Findings) -> Comma
     )
 
 
-def _refuse_asides(reply: Part | None, findings: Findings) -> None:
+def _refuse_asides(reply: Node | None, findings: Problems) -> None:
     """Report `resend` and `extend` of a held command, whose newest values are sent all the time."""
     for inner in [reply, *reply.listed("stages")] if reply is not None else ():
         why = "has no effect with 'hold': the next value follows anyway"
         refuse(inner, ("resend", "extend"), why, findings)
 
 
-def _check_stop(command: Command, part: Part, findings: Findings) -> None:
+def _check_stop(command: Command, part: Node, findings: Problems) -> None:
     """Report keys that would block or delay a command of STOP."""
     moves = () if part.data.get("moves") is False else ("moves",)  # false is the default of a stop
     hindering = (*moves, "confirm", "requires", "coalesce", "rate_limit")
@@ -170,7 +170,7 @@ def _check_stop(command: Command, part: Part, findings: Findings) -> None:
 
 
 def poll_with_flow(
-    poll: Poll, part: Part, commands: dict[str, Command], findings: Findings
+    poll: Poll, part: Node, commands: dict[str, Command], findings: Problems
 ) -> Poll:
     """Return the poll with its command and its period."""
     offline, when = part.get("offline"), part.get("when")
@@ -202,7 +202,7 @@ def poll_with_flow(
 
 
 def parse_sequence(
-    part: Part, title: str, only: str, context: FormContext, findings: Findings
+    part: Node, title: str, only: str, context: FormContext, findings: Problems
 ) -> Command:
     """Return the command for a sequence.
 
@@ -234,7 +234,7 @@ def parse_sequence(
     )
 
 
-def _arguments(part: Part) -> dict[str, Reading]:
+def _arguments(part: Node) -> dict[str, Reading]:
     return {name: given(inner.data) for name, inner in part.named("args").items()}
 
 
@@ -242,7 +242,7 @@ _NUMBERED_IN_FLIGHT: Final = 16
 """Requests in flight where numbers match each reply to its request."""
 
 
-def _queue(part: Part | None, kind: str) -> Queue:
+def _queue(part: Node | None, kind: str) -> Queue:
     default = Queue(in_flight=_NUMBERED_IN_FLIGHT if kind in MESSAGING else 1)
     if part is None:
         return default
@@ -253,7 +253,7 @@ def _queue(part: Part | None, kind: str) -> Queue:
     )
 
 
-def _keepalive(part: Part | None, context: FormContext, findings: Findings) -> Keepalive | None:
+def _keepalive(part: Node | None, context: FormContext, findings: Problems) -> Keepalive | None:
     if part is None:
         return None
     given = [key for key in ("send", "run") if key in part.data]
@@ -272,7 +272,7 @@ def _keepalive(part: Part | None, context: FormContext, findings: Findings) -> K
     )
 
 
-def _rate(part: Part | None, findings: Findings) -> float | None:
+def _rate(part: Node | None, findings: Problems) -> float | None:
     if part is None:
         return None
     number, _, unit = str(part.data).partition("/")
@@ -283,7 +283,7 @@ def _rate(part: Part | None, findings: Findings) -> float | None:
     return rate
 
 
-def _hold(part: Part, findings: Findings) -> Hold:
+def _hold(part: Node, findings: Problems) -> Hold:
     repeat_s = findings.duration(part, "repeat", 0.05, least=0.01, most=10)
     lease_s = findings.duration(part, "lease", 0.25, least=0.1, most=1.0)
     release, step = part.get("release"), part.get("step")
@@ -308,18 +308,18 @@ def _hold(part: Part, findings: Findings) -> Hold:
     return Hold(repeat_s, values, lease_s, _watchdog_s(part, findings), slew, on_stall, step_s)
 
 
-def _watchdog_s(part: Part, findings: Findings) -> float | None:
+def _watchdog_s(part: Node, findings: Problems) -> float | None:
     if part.text("watchdog") == "none":
         return math.inf
     return findings.duration(part, "watchdog", 0.0) or None
 
 
-def _confirm(part: Part) -> Confirm:
+def _confirm(part: Node) -> Confirm:
     level = cast("Literal['normal', 'hazardous']", part.text("level", "normal"))
     return Confirm(level, part.must("text").data, part.flag("two_person", default=False))
 
 
-def parse_choice_questions(part: Part, argument: Argument, findings: Findings) -> Argument:
+def parse_choice_questions(part: Node, argument: Argument, findings: Problems) -> Argument:
     """Return the argument with the confirmations of some of its choices."""
     asked = part.named("confirm")
     if not asked:
@@ -352,7 +352,7 @@ def _written(value: Value) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _retries(part: Part | None, findings: Findings) -> tuple[int, Retry]:
+def _retries(part: Node | None, findings: Problems) -> tuple[int, Retry]:
     """Return the number of retries and their waits."""
     if part is None:
         return 0, Retry()
@@ -371,7 +371,7 @@ def _retries(part: Part | None, findings: Findings) -> tuple[int, Retry]:
     return part.integer("count") or 0, Retry(initial_s, max_s)
 
 
-def _requires(part: Part, findings: Findings) -> tuple[Requirement, ...]:
+def _requires(part: Node, findings: Problems) -> tuple[Requirement, ...]:
     found = []
     for inner in part.listed("requires"):
         condition = findings.expression(inner.must("expr"))
@@ -380,12 +380,12 @@ def _requires(part: Part, findings: Findings) -> tuple[Requirement, ...]:
     return tuple(found)
 
 
-def _verify(part: Part, findings: Findings) -> Verify | None:
+def _verify(part: Node, findings: Problems) -> Verify | None:
     condition = findings.expression(part.must("expr"))
     within_s = findings.duration(part, "within", 1.0, most=MAX_STEP_S)
     return None if condition is None else Verify(condition, within_s)
 
 
-def _offline(part: Part, findings: Findings) -> Offline:
+def _offline(part: Node, findings: Problems) -> Offline:
     after = part.integer("after") or 1
     return Offline(after, findings.duration(part, "retry", 10.0, least=0.05))

@@ -9,14 +9,14 @@ from importlib import import_module
 from typing import Any, NamedTuple, Protocol, cast
 
 from urc.config.form_table import READ_FORMS, WRITE_FORMS
-from urc.config.parse.beside_form import beside_form
-from urc.config.part import Findings, Part
+from urc.config.node import Node, Problems
+from urc.config.parse.form_options import beside_form
 from urc.expressions import Template
 from urc.model.binary import Item
-from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import FramingSpec
+from urc.model.payload import ReadSpec, WriteSpec
 from urc.model.values import NOTHING
-from urc.registry import Catalog
+from urc.registry import Registries
 
 __all__ = [
     "FormContext",
@@ -46,7 +46,7 @@ class FormContext(NamedTuple):
     """The driver's reusable structs."""
     enums: Mapping[str, tuple[tuple[int, str], ...]] = NOTHING
     """The driver's enums."""
-    catalog: Catalog | None = None
+    catalog: Registries | None = None
     """The known framings, for a frame with a framing of its own."""
     framing: FramingSpec | None = None
     """Framing of the transport; None for a frame with a framing of its own."""
@@ -55,24 +55,24 @@ class FormContext(NamedTuple):
 class ReadForm(Protocol):
     """A module that parses one form of received frames."""
 
-    def parse_read(self, part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+    def parse_read(self, part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
         """Return the declaration at `part`, or None when a problem was reported."""
 
-    def place_of(self, part: Part, field: str) -> tuple[Part, dict[str, Any]]:
-        """Return the place of `field`, as arguments of `Findings.error`."""
+    def place_of(self, part: Node, field: str) -> tuple[Node, dict[str, Any]]:
+        """Return the place of `field`, as arguments of `Problems.error`."""
 
 
 class WriteForm(Protocol):
     """A module that parses one form of sent frames."""
 
-    def parse_write(self, part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+    def parse_write(self, part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
         """Return the declaration at `part`, or None when a problem was reported."""
 
-    def templates(self, part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+    def templates(self, part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
         """Return every template of the frame, with its place."""
 
 
-def read_form(part: Part) -> tuple[Part, ReadForm] | None:
+def read_form(part: Node) -> tuple[Node, ReadForm] | None:
     """Return the value of the form's key in a reply or message, and the form's module."""
     for key in READ_FORMS:
         inner = part.get(key)
@@ -81,7 +81,7 @@ def read_form(part: Part) -> tuple[Part, ReadForm] | None:
     return None
 
 
-def write_form(part: Part) -> tuple[Part, WriteForm]:
+def write_form(part: Node) -> tuple[Node, WriteForm]:
     """Return the value of ``send:``, or of the form's key in it, and the form's module."""
     if isinstance(part.data, dict):
         for key in part.data:
@@ -91,7 +91,7 @@ def write_form(part: Part) -> tuple[Part, WriteForm]:
     return part, cast("WriteForm", import_module(module))
 
 
-def body_form(part: Part) -> tuple[Part, WriteForm] | None:
+def body_form(part: Node) -> tuple[Node, WriteForm] | None:
     """Return the value of a form's key inside an envelope, and the form's module."""
     for key in part.data:
         if key in _BODIES:
@@ -99,7 +99,7 @@ def body_form(part: Part) -> tuple[Part, WriteForm] | None:
     return None
 
 
-def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec:
+def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec:
     """Return the form of a received frame."""
     given = [key for key in READ_FORMS if key in part.data]
     if len(given) != 1:
@@ -123,7 +123,7 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
     return beside_form(part, spec, findings)
 
 
-def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec:
+def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec:
     """Return the form of the frame under ``send:``."""
     inner, form = write_form(part)
     return form.parse_write(inner, findings, context) or _NO_WRITE

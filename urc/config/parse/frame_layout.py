@@ -5,16 +5,16 @@ Places count from the first byte of the whole frame, without a delimiter or byte
 
 from typing import Any, Final, NamedTuple
 
+from urc.config.node import Node, Problems
 from urc.config.parse.bytes import parse_bytes
-from urc.config.parse.checksum import WrittenChecksum, parse_checksum
-from urc.config.part import Findings, Part
+from urc.config.parse.checksum import DeclaredChecksum, parse_checksum
 from urc.model.framing import (
+    ByteRange,
     ChecksumSpec,
     Digits,
     FrameLayout,
     LengthSpec,
-    TrailSpec,
-    Window,
+    TrailerSpec,
 )
 
 __all__ = ["MARKED", "checksums_of", "parse_layout"]
@@ -34,7 +34,7 @@ class _Frame(NamedTuple):
     length: LengthSpec | None
 
 
-def parse_layout(part: Part, encoding: str, findings: Findings, longest: int) -> FrameLayout:
+def parse_layout(part: Node, encoding: str, findings: Problems, longest: int) -> FrameLayout:
     """Return the layout of the framing at `part`; report a mistake and use its default."""
     kind = part.text("type")
     start = end = b""
@@ -64,7 +64,7 @@ def parse_layout(part: Part, encoding: str, findings: Findings, longest: int) ->
     return layout._replace(digits=digits)
 
 
-def _digits(part: Part, findings: Findings) -> Digits:
+def _digits(part: Node, findings: Problems) -> Digits:
     """Return the digits that encode the bytes of the framing at `part`."""
     digits: Any = part.text("decode") if part.text("type") in _SPELT else ""
     if digits and "escape" in part.data:
@@ -73,7 +73,7 @@ def _digits(part: Part, findings: Findings) -> Digits:
     return digits  # type: ignore[no-any-return]  # the schema has the words
 
 
-def _check_trail(part: Part, written: WrittenChecksum, count: int, findings: Findings) -> None:
+def _check_trail(part: Node, written: DeclaredChecksum, count: int, findings: Problems) -> None:
     key = "after" if "after" in written.part.data else "each"
     kind = part.text("type")
     if kind in ("fixed", "length"):
@@ -90,20 +90,20 @@ def _check_trail(part: Part, written: WrittenChecksum, count: int, findings: Fin
         findings.error(written.part, "misplaced-key", text, at=key, key=True)
 
 
-def _trail_of(written: WrittenChecksum, start: bytes) -> TrailSpec:
+def _trail_of(written: DeclaredChecksum, start: bytes) -> TrailerSpec:
     trail = written.trail
     if trail is None:
         raise AssertionError("a checksum in a fixed place is not a trailer")
     over = written.over
-    if not isinstance(over, Window):
-        over = Window(len(start) if over == "payload" and not trail.each else 0)
+    if not isinstance(over, ByteRange):
+        over = ByteRange(len(start) if over == "payload" and not trail.each else 0)
     checksum = _spec_of(written, over, -written.size)
-    return TrailSpec(
+    return TrailerSpec(
         checksum, trail.mark, trail.is_padded, trail.is_optional, trail.each, trail.skip
     )
 
 
-def checksums_of(part: Part) -> list[Part]:
+def checksums_of(part: Node) -> list[Node]:
     """Return the checksums of the framing at `part`, which has one or a list."""
     inner = part.get("checksum") if part.text("type") != "xml" else None
     if inner is None:
@@ -111,7 +111,7 @@ def checksums_of(part: Part) -> list[Part]:
     return inner.items() if isinstance(inner.data, list) else [inner]
 
 
-def _check_marks(part: Part, findings: Findings) -> None:
+def _check_marks(part: Node, findings: Problems) -> None:
     for key in ("open", "close"):
         inner = part.must(key)
         if inner.data in ("", []):
@@ -124,7 +124,7 @@ def _check_marks(part: Part, findings: Findings) -> None:
 
 
 def _placed(
-    part: Part, frame: _Frame, written: list[WrittenChecksum], findings: Findings
+    part: Node, frame: _Frame, written: list[DeclaredChecksum], findings: Problems
 ) -> FrameLayout:
     """Return the layout with the places that depend on each other."""
     start, end, size, length = frame
@@ -163,7 +163,7 @@ def _placed(
 
 
 def _checksum(
-    written: WrittenChecksum, at: int, is_last: bool, layout: FrameLayout
+    written: DeclaredChecksum, at: int, is_last: bool, layout: FrameLayout
 ) -> ChecksumSpec:
     # A window without an end stops at a checksum at the end, or at the end bytes.
     behind = len(layout.end)
@@ -172,7 +172,7 @@ def _checksum(
     return _spec_of(written, _over(written, behind, layout), at)
 
 
-def _spec_of(written: WrittenChecksum, over: Window, at: int) -> ChecksumSpec:
+def _spec_of(written: DeclaredChecksum, over: ByteRange, at: int) -> ChecksumSpec:
     return ChecksumSpec(
         written.algorithm, written.bits, over, at, written.is_big, written.spelling,
         written.salt, written.is_from_hex, written.closes, written.before,
@@ -180,7 +180,7 @@ def _spec_of(written: WrittenChecksum, over: Window, at: int) -> ChecksumSpec:
 
 
 def _payload(
-    part: Part, frame: _Frame, head: int, tail: int, findings: Findings
+    part: Node, frame: _Frame, head: int, tail: int, findings: Problems
 ) -> tuple[int, int]:
     start, stop = part.integer("from"), part.integer("to")
     head = head if start is None else start
@@ -202,17 +202,19 @@ def _payload(
     return head, tail
 
 
-def _over(written: WrittenChecksum, behind: int, layout: FrameLayout) -> Window:
+def _over(written: DeclaredChecksum, behind: int, layout: FrameLayout) -> ByteRange:
     stop = -behind or None
-    if isinstance(written.over, Window):
-        return written.over if written.over.stop is not None else Window(written.over.start, stop)
+    if isinstance(written.over, ByteRange):
+        return (
+            written.over if written.over.stop is not None else ByteRange(written.over.start, stop)
+        )
     if written.over == "frame":
-        return Window(0, stop)
-    return Window(layout.head, -layout.tail or None)
+        return ByteRange(0, stop)
+    return ByteRange(layout.head, -layout.tail or None)
 
 
 def _check_checksum(
-    part: Part, checksum: ChecksumSpec, layout: FrameLayout, findings: Findings
+    part: Node, checksum: ChecksumSpec, layout: FrameLayout, findings: Problems
 ) -> None:
     """Report a checksum or window outside the frame, or over another part of it."""
     at, size, frame_size = checksum.at, checksum.size, layout.size
@@ -239,7 +241,7 @@ def _check_checksum(
 
 
 def _check_window(
-    part: Part, checksum: ChecksumSpec, layout: FrameLayout, findings: Findings
+    part: Node, checksum: ChecksumSpec, layout: FrameLayout, findings: Problems
 ) -> None:
     size, over = layout.size, checksum.over
     where = "over" if "over" in part.data else ""
@@ -262,7 +264,7 @@ def _check_window(
         findings.error(part, "empty-window", "the checksum covers no bytes", at=where)
 
 
-def _check_size(part: Part, layout: FrameLayout, longest: int, findings: Findings) -> None:
+def _check_size(part: Node, layout: FrameLayout, longest: int, findings: Problems) -> None:
     """Report frames that cannot hold their own parts, or exceed the largest size."""
     least = layout.head + layout.tail
     if layout.size is not None and layout.size < least:
@@ -285,7 +287,7 @@ def _check_size(part: Part, layout: FrameLayout, longest: int, findings: Finding
 _MOST_BYTES = 8
 
 
-def _parse_length(part: Part, encoding: str, findings: Findings) -> LengthSpec:
+def _parse_length(part: Node, encoding: str, findings: Problems) -> LengthSpec:
     """Return the length field at `part`; report a mistake and use its default."""
     size = part.integer("size") or 1
     spelling = part.text("as", "raw")
@@ -309,7 +311,7 @@ def _parse_length(part: Part, encoding: str, findings: Findings) -> LengthSpec:
     )
 
 
-def _check_length(part: Part, start: bytes, length: LengthSpec, findings: Findings) -> None:
+def _check_length(part: Node, start: bytes, length: LengthSpec, findings: Problems) -> None:
     """Report a length field that overlaps the start bytes, or has keys without effect."""
     if length.offset < len(start):
         findings.error(
@@ -338,7 +340,7 @@ def _check_length(part: Part, start: bytes, length: LengthSpec, findings: Findin
             findings.error(part, "misplaced-key", text, at=other, key=True)
 
 
-def _check_loose(part: Part, findings: Findings) -> None:
+def _check_loose(part: Node, findings: Problems) -> None:
     """Report keys that need a fixed start of the payload, where the length field has none."""
     for key in ("payload", "escape"):
         if key in part.data:

@@ -4,15 +4,15 @@ from collections.abc import Callable
 from re import _constants, _parser  # type: ignore[attr-defined]  # no public API for the syntax tree
 from typing import Any, Final
 
+from urc.config.node import Node, Problems
 from urc.config.parse.bytes import parse_bytes
 from urc.config.parse.checksum import values_of
 from urc.config.parse.escape import parse_escape
 from urc.config.parse.frame_layout import MARKED, parse_layout
-from urc.config.part import Findings, Part
-from urc.config.suggest import did_you_mean, listed
+from urc.config.spelling_suggestions import did_you_mean, listed
 from urc.model.driver import FramingSpec
 from urc.model.framing import FrameLayout
-from urc.registry import Catalog
+from urc.registry import Registries
 
 __all__ = ["parse_framing"]
 
@@ -22,7 +22,9 @@ _SWITCHABLE: Final = (
 """Framings that find the end of a frame in its bytes, so that another framing may follow."""
 
 
-def parse_framing(part: Part, encoding: str, findings: Findings, catalog: Catalog) -> FramingSpec:
+def parse_framing(
+    part: Node, encoding: str, findings: Problems, catalog: Registries
+) -> FramingSpec:
     """Return the framing at `part`; report a mistake and use its default."""
     kind = part.must("type")
     if kind.data == "switch" and catalog.framings.get(kind.data) is not None:
@@ -54,7 +56,7 @@ def parse_framing(part: Part, encoding: str, findings: Findings, catalog: Catalo
     return _with_patience(part, FramingSpec(kind.data, options, longest), findings)
 
 
-def _with_patience(part: Part, spec: FramingSpec, findings: Findings) -> FramingSpec:
+def _with_patience(part: Node, spec: FramingSpec, findings: Problems) -> FramingSpec:
     """Return the framing with the options of every framing type."""
     if "timeout" not in part.data and "strip_ansi" not in part.data:
         return spec
@@ -63,7 +65,7 @@ def _with_patience(part: Part, spec: FramingSpec, findings: Findings) -> Framing
     return spec._replace(timeout_s=timeout_s, strips_ansi=strips)
 
 
-def _delimiter(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
+def _delimiter(part: Node, encoding: str, findings: Problems) -> dict[str, Any]:
     tx = parse_bytes(part.must("tx"), encoding, findings)
     rx_part = part.must("rx")
     rx = parse_bytes(rx_part, encoding, findings)
@@ -78,7 +80,7 @@ def _delimiter(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
 
 
 def _check_raw(
-    part: Part, layout: FrameLayout, options: dict[str, Any], findings: Findings
+    part: Node, layout: FrameLayout, options: dict[str, Any], findings: Problems
 ) -> None:
     """Warn of a binary checksum that may contain a delimiter."""
     specs = () if layout.digits else (*layout.checksums, layout.checksum)
@@ -95,27 +97,27 @@ def _check_raw(
             return
 
 
-def _regex(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
+def _regex(part: Node, encoding: str, findings: Problems) -> dict[str, Any]:
     inner = part.must("pattern")
     if findings.pattern(inner, is_over_bytes=True) is not None:
         _check_pattern(inner, findings)
     return {"pattern": inner.data} | _tx(part, encoding, findings)
 
 
-def _tx(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
+def _tx(part: Node, encoding: str, findings: Problems) -> dict[str, Any]:
     tx = parse_bytes(part.get("tx"), encoding, findings)
     return {"tx": tx} if tx else {}
 
 
-def _idle(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
+def _idle(part: Node, encoding: str, findings: Problems) -> dict[str, Any]:
     return {"gap_s": findings.duration(part, "gap", 0.02, least=0.001, most=60)}
 
 
-def _plain(part: Part, encoding: str, findings: Findings) -> dict[str, Any]:
+def _plain(part: Node, encoding: str, findings: Problems) -> dict[str, Any]:
     return {}
 
 
-_PARSERS: Final[dict[str, Callable[[Part, str, Findings], dict[str, Any]]]] = {
+_PARSERS: Final[dict[str, Callable[[Node, str, Problems], dict[str, Any]]]] = {
     "delimiter": _delimiter,
     "fixed": _plain,
     "length": _plain,
@@ -130,7 +132,7 @@ _PARSERS: Final[dict[str, Callable[[Part, str, Findings], dict[str, Any]]]] = {
 }
 
 
-def _switch(part: Part, encoding: str, findings: Findings, catalog: Catalog) -> FramingSpec:
+def _switch(part: Node, encoding: str, findings: Problems, catalog: Registries) -> FramingSpec:
     cases: list[tuple[bytes, FramingSpec]] = []
     for case in part.listed("cases"):
         first_part, inner = case.must("first"), case.must("framing")
@@ -160,7 +162,7 @@ def _switch(part: Part, encoding: str, findings: Findings, catalog: Catalog) -> 
     return _with_patience(part, FramingSpec("switch", options, longest), findings)
 
 
-def _is_switchable(kind: Part, findings: Findings) -> bool:
+def _is_switchable(kind: Node, findings: Problems) -> bool:
     if kind.data in _SWITCHABLE:
         return True
     findings.error(
@@ -173,11 +175,11 @@ def _is_switchable(kind: Part, findings: Findings) -> bool:
 
 
 def _check_case(
-    part: Part,
+    part: Node,
     first: bytes,
     spec: FramingSpec,
     before: list[tuple[bytes, FramingSpec]],
-    findings: Findings,
+    findings: Problems,
 ) -> None:
     """Report a case that is never reached, or whose frames begin with other bytes."""
     for other, _ in before:
@@ -202,7 +204,7 @@ def _check_case(
 _REPEATS = (_constants.MAX_REPEAT, _constants.MIN_REPEAT)
 
 
-def _check_pattern(part: Part, findings: Findings) -> None:
+def _check_pattern(part: Node, findings: Problems) -> None:
     """Report mistakes in a pattern for a stream, such as an unclear end of its frames."""
     text: str = part.data
     far = next((place for place, char in enumerate(text) if ord(char) > 127), None)

@@ -1,12 +1,12 @@
 """Headers of web requests that a document may not set."""
 
 from urc._headers import is_reserved
-from urc.config.part import Findings, Part
+from urc.config.node import Node, Problems
 
 __all__ = ["check_headers"]
 
 
-def check_headers(part: Part, findings: Findings) -> None:
+def check_headers(part: Node, findings: Problems) -> None:
     """Report each header of `part` that identifies the client or controls the request."""
     headers = part.entries().get("headers")  # most transport types have none
     for name, inner in headers.entries().items() if headers else ():

@@ -3,9 +3,9 @@
 import re
 from typing import Final
 
+from urc.config.node import Node, Problems
 from urc.config.parse.driver import spoken_name
-from urc.config.part import Findings, Part
-from urc.model.interface import DEBUG, SCREENS, Grid, Interface, Slot, Tab
+from urc.model.interface import DEBUG, SCREENS, Interface, Layout, Slot, Tab
 
 __all__ = ["check_names", "parse_interface"]
 
@@ -17,7 +17,7 @@ _Cell = tuple[str, int]
 """The content of a cell, and its offset in the text."""
 
 
-def parse_interface(part: Part, name: str, findings: Findings) -> Interface:
+def parse_interface(part: Node, name: str, findings: Problems) -> Interface:
     """Return the interface at `part`, without the widgets of its slots."""
     title = part.text("title", spoken_name(name))
     pages = part.named("tabs")
@@ -50,7 +50,7 @@ def parse_interface(part: Part, name: str, findings: Findings) -> Interface:
     return interface._replace(background=background)
 
 
-def check_names(root: Part, findings: Findings) -> None:
+def check_names(root: Node, findings: Problems) -> None:
     """Report an interface with the name of the built-in interface."""
     if DEBUG in root.named("interfaces"):
         findings.error(
@@ -63,7 +63,7 @@ def check_names(root: Part, findings: Findings) -> None:
         )
 
 
-def _check_beside_tabs(part: Part, findings: Findings) -> None:
+def _check_beside_tabs(part: Node, findings: Problems) -> None:
     for key in ("grid", "layouts", "left_handed"):
         if part.get(key) is not None:
             findings.error(
@@ -76,7 +76,7 @@ def _check_beside_tabs(part: Part, findings: Findings) -> None:
             )
 
 
-def _tab(part: Part, findings: Findings, around: Part | None = None) -> Tab:
+def _tab(part: Node, findings: Problems, around: Node | None = None) -> Tab:
     """Return one page; the mirroring keys of `around` are the defaults of its tabs."""
     is_mirrored = around.flag("mirror", default=True) if around is not None else True
     left = part.get("left_handed")
@@ -89,7 +89,7 @@ def _tab(part: Part, findings: Findings, around: Part | None = None) -> Tab:
     )
 
 
-def _pictures(part: Part, findings: Findings, *, is_tab: bool) -> dict[str, Grid]:
+def _pictures(part: Node, findings: Problems, *, is_tab: bool) -> dict[str, Layout]:
     one, several = part.get("grid"), part.get("layouts")
     if one is None and several is None:
         findings.error(
@@ -111,7 +111,7 @@ def _pictures(part: Part, findings: Findings, *, is_tab: bool) -> dict[str, Grid
     return found | (_by_screen(several, findings) if several is not None else {})
 
 
-def _by_screen(several: Part, findings: Findings) -> dict[str, Grid]:
+def _by_screen(several: Node, findings: Problems) -> dict[str, Layout]:
     pictures = {screen: several.get(screen) for screen in SCREENS}
     return {
         screen: _grid(picture, findings)
@@ -120,14 +120,14 @@ def _by_screen(several: Part, findings: Findings) -> dict[str, Grid]:
     }
 
 
-def _grid(part: Part, findings: Findings) -> Grid:
+def _grid(part: Node, findings: Problems) -> Layout:
     rows = _rows(part.data)
     if not rows:
         findings.error(part, "empty-grid", "the grid has no rows")
-        return Grid(1, 1, ())
+        return Layout(1, 1, ())
     if len(rows) > _MOST or len(rows[0]) > _MOST:
         findings.error(part, "wrong-size", f"a grid has at most {_MOST} rows and columns")
-        return Grid(1, 1, ())
+        return Layout(1, 1, ())
     width = len(rows[0])
     is_sound = True
     for number, row in enumerate(rows, 1):
@@ -153,9 +153,9 @@ def _grid(part: Part, findings: Findings) -> Grid:
                     hint="use lower-case letters, digits, '-' and '_'; '.' is an empty cell",
                 )
     if not is_sound:
-        return Grid(1, 1, ())
+        return Layout(1, 1, ())
     slots = _slots(part, rows, findings)
-    return Grid(len(rows), width, tuple(slots))
+    return Layout(len(rows), width, tuple(slots))
 
 
 def _cells(count: int) -> str:
@@ -173,7 +173,7 @@ def _rows(text: str) -> list[list[_Cell]]:
     return rows
 
 
-def _slots(part: Part, rows: list[list[_Cell]], findings: Findings) -> list[Slot]:
+def _slots(part: Node, rows: list[list[_Cell]], findings: Problems) -> list[Slot]:
     places: dict[str, list[tuple[int, int]]] = {}
     for row_number, row in enumerate(rows):
         for column, (text, _) in enumerate(row):
@@ -190,7 +190,7 @@ def _slots(part: Part, rows: list[list[_Cell]], findings: Findings) -> list[Slot
     return slots
 
 
-def _check_rectangle(slot: Slot, part: Part, rows: list[list[_Cell]], findings: Findings) -> None:
+def _check_rectangle(slot: Slot, part: Node, rows: list[list[_Cell]], findings: Problems) -> None:
     bottom, right = slot.row + slot.row_span, slot.column + slot.column_span
     wrong = [
         (row, column)

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from urc.config.part import Findings, Part
+from urc.config.node import Node, Problems
 from urc.config.values import check_range, check_within, fit, fit_hint, shown
 from urc.model.profile import Setting
 from urc.model.values import Value
@@ -18,7 +18,7 @@ _VALUE_TYPES: Final = {
 """Type of a setting → type of its value; a missing type means text."""
 
 
-def parse_setting(part: Part, findings: Findings) -> Setting:
+def parse_setting(part: Node, findings: Problems) -> Setting:
     """Return one setting."""
     kind = part.text("type")
     low, high = check_range(
@@ -65,7 +65,7 @@ def parse_setting(part: Part, findings: Findings) -> Setting:
     return setting
 
 
-def _check_choices(part: Part, kind: str, choices: tuple[str, ...], findings: Findings) -> None:
+def _check_choices(part: Node, kind: str, choices: tuple[str, ...], findings: Problems) -> None:
     """Report a setting of type choice without choices, and choices of another type."""
     if kind == "choice" and not choices:
         findings.error(part, "missing-key", "a setting of type choice needs 'choices'", key=True)
@@ -80,7 +80,7 @@ def _check_choices(part: Part, kind: str, choices: tuple[str, ...], findings: Fi
         )
 
 
-def setting_value(part: Part, kind: str, choices: tuple[str, ...], findings: Findings) -> Value:
+def setting_value(part: Node, kind: str, choices: tuple[str, ...], findings: Problems) -> Value:
     """Return the value of a setting in a document, or None when it was reported."""
     wanted = _VALUE_TYPES.get(kind, "string")
     try:

@@ -1,13 +1,13 @@
 """The reply to a request: mapping → `Reply`, with its stages, its errors and its correlation."""
 
 from urc.config.form_table import READ_FORMS
-from urc.config.parse.beside_form import parse_lines
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext, parse_read
+from urc.config.parse.form_options import parse_lines
 from urc.config.parse.framing import parse_framing
-from urc.config.part import Findings, Part
-from urc.model.codec import NUMBERED, ReadSpec, WriteSpec
 from urc.model.driver import FramingSpec, Reply
-from urc.model.flow import Asides, ErrorReply, Stage
+from urc.model.exchange import ErrorReply, ProvisionalReplies, Stage
+from urc.model.payload import NUMBERED, ReadSpec, WriteSpec
 from urc.patterns import Pattern
 
 __all__ = [
@@ -28,7 +28,7 @@ _MOST_BUSY_S = 600.0
 """Default of ``within``: maximum time of a busy robot, in seconds."""
 
 
-def parse_reply(part: Part | None, findings: Findings, context: FormContext) -> Reply | None:
+def parse_reply(part: Node | None, findings: Problems, context: FormContext) -> Reply | None:
     """Return the reply at `part`, or None."""
     if part is None:
         return None
@@ -72,7 +72,7 @@ def implied_reply(send: WriteSpec) -> Reply | None:
     return Reply(ReadSpec("any")) if send.options.get("verb") in NUMBERED else None
 
 
-def parse_stage(part: Part, findings: Findings, context: FormContext) -> Stage:
+def parse_stage(part: Node, findings: Problems, context: FormContext) -> Stage:
     """Return one stage of the reply to any request."""
     errors, faults = parse_errors(part, findings, context)
     if "silence" in part.data:
@@ -87,10 +87,10 @@ def parse_stage(part: Part, findings: Findings, context: FormContext) -> Stage:
 
 
 def _silence(
-    part: Part,
+    part: Node,
     errors: tuple[Pattern, ...],
     faults: tuple[ErrorReply, ...],
-    findings: Findings,
+    findings: Problems,
 ) -> Stage:
     """Return the stage for a robot that is silent on success."""
     beside = (*READ_FORMS, *_BESIDE_SILENCE)
@@ -99,7 +99,7 @@ def _silence(
     return Stage(read=read, errors=errors, faults=faults, timeout_s=within_s)
 
 
-def _asides(part: Part, findings: Findings, context: FormContext) -> Asides:
+def _asides(part: Node, findings: Problems, context: FormContext) -> ProvisionalReplies:
     """Return the provisional replies under ``resend:`` and ``extend:``."""
     extend, extend_s = part.get("extend"), _MOST_BUSY_S
     if extend is not None and isinstance(extend.data, dict):
@@ -115,10 +115,12 @@ def _asides(part: Part, findings: Findings, context: FormContext) -> Asides:
     resend = part.get("resend")
     if resend is not None and isinstance(resend.data, dict):
         refuse(resend, ("within",), "belongs to 'extend'", findings)
-    return Asides(_aside(resend, findings, context), _aside(extend, findings, context), extend_s)
+    return ProvisionalReplies(
+        _aside(resend, findings, context), _aside(extend, findings, context), extend_s
+    )
 
 
-def _aside(part: Part | None, findings: Findings, context: FormContext) -> ReadSpec | None:
+def _aside(part: Node | None, findings: Problems, context: FormContext) -> ReadSpec | None:
     """Return a frame in any form; a text is a pattern."""
     if part is None:
         return None
@@ -129,7 +131,7 @@ def _aside(part: Part | None, findings: Findings, context: FormContext) -> ReadS
 
 
 def parse_errors(
-    part: Part, findings: Findings, context: FormContext
+    part: Node, findings: Problems, context: FormContext
 ) -> tuple[tuple[Pattern, ...], tuple[ErrorReply, ...]]:
     """Return the error replies under ``errors:``: patterns, and replies of any form."""
     patterns: list[Pattern] = []
@@ -146,7 +148,7 @@ def parse_errors(
     return tuple(patterns), tuple(faults)
 
 
-def refuse(part: Part, keys: tuple[str, ...], why: str, findings: Findings) -> None:
+def refuse(part: Node, keys: tuple[str, ...], why: str, findings: Problems) -> None:
     """Report each of `keys` in `part`."""
     for key in keys:
         if key in part.data:
@@ -154,7 +156,7 @@ def refuse(part: Part, keys: tuple[str, ...], why: str, findings: Findings) -> N
 
 
 def parse_own_framing(
-    part: Part, findings: Findings, context: FormContext
+    part: Node, findings: Problems, context: FormContext
 ) -> tuple[FramingSpec | None, FormContext]:
     """Return the reply's own framing and the context of its forms, which is then another one.
 
@@ -169,6 +171,6 @@ def parse_own_framing(
     return spec, context._replace(framing=None)
 
 
-def _read(part: Part, findings: Findings, context: FormContext) -> ReadSpec:
+def _read(part: Node, findings: Problems, context: FormContext) -> ReadSpec:
     lines = parse_lines(part.get("lines"), findings)
     return parse_read(part, findings, context)._replace(lines=lines)

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Final
 
+from urc.config.node import Node, Problems
 from urc.config.parse.conversion import CONVERSION_KEYS, parse_conversion, parse_states
-from urc.config.part import Findings, Part
 from urc.config.values import check_range, check_within
 from urc.expressions import Template
 from urc.model.axes import ANGLE_UNITS
 from urc.model.driver import Poll
-from urc.model.values import Limits, Signal
+from urc.model.values import AlarmLimits, Signal
 
 __all__ = ["parse_signal", "with_ages"]
 
@@ -19,7 +19,7 @@ _ROTATIONS: Final = ("roll", "pitch", "yaw")
 _BYTES: Final = ("image", "blob")
 
 
-def parse_signal(part: Part, title: str, findings: Findings) -> Signal:
+def parse_signal(part: Node, title: str, findings: Problems) -> Signal:
     """Return the signal at `part`; `title` is the default of its title."""
     kind = part.text("type", "number")
     element = part.text("items", "number") if kind == "array" else kind
@@ -96,7 +96,7 @@ def _with_age(signal: Signal, polls: tuple[Poll, ...]) -> Signal:
     return signal._replace(stale_after_s=max(1.0, 3 * min(periods)) if periods else 5.0)
 
 
-def _check_vector(part: Part, kind: str, findings: Findings) -> None:
+def _check_vector(part: Node, kind: str, findings: Problems) -> None:
     for key, kinds in (("items", ("array",)), ("size", ("array", *_BYTES))):
         if part.get(key) is not None and kind not in kinds:
             findings.error(
@@ -109,7 +109,7 @@ def _check_vector(part: Part, kind: str, findings: Findings) -> None:
             )
 
 
-def _check_rotation(part: Part, kind: str, findings: Findings) -> None:
+def _check_rotation(part: Node, kind: str, findings: Problems) -> None:
     """Warn of a rotation without an axis convention, unless it is computed."""
     is_named = not {*part.name.split("_")}.isdisjoint(_ROTATIONS)
     is_angle = kind in _NUMBERS and part.text("unit") in ANGLE_UNITS
@@ -124,7 +124,7 @@ def _check_rotation(part: Part, kind: str, findings: Findings) -> None:
         )
 
 
-def _axes(part: Part, kind: str, findings: Findings) -> str:
+def _axes(part: Node, kind: str, findings: Problems) -> str:
     inner = part.get("axes")
     if inner is None:
         _check_rotation(part, kind, findings)
@@ -146,7 +146,7 @@ def _axes(part: Part, kind: str, findings: Findings) -> str:
 
 
 def _deadband(
-    part: Part, element: str, bounds: tuple[float | None, float | None], findings: Findings
+    part: Node, element: str, bounds: tuple[float | None, float | None], findings: Problems
 ) -> float:
     band = part.number("deadband") or 0.0
     if not band:
@@ -165,14 +165,14 @@ def _deadband(
     return band
 
 
-def _debounce_s(part: Part, kind: str, findings: Findings) -> float:
+def _debounce_s(part: Node, kind: str, findings: Problems) -> float:
     if kind not in (*_NUMBERS, "boolean", "string") and "debounce" in part.data:
         text = f"'debounce' has no effect for {kind}"
         findings.error(part, "misplaced-key", text, at="debounce", key=True)
     return findings.duration(part, "debounce", 0.0, most=3600)
 
 
-def _formula(part: Part, findings: Findings) -> Template | None:
+def _formula(part: Node, findings: Problems) -> Template | None:
     inner = part.get("value")
     if inner is None:
         return None
@@ -189,7 +189,7 @@ def _formula(part: Part, findings: Findings) -> Template | None:
     return findings.expression(inner)
 
 
-def _check_hysteresis(part: Part, values: Mapping[str, float | None], findings: Findings) -> None:
+def _check_hysteresis(part: Node, values: Mapping[str, float | None], findings: Problems) -> None:
     """Warn of an alarm that ends only after the opposite alarm has begun."""
     width = part.number("hysteresis") or 0.0
     low = values["low"] if values["low"] is not None else values["lolo"]
@@ -206,14 +206,14 @@ def _check_hysteresis(part: Part, values: Mapping[str, float | None], findings: 
 
 
 def _limits(
-    part: Part, kind: str, bounds: tuple[float | None, float | None], findings: Findings
-) -> Limits:
+    part: Node, kind: str, bounds: tuple[float | None, float | None], findings: Problems
+) -> AlarmLimits:
     inner = part.get("limits")
     if inner is None:
-        return Limits()
+        return AlarmLimits()
     if kind not in _NUMBERS:
         findings.error(inner, "misplaced-key", f"'limits' have no effect for {kind}", key=True)
-        return Limits()
+        return AlarmLimits()
     names = ("lolo", "low", "high", "hihi")
     values = {name: inner.number(name) for name in names}
     given = [(name, value) for name, value in values.items() if value is not None]
@@ -229,7 +229,7 @@ def _limits(
     for name, value in given:
         check_within(value, *bounds, inner.must(name), findings)
     _check_hysteresis(inner, values, findings)
-    return Limits(
+    return AlarmLimits(
         lolo=values["lolo"],
         low=values["low"],
         high=values["high"],

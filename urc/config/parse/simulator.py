@@ -4,15 +4,15 @@ import math
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple, TypeVar
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext, parse_read, parse_write
 from urc.config.parse.framing import parse_framing
-from urc.config.part import Findings, Part
 from urc.config.sources import Sources
-from urc.config.suggest import did_you_mean
+from urc.config.spelling_suggestions import did_you_mean
 from urc.config.values import given
 from urc.expressions import Template
-from urc.model.codec import ReadSpec
 from urc.model.driver import Driver
+from urc.model.payload import ReadSpec
 from urc.model.profile import Reaction, SimulatorRule
 from urc.model.sequence import MAX_STEP_S
 from urc.model.values import NOTHING, Reading
@@ -31,9 +31,9 @@ from urc.model.world import (
     WorldSpec,
 )
 from urc.patterns import Pattern
-from urc.registry import Catalog
+from urc.registry import Registries
 
-__all__ = ["Simulated", "parse_simulator"]
+__all__ = ["SimulatorSpec", "parse_simulator"]
 
 
 _DEGREES: Final = {
@@ -49,7 +49,7 @@ _LONGEST_S: Final = 3600.0
 Spec = TypeVar("Spec", bound=Any)
 
 
-def parse_world(part: Part, findings: Findings) -> WorldSpec:
+def parse_world(part: Node, findings: Problems) -> WorldSpec:
     """Return the world at `part`, before its names are resolved."""
     if "body" not in part.data:
         text = "this world lacks 'body'"
@@ -84,12 +84,12 @@ def parse_world(part: Part, findings: Findings) -> WorldSpec:
     )
 
 
-def _start(part: Part) -> tuple[float, float, float]:
+def _start(part: Node) -> tuple[float, float, float]:
     x, y = _pair(part, "at") if "at" in part.data else (0.0, 0.0)
     return x, y, math.radians(part.number("yaw") or 0.0)
 
 
-def _datum(part: Part) -> tuple[float, float, float]:
+def _datum(part: Node) -> tuple[float, float, float]:
     found = map(part.number, ("latitude", "longitude", "altitude"))
     latitude, longitude, altitude = (
         default if one is None else one
@@ -98,12 +98,12 @@ def _datum(part: Part) -> tuple[float, float, float]:
     return latitude, longitude, altitude
 
 
-def _pair(part: Part, key: str) -> tuple[float, float]:
+def _pair(part: Node, key: str) -> tuple[float, float]:
     x, y = part.must(key).data
     return x, y
 
 
-def _filled(spec: Spec, part: Part, key: str) -> Spec:
+def _filled(spec: Spec, part: Node, key: str) -> Spec:
     """Return `spec` with the plain values of the document, and degrees as radians."""
     values: dict[str, object] = {}
     inner = part.get(key)
@@ -120,7 +120,7 @@ def _filled(spec: Spec, part: Part, key: str) -> Spec:
     return filled
 
 
-def _camera(part: Part, findings: Findings) -> CameraSpec:
+def _camera(part: Node, findings: Problems) -> CameraSpec:
     spec, inner = _filled(CameraSpec(), part, "camera"), part.get("camera")
     found: dict[str, Any] = {}
     for key in ("flip", "mirror"):
@@ -129,7 +129,7 @@ def _camera(part: Part, findings: Findings) -> CameraSpec:
     return spec._replace(**found)
 
 
-def _check_body(part: Part, body: BodySpec, findings: Findings) -> None:
+def _check_body(part: Node, body: BodySpec, findings: Problems) -> None:
     for key in part.data:
         kinds = BODY_KEYS.get(key)
         if kinds is not None and body.type not in kinds:
@@ -137,7 +137,7 @@ def _check_body(part: Part, body: BodySpec, findings: Findings) -> None:
             findings.error(part, "misplaced-key", text, at=key, key=True)
 
 
-def _check_inputs(part: Part, body: BodySpec, findings: Findings) -> None:
+def _check_inputs(part: Node, body: BodySpec, findings: Problems) -> None:
     known = INPUTS[body.type]
     for name, inner in part.named("drive").items():
         if name not in known:
@@ -146,19 +146,19 @@ def _check_inputs(part: Part, body: BodySpec, findings: Findings) -> None:
             findings.error(inner, "unknown-input", text, key=True, hint=hint)
 
 
-def _value(part: Part, findings: Findings) -> Template | Reading:
+def _value(part: Node, findings: Problems) -> Template | Reading:
     if isinstance(part.data, str):
         return findings.template(part) or 0.0
     value = given(part.data)
     return float(value) if isinstance(value, bool) else value
 
 
-def _templates(parts: Mapping[str, Part], findings: Findings) -> dict[str, Template]:
+def _templates(parts: Mapping[str, Node], findings: Problems) -> dict[str, Template]:
     found = {name: findings.template(inner) for name, inner in parts.items()}
     return {name: template for name, template in found.items() if template is not None}
 
 
-def _failsafe(part: Part | None, findings: Findings) -> Failsafe | None:
+def _failsafe(part: Node | None, findings: Problems) -> Failsafe | None:
     if part is None:
         return None
     sets = {
@@ -169,7 +169,7 @@ def _failsafe(part: Part | None, findings: Findings) -> Failsafe | None:
     return Failsafe(after_s, tuple(one.data for one in part.listed("without")), sets)
 
 
-def _plan(part: Part) -> PlanSpec:
+def _plan(part: Node) -> PlanSpec:
     return PlanSpec(
         walls=tuple(
             Wall(*_pair(one, "from"), *_pair(one, "to"), **_look(one))
@@ -184,14 +184,14 @@ def _plan(part: Part) -> PlanSpec:
     )
 
 
-def _look(part: Part) -> dict[str, Any]:
+def _look(part: Node) -> dict[str, Any]:
     return {key: part.must(key).data for key in ("height", "colour") if key in part.data}
 
 
 _TRIGGERS: Final = ("match", "command", "poll", "every")
 
 
-class Simulated(NamedTuple):
+class SimulatorSpec(NamedTuple):
     """The emulated robot of a document, before its names are resolved."""
 
     rules: Mapping[str, list[SimulatorRule]] = NOTHING
@@ -200,8 +200,8 @@ class Simulated(NamedTuple):
 
 
 def parse_simulator(
-    sources: Sources, driver: Driver, catalog: Catalog, findings: Findings
-) -> Simulated:
+    sources: Sources, driver: Driver, catalog: Registries, findings: Problems
+) -> SimulatorSpec:
     """Return the rules of each transport, and the world, before their names are resolved."""
     found: dict[str, list[SimulatorRule]] = {}
     context = FormContext(catalog=catalog)
@@ -209,7 +209,7 @@ def parse_simulator(
         from urc.config.parse.struct.numbers import parse_enums
         from urc.config.parse.types import parse_types
 
-        quiet = Findings()  # the driver already reported these problems
+        quiet = Problems()  # the driver already reported these problems
         enums = parse_enums(sources.driver, quiet)
         types = parse_types(sources.driver, enums, quiet)
         context = context._replace(types=types, enums=enums)
@@ -221,12 +221,12 @@ def parse_simulator(
         _check_names(part, found[name], findings)
     world = sources.simulator.get("world")
     if world is None:
-        return Simulated(found)
+        return SimulatorSpec(found)
 
-    return Simulated(found, parse_world(world, findings))
+    return SimulatorSpec(found, parse_world(world, findings))
 
 
-def _check_names(part: Part, rules: list[SimulatorRule], findings: Findings) -> None:
+def _check_names(part: Node, rules: list[SimulatorRule], findings: Problems) -> None:
     """Report two rules of one name, which a derived document could not tell apart."""
     seen: set[str] = set()
     for inner, rule in zip(part.items(), rules, strict=True):
@@ -243,7 +243,7 @@ def _needs_types(data: object) -> bool:
     return isinstance(data, list) and any(map(_needs_types, data))
 
 
-def _rule(part: Part, transport: str, findings: Findings, context: FormContext) -> SimulatorRule:
+def _rule(part: Node, transport: str, findings: Problems, context: FormContext) -> SimulatorRule:
     triggers = [key for key in _TRIGGERS if key in part.data]
     if len(triggers) != 1:
         _not_one_trigger(part, triggers, findings)
@@ -272,12 +272,12 @@ def _rule(part: Part, transport: str, findings: Findings, context: FormContext) 
     )
 
 
-def _speaks(part: Part) -> bool:
+def _speaks(part: Node) -> bool:
     """Return whether a rule has a reply of its own, immediate or delayed."""
     return any("send" in one.data or "answer" in one.data for one in (part, *part.listed("then")))
 
 
-def _not_one_trigger(part: Part, triggers: list[str], findings: Findings) -> None:
+def _not_one_trigger(part: Node, triggers: list[str], findings: Problems) -> None:
     if not triggers:
         findings.error(
             part,
@@ -298,14 +298,14 @@ def _not_one_trigger(part: Part, triggers: list[str], findings: Findings) -> Non
     )
 
 
-def _match(part: Part, findings: Findings, context: FormContext) -> Pattern | ReadSpec | None:
+def _match(part: Node, findings: Problems, context: FormContext) -> Pattern | ReadSpec | None:
     if isinstance(part.data, str):
         return findings.pattern(part)
     return parse_read(part, findings, context)
 
 
 def _reaction(
-    part: Part, findings: Findings, context: FormContext, *, answers: bool = False
+    part: Node, findings: Problems, context: FormContext, *, answers: bool = False
 ) -> Reaction:
     answer = part.text("answer")
     send, framing = part.get("send"), part.get("framing")
@@ -329,7 +329,7 @@ def _reaction(
     )
 
 
-def _sets(parts: Mapping[str, Part], findings: Findings) -> dict[str, Template | Reading]:
+def _sets(parts: Mapping[str, Node], findings: Problems) -> dict[str, Template | Reading]:
     values: dict[str, Template | Reading] = {}
     for name, inner in parts.items():
         if isinstance(inner.data, str):

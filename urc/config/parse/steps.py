@@ -2,13 +2,13 @@
 
 from typing import Final, NamedTuple
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext, parse_write
 from urc.config.parse.reply import parse_own_framing, parse_stage, refuse
-from urc.config.part import Findings, Part
 from urc.expressions import Template, compile_template
 from urc.model import sequence
-from urc.model.codec import ReadSpec
-from urc.model.flow import Stage
+from urc.model.exchange import Stage
+from urc.model.payload import ReadSpec
 from urc.model.values import Value
 
 __all__ = ["VERBS", "StepContext", "parse_steps"]
@@ -41,7 +41,7 @@ class StepContext(NamedTuple):
     forms: FormContext
 
 
-def parse_steps(part: Part, context: StepContext, findings: Findings) -> tuple[sequence.Step, ...]:
+def parse_steps(part: Node, context: StepContext, findings: Problems) -> tuple[sequence.Step, ...]:
     """Return the steps in the list at `part`, with their branches."""
     steps = _steps(part, context, findings)
     count = sum(1 for _ in sequence.all_steps(steps))
@@ -64,7 +64,7 @@ def parse_steps(part: Part, context: StepContext, findings: Findings) -> tuple[s
 
 
 def _steps(
-    part: Part | None, context: StepContext, findings: Findings
+    part: Node | None, context: StepContext, findings: Problems
 ) -> tuple[sequence.Step, ...]:
     if part is None:
         return ()
@@ -72,7 +72,7 @@ def _steps(
     return tuple(step for step in found if step is not None)
 
 
-def _step(part: Part, context: StepContext, findings: Findings) -> sequence.Step | None:
+def _step(part: Node, context: StepContext, findings: Problems) -> sequence.Step | None:
     verbs = [verb for verb in VERBS if verb in part.data]
     if len(verbs) != 1:
         findings.error(
@@ -96,7 +96,7 @@ def _step(part: Part, context: StepContext, findings: Findings) -> sequence.Step
     return _one(verb, part, context, findings)
 
 
-def _one(verb: str, part: Part, context: StepContext, findings: Findings) -> sequence.Step | None:
+def _one(verb: str, part: Node, context: StepContext, findings: Problems) -> sequence.Step | None:
     inner = part.must(verb)
     match verb:
         case "send":
@@ -123,7 +123,7 @@ def _one(verb: str, part: Part, context: StepContext, findings: Findings) -> seq
 
 
 def _expect(
-    part: Part, inner: Part, context: StepContext, findings: Findings
+    part: Node, inner: Node, context: StepContext, findings: Problems
 ) -> sequence.ExpectStep | None:
     transport = part.text("from", context.transport)
     framing = None
@@ -151,7 +151,7 @@ def _expect(
 
 
 def _prompt(
-    part: Part, inner: Part, context: StepContext, findings: Findings
+    part: Node, inner: Node, context: StepContext, findings: Problems
 ) -> sequence.PromptStep | None:
     pattern = findings.pattern(inner)
     if pattern is None:
@@ -162,7 +162,7 @@ def _prompt(
 
 
 def _wait(
-    part: Part, inner: Part, context: StepContext, findings: Findings
+    part: Node, inner: Node, context: StepContext, findings: Problems
 ) -> sequence.Step | None:
     if not isinstance(inner.data, dict):
         refuse(part, ("else",), "has no effect for a plain wait", findings)
@@ -174,7 +174,7 @@ def _wait(
 
 
 def _repeat(
-    part: Part, inner: Part, context: StepContext, findings: Findings
+    part: Node, inner: Node, context: StepContext, findings: Problems
 ) -> sequence.Step | None:
     times = part.integer("times")
     if times is None:
@@ -198,12 +198,12 @@ def _repeat(
     )
 
 
-def _timeout_s(part: Part, findings: Findings) -> float | None:
+def _timeout_s(part: Node, findings: Problems) -> float | None:
     return findings.duration(part, "timeout", 0.0, most=sequence.MAX_STEP_S) or None
 
 
 def _else(
-    part: Part, context: StepContext, findings: Findings
+    part: Node, context: StepContext, findings: Problems
 ) -> tuple[tuple[sequence.Step, ...] | None, str]:
     """Return what to do when it does not come: steps, or what to say."""
     inner = part.get("else")
@@ -215,7 +215,7 @@ def _else(
 
 
 def _if(
-    part: Part, inner: Part, context: StepContext, findings: Findings
+    part: Node, inner: Node, context: StepContext, findings: Problems
 ) -> sequence.IfStep | None:
     condition = findings.expression(inner)
     then = _steps(part.get("then"), context, findings)
@@ -232,7 +232,7 @@ def _if(
     return None if condition is None else sequence.IfStep(condition, then, otherwise or ())
 
 
-def _values(parts: dict[str, Part], findings: Findings) -> dict[str, Template | Value]:
+def _values(parts: dict[str, Node], findings: Problems) -> dict[str, Template | Value]:
     """Return plain values, and templates for texts with expressions."""
     values: dict[str, Template | Value] = {}
     for name, inner in parts.items():

@@ -2,9 +2,9 @@
 
 from typing import Final
 
-from urc.config.part import Findings, Part
-from urc.model.codec import Envelope
-from urc.model.profile import DialogueStep, DocumentTest, Expected, Fed, State
+from urc.config.node import Node, Problems
+from urc.model.payload import Envelope
+from urc.model.profile import DialogueStep, DocumentTest, Expected, ExpectedState, Fed
 from urc.model.values import Value
 
 __all__ = ["parse_test"]
@@ -28,7 +28,7 @@ _HAPPENS: Final = ("feed", "run", "wait", "connects", "closes", "leaves")
 """Keys of a step that exclude each other."""
 
 
-def parse_test(part: Part, findings: Findings) -> DocumentTest:
+def parse_test(part: Node, findings: Problems) -> DocumentTest:
     """Return one test, before its names are resolved."""
     line, column, source = _place(part)
     reply_to = part.scalar("reply_to")
@@ -55,7 +55,7 @@ def parse_test(part: Part, findings: Findings) -> DocumentTest:
     )
 
 
-def _check_keys(part: Part, findings: Findings) -> None:
+def _check_keys(part: Node, findings: Problems) -> None:
     has_steps = "steps" in part.data
     for key in _AT_ONCE if has_steps else _IN_STEPS:
         if key in part.data:
@@ -63,7 +63,7 @@ def _check_keys(part: Part, findings: Findings) -> None:
             findings.error(part, "misplaced-key", f"'{key}' {why}", at=key, key=True)
 
 
-def _step(part: Part, findings: Findings) -> DialogueStep:
+def _step(part: Node, findings: Problems) -> DialogueStep:
     happens = [key for key in _HAPPENS if part.data.get(key, False) is not False]
     if len(happens) > 1:
         findings.error(
@@ -99,30 +99,30 @@ def _step(part: Part, findings: Findings) -> DialogueStep:
     )
 
 
-def _place(part: Part) -> tuple[int, int, str]:
+def _place(part: Node) -> tuple[int, int, str]:
     """Return line, column and the text of the line."""
     mark, home = part.document.at(part.path), part.document.source_of(part.path)
     line, column = (mark.span.line, mark.span.column) if mark else (1, 1)
     return line, column, home.lines[line - 1]
 
 
-def _values(part: Part, key: str) -> dict[str, Value | tuple[Value, ...]]:
+def _values(part: Node, key: str) -> dict[str, Value | tuple[Value, ...]]:
     return {name: _value(inner) for name, inner in part.named(key).items()}
 
 
-def _value(part: Part) -> Value | tuple[Value, ...]:
+def _value(part: Node) -> Value | tuple[Value, ...]:
     return tuple(part.data) if isinstance(part.data, list) else part.data
 
 
-def _expected(part: Part) -> dict[str, Expected]:
+def _expected(part: Node) -> dict[str, Expected]:
     return {name: _state(inner) for name, inner in part.named("expect").items()}
 
 
-def _state(part: Part) -> Expected:
+def _state(part: Node) -> Expected:
     if not isinstance(part.data, dict):
         return _value(part)
     value, alarm = part.get("value"), part.text("alarm")
-    return State(
+    return ExpectedState(
         has_value=value is not None,
         value=None if value is None else _value(value),
         alarm=None if not alarm else "" if alarm == "none" else alarm,  # type: ignore[arg-type]  # the schema's enum
@@ -130,17 +130,17 @@ def _state(part: Part) -> Expected:
     )
 
 
-def _fed(part: Part, key: str, findings: Findings) -> dict[str, Fed | tuple[Fed, ...]]:
+def _fed(part: Node, key: str, findings: Problems) -> dict[str, Fed | tuple[Fed, ...]]:
     return {name: _pieces(inner, findings) for name, inner in part.named(key).items()}
 
 
-def _pieces(part: Part, findings: Findings) -> Fed | tuple[Fed, ...]:
+def _pieces(part: Node, findings: Problems) -> Fed | tuple[Fed, ...]:
     if isinstance(part.data, list):
         return tuple(_wire(inner, findings) for inner in part.items())
     return _wire(part, findings)
 
 
-def _wire(part: Part, findings: Findings) -> Fed:
+def _wire(part: Node, findings: Problems) -> Fed:
     """Return text, the bytes under ``hex``, or a message."""
     if not isinstance(part.data, dict):
         return str(part.data)
@@ -148,7 +148,7 @@ def _wire(part: Part, findings: Findings) -> Fed:
     return _message(part, findings) if inner is None else _hex(inner, findings)
 
 
-def _message(part: Part, findings: Findings) -> Envelope:
+def _message(part: Node, findings: Problems) -> Envelope:
     verb, inner = next((verb, one) for verb in _VERBS if (one := part.get(verb)) is not None)
     bodies = [key for key in _BODIES if key in inner.data]
     if len(bodies) > 1:
@@ -166,7 +166,7 @@ def _message(part: Part, findings: Findings) -> Envelope:
     return Envelope(verb, attributes, body)
 
 
-def _hex(inner: Part, findings: Findings) -> bytes:
+def _hex(inner: Node, findings: Problems) -> bytes:
     try:
         return bytes.fromhex(inner.data)
     except ValueError:

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from urc.config.node import Node, Problems
 from urc.config.parse.struct.items import ItemParser
-from urc.config.part import Findings, Part
 from urc.model.binary import Item, number_of
 
 __all__ = ["parse_types"]
@@ -13,7 +13,7 @@ Items = tuple[Item, ...]
 
 
 def parse_types(
-    part: Part, enums: Mapping[str, tuple[tuple[int, str], ...]], findings: Findings
+    part: Node, enums: Mapping[str, tuple[tuple[int, str], ...]], findings: Problems
 ) -> Mapping[str, Items]:
     """Return every type of the driver at `part`; an invalid type is empty."""
     parts = part.named("types")
@@ -30,12 +30,12 @@ def parse_types(
 
 def _parse(
     name: str,
-    parts: Mapping[str, Part],
+    parts: Mapping[str, Node],
     needed: Mapping[str, set[str]],
     above: tuple[str, ...],
     types: dict[str, Items],
     enums: Mapping[str, tuple[tuple[int, str], ...]],
-    findings: Findings,
+    findings: Problems,
 ) -> None:
     """Parse the types that `name` needs, then `name` itself."""
     if name in types:

@@ -4,22 +4,22 @@ import re
 from collections.abc import Iterable
 from pathlib import Path as FilePath
 
-from urc.config.part import Findings, Part
+from urc.config.node import Node, Problems
 from urc.config.schemas import kind_of
 from urc.config.shape.check import check_options, check_shape
-from urc.config.suggest import did_you_mean
-from urc.model.widget import Port, Widget
+from urc.config.spelling_suggestions import did_you_mean
+from urc.model.widget import Widget, WidgetPort
 from urc.problems import Problem, ProblemsError, has_errors
 from urc.source import Document, read_document
 
-__all__ = ["Shelf", "parse_widget"]
+__all__ = ["WidgetFolder", "parse_widget"]
 
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,63}")
 
 
-def parse_widget(document: Document, findings: Findings) -> Widget:
+def parse_widget(document: Document, findings: Problems) -> Widget:
     """Return the widget of a manifest."""
-    part = Part(document, (), document.data)
+    part = Node(document, (), document.data)
     folder = FilePath(document.file).parent
     name = part.text("name")
     if folder.absolute().name != name:
@@ -56,10 +56,10 @@ def parse_widget(document: Document, findings: Findings) -> Widget:
     return widget
 
 
-def _check_names(part: Part, widget: Widget, findings: Findings) -> None:
+def _check_names(part: Node, widget: Widget, findings: Problems) -> None:
     """Report each name of an input, output or option that the manifest does not have."""
     ports, options = {**widget.inputs, **widget.outputs}, widget.options
-    told: list[tuple[Part, Iterable[str]]] = []
+    told: list[tuple[Node, Iterable[str]]] = []
     told += [(inner, (*ports, *options)) for inner in part.listed("at_least_one_of")]
     told += [
         (inner, ports) for group in part.listed("required_together") for inner in group.items()
@@ -85,8 +85,8 @@ def _check_names(part: Part, widget: Widget, findings: Findings) -> None:
             )
 
 
-def _port(part: Part) -> Port:
-    return Port(
+def _port(part: Node) -> WidgetPort:
+    return WidgetPort(
         name=part.name,
         types=_one_or_more(part.get("type")),
         unit=part.text("unit"),
@@ -96,7 +96,7 @@ def _port(part: Part) -> Port:
     )
 
 
-def _input(part: Part) -> Port:
+def _input(part: Node) -> WidgetPort:
     size = part.get("size")
     return _port(part)._replace(
         items=_one_or_more(part.get("items")),
@@ -108,19 +108,19 @@ def _input(part: Part) -> Port:
     )
 
 
-def _one_or_more(part: Part | None) -> tuple[str, ...]:
+def _one_or_more(part: Node | None) -> tuple[str, ...]:
     if part is None:
         return ()
     return (part.data,) if isinstance(part.data, str) else tuple(part.data)
 
 
-def _output(part: Part) -> Port:
+def _output(part: Node) -> WidgetPort:
     return _port(part)._replace(
         is_held=part.flag("hold", default=False), arguments=tuple(part.named("arguments"))
     )
 
 
-def _check_defaults(options: Part, findings: Findings) -> None:
+def _check_defaults(options: Node, findings: Problems) -> None:
     """Report each default that does not fit its own schema."""
     for name, inner in options.entries().items():
         default = inner.get("default")
@@ -140,7 +140,7 @@ def _nearby(file: FilePath) -> str:
         return str(file)
 
 
-class Shelf:
+class WidgetFolder:
     """The widgets of one folder; each manifest is read once, at its first use."""
 
     def __init__(self, folder: FilePath) -> None:
@@ -195,7 +195,7 @@ class Shelf:
                     hint="write 'kind: widget'",
                 )
             ]
-        findings = Findings()
+        findings = Problems()
         widget = None if has_errors(problems) else parse_widget(document, findings)
         self.problems += [*document.findings, *problems, *findings]
         return None if has_errors(findings) else widget

@@ -3,7 +3,7 @@
 from typing import Final
 
 from urc.config.link.steps import steps_of
-from urc.config.part import Findings, Part
+from urc.config.node import Node, Problems
 from urc.model.driver import Driver, Reply, TransportSpec
 from urc.model.sequence import ExpectStep, PromptStep, Step, all_steps
 
@@ -12,7 +12,7 @@ __all__ = ["check_answers"]
 _HINT: Final = "remove 'answers: never', or remove the waits for this transport"
 
 
-def check_answers(part: Part, driver: Driver, findings: Findings) -> None:
+def check_answers(part: Node, driver: Driver, findings: Problems) -> None:
     """Report waits on a transport without replies, and silence that no error reply can end."""
     for name, inner in part.named("commands").items():
         one = driver.commands[name]
@@ -46,7 +46,7 @@ def check_answers(part: Part, driver: Driver, findings: Findings) -> None:
 
 
 def _check_silence(
-    part: Part, reply: Reply | None, spec: TransportSpec | None, findings: Findings
+    part: Node, reply: Reply | None, spec: TransportSpec | None, findings: Problems
 ) -> None:
     """Report a stage of silence that no error reply can end."""
     place = part.get("reply")
@@ -67,12 +67,12 @@ def _check_silence(
             )
 
 
-def _refuse(part: Part, key: str, name: str, findings: Findings) -> None:
+def _refuse(part: Node, key: str, name: str, findings: Problems) -> None:
     text = f"{name!r} waits for a reply on a transport with 'answers: never'"
     findings.error(part, "never-replies", text, at=key, key=True, hint=_HINT)
 
 
-def _check_line(part: Part, spec: TransportSpec, findings: Findings) -> None:
+def _check_line(part: Node, spec: TransportSpec, findings: Problems) -> None:
     timeouts = part.get("timeouts")
     for place, key in ((part, "stale_after"), (timeouts, "idle")):
         if place is not None and key in place.data:
@@ -83,7 +83,7 @@ def _check_line(part: Part, spec: TransportSpec, findings: Findings) -> None:
             _check_steps(part.must(key), steps, {spec.name}, findings)
 
 
-def _check_steps(part: Part, steps: tuple[Step, ...], mute: set[str], findings: Findings) -> None:
+def _check_steps(part: Node, steps: tuple[Step, ...], mute: set[str], findings: Problems) -> None:
     for step in all_steps(steps):
         if isinstance(step, (ExpectStep, PromptStep)) and step.transport in mute:
             text = f"a step waits for {step.transport!r}, which has 'answers: never'"

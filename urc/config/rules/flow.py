@@ -6,16 +6,16 @@ All are warnings about declared values, never about defaults.
 from collections.abc import Iterator
 
 from urc.config.link.steps import steps_of
+from urc.config.node import Node, Problems, shown_duration
 from urc.config.parse.form import write_form
-from urc.config.part import Findings, Part, shown_duration
 from urc.config.rules.answers import check_answers
 from urc.config.rules.frames import check_frames_apart
 from urc.config.rules.motion import check_motion
 from urc.config.rules.traffic import check_traffic
 from urc.config.rules.unmarked import check_unguarded, check_unmarked
 from urc.expressions import digested_settings, split_template
-from urc.model.codec import WriteSpec
 from urc.model.driver import Driver, Poll, Reply, TransportSpec
+from urc.model.payload import WriteSpec
 from urc.model.sequence import SendStep, Step, UntilStep, WaitStep, all_steps
 
 __all__ = ["check_flow"]
@@ -26,7 +26,7 @@ _BITS_OF_A_BYTE = 10
 """Bits of a byte on a serial line, with start and stop bit."""
 
 
-def check_flow(part: Part, driver: Driver, secrets: frozenset[str], findings: Findings) -> None:
+def check_flow(part: Node, driver: Driver, secrets: frozenset[str], findings: Problems) -> None:
     """Add the warnings about the driver at `part`.
 
     `secrets` has the names of secret settings.
@@ -51,7 +51,7 @@ def check_flow(part: Part, driver: Driver, secrets: frozenset[str], findings: Fi
     check_frames_apart(part, driver, findings)
 
 
-def _check_line(part: Part, spec: TransportSpec, findings: Findings) -> None:
+def _check_line(part: Node, spec: TransportSpec, findings: Problems) -> None:
     keepalive = spec.keepalive
     watchdog_s = keepalive.watchdog_s if keepalive is not None else None
     if keepalive is not None and watchdog_s is not None and keepalive.every_s >= watchdog_s:
@@ -78,7 +78,7 @@ def _wait_s(step: Step) -> float:
     return step.seconds if isinstance(step, WaitStep) else 0.0
 
 
-def _check_baud(part: Part, driver: Driver, spec: TransportSpec, findings: Findings) -> None:
+def _check_baud(part: Node, driver: Driver, spec: TransportSpec, findings: Problems) -> None:
     """Warn of polls whose smallest frames already exceed the baud rate of a serial line."""
     baud = spec.options.get("baud")
     if isinstance(baud, bool) or not isinstance(baud, (int, float)) or baud <= 0:
@@ -104,7 +104,7 @@ def _least_bytes(poll: Poll) -> int:
 
 
 def _check_stages(
-    part: Part, reply: Reply, transport: str, driver: Driver, findings: Findings
+    part: Node, reply: Reply, transport: str, driver: Driver, findings: Problems
 ) -> None:
     """Warn of a long second stage that delays the polls of a line with one request in flight."""
     if not reply.stages or driver.transports[transport].queue.in_flight > 1:
@@ -122,7 +122,7 @@ def _check_stages(
         )
 
 
-def _check_haste(part: Part, driver: Driver, name: str, findings: Findings) -> None:
+def _check_haste(part: Node, driver: Driver, name: str, findings: Problems) -> None:
     """Warn when the signals of a condition are polled less often than its time limit."""
     verify = driver.commands[name].verify
     if verify is None:
@@ -143,7 +143,7 @@ def _fields(reply: Reply | None) -> tuple[str, ...]:
     return () if reply is None else reply.read.fields
 
 
-def _check_poll(part: Part, poll: Poll, findings: Findings) -> None:
+def _check_poll(part: Node, poll: Poll, findings: Problems) -> None:
     if poll.offline is not None and poll.offline.retry_s < poll.every_s:
         findings.warn(
             part.must("offline").must("retry"),
@@ -154,7 +154,7 @@ def _check_poll(part: Part, poll: Poll, findings: Findings) -> None:
         )
 
 
-def _digested(part: Part, send: WriteSpec) -> set[str]:
+def _digested(part: Node, send: WriteSpec) -> set[str]:
     """Return the settings that are sent only inside a hash that changes every time."""
     inner, form = write_form(part)
     found = [template for _, template in form.templates(inner, send)]
@@ -162,7 +162,7 @@ def _digested(part: Part, send: WriteSpec) -> set[str]:
     return digested - {name for one in found for name in one.settings - digested_settings(one)}
 
 
-def _check_secrets(part: Part, driver: Driver, secrets: frozenset[str], findings: Findings) -> None:
+def _check_secrets(part: Node, driver: Driver, secrets: frozenset[str], findings: Problems) -> None:
     """Warn of commands that send a secret without `redact`."""
     asked = [
         (inner.must("send"), driver.commands[name].send)
@@ -193,7 +193,7 @@ def _check_secrets(part: Part, driver: Driver, secrets: frozenset[str], findings
             )
 
 
-def _sends(part: Part, driver: Driver) -> Iterator[tuple[Part, SendStep]]:
+def _sends(part: Node, driver: Driver) -> Iterator[tuple[Node, SendStep]]:
     for name, inner in part.named("sequences").items():
         yield from _sends_in(steps_of(inner), driver.commands[name].steps)
     for name, inner in part.named("transports").items():
@@ -203,7 +203,7 @@ def _sends(part: Part, driver: Driver) -> Iterator[tuple[Part, SendStep]]:
                 yield from _sends_in(inner.must(key), steps)
 
 
-def _sends_in(part: Part, steps: tuple[Step, ...]) -> Iterator[tuple[Part, SendStep]]:
+def _sends_in(part: Node, steps: tuple[Step, ...]) -> Iterator[tuple[Node, SendStep]]:
     for inner, step in zip(part.items(), steps, strict=True):
         if isinstance(step, SendStep):
             yield inner, step

@@ -9,12 +9,12 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any, Final, cast
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import read_form
-from urc.config.part import Findings, Part
 from urc.model.binary import Item, fixed_size
-from urc.model.codec import ReadSpec
 from urc.model.driver import Driver, Reply
-from urc.model.flow import Asides
+from urc.model.exchange import ProvisionalReplies
+from urc.model.payload import ReadSpec
 from urc.model.values import Signal
 from urc.patterns import Pattern, can_be_empty, example
 
@@ -31,7 +31,7 @@ _MAY_BE_LESS: Final = re.compile(r"[*?|{]|\(\)")
 """Characters of a group that may be empty."""
 
 
-def check_frames_apart(part: Part, driver: Driver, findings: Findings) -> None:
+def check_frames_apart(part: Node, driver: Driver, findings: Problems) -> None:
     """Add the warnings about the frames of the driver at `part`."""
     _check_messages(part, driver, findings)
     for inner, reply in _replies(part, driver):
@@ -53,7 +53,7 @@ def check_frames_apart(part: Part, driver: Driver, findings: Findings) -> None:
     _check_words(part, findings)
 
 
-def _prompts(part: Part) -> Iterator[Part]:
+def _prompts(part: Node) -> Iterator[Node]:
     """Yield the pattern of every prompt in the steps of the driver at `part`."""
     for inner in part.named("sequences").values():
         yield from _prompts_in(inner)
@@ -64,7 +64,7 @@ def _prompts(part: Part) -> Iterator[Part]:
                 yield from _prompts_in(steps)
 
 
-def _prompts_in(part: Part) -> Iterator[Part]:
+def _prompts_in(part: Node) -> Iterator[Node]:
     if isinstance(part.data, dict):
         for key, inner in part.entries().items():
             if key == "prompt":
@@ -76,7 +76,7 @@ def _prompts_in(part: Part) -> Iterator[Part]:
             yield from _prompts_in(inner)
 
 
-def _replies(part: Part, driver: Driver) -> Iterator[tuple[Part, Reply]]:
+def _replies(part: Node, driver: Driver) -> Iterator[tuple[Node, Reply]]:
     for name, inner in part.named("commands").items():
         reply = driver.commands[name].reply
         if reply is not None and "reply" in inner.data:
@@ -86,7 +86,7 @@ def _replies(part: Part, driver: Driver) -> Iterator[tuple[Part, Reply]]:
             yield inner.must("reply"), poll.reply
 
 
-def _stages(part: Part, reply: Reply) -> Iterator[tuple[Part, ReadSpec]]:
+def _stages(part: Node, reply: Reply) -> Iterator[tuple[Node, ReadSpec]]:
     reads = [reply.read, *(one.read for one in reply.stages)]
     yield from zip(part.listed("stages") or [part], reads, strict=True)
 
@@ -135,7 +135,7 @@ def _head(source: str) -> str:
     return found[1][:-1] if source[found.end() : found.end() + 1] in ("*", "?", "{") else found[1]
 
 
-def _check_messages(part: Part, driver: Driver, findings: Findings) -> None:
+def _check_messages(part: Node, driver: Driver, findings: Problems) -> None:
     """Warn of a message whose frames match an earlier message, which takes them."""
     seen: list[tuple[str, str, ReadSpec, _Text | None]] = []
     for name, inner in part.named("messages").items():
@@ -213,7 +213,7 @@ def _asked(items: tuple[Item, ...]) -> dict[tuple[int, int], object] | None:
     return found
 
 
-def _check_refusals(part: Part, reply: Reply, findings: Findings) -> None:
+def _check_refusals(part: Node, reply: Reply, findings: Problems) -> None:
     """Warn of an error pattern that matches a reply: errors are tried first."""
     good = _text_of(reply.read) if reply.read.when is None and reply.read.lines is None else None
     errors = [(inner, "an error", "errors") for inner in part.listed("errors")]
@@ -246,7 +246,7 @@ def _check_refusals(part: Part, reply: Reply, findings: Findings) -> None:
     _check_struct_refusals(part, reply, findings)
 
 
-def _check_shared_refusals(part: Part, driver: Driver, findings: Findings) -> None:
+def _check_shared_refusals(part: Node, driver: Driver, findings: Problems) -> None:
     """Warn of an error pattern of a transport that matches the reply to some request."""
     for name, inner in part.named("transports").items():
         spec = driver.transports[name]
@@ -262,14 +262,14 @@ def _check_shared_refusals(part: Part, driver: Driver, findings: Findings) -> No
                 break  # one warning is enough
 
 
-def _patterns_of(asides: Asides) -> Iterator[Pattern]:
+def _patterns_of(asides: ProvisionalReplies) -> Iterator[Pattern]:
     for read in (asides.resend, asides.extend):
         pattern = read.options.get("pattern") if read is not None else None
         if isinstance(pattern, Pattern):
             yield pattern
 
 
-def _check_struct_refusals(part: Part, reply: Reply, findings: Findings) -> None:
+def _check_struct_refusals(part: Node, reply: Reply, findings: Problems) -> None:
     """Warn of a binary error reply that differs from the reply in only a field."""
     given = [inner for inner in part.listed("errors") if isinstance(inner.data, dict)]
     if len(given) != len(reply.faults) or reply.read.form != "struct":
@@ -289,7 +289,7 @@ def _check_struct_refusals(part: Part, reply: Reply, findings: Findings) -> None
 
 
 def _check_empty(
-    part: Part, read: ReadSpec, signals: Mapping[str, Signal], findings: Findings
+    part: Node, read: ReadSpec, signals: Mapping[str, Signal], findings: Problems
 ) -> None:
     """Warn of a number from a group that may be empty."""
     pattern = read.options.get("pattern")
@@ -326,7 +326,7 @@ def _is_plain_number(signal: Signal) -> bool:
 # -- types and enums
 
 
-def _check_words(part: Part, findings: Findings) -> None:
+def _check_words(part: Node, findings: Problems) -> None:
     """Warn of types and enums that are never used."""
     if "types" not in part.data and "enums" not in part.data:
         return

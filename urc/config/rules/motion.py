@@ -9,13 +9,13 @@ import math
 from collections.abc import Iterator
 from typing import Final, cast
 
-from urc.config.part import Findings, Part, shown_duration
+from urc.config.node import Node, Problems, shown_duration
 from urc.expressions import Template, split_template
 from urc.model.binary import Item, least_size
-from urc.model.codec import WriteSpec, each_of
 from urc.model.driver import Command, Driver, TransportSpec
-from urc.model.flow import Hold
+from urc.model.exchange import Hold
 from urc.model.framing import FrameLayout
+from urc.model.payload import WriteSpec, each_of
 
 __all__ = ["check_motion", "least_frame_bytes"]
 
@@ -27,7 +27,7 @@ _BITS_OF_A_BYTE: Final = 10
 _ROUNDING: Final = 1.000001
 
 
-def check_motion(part: Part, driver: Driver, findings: Findings) -> None:
+def check_motion(part: Node, driver: Driver, findings: Problems) -> None:
     """Report problems of the held commands of the driver at `part`."""
     held = [
         (inner.must("hold"), driver.commands[name], hold)
@@ -65,7 +65,7 @@ def check_motion(part: Part, driver: Driver, findings: Findings) -> None:
                 _check_freeze(streamed[0], spec, findings)
 
 
-def _check_freeze(one: tuple[Part, Command, Hold], spec: TransportSpec, findings: Findings) -> None:
+def _check_freeze(one: tuple[Node, Command, Hold], spec: TransportSpec, findings: Problems) -> None:
     """Warn of motion over a transport that cannot detect a frozen robot program."""
     part, command, _ = one
     is_asked = spec.type in _ASKED or spec.never_replies
@@ -82,7 +82,7 @@ def _check_freeze(one: tuple[Part, Command, Hold], spec: TransportSpec, findings
     )
 
 
-def _check_line(part: Part, spec: TransportSpec | None, findings: Findings) -> None:
+def _check_line(part: Node, spec: TransportSpec | None, findings: Problems) -> None:
     if spec is not None and spec.connection == "per_request":
         findings.error(
             part,
@@ -94,7 +94,7 @@ def _check_line(part: Part, spec: TransportSpec | None, findings: Findings) -> N
         )
 
 
-def _check_watchdog(part: Part, command: Command, hold: Hold, findings: Findings) -> None:
+def _check_watchdog(part: Node, command: Command, hold: Hold, findings: Problems) -> None:
     watchdog_s = hold.watchdog_s
     if watchdog_s is None:
         findings.warn(
@@ -124,7 +124,7 @@ def _check_watchdog(part: Part, command: Command, hold: Hold, findings: Findings
         )
 
 
-def _check_step(part: Part, hold: Hold, step_s: float, findings: Findings) -> None:
+def _check_step(part: Node, hold: Hold, step_s: float, findings: Problems) -> None:
     if hold.repeat_s < step_s / _ROUNDING:
         findings.error(
             part.must("repeat"),
@@ -143,7 +143,7 @@ def _check_step(part: Part, hold: Hold, step_s: float, findings: Findings) -> No
         )
 
 
-def _check_lease(part: Part, hold: Hold, findings: Findings) -> None:
+def _check_lease(part: Node, hold: Hold, findings: Problems) -> None:
     if hold.lease_s > LONG_LEASE_S:
         findings.warn(
             part.must("lease"),
@@ -154,7 +154,7 @@ def _check_lease(part: Part, hold: Hold, findings: Findings) -> None:
 
 
 def _check_baud(
-    held: list[tuple[Part, Command, Hold]], spec: TransportSpec, findings: Findings
+    held: list[tuple[Node, Command, Hold]], spec: TransportSpec, findings: Problems
 ) -> None:
     """Report motion whose smallest frames already exceed the baud rate of a serial line."""
     baud = spec.options.get("baud")
@@ -177,7 +177,7 @@ def _check_baud(
 
 
 def _check_will(
-    held: list[tuple[Part, Command, Hold]], spec: TransportSpec, findings: Findings
+    held: list[tuple[Node, Command, Hold]], spec: TransportSpec, findings: Problems
 ) -> None:
     """Warn of motion through a broker without a last will that stops the robot."""
     if spec.type != "mqtt" or spec.options.get("will") is not None:
@@ -193,7 +193,7 @@ def _check_will(
     )
 
 
-def _bearable_ms(excess: float, held: list[tuple[Part, Command, Hold]]) -> int:
+def _bearable_ms(excess: float, held: list[tuple[Node, Command, Hold]]) -> int:
     """Return the shortest repeat that the line can carry, if all commands slow down alike."""
     return math.ceil(min(hold.repeat_s for _, _, hold in held) * excess * 1000 - 1e-6)
 

@@ -4,11 +4,11 @@ import re
 from pathlib import PurePath
 from typing import Final
 
-from urc.config.link.driver import Uses
-from urc.config.part import Findings, Part, shown_duration
+from urc.config.link.driver import NameUses
+from urc.config.node import Node, Problems, shown_duration
 from urc.config.rules.flow import check_flow
 from urc.config.sources import Sources
-from urc.config.suggest import did_you_mean
+from urc.config.spelling_suggestions import did_you_mean
 from urc.model.driver import Driver, Poll, Timeouts
 from urc.model.interface import Interface
 
@@ -22,8 +22,8 @@ def check_profile(
     sources: Sources,
     driver: Driver,
     interfaces: dict[str, Interface],
-    uses: Uses,
-    findings: Findings,
+    uses: NameUses,
+    findings: Problems,
 ) -> None:
     """Add a warning for each unused declaration, and for polls that are too fast."""
     _check_name(sources, findings)
@@ -37,7 +37,7 @@ def check_profile(
     check_flow(sources.driver, driver, frozenset(secrets), findings)
 
 
-def _check_name(sources: Sources, findings: Findings) -> None:
+def _check_name(sources: Sources, findings: Problems) -> None:
     """Warn of a robot whose file has another name than the robot."""
     file = PurePath(sources.root.document.file)
     name = sources.root.text("name")
@@ -54,7 +54,7 @@ def _check_name(sources: Sources, findings: Findings) -> None:
         )
 
 
-def _check_unused(sources: Sources, driver: Driver, uses: Uses, findings: Findings) -> None:
+def _check_unused(sources: Sources, driver: Driver, uses: NameUses, findings: Problems) -> None:
     for name, part in sources.driver.named("signals").items():
         if name not in uses.signals and driver.signals[name].formula is None:
             findings.warn(
@@ -82,7 +82,7 @@ def _check_unused(sources: Sources, driver: Driver, uses: Uses, findings: Findin
             )
 
 
-def _check_slots(sources: Sources, interfaces: dict[str, Interface], findings: Findings) -> None:
+def _check_slots(sources: Sources, interfaces: dict[str, Interface], findings: Problems) -> None:
     """Warn of a slot that this document fills and no interface shows.
 
     A driver's document fills slots for every interface, so only the slots of the robot are checked.
@@ -102,7 +102,7 @@ def _check_slots(sources: Sources, interfaces: dict[str, Interface], findings: F
             )
 
 
-def _check_unfilled(sources: Sources, interfaces: dict[str, Interface], findings: Findings) -> None:
+def _check_unfilled(sources: Sources, interfaces: dict[str, Interface], findings: Problems) -> None:
     """Warn of an empty slot in a robot's own grid.
 
     An interface in its own document serves several drivers, and may have slots that a driver lacks.
@@ -128,7 +128,7 @@ def _check_unfilled(sources: Sources, interfaces: dict[str, Interface], findings
                 )
 
 
-def _drawn(part: Part, slot: str) -> tuple[Part, int] | None:
+def _drawn(part: Node, slot: str) -> tuple[Node, int] | None:
     """Return the first grid of an interface that shows a slot, and the offset in its text."""
     for page in (part, *part.named("tabs").values()):
         one = page.get("grid")
@@ -140,7 +140,7 @@ def _drawn(part: Part, slot: str) -> tuple[Part, int] | None:
     return None
 
 
-def _check_pace(part: Part, poll: Poll, driver: Part, findings: Findings) -> None:
+def _check_pace(part: Node, poll: Poll, driver: Node, findings: Problems) -> None:
     """Warn of a poll whose reply timeout is longer than its period.
 
     An explicit timeout up to the default gives no warning, because the default gives none either.
@@ -149,14 +149,14 @@ def _check_pace(part: Part, poll: Poll, driver: Part, findings: Findings) -> Non
         return
     asked = driver.must("commands").must(poll.run) if poll.run else part
     reply = asked.get("reply")
-    where: Part | None = reply.get("timeout") if reply else None
+    where: Node | None = reply.get("timeout") if reply else None
     seconds = poll.reply.timeout_s
     if where is None:
         timeouts = driver.must("transports").must(poll.transport).get("timeouts")
         where = timeouts.get("reply") if timeouts else None
         if where is None:
             return  # a default is not a decision of the author
-        seconds = Findings().duration(timeouts, "reply", 2.0) if timeouts else None
+        seconds = Problems().duration(timeouts, "reply", 2.0) if timeouts else None
     if seconds is not None and seconds > max(poll.every_s, Timeouts().reply_s):
         findings.warn(
             part.must("every"),
@@ -167,7 +167,7 @@ def _check_pace(part: Part, poll: Poll, driver: Part, findings: Findings) -> Non
         )
 
 
-def _place(part: Part, near: Part) -> str:
+def _place(part: Node, near: Node) -> str:
     """Return the place of `part`, as seen from `near`."""
     mark = part.document.at(part.path)
     file = part.document.source_of(part.path).file
@@ -175,7 +175,7 @@ def _place(part: Part, near: Part) -> str:
     return line if file == near.document.source_of(near.path).file else f"{line} of {file}"
 
 
-def _check_rate(part: Part, driver: Driver, findings: Findings) -> None:
+def _check_rate(part: Node, driver: Driver, findings: Problems) -> None:
     """Warn of polls that together exceed the request rate of their transport."""
     for name, transport in driver.transports.items():
         if not transport.min_gap_s:

@@ -5,14 +5,14 @@ All are warnings about declared values, never about defaults.
 
 from collections.abc import Mapping
 
-from urc.config.part import Findings, Part, shown_duration
+from urc.config.node import Node, Problems, shown_duration
 from urc.expressions import Template
 from urc.model.driver import Command, Driver, TransportSpec
 
 __all__ = ["check_traffic"]
 
 
-def check_traffic(part: Part, driver: Driver, findings: Findings) -> None:
+def check_traffic(part: Node, driver: Driver, findings: Problems) -> None:
     """Add the warnings about the traffic and the motion of the driver at `part`."""
     for name, inner in part.named("commands").items():
         command = driver.commands[name]
@@ -36,7 +36,7 @@ def check_traffic(part: Part, driver: Driver, findings: Findings) -> None:
         _check_silence(inner, driver.transports[name], driver, findings)
 
 
-def _check_counted(part: Part, driver: Driver, findings: Findings) -> None:
+def _check_counted(part: Node, driver: Driver, findings: Problems) -> None:
     """Warn of commands that fill the robot's buffer without a reply that shows their end."""
     requests = [
         (inner, one.transport, one.reply, one.priority)
@@ -62,7 +62,7 @@ def _check_counted(part: Part, driver: Driver, findings: Findings) -> None:
             )
 
 
-def _check_ports(part: Part, driver: Driver, findings: Findings) -> None:
+def _check_ports(part: Node, driver: Driver, findings: Problems) -> None:
     """Warn of two transports that listen on one port of this machine."""
     seen: dict[tuple[str, str, str], str] = {}
     for name, inner in part.named("transports").items():
@@ -87,7 +87,7 @@ def _written(value: object) -> str:
     return value.source if isinstance(value, Template) else str(value)
 
 
-def _check_kept(part: Part, command: Command, findings: Findings) -> None:
+def _check_kept(part: Node, command: Command, findings: Problems) -> None:
     """Report motion that a broker would keep or repeat."""
     attributes = command.send.options.get("attributes")
     if not isinstance(attributes, Mapping):
@@ -105,7 +105,7 @@ def _check_kept(part: Part, command: Command, findings: Findings) -> None:
         )
 
 
-def _check_pace(part: Part, command: Command, spec: TransportSpec, findings: Findings) -> None:
+def _check_pace(part: Node, command: Command, spec: TransportSpec, findings: Problems) -> None:
     """Warn of a held command whose period is shorter than its rate limit allows."""
     if command.hold is None:
         return
@@ -124,7 +124,7 @@ def _check_pace(part: Part, command: Command, spec: TransportSpec, findings: Fin
             )
 
 
-def _check_silence(part: Part, spec: TransportSpec, driver: Driver, findings: Findings) -> None:
+def _check_silence(part: Node, spec: TransportSpec, driver: Driver, findings: Problems) -> None:
     """Warn of a transport that counts as silent, or closes, between two polls."""
     if any(one.transport == spec.name for one in driver.messages.values()):
         return  # unsolicited messages come at an unknown rate

@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from urc.config.part import Findings, Part
+from urc.config.node import Node, Problems
 from urc.model.driver import Command, Driver
 from urc.model.units import quantity_of
 
@@ -52,7 +52,7 @@ _HINT_OF_STEPS: Final = (
 )
 
 
-def check_unmarked(part: Part, driver: Driver, findings: Findings) -> None:
+def check_unmarked(part: Node, driver: Driver, findings: Problems) -> None:
     """Warn of each command and sequence that seems to move the robot and is not marked."""
     for key in ("commands", "sequences"):
         for name, inner in part.named(key).items():
@@ -71,7 +71,7 @@ def check_unmarked(part: Part, driver: Driver, findings: Findings) -> None:
                 )
 
 
-def check_unguarded(part: Part, driver: Driver, findings: Findings) -> None:
+def check_unguarded(part: Node, driver: Driver, findings: Problems) -> None:
     """Warn of autonomous motion that STOP cannot end and that needs no confirmation.
 
     A held command needs neither: its release ends it.
@@ -98,7 +98,7 @@ def _is_asked(command: Command) -> bool:
     return command.confirm is not None or any(one.confirm for one in command.arguments.values())
 
 
-def _says_no(part: Part) -> bool:
+def _says_no(part: Node) -> bool:
     return isinstance(part.data, dict) and part.data.get("moves") is False
 
 

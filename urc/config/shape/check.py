@@ -10,7 +10,7 @@ from functools import cache
 from typing import Any, Final
 
 from urc.config.schemas import KINDS, QuickCheck, kind_of, read_schema, shipped_check
-from urc.config.suggest import did_you_mean
+from urc.config.spelling_suggestions import did_you_mean
 from urc.problems import Problem
 from urc.source import Document, Path
 

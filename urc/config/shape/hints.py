@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from urc.config.renames import renamed_hint
-from urc.config.suggest import did_you_mean
+from urc.config.spelling_suggestions import did_you_mean
 from urc.source import Document, Path
 
 __all__ = ["example_of", "key_hint", "mapping_hint", "type_hint", "word_hint"]

@@ -20,7 +20,7 @@ from urc.config.shape.hints import (
     type_hint,
     word_hint,
 )
-from urc.config.suggest import listed
+from urc.config.spelling_suggestions import listed
 from urc.problems import Problem
 from urc.source import Document, Path
 

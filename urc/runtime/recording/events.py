@@ -11,7 +11,7 @@ from typing import Any, Final, cast, get_args
 import msgspec
 
 from urc.model.values import Alarm, Reading, Sample, Signal
-from urc.runtime.hub import LinkState, LinkStatus, Note, Traffic
+from urc.runtime.hub import LinkState, LinkStatus, LogEntry, Traffic
 from urc.runtime.recording.shapes import DRIVING, LEVELS, LINK, LOG, SIGNALS, WIRE
 
 __all__ = ["event_of", "is_state", "topic_of"]
@@ -31,7 +31,7 @@ def topic_of(signal: str) -> str:
 
 def event_of(
     topic: str, data: bytes, time_s: float, signals: Mapping[str, Signal]
-) -> Sample | LinkStatus | Note | Traffic | None:
+) -> Sample | LinkStatus | LogEntry | Traffic | None:
     """Return the event of a message, as if it happened now; None for an unknown message.
 
     Args:
@@ -49,7 +49,7 @@ def event_of(
 
 def _event(
     topic: str, told: dict[str, Any], time_s: float, signals: Mapping[str, Signal]
-) -> Sample | LinkStatus | Note | Traffic | None:
+) -> Sample | LinkStatus | LogEntry | Traffic | None:
     if topic.startswith(SIGNALS):
         signal = signals.get(topic.removeprefix(SIGNALS))
         alarm = told.get("alarm", "")
@@ -68,10 +68,10 @@ def _event(
         return Traffic(time_s, topic.removeprefix(WIRE), direction, data)
     if topic == LOG:
         level: Any = next((name for name, no in LEVELS.items() if no == told["level"]), "info")
-        return Note(time_s, level, str(told["name"]), str(told["message"]))
+        return LogEntry(time_s, level, str(told["name"]), str(told["message"]))
     if topic == DRIVING:
         words = [told.get(name) for name in ("who", "what", "command", "arguments", "outcome")]
-        return Note(time_s, "info", "driving", " ".join(str(word) for word in words if word))
+        return LogEntry(time_s, "info", "driving", " ".join(str(word) for word in words if word))
     return None
 
 

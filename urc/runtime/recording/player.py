@@ -14,18 +14,18 @@ from contextlib import asynccontextmanager, suppress
 from itertools import islice
 from typing import Final
 
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.model.profile import Profile
 from urc.model.values import Reading, Sample, Value
 from urc.problems import UrcError
 from urc.protocol.engine import Engine
 from urc.protocol.events import Replied
-from urc.protocol.reins import Pull
+from urc.protocol.sequences.sequence_control import Pull
 from urc.runtime.clock import Clock, LoopClock, within
-from urc.runtime.held import Frames, Movers
-from urc.runtime.hub import Hub, LinkStatus, Note, Traffic
+from urc.runtime.held_commands import MotionBackend, MotionFrames
+from urc.runtime.hub import Hub, LinkStatus, LogEntry, Traffic
 from urc.runtime.recording.events import event_of, topic_of
-from urc.runtime.recording.reader import Message, Recording
+from urc.runtime.recording.reader import RecordedMessage, Recording
 from urc.runtime.session import CommandFailed
 
 __all__ = ["FASTEST", "Player", "REFUSAL"]
@@ -134,9 +134,9 @@ class Player:
         self._changed.set()
 
     @asynccontextmanager
-    async def session(self) -> AsyncIterator["Played"]:
+    async def session(self) -> AsyncIterator["PlaybackSession"]:
         """Open a session for a dashboard, which continues at the last position."""
-        played = Played(self.profile, self.settings)
+        played = PlaybackSession(self.profile, self.settings)
         playing = asyncio.create_task(self._play(played.hub))
         self._is_open = True
         self._stand(self._base_s)
@@ -159,7 +159,7 @@ class Player:
                 if not isinstance(fault, UrcError):
                     log.exception("%s cannot be played", self.recording.file)
                 text = str(fault) if isinstance(fault, UrcError) else f"unexpected error: {fault!r}"
-                hub.note(Note(self._clock.now(), "error", "recording", text))
+                hub.note(LogEntry(self._clock.now(), "error", "recording", text))
                 self.pause()
                 number = self._number
                 while number == self._number:
@@ -184,16 +184,18 @@ class Player:
             if number == self._number:
                 await self._at_end(number)
 
-    async def _follow(self, hub: Hub, stream: Generator[Message, None, None], number: int) -> None:
+    async def _follow(
+        self, hub: Hub, stream: Generator[RecordedMessage, None, None], number: int
+    ) -> None:
         """Send each message of the stream at its time, until the end or a change of position."""
-        waiting: deque[Message] = deque()
+        waiting: deque[RecordedMessage] = deque()
         while True:
             if not waiting:
                 waiting.extend(await asyncio.to_thread(lambda: list(islice(stream, _AHEAD))))
             if not waiting or number != self._number:
                 return
             due_ns = self._due_ns()
-            due: list[Message] = []
+            due: list[RecordedMessage] = []
             while waiting and waiting[0].time_ns <= due_ns:
                 due.append(waiting.popleft())
             self._give(hub, due)
@@ -239,7 +241,7 @@ class Player:
         if later:
             hub.put(tuple(Sample(name, None, now_s) for name in later))
 
-    def _give(self, hub: Hub, messages: Iterable[Message]) -> None:
+    def _give(self, hub: Hub, messages: Iterable[RecordedMessage]) -> None:
         """Send messages to the hub, with times relative to the current position."""
         now_s = self._clock.now()
         position_ns = self.recording.start_ns + round(self.position_s * 1e9)
@@ -256,7 +258,7 @@ class Player:
             match event:
                 case LinkStatus() if event.transport in self.profile.driver.transports:
                     hub.set_link(event)
-                case Note():
+                case LogEntry():
                     hub.note(event)
                 case Traffic() if hub.traffic_watchers:
                     hub.saw(event)
@@ -264,14 +266,14 @@ class Player:
             hub.put(tuple(samples))
 
 
-class Played:
+class PlaybackSession:
     """A playback in place of a session; it accepts no command."""
 
     def __init__(self, profile: Profile, settings: Mapping[str, Value]) -> None:
         """Start without values."""
         self.hub = Hub(profile.driver.signals)
-        self.frames: Frames = Engine(profile.driver, settings).motions
-        self.movers: Movers | None = None
+        self.frames: MotionFrames = Engine(profile.driver, settings).motions
+        self.movers: MotionBackend | None = None
 
     async def command(
         self,

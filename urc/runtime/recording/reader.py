@@ -19,13 +19,13 @@ from urc.runtime.recording.events import is_state
 from urc.runtime.recording.recorder import check_installed
 from urc.runtime.recording.shapes import LOG, PROFILE
 
-__all__ = ["Message", "Recording", "open_recording"]
+__all__ = ["RecordedMessage", "Recording", "open_recording"]
 
 _RECORD_BYTES: Final = 64 * 1024 * 1024
 """Limit of a record, also after decompression, in bytes; a longer one means a damaged file."""
 
 
-class Message(NamedTuple):
+class RecordedMessage(NamedTuple):
     """One message of a recording."""
 
     time_ns: int
@@ -53,16 +53,16 @@ class Recording(NamedTuple):
         """Length in seconds."""
         return (self.end_ns - self.start_ns) / 1e9
 
-    def messages(self, from_ns: int) -> Generator[Message, None, None]:
+    def messages(self, from_ns: int) -> Generator[RecordedMessage, None, None]:
         """Yield the messages from a time on, in order; end early at damage in the file.
 
         An unreadable piece in the middle becomes a log message.
         """
         yield from _messages(self, from_ns, math.inf)
 
-    def before(self, until_ns: int) -> list[Message]:
+    def before(self, until_ns: int) -> list[RecordedMessage]:
         """Return the state before a time: the last message of each signal and transport."""
-        last: dict[str, Message] = {}
+        last: dict[str, RecordedMessage] = {}
         for message in _messages(self, 0, until_ns):
             if is_state(message.topic):
                 last[message.topic] = message
@@ -107,7 +107,7 @@ def open_recording(file: Path, *, has_profile: bool = False) -> Recording:
     return Recording(file, document, min(times), max(times), topics, unread)
 
 
-def _messages(recording: Recording, from_ns: int, before_ns: float) -> Iterator[Message]:
+def _messages(recording: Recording, from_ns: int, before_ns: float) -> Iterator[RecordedMessage]:
     from mcap.records import Channel, Chunk
     from mcap.records import Message as Written
 
@@ -129,7 +129,7 @@ def _messages(recording: Recording, from_ns: int, before_ns: float) -> Iterator[
                 if isinstance(one, Channel):
                     topics[one.id] = one.topic
                 elif isinstance(one, Written) and from_ns <= one.log_time < before_ns:
-                    yield Message(one.log_time, topics.get(one.channel_id, ""), one.data)
+                    yield RecordedMessage(one.log_time, topics.get(one.channel_id, ""), one.data)
 
 
 def _unpacked(chunk: Any) -> Iterable[object]:
@@ -152,10 +152,10 @@ def _unpacked(chunk: Any) -> Iterable[object]:
     return breakup_chunk(replace(chunk, compression="", data=data), validate_crc=True)
 
 
-def _unreadable(time_ns: int, fault: Exception) -> Message:
+def _unreadable(time_ns: int, fault: Exception) -> RecordedMessage:
     text = f"a piece of the recording cannot be read: {str(fault) or type(fault).__name__}"
     told = {"level": 3, "name": "recording", "message": text}
-    return Message(time_ns, LOG, json.dumps(told).encode())
+    return RecordedMessage(time_ns, LOG, json.dumps(told).encode())
 
 
 def _opened(file: Path) -> IO[bytes]:

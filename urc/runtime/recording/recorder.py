@@ -25,9 +25,9 @@ from urc.config.resolve import resolve
 from urc.model.profile import Profile
 from urc.model.values import Sample
 from urc.problems import UrcError
-from urc.runtime.hub import Hub, Note, Tap, Tapped, Traffic
-from urc.runtime.recording.shapes import PROFILE, Shapes, channels
-from urc.runtime.shelves import shelf_of
+from urc.runtime.hub import EventTap, Hub, LogEntry, Tapped, Traffic
+from urc.runtime.recording.shapes import PROFILE, RecordingEncoder, channels
+from urc.runtime.widget_registry import shelf_of
 
 __all__ = ["Recorder", "check_installed", "named", "recorded"]
 
@@ -92,7 +92,9 @@ class Recorder:
         self._document = document
         # One offset for the whole file: a change of the system clock must not shift its times.
         offset_ns = time.time_ns() - time.monotonic_ns()
-        self._shapes = Shapes(profile.driver, lambda time_s: offset_ns + round(time_s * _SECOND_NS))
+        self._shapes = RecordingEncoder(
+            profile.driver, lambda time_s: offset_ns + round(time_s * _SECOND_NS)
+        )
         self._writer: Any = None  # half of its methods have no types
         self._channels: dict[str, int] = {}
         self._waiting: deque[Tapped] = deque()
@@ -182,7 +184,7 @@ class Recorder:
             writer.add_attachment(now_ns, now_ns, PROFILE, "application/yaml", data)
         else:
             text = f"{profile.file} can no longer be loaded: replay this with --profile"
-            self.put([Note(time.monotonic(), "warning", "recording", text)])
+            self.put([LogEntry(time.monotonic(), "warning", "recording", text)])
         for channel in channels(profile.driver):
             schema = json.dumps(channel.schema).encode()
             shape = writer.register_schema(channel.shape, "jsonschema", schema)
@@ -214,7 +216,7 @@ class Recorder:
             lost, self._lost = self._lost, 0
             if lost:
                 text = f"{lost} events are missing here: they arrived too fast to be written"
-                batch.append(Note(time.monotonic(), "warning", "recording", text))
+                batch.append(LogEntry(time.monotonic(), "warning", "recording", text))
             if not batch and self._is_closing:
                 return None
             return batch
@@ -228,7 +230,7 @@ class Recorder:
             if not self._is_faulty:
                 log.exception("%s lacks an event of kind %s", self.file, type(event).__name__)
                 text = "an event is missing here because it could not be written; see URC's log"
-                self.put([Note(time.monotonic(), "warning", "recording", text)])
+                self.put([LogEntry(time.monotonic(), "warning", "recording", text)])
             self._is_faulty = True
 
     def _write(self, messages: Iterable[tuple[str, int, bytes]]) -> None:
@@ -294,7 +296,7 @@ async def recorded(
             await asyncio.to_thread(recorder.close)
 
 
-async def _feed(tap: Tap, hub: Hub, recorder: Recorder) -> None:
+async def _feed(tap: EventTap, hub: Hub, recorder: Recorder) -> None:
     dropped, said = 0, ""
     while True:
         with suppress(TimeoutError):  # the state of the file is also reported without events
@@ -306,7 +308,7 @@ async def _feed(tap: Tap, hub: Hub, recorder: Recorder) -> None:
         if text and text != said:
             said = text
             level: Any = "warning" if recorder.fault else "info"
-            hub.note(Note(time.monotonic(), level, "recording", text))
+            hub.note(LogEntry(time.monotonic(), level, "recording", text))
         await asyncio.sleep(_GATHER_S)
 
 

@@ -17,8 +17,16 @@ import msgspec
 from urc.images import media_type
 from urc.model.driver import Driver
 from urc.model.values import Alarm, Reading, Sample, Signal
-from urc.runtime.audit import Entry
-from urc.runtime.hub import LinkState, LinkStatus, Moved, Note, Tapped, Told, Traffic
+from urc.runtime.audit import AuditEntry
+from urc.runtime.hub import (
+    AuditRecord,
+    LinkState,
+    LinkStatus,
+    LogEntry,
+    MotionRecord,
+    Tapped,
+    Traffic,
+)
 
 __all__ = [
     "COMMANDS",
@@ -29,8 +37,8 @@ __all__ = [
     "PROFILE",
     "SIGNALS",
     "WIRE",
-    "Channel",
-    "Shapes",
+    "McapChannel",
+    "RecordingEncoder",
     "channels",
 ]
 
@@ -82,13 +90,13 @@ _BYTES: Final = {
 }
 _ENTRY: Final = {
     name: {"type": {str: "string", int: "integer", float: "number"}[kind]}
-    for name, kind in Entry.__annotations__.items()
+    for name, kind in AuditEntry.__annotations__.items()
 }
 
 _encode: Final = msgspec.json.Encoder(enc_hook=lambda value: _plain(value)).encode
 
 
-class Channel(NamedTuple):
+class McapChannel(NamedTuple):
     """One topic of a recording, with its message type."""
 
     topic: str
@@ -97,7 +105,7 @@ class Channel(NamedTuple):
     schema: Mapping[str, object]
 
 
-def channels(driver: Driver) -> tuple[Channel, ...]:
+def channels(driver: Driver) -> tuple[McapChannel, ...]:
     """Return the topics of a robot's recordings: signals, motion, traffic, log and audit."""
     found = [_signal_channel(signal) for signal in driver.signals.values()]
     for command in driver.commands.values():
@@ -112,11 +120,11 @@ def channels(driver: Driver) -> tuple[Channel, ...]:
     return tuple(found)
 
 
-def _channel(topic: str, shape: str, properties: Mapping[str, object]) -> Channel:
-    return Channel(topic, shape, {"title": shape, "type": "object", "properties": properties})
+def _channel(topic: str, shape: str, properties: Mapping[str, object]) -> McapChannel:
+    return McapChannel(topic, shape, {"title": shape, "type": "object", "properties": properties})
 
 
-def _signal_channel(signal: Signal) -> Channel:
+def _signal_channel(signal: Signal) -> McapChannel:
     topic = SIGNALS + signal.name
     if signal.type == "image":
         return _channel(topic, "foxglove.CompressedImage", _IMAGE)
@@ -132,7 +140,7 @@ def _signal_channel(signal: Signal) -> Channel:
     return _channel(topic, f"urc.Signal.{signal.name}", {"value": value, "alarm": alarm})
 
 
-class Shapes:
+class RecordingEncoder:
     """An encoder for one recording; it has state, because its times never decrease."""
 
     def __init__(self, driver: Driver, utc_ns: Callable[[float], int]) -> None:
@@ -154,14 +162,14 @@ class Shapes:
                 return [self._sample(event)]
             case Traffic():
                 return [self._traffic(event)]
-            case Moved():
+            case MotionRecord():
                 return [self._moved(event.command, event.arguments, self._now(event.time_s))]
             case LinkStatus():
                 return [self._line(event)]
-            case Note():
+            case LogEntry():
                 time_ns = self._now(event.time_s)
                 return [(LOG, time_ns, _json(_log(event, time_ns)))]
-            case Told():
+            case AuditRecord():
                 entry, time_ns = event.entry, self._now(event.time_s)
                 told = entry._asdict()
                 return [(DRIVING, time_ns, _json(told)), *self._ended(entry, time_ns)]
@@ -197,7 +205,7 @@ class Shapes:
     ) -> tuple[str, int, bytes]:
         return COMMANDS + command, time_ns, _json(arguments)
 
-    def _ended(self, entry: Entry, time_ns: int) -> list[tuple[str, int, bytes]]:
+    def _ended(self, entry: AuditEntry, time_ns: int) -> list[tuple[str, int, bytes]]:
         """Return the message for the end of a motion, which else would seem to continue."""
         command = self._commands.get(entry.command)
         if entry.what != "stopped" or command is None or command.hold is None:
@@ -225,7 +233,7 @@ def _wire(direction: str, data: bytes) -> dict[str, object]:
         return {"direction": direction, "hex": data.hex()}
 
 
-def _log(note: Note, time_ns: int) -> dict[str, object]:
+def _log(note: LogEntry, time_ns: int) -> dict[str, object]:
     return {
         "timestamp": _stamp(time_ns),
         "level": LEVELS[note.level],

@@ -10,7 +10,7 @@ from urc.model.driver import TransportSpec
 from urc.model.values import NOTHING, Value
 from urc.problems import UrcError
 from urc.registry import Table
-from urc.simulator.twin import TwinLine
+from urc.simulator.emulated_robot import EmulatedConnection
 
 __all__ = [
     "SERVERS",
@@ -58,7 +58,7 @@ class ServerContext(NamedTuple):
     """Options of the transport, evaluated over the settings."""
     host: str
     """Address to listen on, for kinds of transport that listen."""
-    line: Callable[[], TwinLine]
+    line: Callable[[], EmulatedConnection]
     """Makes the robot's side of a new connection."""
     now: Callable[[], float]
     """Seconds since the epoch, the templates' ``now``."""

@@ -1,8 +1,8 @@
 """The clients of a simulated server, and the dialogue with each.
 
-Each client talks to a `TwinLine` of its own. The number of clients, the bytes read ahead and the
-time for accepting replies are bounded. When all places are taken, the client that was silent for
-longest is disconnected, so half-open connections cannot block the server.
+Each client talks to a `EmulatedConnection` of its own. The number of clients, the bytes read ahead
+and the time for accepting replies are bounded. When all places are taken, the client that was
+silent for longest is disconnected, so half-open connections cannot block the server.
 """
 
 import asyncio
@@ -11,9 +11,9 @@ import math
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from typing import Any
 
-from urc.model.codec import Payload
+from urc.model.payload import Payload
+from urc.simulator.emulated_robot import EmulatedConnection
 from urc.simulator.servers.base import ServerContext
-from urc.simulator.twin import TwinLine
 
 __all__ = ["MAX_CLIENTS", "READ_BYTES", "TAKEN_WITHIN_S", "ClientConnection", "Clients", "converse"]
 
@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 class ClientConnection:
     """One client of a server."""
 
-    def __init__(self, line: TwinLine, abort: Callable[[], None]) -> None:
+    def __init__(self, line: EmulatedConnection, abort: Callable[[], None]) -> None:
         self.line = line
         self.abort = abort
         """Disconnects the client at once; a second call does nothing."""
@@ -47,7 +47,7 @@ class Clients:
         self._talks: dict[ClientConnection, asyncio.Task[None]] = {}
 
     @property
-    def lines(self) -> Sequence[TwinLine]:
+    def lines(self) -> Sequence[EmulatedConnection]:
         """The robot's side of every connection."""
         return [client.line for client in self._talks]
 

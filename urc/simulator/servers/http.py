@@ -15,12 +15,12 @@ from urllib.parse import parse_qsl, unquote, urlsplit
 import h11
 import msgspec
 
-from urc.model.codec import Envelope, Payload
+from urc.model.payload import Envelope, Payload
+from urc.simulator.emulated_robot import EmulatedConnection
 from urc.simulator.servers.base import ServerContext
 from urc.simulator.servers.clients import READ_BYTES, TAKEN_WITHIN_S, ClientConnection, converse
 from urc.simulator.servers.http_auth import HttpAuth
 from urc.simulator.servers.listening import StreamServer, UrlServer
-from urc.simulator.twin import TwinLine
 
 __all__ = ["HttpServer"]
 
@@ -82,7 +82,7 @@ _TYPES = {
 }
 
 
-class Asked(NamedTuple):
+class HttpRequest(NamedTuple):
     """One request of a client."""
 
     method: str
@@ -157,7 +157,7 @@ class _Talk:
         async with asyncio.timeout(TAKEN_WITHIN_S):
             await self._writer.wait_closed()
 
-    async def _next(self, client: ClientConnection) -> Asked | None:
+    async def _next(self, client: ClientConnection) -> HttpRequest | None:
         """Return the next request, None at the end of the connection."""
         head: h11.Request | None = None
         body = bytearray()
@@ -179,13 +179,13 @@ class _Talk:
             else:
                 return None
 
-    def _asked(self, head: h11.Request, body: bytes) -> Asked:
+    def _asked(self, head: h11.Request, body: bytes) -> HttpRequest:
         target = head.target.decode("ascii", "replace")
         path = unquote(urlsplit(target).path).removeprefix(self._base) or "/"
         headers = {name.decode(): value.decode("latin-1") for name, value in head.headers}
-        return Asked(head.method.decode(), target, path, headers, body)
+        return HttpRequest(head.method.decode(), target, path, headers, body)
 
-    async def _serve(self, client: ClientConnection, asked: Asked) -> None:
+    async def _serve(self, client: ClientConnection, asked: HttpRequest) -> None:
         given = asked.headers.get("authorization", "")
         challenge = self._auth.challenge(asked.method, asked.target, given)
         if challenge is not None:
@@ -204,14 +204,14 @@ class _Talk:
         else:
             await self._answer(*_written(self._asks(client.line, asked)), asked)
 
-    async def _suffer(self, line: TwinLine) -> None:
+    async def _suffer(self, line: EmulatedConnection) -> None:
         """Delay or lose the reply, as the injected faults demand."""
         if line.loses:
             raise ConnectionResetError("lost on demand")
         if line.delay_s:
             await asyncio.sleep(line.delay_s)
 
-    def _asks(self, line: TwinLine, asked: Asked) -> Envelope:
+    def _asks(self, line: EmulatedConnection, asked: HttpRequest) -> Envelope:
         """Return the robot's reply, or an error status."""
         for envelope in asked.ways:
             before = line.faults
@@ -225,7 +225,7 @@ class _Talk:
         reason = f"{line.last_fault}\n"
         return Envelope("response", {"ok": False, "status": 404, "reason": reason})
 
-    def _kind(self, asked: Asked) -> str:
+    def _kind(self, asked: HttpRequest) -> str:
         """Return the stream kind of the driver's subscription to that path, "" without one."""
         if asked.method != "GET":
             return ""
@@ -235,14 +235,14 @@ class _Talk:
         kinds = [how.get("stream") for topic, how in ways if topic.partition("#")[0] in names]
         return str(kinds[0]) if kinds else ""
 
-    def _picture(self, asked: Asked) -> bytes:
+    def _picture(self, asked: HttpRequest) -> bytes:
         """Return the camera image of the robot's world, or one of a changing colour."""
         context, target = self._context, asked.target.removeprefix(self._base)
         seen = context.picture((asked.path, target))
         return picture(context.now()) if seen is None else seen
 
     async def _answer(
-        self, status: int, headers: Sequence[tuple[str, str]], body: bytes, asked: Asked
+        self, status: int, headers: Sequence[tuple[str, str]], body: bytes, asked: HttpRequest
     ) -> None:
         given = {name.lower() for name, _ in headers}
         sent = (
@@ -258,7 +258,7 @@ class _Talk:
             await self._say(h11.Data(data=body))
         await self._say(h11.EndOfMessage())
 
-    async def _stream(self, client: ClientConnection, asked: Asked, kind: str) -> None:
+    async def _stream(self, client: ClientConnection, asked: HttpRequest, kind: str) -> None:
         """Stream the robot's messages on a topic, until the client leaves."""
         headers = [("Content-Type", _TYPES[kind]), ("Cache-Control", "no-store")]
         await self._say(h11.Response(status_code=200, headers=headers))
@@ -276,7 +276,7 @@ class _Talk:
 
         await converse(self._context, client, self._gone, put)
 
-    async def _pictures(self, asked: Asked) -> None:
+    async def _pictures(self, asked: HttpRequest) -> None:
         gone = asyncio.ensure_future(self._gone())
         try:
             while not gone.done():

@@ -9,12 +9,12 @@ import logging
 from collections.abc import Sequence
 from contextlib import suppress
 
-from urc.model.codec import Envelope, Payload
+from urc.model.payload import Envelope, Payload
 from urc.problems import UrcError
-from urc.protocol.topics import matches
+from urc.protocol.forms.topics import matches
 from urc.simulator.servers.base import Endpoint, ServerContext
 from urc.simulator.servers.clients import ClientConnection, Clients, converse
-from urc.transports.base import Setup, Subscription, Transport, TransportError
+from urc.transports.base import TopicSubscription, Transport, TransportError, TransportSetup
 from urc.transports.mqtt import from_setup
 
 __all__ = ["MqttRobot"]
@@ -43,7 +43,7 @@ class MqttRobot:
         context = self._context
         options = {name: value for name, value in context.options.items() if name not in _NOT_OURS}
         try:
-            transport = from_setup(Setup(context.name, options, (Subscription("#"),)))
+            transport = from_setup(TransportSetup(context.name, options, (TopicSubscription("#"),)))
             await transport.open(OPEN_S)
         except TransportError as fault:
             hint = "an emulated MQTT robot needs a broker; start one, such as mosquitto -p 1883"

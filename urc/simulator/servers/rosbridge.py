@@ -11,11 +11,11 @@ import msgspec
 from websockets.asyncio.server import Server, ServerConnection, broadcast, serve
 from websockets.exceptions import ConnectionClosed
 
-from urc.model.codec import Envelope, Payload
+from urc.model.payload import Envelope, Payload
 from urc.simulator.servers.base import ServerContext
 from urc.simulator.servers.clients import ClientConnection, converse
 from urc.simulator.servers.websocket import MessageServer
-from urc.transports.rosbridge_types import spelled
+from urc.transports.ros.types import spelled
 
 __all__ = ["RosbridgeServer"]
 

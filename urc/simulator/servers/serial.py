@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.problems import UrcError
 from urc.simulator.servers.base import Endpoint, ServerContext, SimulatedServer, reason
 from urc.simulator.servers.clients import READ_BYTES, ClientConnection, Clients, converse

@@ -15,7 +15,7 @@ from typing import Any
 import asyncssh
 
 from urc._folders import data_folder
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.problems import UrcError
 from urc.simulator.servers.base import Endpoint, ServerContext, host_and_port
 from urc.simulator.servers.clients import (
@@ -26,7 +26,7 @@ from urc.simulator.servers.clients import (
     converse,
 )
 from urc.simulator.servers.listening import Listener, ListeningServer
-from urc.simulator.servers.terminal import Keys, echo_of
+from urc.simulator.servers.terminal import TerminalInput, echo_of
 
 __all__ = ["SshServer"]
 
@@ -186,7 +186,7 @@ class _Talk:
     def __init__(self, context: ServerContext, process: "asyncssh.SSHServerProcess[bytes]") -> None:
         self._context = context
         self._process = process
-        self._keys = Keys(context.spec)
+        self._keys = TerminalInput(context.spec)
         self._is_terminal = process.term_type is not None
 
     async def run(self, client: ClientConnection) -> None:

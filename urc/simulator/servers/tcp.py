@@ -5,7 +5,7 @@ import socket
 from collections.abc import Sequence
 from contextlib import suppress
 
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.simulator.servers.base import Endpoint, ServerContext, host_and_port
 from urc.simulator.servers.clients import READ_BYTES, TAKEN_WITHIN_S, ClientConnection, converse
 from urc.simulator.servers.listening import StreamServer

@@ -3,12 +3,12 @@
 import asyncio
 from collections.abc import Sequence
 
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.simulator.servers.base import ServerContext
 from urc.simulator.servers.clients import READ_BYTES, TAKEN_WITHIN_S, ClientConnection, converse
 from urc.simulator.servers.listening import StreamServer
-from urc.simulator.servers.terminal import Keys, echo_of
-from urc.transports.telnet_protocol import BINARY, ECHO, NAWS, SGA, TTYPE, TelnetTalk
+from urc.simulator.servers.terminal import TerminalInput, echo_of
+from urc.transports.telnet_protocol import BINARY, ECHO, NAWS, SGA, TTYPE, TelnetNegotiation
 
 __all__ = ["TelnetServer"]
 
@@ -36,8 +36,8 @@ class _Talk:
         self._context = context
         self._reader = reader
         self._writer = writer
-        self._keys = Keys(context.spec)
-        self._telnet = TelnetTalk(
+        self._keys = TerminalInput(context.spec)
+        self._telnet = TelnetNegotiation(
             ours=frozenset((ECHO, SGA, BINARY)), theirs=frozenset((SGA, BINARY, TTYPE, NAWS))
         )
 

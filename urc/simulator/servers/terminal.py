@@ -7,12 +7,12 @@ from typing import Final
 
 from urc.model.driver import TransportSpec
 
-__all__ = ["Keys", "echo_of"]
+__all__ = ["TerminalInput", "echo_of"]
 
 _LINE_ENDS: Final = (b"\r", b"\n", b"\r\n")
 
 
-class Keys:
+class TerminalInput:
     """Input of one client, with the line ends that the driver declares."""
 
     def __init__(self, spec: TransportSpec) -> None:

@@ -10,7 +10,7 @@ import socket
 from collections.abc import Sequence
 from contextlib import suppress
 
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.simulator.servers.base import (
     Endpoint,
     ServerContext,

@@ -11,7 +11,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.typing import Subprotocol
 
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.simulator.servers.base import ServerContext
 from urc.simulator.servers.clients import ClientConnection, converse
 from urc.simulator.servers.http_auth import HttpAuth

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from urc.simulator.world.rays import Faces, first_hits
-from urc.simulator.world.sensors import Moment
+from urc.simulator.world.rays import EdgeArrays, first_hits
+from urc.simulator.world.sensors import SensorInput
 
 __all__ = ["sweep"]
 
@@ -17,7 +17,7 @@ _HEIGHT_M = 0.15
 """Height of the scanner above the robot's foot, in metres."""
 
 
-def sweep(faces: Faces, moment: Moment) -> Mapping[str, object]:
+def sweep(faces: EdgeArrays, moment: SensorInput) -> Mapping[str, object]:
     """Return ``world.laser``; a ray without echo within range has None."""
     spec, motion = moment.spec.laser, moment.motion
     step = (spec.last - spec.first) / spec.rays

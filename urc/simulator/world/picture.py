@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from urc.simulator.world.plan import Plan
-from urc.simulator.world.rays import Faces, cast
+from urc.simulator.world.plan import WorldMap
+from urc.simulator.world.rays import EdgeArrays, cast
 
-__all__ = ["Eye", "camera_picture", "jpeg", "panorama_picture"]
+__all__ = ["CameraPose", "camera_picture", "jpeg", "panorama_picture"]
 
 Array = NDArray[np.float32]
 _BINS: Final = 1440
@@ -35,7 +35,7 @@ _FAR_M: Final = 25.0
 _QUALITY: Final = 80
 
 
-class Eye(NamedTuple):
+class CameraPose(NamedTuple):
     """Pose of the camera; metres and radians."""
 
     x: float
@@ -49,7 +49,7 @@ class Eye(NamedTuple):
 
 
 def camera_picture(
-    plan: Plan, faces: Faces, eye: Eye, size: tuple[int, int], view: float
+    plan: WorldMap, faces: EdgeArrays, eye: CameraPose, size: tuple[int, int], view: float
 ) -> NDArray[np.uint8]:
     """Return the image ahead, as rows by columns by red, green and blue.
 
@@ -68,7 +68,7 @@ def camera_picture(
 
 
 def panorama_picture(
-    plan: Plan, faces: Faces, eye: Eye, size: tuple[int, int]
+    plan: WorldMap, faces: EdgeArrays, eye: CameraPose, size: tuple[int, int]
 ) -> NDArray[np.uint8]:
     """Return the panorama: a column for each direction, a row for each height."""
     columns, rows = size
@@ -116,7 +116,9 @@ def _rotation(pitch: float, roll: float) -> Array:
     return np.array(rows, dtype=np.float32)
 
 
-def _seen(plan: Plan, faces: Faces, eye: Eye, azimuth: Array, slope: Array) -> NDArray[np.uint8]:
+def _seen(
+    plan: WorldMap, faces: EdgeArrays, eye: CameraPose, azimuth: Array, slope: Array
+) -> NDArray[np.uint8]:
     """Return the colours in given directions: `azimuth` from ahead to the left, `slope` upwards."""
     direction = azimuth + np.float32(eye.yaw)
     picture = _open_country(plan, eye, direction, slope)
@@ -126,7 +128,7 @@ def _seen(plan: Plan, faces: Faces, eye: Eye, azimuth: Array, slope: Array) -> N
     return np.clip(picture, 0, 255).astype(np.uint8)
 
 
-def _open_country(plan: Plan, eye: Eye, direction: Array, slope: Array) -> Array:
+def _open_country(plan: WorldMap, eye: CameraPose, direction: Array, slope: Array) -> Array:
     """Return sky and ground."""
     above, horizon = (np.array(one, dtype=np.float32) for one in _SKY)
     share = np.clip(slope * 1.5, 0, 1)[..., None]
@@ -147,7 +149,7 @@ def _open_country(plan: Plan, eye: Eye, direction: Array, slope: Array) -> Array
 
 
 def _paint_edges(
-    picture: Array, faces: Faces, eye: Eye, bins: NDArray[np.int32], slope: Array
+    picture: Array, faces: EdgeArrays, eye: CameraPose, bins: NDArray[np.int32], slope: Array
 ) -> None:
     """Draw the obstacles, from the farthest to the nearest."""
     horizon = np.array(_SKY[1], dtype=np.float32)

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from urc.model.world import Box, PlanSpec, Wall
 
-__all__ = ["ROOM", "Edge", "Plan", "Touch"]
+__all__ = ["ROOM", "Edge", "WorldMap", "Contact"]
 
 
 class Edge(NamedTuple):
@@ -25,7 +25,7 @@ class Edge(NamedTuple):
     is_landmark: bool = False
 
 
-class Touch(NamedTuple):
+class Contact(NamedTuple):
     """Overlap of a circle with an edge."""
 
     x: float
@@ -58,7 +58,7 @@ ROOM: Final = PlanSpec(
 stairs down."""
 
 
-class Plan:
+class WorldMap:
     """A map, prepared for collision tests."""
 
     def __init__(self, spec: PlanSpec) -> None:
@@ -78,16 +78,16 @@ class Plan:
         ys = [value for edge in self.edges for value in (edge.y1, edge.y2)]
         return min(xs), min(ys), max(xs), max(ys)
 
-    def touch(self, x: float, y: float, z: float, radius: float) -> Touch | None:
+    def touch(self, x: float, y: float, z: float, radius: float) -> Contact | None:
         """Return the deepest overlap of a circle at a height with an edge; None if it is free."""
-        deepest: Touch | None = None
+        deepest: Contact | None = None
         for edge in self.edges:
             if z >= edge.height:
                 continue
             px, py = _nearest(edge, x, y)
             depth = radius - math.hypot(x - px, y - py)
             if depth > 0 and (deepest is None or depth > deepest.depth):
-                deepest = Touch(px, py, depth)
+                deepest = Contact(px, py, depth)
         return deepest
 
     def is_hole(self, x: float, y: float) -> bool:

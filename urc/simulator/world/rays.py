@@ -8,18 +8,18 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from urc.simulator.world.plan import Edge, Plan
+from urc.simulator.world.plan import Edge, WorldMap
 
-__all__ = ["Faces", "cast", "first_hits"]
+__all__ = ["EdgeArrays", "cast", "first_hits"]
 
 Numbers = NDArray[np.floating]
 _NEAREST: Final = 1e-6
 
 
-class Faces:
+class EdgeArrays:
     """The edges of a plan as arrays."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: WorldMap) -> None:
         """Convert the edges of `plan`."""
         edges: tuple[Edge, ...] = plan.edges
         self.start: Numbers = np.array([(one.x1, one.y1) for one in edges]).reshape(-1, 2)
@@ -30,7 +30,7 @@ class Faces:
         self.colour: Numbers = np.array([_rgb(one.colour) for one in edges]).reshape(-1, 3)
 
 
-def cast(faces: Faces, x: float, y: float, angles: Numbers) -> tuple[Numbers, Numbers]:
+def cast(faces: EdgeArrays, x: float, y: float, angles: Numbers) -> tuple[Numbers, Numbers]:
     """Return distance and position along the edge, for each ray and each edge.
 
     Args:
@@ -53,7 +53,7 @@ def cast(faces: Faces, x: float, y: float, angles: Numbers) -> tuple[Numbers, Nu
     return np.where(meets, distance, np.inf), share
 
 
-def first_hits(faces: Faces, x: float, y: float, z: float, angles: Numbers) -> Numbers:
+def first_hits(faces: EdgeArrays, x: float, y: float, z: float, angles: Numbers) -> Numbers:
     """Return the range of each ray at the height `z`, ``inf`` without an edge."""
     if not len(faces.height):
         return np.full(len(angles), np.inf)

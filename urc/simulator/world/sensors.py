@@ -12,9 +12,9 @@ from typing import Final, NamedTuple
 from urc.model.world import BodySpec, WorldSpec
 from urc.simulator.world.bodies import GRAVITY, Motion
 from urc.simulator.world.chance import gauss, uniform, wander
-from urc.simulator.world.plan import Plan, Touch
+from urc.simulator.world.plan import Contact, WorldMap
 
-__all__ = ["Battery", "Moment", "Odometry", "contact", "gps", "imu", "odometry", "quaternion"]
+__all__ = ["Battery", "SensorInput", "Odometry", "contact", "gps", "imu", "odometry", "quaternion"]
 
 _EQUATOR_M: Final = 6378137.0
 _SQUARE_OF_ECCENTRICITY: Final = 0.00669437999014
@@ -27,13 +27,13 @@ _REACH_M: Final = 0.06
 """Distance of cliff sensors beyond the robot's edge, in metres."""
 
 
-class Moment(NamedTuple):
+class SensorInput(NamedTuple):
     """The inputs of all sensors."""
 
     spec: WorldSpec
-    plan: Plan
+    plan: WorldMap
     motion: Motion
-    touch: Touch | None
+    touch: Contact | None
     tick: int
     time_s: float
     """Time, in seconds since the epoch."""
@@ -86,7 +86,7 @@ class Odometry:
         self.right += (motion.told_forward + motion.told_turn * self._half_track) * dt_s
 
 
-def odometry(moment: Moment, reckoned: Odometry) -> Mapping[str, object]:
+def odometry(moment: SensorInput, reckoned: Odometry) -> Mapping[str, object]:
     """Return ``world.odometry``."""
     motion = moment.motion
     x, y, z, w = quaternion(0.0, 0.0, reckoned.yaw)
@@ -109,7 +109,7 @@ def odometry(moment: Moment, reckoned: Odometry) -> Mapping[str, object]:
     }
 
 
-def imu(moment: Moment) -> Mapping[str, object]:
+def imu(moment: SensorInput) -> Mapping[str, object]:
     """Return ``world.imu``: acceleration with gravity, and attitude."""
     motion = moment.motion
     roll = motion.roll + 0.001 * moment.gauss("roll")
@@ -147,7 +147,7 @@ def place_on_earth(spec: WorldSpec, x: float, y: float) -> tuple[float, float]:
     return latitude + math.degrees(y / north_m), longitude + math.degrees(x / east_m)
 
 
-def gps(moment: Moment) -> Mapping[str, object]:
+def gps(moment: SensorInput) -> Mapping[str, object]:
     """Return ``world.gps``: x is east, y is north."""
     spec, motion, noise = moment.spec, moment.motion, moment.noise
     wide = 1.2 * noise
@@ -185,7 +185,7 @@ def _ddmm(degrees: float, width: int) -> str:
     return f"{int(whole):0{width}}{rest:07.4f}"
 
 
-def contact(moment: Moment) -> Mapping[str, object]:
+def contact(moment: SensorInput) -> Mapping[str, object]:
     """Return ``world.contact``: bumpers, and cliffs."""
     motion, body = moment.motion, moment.spec.body
     left = right = False
@@ -209,7 +209,7 @@ def contact(moment: Moment) -> Mapping[str, object]:
     }
 
 
-def _is_cliff(moment: Moment, body: BodySpec, angle: float) -> bool:
+def _is_cliff(moment: SensorInput, body: BodySpec, angle: float) -> bool:
     motion, reach = moment.motion, body.radius + _REACH_M
     direction = motion.yaw + angle
     x, y = motion.x + reach * math.cos(direction), motion.y + reach * math.sin(direction)

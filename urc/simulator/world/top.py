@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw
 
 from urc.model.world import BodySpec
 from urc.simulator.world.bodies import Motion, joints_of
-from urc.simulator.world.plan import Plan
+from urc.simulator.world.plan import WorldMap
 
 __all__ = ["top_picture"]
 
@@ -30,7 +30,7 @@ Point = tuple[float, float]
 class _Map:
     """The transform from metres to pixels."""
 
-    def __init__(self, plan: Plan, motion: Motion, size: tuple[int, int]) -> None:
+    def __init__(self, plan: WorldMap, motion: Motion, size: tuple[int, int]) -> None:
         low_x, low_y, high_x, high_y = plan.bounds
         if not plan.edges:
             low_x, high_x = motion.x - _OPEN_M / 2, motion.x + _OPEN_M / 2
@@ -45,7 +45,7 @@ class _Map:
 
 
 def top_picture(
-    plan: Plan, body: BodySpec, motion: Motion, trail: Iterable[Point], size: tuple[int, int]
+    plan: WorldMap, body: BodySpec, motion: Motion, trail: Iterable[Point], size: tuple[int, int]
 ) -> bytes:
     """Return the image, north (y) up.
 

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Final
 from urc.expressions import Template
 from urc.model.world import READINGS, WorldSpec
 from urc.simulator.world.bodies import Motion, joints_of, legs_of, move
-from urc.simulator.world.plan import ROOM, Plan, Touch
+from urc.simulator.world.plan import ROOM, Contact, WorldMap
 from urc.simulator.world.sensors import (
     Battery,
-    Moment,
     Odometry,
+    SensorInput,
     contact,
     gps,
     imu,
@@ -24,10 +24,10 @@ from urc.simulator.world.sensors import (
 )
 
 if TYPE_CHECKING:
-    from urc.simulator.world.picture import Eye
-    from urc.simulator.world.rays import Faces
+    from urc.simulator.world.picture import CameraPose
+    from urc.simulator.world.rays import EdgeArrays
 
-__all__ = ["FARTHEST_S", "STEP_S", "View", "World"]
+__all__ = ["FARTHEST_S", "STEP_S", "SensorView", "World"]
 
 STEP_S: Final = 0.02
 """Length of a step, in seconds."""
@@ -63,12 +63,12 @@ class World:
         holds: Callable[[Template | bool], bool] = bool,
     ) -> None:
         self.spec = spec
-        self.plan = Plan(ROOM if spec.map is None else spec.map)
+        self.plan = WorldMap(ROOM if spec.map is None else spec.map)
         x, y, yaw = spec.start
         self.motion = Motion(x=x, y=y, yaw=yaw)
         self.odometry = Odometry(spec)
         self.battery = Battery(spec)
-        self.touch: Touch | None = None
+        self.touch: Contact | None = None
         self.tick = 0
         """Steps since the beginning."""
         self.time_s: float | None = None
@@ -82,7 +82,7 @@ class World:
         self._trail: deque[tuple[float, float]] = deque([(x, y)], _TRAIL_MOST)
         self._kept: dict[object, tuple[float, bytes]] = {}
         """Kind of image → its time, and its bytes."""
-        self._faces: Faces | None = None
+        self._faces: EdgeArrays | None = None
 
     def advance(self, now_s: float) -> None:
         """Advance to `now_s` in whole steps; the remainder waits for the next call."""
@@ -104,10 +104,10 @@ class World:
         """Set the battery to nearly empty."""
         self.battery.drain(_LOW)
 
-    def view(self, now_s: float) -> "View":
+    def view(self, now_s: float) -> "SensorView":
         """Return the sensor view at `now_s`."""
         self.advance(now_s)
-        return View(self)
+        return SensorView(self)
 
     def top_view(self, width: int, height: int) -> bytes:
         """Return the world from above as JPEG, at most five new ones a second.
@@ -149,19 +149,19 @@ class World:
 
         return self._once("panorama", 0.5, draw)
 
-    def faces(self) -> "Faces":
+    def faces(self) -> "EdgeArrays":
         """Return the edges of the plan, for rays."""
         if self._faces is None:
-            from urc.simulator.world.rays import Faces
+            from urc.simulator.world.rays import EdgeArrays
 
-            self._faces = Faces(self.plan)
+            self._faces = EdgeArrays(self.plan)
         return self._faces
 
-    def _eye(self) -> "Eye":
-        from urc.simulator.world.picture import Eye
+    def _eye(self) -> "CameraPose":
+        from urc.simulator.world.picture import CameraPose
 
         motion, camera = self.motion, self.spec.camera
-        return Eye(
+        return CameraPose(
             motion.x,
             motion.y,
             motion.z + camera.mount_height,
@@ -211,7 +211,7 @@ class World:
             motion.y += dy / far * touch.depth
 
 
-class View(Mapping[str, object]):
+class SensorView(Mapping[str, object]):
     """The sensor view of a world: the names of `READINGS`, computed on access."""
 
     __slots__ = ("_world",)
@@ -261,8 +261,8 @@ _PLAIN: Final = {
 }
 
 
-def _moment(world: World) -> Moment:
-    return Moment(
+def _moment(world: World) -> SensorInput:
+    return SensorInput(
         world.spec,
         world.plan,
         world.motion,

@@ -17,16 +17,16 @@ from urc.config.messaging import MESSAGING
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError
-from urc.runtime.blanking import stand_ins
-from urc.runtime.hub import Note, Tap, Traffic
-from urc.runtime.selftest import sample_settings
+from urc.runtime.document_tests import sample_settings
+from urc.runtime.hub import EventTap, LogEntry, Traffic
+from urc.runtime.redaction import stand_ins
 from urc.web.dev import wire
 from urc.web.dev.preview import Preview, preview
-from urc.web.dev.rows import Row, note_row, traffic_row
+from urc.web.dev.rows import TrafficRow, note_row, traffic_row
 from urc.web.dev.tryout import pasted_bytes, try_out
 from urc.web.dev.watch import ProfileWatch
 from urc.web.fleet.robots import SessionFailed, missing_settings
-from urc.web.socket import STALL_S, Allowance, Flow, Line
+from urc.web.page_socket import STALL_S, ClientSocket, FlowControl, TokenBucket
 from urc.web.wire.messages import (
     CLOSE_BAD_MESSAGES,
     CLOSE_TOO_FAST,
@@ -61,13 +61,13 @@ class Backlog:
     def __init__(self) -> None:
         self.first = 0
         """Number of the oldest row."""
-        self._rows: deque[Row] = deque()
+        self._rows: deque[TrafficRow] = deque()
         self._bytes = 0
 
     def __len__(self) -> int:
         return len(self._rows)
 
-    def put(self, row: Row) -> None:
+    def put(self, row: TrafficRow) -> None:
         """Add a row; drop the oldest ones beyond the limit."""
         row.n = self.first + len(self._rows)
         self._rows.append(row)
@@ -75,11 +75,11 @@ class Backlog:
         while len(self._rows) > ROWS_KEPT or (self._bytes > BYTES_KEPT and len(self._rows) > 1):
             self._pop()
 
-    def take(self) -> list[Row]:
+    def take(self) -> list[TrafficRow]:
         """Remove and return the oldest rows, up to the limit of one message."""
         return [self._pop() for _ in range(min(ROWS_AT_ONCE, len(self._rows)))]
 
-    def _pop(self) -> Row:
+    def _pop(self) -> TrafficRow:
         row = self._rows.popleft()
         self._bytes -= row.weight
         self.first += 1
@@ -97,7 +97,7 @@ class _Known(NamedTuple):
 class DevClient:
     """The server's side of one developer page, until either side closes."""
 
-    def __init__(self, line: Line, watch: ProfileWatch, flow: Flow) -> None:
+    def __init__(self, line: ClientSocket, watch: ProfileWatch, flow: FlowControl) -> None:
         self._line = line
         self._watch = watch
         self._station = watch.station
@@ -106,9 +106,11 @@ class DevClient:
         self._news = asyncio.Event()
         self._backlog = Backlog()
         self._answers: deque[str] = deque()
-        self._questions: asyncio.Queue[wire.Try | wire.Show] = asyncio.Queue(QUESTIONS)
+        self._questions: asyncio.Queue[wire.ParseRequest | wire.PreviewRequest] = asyncio.Queue(
+            QUESTIONS
+        )
         self._closing: tuple[int, str] | None = None
-        self._allowance = Allowance(MESSAGES_PER_S, self._clock.now())
+        self._allowance = TokenBucket(MESSAGES_PER_S, self._clock.now())
         self._bad = 0
         self._edition = -1
 
@@ -156,24 +158,24 @@ class DevClient:
                         listening.cancel()
                         ended.cancel()
 
-    async def _listen(self, tap: Tap) -> None:
+    async def _listen(self, tap: EventTap) -> None:
         dropped = 0
         while True:
             await tap.filled()
             for one in tap.take():
                 if isinstance(one, Traffic):
                     self._put(traffic_row(one))
-                elif isinstance(one, Note):
+                elif isinstance(one, LogEntry):
                     self._put(note_row(one))
             if tap.dropped > dropped:
                 lost, dropped = tap.dropped - dropped, tap.dropped
                 text = f"{lost} rows of traffic were lost: the server cannot keep up"
                 self._put(note_row(self._note(text)))
 
-    def _note(self, text: str) -> Note:
-        return Note(self._clock.now(), "warning", "URC", text)
+    def _note(self, text: str) -> LogEntry:
+        return LogEntry(self._clock.now(), "warning", "URC", text)
 
-    def _put(self, row: Row) -> None:
+    def _put(self, row: TrafficRow) -> None:
         self._backlog.put(row)
         self._news.set()
 
@@ -274,21 +276,23 @@ class DevClient:
             self._say(await asyncio.to_thread(_answered, asked, known))
 
 
-def _answered(asked: wire.Try | wire.Show, known: _Known) -> str:
+def _answered(asked: wire.ParseRequest | wire.PreviewRequest, known: _Known) -> str:
     try:
-        return _tried(asked, known) if isinstance(asked, wire.Try) else _shown(asked, known)
+        return (
+            _tried(asked, known) if isinstance(asked, wire.ParseRequest) else _shown(asked, known)
+        )
     except Exception as bug:  # a supervisor: a bug costs the answer
         log.exception("a request of a developer page failed")
         return _refused(asked, f"it failed inside URC ({type(bug).__name__}: {bug})")
 
 
-def _refused(asked: wire.Try | wire.Show, text: str) -> str:
-    if isinstance(asked, wire.Try):
+def _refused(asked: wire.ParseRequest | wire.PreviewRequest, text: str) -> str:
+    if isinstance(asked, wire.ParseRequest):
         return wire.encode_tried(asked.id, None, text)
     return wire.encode_shown(asked.id, Preview(text))
 
 
-def _tried(asked: wire.Try, known: _Known) -> str:
+def _tried(asked: wire.ParseRequest, known: _Known) -> str:
     spec = known.profile.driver.transports.get(asked.transport)
     encoding = spec.encoding if spec else "utf-8"
     try:
@@ -299,6 +303,6 @@ def _tried(asked: wire.Try, known: _Known) -> str:
     return wire.encode_tried(asked.id, found)
 
 
-def _shown(asked: wire.Show, known: _Known) -> str:
+def _shown(asked: wire.PreviewRequest, known: _Known) -> str:
     found = preview(known.profile.driver, known.settings, asked.command, asked.arguments)
     return wire.encode_shown(asked.id, found)

@@ -9,23 +9,23 @@ from typing import NamedTuple
 
 from urc.expressions import COUNTERS, ExpressionError, Template
 from urc.model import sequence
-from urc.model.codec import Payload, WriteSpec
 from urc.model.driver import Command, Driver
+from urc.model.payload import Payload, WriteSpec
 from urc.problems import UrcError
-from urc.protocol.codec import CodecContext
-from urc.protocol.commands import questions
-from urc.protocol.encode import build_encode, check_arguments
-from urc.protocol.framing import build_framing
-from urc.protocol.gate import Counters
+from urc.protocol.framing.table import build_framing
+from urc.protocol.requests.encode import build_encode, check_arguments
+from urc.protocol.requests.rate import Counters
+from urc.protocol.sequences.commands import questions
+from urc.protocol.values.payload import CodecContext
 
-__all__ = ["Preview", "Written", "preview"]
+__all__ = ["Preview", "PreviewLine", "preview"]
 
 MOST_FRAMES = 200
 MOST_WITHIN = 8
 """Deepest nesting of sequences that run each other."""
 
 
-class Written(NamedTuple):
+class PreviewLine(NamedTuple):
     """One line of a preview: a frame, or a step between two frames."""
 
     transport: str
@@ -40,7 +40,7 @@ class Preview(NamedTuple):
 
     refusal: str
     """Reason of a refusal, or ""."""
-    frames: tuple[Written, ...] = ()
+    frames: tuple[PreviewLine, ...] = ()
     questions: tuple[str, ...] = ()
     """Questions to the operator before the command runs."""
     requires: tuple[str, ...] = ()
@@ -85,7 +85,7 @@ def _frames(
     command: Command,
     values: Mapping[str, object],
     depth: int,
-) -> Iterator[Written]:
+) -> Iterator[PreviewLine]:
     names = {"settings": settings, **values}
     if not command.steps:
         yield _written(driver, settings, command.transport, command.send, names)
@@ -93,13 +93,13 @@ def _frames(
     for step in sequence.all_steps(command.steps):
         if isinstance(step, sequence.SendStep):
             if step.is_secret:
-                yield Written("", b"", f"sends a secret on {step.transport}")
+                yield PreviewLine("", b"", f"sends a secret on {step.transport}")
             else:
                 yield _written(driver, settings, step.transport, step.send, names)
         elif isinstance(step, sequence.RunStep) and depth < MOST_WITHIN:
             yield from _run(driver, settings, step, names, depth)
         else:
-            yield Written("", b"", _in_words(step))
+            yield PreviewLine("", b"", _in_words(step))
 
 
 def _run(
@@ -108,8 +108,8 @@ def _run(
     step: sequence.RunStep,
     names: Mapping[str, object],
     depth: int,
-) -> Iterator[Written]:
-    yield Written("", b"", f"runs {step.command}")
+) -> Iterator[PreviewLine]:
+    yield PreviewLine("", b"", f"runs {step.command}")
     inner = driver.commands[step.command]
     try:
         given = {
@@ -118,7 +118,7 @@ def _run(
         }
         yield from _frames(driver, settings, inner, check_arguments(inner, given), depth + 1)
     except ExpressionError as error:
-        yield Written("", b"", f"its arguments are only known at run time: {error}")
+        yield PreviewLine("", b"", f"its arguments are only known at run time: {error}")
 
 
 def _written(
@@ -127,7 +127,7 @@ def _written(
     transport: str,
     send: WriteSpec,
     names: Mapping[str, object],
-) -> Written:
+) -> PreviewLine:
     spec = driver.transports[transport]
     context = CodecContext(spec.encoding, settings)
     if COUNTERS in send.names:
@@ -135,8 +135,8 @@ def _written(
     try:
         payload = build_encode(send, build_framing(spec.framing), context)(names)
     except UrcError as error:
-        return Written(transport, b"", str(error))
-    return Written(transport, payload, "")
+        return PreviewLine(transport, b"", str(error))
+    return PreviewLine(transport, payload, "")
 
 
 def _in_words(step: sequence.Step) -> str:

@@ -18,8 +18,8 @@ from starlette.websockets import WebSocket
 
 from urc.web.dev.client import DevClient
 from urc.web.dev.watch import ProfileWatch, Remake
-from urc.web.fleet.robots import Robot, Station
-from urc.web.show.pages import Head, render
+from urc.web.fleet.robots import Robot, RobotService
+from urc.web.show.pages import PageHead, render
 from urc.web.wire import messages as wire
 
 __all__ = ["HOW_TO_TURN_ON", "Dev", "DevPage", "dev_url", "no_dev_routes"]
@@ -34,7 +34,7 @@ CLIENTS = 16
 class DevPage:
     """``dev.html.j2``; the two sockets bring all other data."""
 
-    head: Head
+    head: PageHead
     title: str
     url: str
     """Path of the robot's own page."""
@@ -65,7 +65,7 @@ class Dev:
 
     def __init__(
         self,
-        stations: Mapping[str, Station],
+        stations: Mapping[str, RobotService],
         remake: Mapping[str, Remake],
         take: Callable[[str, Robot], None],
         is_here: Callable[[HTTPConnection], bool],
@@ -108,7 +108,7 @@ class Dev:
         title = watch.station.robot.profile.title or name
         quoted = quote(name, safe="")
         page = DevPage(
-            head=Head(request.state.nonce, f"Dev: {title}"),
+            head=PageHead(request.state.nonce, f"Dev: {title}"),
             title=title,
             url=f"/robots/{quoted}/",
             values=f"/ws?robot={quoted}",

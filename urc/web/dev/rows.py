@@ -8,13 +8,13 @@ import json
 import msgspec
 
 from urc.images import MAX_PIXELS, media_type, pixels
-from urc.model.codec import Envelope
-from urc.runtime.hub import Note, Traffic
+from urc.model.payload import Envelope
+from urc.runtime.hub import LogEntry, Traffic
 from urc.web.wire.text import cut
 
 __all__ = [
     "SHOWN_BYTES",
-    "Row",
+    "TrafficRow",
     "fill",
     "grouped",
     "note_row",
@@ -30,7 +30,7 @@ _NAMES = ("topic", "action", "service", "method", "path", "url")
 """Attributes with the source or target of a message, by priority."""
 
 
-class Row(msgspec.Struct, omit_defaults=True):
+class TrafficRow(msgspec.Struct, omit_defaults=True):
     """One line of the traffic log."""
 
     n: int
@@ -57,9 +57,9 @@ class Row(msgspec.Struct, omit_defaults=True):
         return 100 + len(self.data) + len(self.text) + len(self.more)
 
 
-def traffic_row(traffic: Traffic) -> Row:
+def traffic_row(traffic: Traffic) -> TrafficRow:
     """Return the row of sent or received data."""
-    row = Row(0, traffic.time_s, traffic.direction, traffic.transport)
+    row = TrafficRow(0, traffic.time_s, traffic.direction, traffic.transport)
     if traffic.envelope is not None:
         fill(row, traffic.envelope)
     else:
@@ -67,12 +67,12 @@ def traffic_row(traffic: Traffic) -> Row:
     return row
 
 
-def note_row(note: Note) -> Row:
+def note_row(note: LogEntry) -> TrafficRow:
     """Return the row of a fault or a change of state."""
-    return Row(0, note.time_s, "note", note.source, level=note.level, text=cut(note.text))
+    return TrafficRow(0, note.time_s, "note", note.source, level=note.level, text=cut(note.text))
 
 
-def fill(row: Row, envelope: Envelope) -> None:
+def fill(row: TrafficRow, envelope: Envelope) -> None:
     """Write a message into a row: verb, address, other attributes and body."""
     named = [name for name in _NAMES if envelope.attributes.get(name) is not None]
     told = [str(envelope.attributes[name]) for name in named]
@@ -92,7 +92,7 @@ def fill(row: Row, envelope: Envelope) -> None:
         row.text = cut(text)
 
 
-def _fill_bytes(row: Row, data: bytes) -> None:
+def _fill_bytes(row: TrafficRow, data: bytes) -> None:
     row.size = len(data)  # size of the shown text: the length of a secret must not leak
     kind = media_type(data)
     if kind in _SHOWN:

@@ -15,14 +15,14 @@ from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route
 
 from urc.problems import UrcError
-from urc.runtime.opened import open_document
+from urc.runtime.open_profile import open_document
 from urc.web.dev.watch import Remake
 from urc.web.fleet.fleet import Fleet
 from urc.web.fleet.robots import Robot
 from urc.web.manage.routes import answer, told
-from urc.web.manage.wire import Started
-from urc.web.show.menu import Nav, SettingRow, Ways, setting_row
-from urc.web.show.pages import Head, render
+from urc.web.manage.wire import ReloadResult
+from urc.web.show.menu import Nav, NavigationLinks, SettingRow, setting_row
+from urc.web.show.pages import PageHead, render
 from urc.web.words import t
 
 __all__ = ["DevStart", "DevStartPage", "no_dev_start"]
@@ -31,7 +31,7 @@ _NO_STORE = {"cache-control": "no-store"}
 
 
 @dataclass(frozen=True, slots=True)
-class Fixed:
+class PinnedRobot:
     """One robot with its fixed values."""
 
     name: str
@@ -47,9 +47,9 @@ class Fixed:
 class DevStartPage:
     """``dev_start.html.j2``: the fixed values, and the start button."""
 
-    head: Head
+    head: PageHead
     nav: Nav
-    robots: tuple[Fixed, ...]
+    robots: tuple[PinnedRobot, ...]
 
 
 class DevStart:
@@ -60,7 +60,7 @@ class DevStart:
         fleet: Fleet,
         remake: Mapping[str, Remake],
         take: Callable[[str, Robot], None],
-        ways: Ways,
+        ways: NavigationLinks,
         is_here: Callable[[HTTPConnection], bool],
     ) -> None:
         """Prepare.
@@ -91,7 +91,7 @@ class DevStart:
             raise HTTPException(
                 403, t("The dev interface needs the key in the address that URC printed.")
             )
-        head = Head(request.state.nonce, t("Dev interface"))
+        head = PageHead(request.state.nonce, t("Dev interface"))
         robots = tuple(
             _fixed(name, self._fleet.robots[name])
             for name in self._remake
@@ -115,7 +115,7 @@ class DevStart:
             self._take(name, robot)
         except (UrcError, OSError) as error:
             return told(422, str(error).strip().partition("\n")[0])
-        return answer(Started(t("read anew"), f"/robots/{quote(name, safe='')}/"))
+        return answer(ReloadResult(t("read anew"), f"/robots/{quote(name, safe='')}/"))
 
     def _read(self, name: str) -> Robot:
         return self._remake[name](open_document(self._fleet.robots[name].profile.file))
@@ -130,11 +130,11 @@ def no_dev_start() -> list[Route]:
     return [Route("/dev", tell)]
 
 
-def _fixed(name: str, robot: Robot) -> Fixed:
+def _fixed(name: str, robot: Robot) -> PinnedRobot:
     profile = robot.profile
     place = quote(name, safe="")
     first = next(iter(profile.interfaces.values()), None)
-    return Fixed(
+    return PinnedRobot(
         name=name,
         title=profile.title or name,
         file=profile.file,

@@ -11,20 +11,20 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from urc.config.messaging import MESSAGING
-from urc.model.codec import Envelope, ReadSpec
 from urc.model.driver import Driver, Reply, TransportSpec
+from urc.model.payload import Envelope, ReadSpec
 from urc.model.sequence import ExpectStep, all_steps
 from urc.patterns import Pattern
 from urc.problems import UrcError
-from urc.protocol.answer import Answer, Ear, Matcher
-from urc.protocol.codec import BadItem, BadText, CodecContext, Frame
-from urc.protocol.forms import build_reader
-from urc.protocol.framing import build_framing
-from urc.protocol.framings.base import FrameFault
-from urc.protocol.readings import Readings
-from urc.protocol.topics import frame_of, topic_of
+from urc.protocol.forms.table import build_reader
+from urc.protocol.forms.topics import frame_of, topic_of
+from urc.protocol.framing.base import FrameFault
+from urc.protocol.framing.table import build_framing
+from urc.protocol.readings.readings import Readings
+from urc.protocol.requests.reply_match import CompiledReply, Expectation, Matcher
+from urc.protocol.values.payload import BadItem, BadText, CodecContext, Frame
 
-__all__ = ["MOST_BYTES", "Finding", "Piece", "Taker", "pasted_bytes", "try_out"]
+__all__ = ["MOST_BYTES", "ParseResult", "ParsedPiece", "FrameConsumer", "pasted_bytes", "try_out"]
 
 MOST_BYTES = 64 * 1024
 MOST_PIECES = 200
@@ -34,7 +34,7 @@ _ESCAPES = {"n": b"\n", "r": b"\r", "t": b"\t", "0": b"\0", "e": b"\x1b", "\\": 
 _ESCAPE = re.compile(r"\\(x[0-9A-Fa-f]{2}|.|$)", re.DOTALL)
 
 
-class Taker(NamedTuple):
+class FrameConsumer(NamedTuple):
     """The consumer of a frame."""
 
     kind: str
@@ -48,7 +48,7 @@ class Taker(NamedTuple):
     """Invalid values with the reason; of an error reply, its text for people."""
 
 
-class Piece(NamedTuple):
+class ParsedPiece(NamedTuple):
     """One frame, or bytes outside any frame."""
 
     start: int
@@ -58,16 +58,16 @@ class Piece(NamedTuple):
     """Its payload: without delimiter, length or checksum."""
     fault: str
     """Why the bytes are no frame; "" for a frame."""
-    takers: tuple[Taker, ...] = ()
+    takers: tuple[FrameConsumer, ...] = ()
     reasons: tuple[str, ...] = ()
     """Reason of each candidate that does not match, if none does."""
 
 
-class Finding(NamedTuple):
+class ParseResult(NamedTuple):
     """The result of a try-out."""
 
     size: int
-    pieces: tuple[Piece, ...]
+    pieces: tuple[ParsedPiece, ...]
     left: int
     """Bytes of an incomplete frame at the end."""
     more: int
@@ -81,7 +81,7 @@ class _Candidate(NamedTuple):
     name: str
     read: ReadSpec
     matcher: Matcher
-    ear: Ear | None
+    ear: Expectation | None
 
 
 def pasted_bytes(text: str, *, is_hex: bool, encoding: str) -> bytes:
@@ -108,7 +108,7 @@ def try_out(
     transport: str,
     data: bytes,
     topic: str = "",
-) -> Finding:
+) -> ParseResult:
     """Return the frames in `data` and their consumers.
 
     Args:
@@ -128,16 +128,18 @@ def try_out(
     if spec.type in MESSAGING:
         frame = frame_of(_envelope(spec, data, topic), spec.encoding)
         takers, reasons = _take(frame, asked, spec, settings)
-        return Finding(len(data), (Piece(0, len(data), data, "", takers, reasons),), 0, 0)
-    pieces: list[Piece] = []
+        return ParseResult(len(data), (ParsedPiece(0, len(data), data, "", takers, reasons),), 0, 0)
+    pieces: list[ParsedPiece] = []
     cut, left, more = _cut(spec, data)
     for start, end, found in cut:
         if isinstance(found, FrameFault):
-            pieces.append(Piece(start, end, data[start:end], f"{found.code}: {found.message}"))
+            pieces.append(
+                ParsedPiece(start, end, data[start:end], f"{found.code}: {found.message}")
+            )
             continue
         takers, reasons = _take(Frame(found, spec.encoding), asked, spec, settings)
-        pieces.append(Piece(start, end, found, "", takers, reasons))
-    return Finding(len(data), tuple(pieces), left, more)
+        pieces.append(ParsedPiece(start, end, found, "", takers, reasons))
+    return ParseResult(len(data), tuple(pieces), left, more)
 
 
 def _cut(
@@ -177,8 +179,8 @@ def _envelope(spec: TransportSpec, data: bytes, topic: str) -> Envelope:
 
 def _take(
     frame: Frame, asked: list[_Candidate], spec: TransportSpec, settings: Mapping[str, object]
-) -> tuple[tuple[Taker, ...], tuple[str, ...]]:
-    takers: list[Taker] = []
+) -> tuple[tuple[FrameConsumer, ...], tuple[str, ...]]:
+    takers: list[FrameConsumer] = []
     for one in asked:
         if one.kind == "message" and any(taker.kind == "message" for taker in takers):
             continue  # the first match consumes the frame
@@ -192,7 +194,7 @@ def _take(
     return tuple(takers), reasons
 
 
-def _add(takers: list[Taker], taker: Taker) -> None:
+def _add(takers: list[FrameConsumer], taker: FrameConsumer) -> None:
     """Add a consumer; merge it into an equal one."""
     for place, other in enumerate(takers):
         if other._replace(names=()) == taker._replace(names=()) and taker.kind != "message":
@@ -201,7 +203,7 @@ def _add(takers: list[Taker], taker: Taker) -> None:
     takers.append(taker)
 
 
-def _taken(frame: Frame, one: _Candidate) -> Taker | None:
+def _taken(frame: Frame, one: _Candidate) -> FrameConsumer | None:
     if one.ear is None:
         found = one.matcher.read(frame)
     else:
@@ -209,13 +211,13 @@ def _taken(frame: Frame, one: _Candidate) -> Taker | None:
         if offer is None:
             return None
         if offer.refusal:
-            return Taker("refusal", (one.name,), {}, (), (offer.refusal,))
+            return FrameConsumer("refusal", (one.name,), {}, (), (offer.refusal,))
         found = offer.fields
     if found is None:
         return None
     samples, refused = one.matcher.decode(found, 0.0)
     told = tuple((each.signal, each.value, each.alarm) for each in samples)
-    return Taker(one.kind, (one.name,), dict(found), told, tuple(refused))
+    return FrameConsumer(one.kind, (one.name,), dict(found), told, tuple(refused))
 
 
 def _why_not(
@@ -258,7 +260,7 @@ def _candidates(
     for name, reply in _replies(driver, spec):
         mine = matcher(reply.read)
         faults = tuple((matcher(one.read), one.text) for one in reply.faults)
-        ear = Ear(Answer(mine, 0.0, reply.errors, faults, reply.read.lines))
+        ear = Expectation(CompiledReply(mine, 0.0, reply.errors, faults, reply.read.lines))
         found.append(_Candidate("reply", name, reply.read, mine, ear))
     return found
 

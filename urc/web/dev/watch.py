@@ -13,13 +13,13 @@ from typing import Literal, NamedTuple
 from urc.config.load import check
 from urc.model.profile import Profile
 from urc.problems import Problem, ProblemsError, UrcError, has_errors
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.changes import PERIOD_S, Watched
-from urc.runtime.selftest import exercise
-from urc.runtime.shelves import shelf_of
-from urc.web.fleet.robots import Robot, Station
+from urc.runtime.document_tests import exercise
+from urc.runtime.file_watch import PERIOD_S, FileWatcher
+from urc.runtime.registries import built_in_catalog
+from urc.runtime.widget_registry import shelf_of
+from urc.web.fleet.robots import Robot, RobotService
 
-__all__ = ["Examined", "ProfileWatch", "Remake", "examine"]
+__all__ = ["CheckedProfile", "ProfileWatch", "Remake", "examine"]
 
 Remake = Callable[[Profile], Robot]
 """Makes the robot of a new version of its profile; may raise `UrcError`."""
@@ -28,7 +28,7 @@ State = Literal["running", "waiting", "broken"]
 log = logging.getLogger(__name__)
 
 
-class Examined(NamedTuple):
+class CheckedProfile(NamedTuple):
     """The result of `urc validate` for a file."""
 
     profile: Profile | None
@@ -38,20 +38,20 @@ class Examined(NamedTuple):
     """Paths of all documents of the profile."""
 
 
-def examine(file: str) -> Examined:
+def examine(file: str) -> CheckedProfile:
     """Check a document and run its tests."""
     checked = check(file, built_in_catalog(), shelf_of(file))
     problems = checked.problems
     if checked.profile is not None:
         problems = (*problems, *exercise(checked.profile).problems)
-    return Examined(checked.profile, problems, checked.files)
+    return CheckedProfile(checked.profile, problems, checked.files)
 
 
 @dataclass(slots=True)
 class ProfileWatch:
     """The watch over the documents of one robot."""
 
-    station: Station
+    station: RobotService
     remake: Remake
     take: Callable[[Robot], None]
     """Switches all users to another version; may raise `UrcError`."""
@@ -78,7 +78,7 @@ class ProfileWatch:
     async def run(self) -> None:
         """Watch until cancelled."""
         sleep = self.station.clock.sleep
-        watched = Watched([self.file])
+        watched = FileWatcher([self.file])
         found = await asyncio.to_thread(examine, self.file)
         self.problems = found.problems
         self._tell("running", "")
@@ -89,7 +89,7 @@ class ProfileWatch:
                 await sleep(PERIOD_S)
             await self._settled(watched)
             # Taken before the file is read, so that no change is missed.
-            watched = Watched((self.file, *found.files))
+            watched = FileWatcher((self.file, *found.files))
             try:
                 found = await asyncio.to_thread(examine, self.file)
                 self._judge(found)
@@ -97,14 +97,14 @@ class ProfileWatch:
                 log.exception("%s could not be checked", self.file)
                 self._tell("broken", f"the check failed ({type(bug).__name__}: {bug})")
 
-    async def _settled(self, watched: Watched) -> None:
+    async def _settled(self, watched: FileWatcher) -> None:
         """Wait until the files are stable: a program may write a file in several steps."""
         before: list[object] = []
         while (now := watched.states()) != before:
             before = now
             await self.station.clock.sleep(PERIOD_S)
 
-    def _judge(self, found: Examined) -> None:
+    def _judge(self, found: CheckedProfile) -> None:
         self.problems = found.problems
         name = self.robot.profile.name
         if found.profile is None:

@@ -5,8 +5,8 @@ Layer 5. JSON text both ways; bytes travel as base64. Server → page, by ``t``:
     hello    once, first
     profile  the profile, its state and its problems
     rows     traffic and notes, oldest first; a gap in the numbers shows dropped rows
-    tried    the reply to `Try`
-    shown    the reply to `Show`
+    tried    the reply to `ParseRequest`
+    shown    the reply to `PreviewRequest`
     pong, error   as on the dashboard's WebSocket
 
 Page → server: ``ping``, ``try`` and ``show``.
@@ -17,19 +17,19 @@ from collections.abc import Iterable, Mapping
 
 import msgspec
 
-from urc.model.codec import Envelope
 from urc.model.driver import Argument, Command, Driver
+from urc.model.payload import Envelope
 from urc.problems import Problem, to_text
-from urc.web.dev.preview import Preview, Written
-from urc.web.dev.rows import SHOWN_BYTES, Row, fill, grouped
-from urc.web.dev.tryout import Finding, Piece, Taker
+from urc.web.dev.preview import Preview, PreviewLine
+from urc.web.dev.rows import SHOWN_BYTES, TrafficRow, fill, grouped
+from urc.web.dev.tryout import FrameConsumer, ParsedPiece, ParseResult
 from urc.web.wire.messages import Ping, decoded
 from urc.web.wire.text import Outbound, cut, encoded, milliseconds
 
 __all__ = [
     "Inbound",
-    "Show",
-    "Try",
+    "PreviewRequest",
+    "ParseRequest",
     "decode",
     "encode_hello",
     "encode_profile",
@@ -41,7 +41,9 @@ __all__ = [
 MOST_PROBLEMS = 100
 
 
-class Try(msgspec.Struct, tag_field="t", tag="try", forbid_unknown_fields=True, frozen=True):
+class ParseRequest(
+    msgspec.Struct, tag_field="t", tag="try", forbid_unknown_fields=True, frozen=True
+):
     """Requests a try-out of the parser with pasted text."""
 
     id: int
@@ -54,7 +56,9 @@ class Try(msgspec.Struct, tag_field="t", tag="try", forbid_unknown_fields=True, 
 _Scalar = bool | int | float | str
 
 
-class Show(msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True):
+class PreviewRequest(
+    msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True
+):
     """Requests a preview of a command."""
 
     id: int
@@ -62,7 +66,7 @@ class Show(msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True
     arguments: dict[str, bool | int | float | str | tuple[_Scalar, ...] | None] = {}
 
 
-Inbound = Ping | Try | Show
+Inbound = Ping | ParseRequest | PreviewRequest
 _decoder: msgspec.json.Decoder[Inbound] = msgspec.json.Decoder(Inbound)
 
 
@@ -82,7 +86,7 @@ class _Hello(Outbound, tag="hello", omit_defaults=False, frozen=True):
 class _Rows(Outbound, tag="rows", omit_defaults=False, frozen=True):
     first: int
     now: int
-    rows: list[Row]
+    rows: list[TrafficRow]
     """Rows with their ages in milliseconds; see `encode_rows`."""
 
 
@@ -183,7 +187,7 @@ def encode_hello(robot: str, now_s: float) -> str:
     return encoded(_Hello(robot, milliseconds(now_s)))
 
 
-def encode_rows(rows: Iterable[Row], first: int, now_s: float) -> str:
+def encode_rows(rows: Iterable[TrafficRow], first: int, now_s: float) -> str:
     """Return rows of the traffic log; `first` is the number of the first row."""
     aged = [
         msgspec.structs.replace(row, time_s=max(0, milliseconds(now_s - row.time_s)))
@@ -223,7 +227,7 @@ def encode_profile(
     return encoded(_Profile(edition, state, file, told, found[:MOST_PROBLEMS], lines, commands))
 
 
-def encode_tried(number: int, finding: Finding | None, error: str = "") -> str:
+def encode_tried(number: int, finding: ParseResult | None, error: str = "") -> str:
     """Return the result of a try-out."""
     if finding is None:
         return encoded(_Tried(number, cut(error)))
@@ -263,13 +267,13 @@ def _argument(one: Argument) -> _Argument:
     )
 
 
-def _piece(piece: Piece) -> _Piece:
+def _piece(piece: ParsedPiece) -> _Piece:
     takers = [_taker(one) for one in piece.takers]
     data = piece.data[:SHOWN_BYTES]
     return _Piece(piece.start, piece.end, data, cut(piece.fault), takers, piece.reasons)
 
 
-def _taker(taker: Taker) -> _Taker:
+def _taker(taker: FrameConsumer) -> _Taker:
     fields = {name: _word(value) for name, value in taker.fields.items()}
     samples = [(name, _word(value), alarm) for name, value, alarm in taker.samples]
     return _Taker(taker.kind, taker.names, fields, samples, taker.refused)
@@ -283,13 +287,13 @@ def _word(value: object) -> str:
     return cut(repr(value))
 
 
-def _frame(written: Written) -> _Frame:
+def _frame(written: PreviewLine) -> _Frame:
     payload = written.payload
     if written.text:
         return _Frame(written.transport, written.text)
     if not isinstance(payload, Envelope):
         return _Frame(written.transport, data=payload[:SHOWN_BYTES], size=len(payload))
-    row = Row(0, 0.0, "sent", written.transport)
+    row = TrafficRow(0, 0.0, "sent", written.transport)
     fill(row, payload)
     return _Frame(
         written.transport, "", row.data, row.size, row.verb, row.address, row.more, row.text

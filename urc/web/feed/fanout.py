@@ -11,14 +11,14 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from urc.model.values import NOTHING, Sample
-from urc.runtime.clock import Alarm, Clock, LoopClock
+from urc.runtime.clock import Clock, LoopClock, Timer
 from urc.runtime.hub import Hub
-from urc.web.feed.picture_shelf import Looks, PictureShelf, is_picture
+from urc.web.feed.image_cache import ImageCache, ImageSubscription, is_picture
 from urc.web.wire.ask import encode_progress
 from urc.web.wire.messages import Indexes, encode_links, encode_log, encode_values
 from urc.web.wire.picture import as_frame
 
-__all__ = ["FRAMES_PER_SECOND", "Fanout", "Known", "Pacer", "Place"]
+__all__ = ["FRAMES_PER_SECOND", "Fanout", "FanoutPosition", "Pacer", "Place"]
 
 FRAMES_PER_SECOND = 60.0
 LOG_LINES_FOR_NEWCOMERS = 50
@@ -26,7 +26,7 @@ SHARED_FOR_S = 0.005
 """Reuse of an encoded frame, in seconds; its ages count from its encoding."""
 
 
-class Known(NamedTuple):
+class FanoutPosition(NamedTuple):
     """A client's position in the robot's state."""
 
     revision: int = 0
@@ -45,14 +45,14 @@ class Known(NamedTuple):
 class Place:
     """One client's position in values and images."""
 
-    known: Known = field(default_factory=Known)
-    looks: Looks = field(default_factory=Looks)
+    known: FanoutPosition = field(default_factory=FanoutPosition)
+    looks: ImageSubscription = field(default_factory=ImageSubscription)
 
 
 class _Update(NamedTuple):
-    """The news for every client with the same `Known`."""
+    """The news for every client with the same `FanoutPosition`."""
 
-    after: Known
+    after: FanoutPosition
     frames: bytes
     """WebSocket frames, one after the other."""
     time_s: float
@@ -96,16 +96,16 @@ class Fanout:
         self._pacer = Pacer(rate_hz)
         self._head = 0
         """Hub revision of the last flush: newer values wait for the next one."""
-        self._updates: dict[Known, _Update] = {}
+        self._updates: dict[FanoutPosition, _Update] = {}
         self._encoded_at = -1
         """Hub revision of `_updates`."""
-        self._due: Alarm | None = None
+        self._due: Timer | None = None
         """The next flush."""
         self._loop: asyncio.AbstractEventLoop | None = None
         """The event loop while this runs."""
         self._broken: asyncio.Future[None] | None = None
         self._pictures = {name for name, signal in hub.signals.items() if is_picture(signal)}
-        self.shelf = PictureShelf(hub, self._clock)
+        self.shelf = ImageCache(hub, self._clock)
 
     async def run(self) -> None:
         """Flush until cancelled, or raise the exception of a flush."""
@@ -150,7 +150,7 @@ class Fanout:
         """Call `wake`, which must not block, at each flush; return the client's position."""
         self._wakes.add(wake)
         notes = max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS)
-        return Place(Known(notes=notes, joined=self.hub.revision))
+        return Place(FanoutPosition(notes=notes, joined=self.hub.revision))
 
     def leave(self, wake: Callable[[], None]) -> None:
         """Stop calling `wake`."""
@@ -167,7 +167,7 @@ class Fanout:
         place.known = update.after
         return update.frames
 
-    def _encode(self, known: Known, now_s: float) -> _Update:
+    def _encode(self, known: FanoutPosition, now_s: float) -> _Update:
         hub = self.hub
         messages: list[bytes] = []
         revision, links, progress, notes, joined = known
@@ -182,7 +182,9 @@ class Fanout:
             messages.append(self._take_log(hub.notes_count - notes, now_s).encode())
         if progress != hub.progress_count:
             messages.append(encode_progress(tuple(hub.progress.values())).encode())
-        after = Known(revision, hub.links_count, hub.progress_count, hub.notes_count, joined)
+        after = FanoutPosition(
+            revision, hub.links_count, hub.progress_count, hub.notes_count, joined
+        )
         frames = b"".join([as_frame(message, is_text=True) for message in messages])
         return _Update(after, frames, now_s)
 

@@ -9,18 +9,18 @@ from contextlib import asynccontextmanager
 from dataclasses import replace
 from typing import NamedTuple
 
-from urc.web.fleet.robots import Robot, Station
-from urc.web.load.apart import apart, unified
+from urc.web.fleet.robots import Robot, RobotService
 from urc.web.load.assets import Assets, widget_assets
+from urc.web.load.widget_versions import apart, unified
 from urc.web.words import t
 
-__all__ = ["Broken", "Fleet"]
+__all__ = ["BrokenRobot", "Fleet"]
 
 _END_S = 15.0
 """Longest wait for the end of a robot's session, in seconds."""
 
 
-class Broken(NamedTuple):
+class BrokenRobot(NamedTuple):
     """A robot whose documents or widgets cannot be used."""
 
     title: str
@@ -32,7 +32,7 @@ class Fleet:
     """All robots of one dashboard."""
 
     def __init__(
-        self, robots: Mapping[str, Robot], station: Callable[[str, Robot], Station]
+        self, robots: Mapping[str, Robot], station: Callable[[str, Robot], RobotService]
     ) -> None:
         """Prepare the robots from the start.
 
@@ -46,10 +46,10 @@ class Fleet:
         self._station = station
         self.widgets: Assets = _assets(robots)
         self.robots: dict[str, Robot] = dict(robots)
-        self.stations: dict[str, Station] = {
+        self.stations: dict[str, RobotService] = {
             name: station(name, robot) for name, robot in robots.items()
         }
-        self.broken: dict[str, Broken] = {}
+        self.broken: dict[str, BrokenRobot] = {}
         """Robots that cannot be used, by name."""
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._group: asyncio.TaskGroup | None = None
@@ -80,7 +80,7 @@ class Fleet:
     def renew(self, name: str, robot: Robot) -> Robot:
         """Register another version of a robot, and return it in its served form.
 
-        The caller then passes it to the station: see `Station.replace`.
+        The caller then passes it to the station: see `RobotService.replace`.
 
         Raises:
             UrcError: its widgets cannot be served.

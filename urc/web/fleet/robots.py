@@ -13,36 +13,36 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager, context
 from dataclasses import dataclass
 from typing import Protocol
 
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.model.profile import Profile, Setting
 from urc.model.values import Reading, Value
 from urc.problems import UrcError
 from urc.protocol.events import Replied
-from urc.protocol.reins import Pull
+from urc.protocol.sequences.sequence_control import Pull
+from urc.runtime.audit_recorder import AuditRecorder
 from urc.runtime.clock import Clock, LoopClock
 from urc.runtime.hub import Hub
-from urc.runtime.latch import LatchFile
-from urc.runtime.motion import Frames, Movers
-from urc.runtime.trail import Trail
-from urc.web.drive.consent import Consent
-from urc.web.drive.controls import Controls
+from urc.runtime.latch import LatchStore
+from urc.runtime.motion_controller import MotionBackend, MotionFrames
+from urc.web.drive.control_service import ControlService
+from urc.web.drive.two_person import TwoPersonRule
+from urc.web.feed.client_socket import SocketPeer
 from urc.web.feed.fanout import Fanout
-from urc.web.feed.line import Guest
 
 __all__ = [
     "Glimpse",
-    "Live",
+    "LiveSession",
     "Robot",
     "SessionFailed",
     "SessionLike",
-    "Station",
-    "Tape",
+    "RobotService",
+    "Playback",
     "each_counts",
     "missing_settings",
 ]
 
 
-class Tape(Protocol):
+class Playback(Protocol):
     """A recording with its playback position."""
 
     @property
@@ -98,11 +98,11 @@ class SessionLike(Protocol):
         """Latest values and link states."""
 
     @property
-    def frames(self) -> Frames:
+    def frames(self) -> MotionFrames:
         """The encoder of held commands."""
 
     @property
-    def movers(self) -> Movers | None:
+    def movers(self) -> MotionBackend | None:
         """The sender of motion; None for a robot without a held command."""
 
     async def command(
@@ -139,12 +139,12 @@ class Robot:
     """View of an emulated robot without a connection; None for a real one."""
     is_emulated: bool = False
     """Whether it is emulated: real and emulated robots of one name share no stored state."""
-    tape: Tape | None = None
+    tape: Playback | None = None
     """The recording in place of the robot, or None."""
 
 
 @dataclass(frozen=True, slots=True)
-class Live:
+class LiveSession:
     """An open session with its fan-out."""
 
     session: SessionLike
@@ -182,7 +182,7 @@ def each_counts(profile: Profile) -> frozenset[str]:
     return frozenset(found & profile.driver.signals.keys())
 
 
-class Station:
+class RobotService:
     """Opens and closes the session of one robot as clients come and go."""
 
     def __init__(
@@ -191,8 +191,8 @@ class Station:
         *,
         linger_s: float = LINGER_S,
         clock: Clock | None = None,
-        latch: LatchFile | None = None,
-        trail: Trail | None = None,
+        latch: LatchStore | None = None,
+        trail: AuditRecorder | None = None,
     ) -> None:
         """Wait for the first client.
 
@@ -205,32 +205,32 @@ class Station:
         """
         self.robot = robot
         self.clock: Clock = clock or LoopClock()
-        self.controls = Controls(robot.profile.driver, self.clock, latch, trail)
-        self.consent = Consent(lambda: self.controls.seats, self.clock)
+        self.controls = ControlService(robot.profile.driver, self.clock, latch, trail)
+        self.consent = TwoPersonRule(lambda: self.controls.seats, self.clock)
         self.controls.once.on_stopped = self.consent.stop
         self._linger_s = linger_s
         self._visitors = 0
         self._seats: Counter[str] = Counter()
         self._stirred = asyncio.Event()
-        self._next: asyncio.Future[Live] | None = None
+        self._next: asyncio.Future[LiveSession] | None = None
         self._is_open = False
         self._held_off = 0
         """Number of users that need the robot disconnected."""
-        self._successor: tuple[Robot, LatchFile | None] | None = None
+        self._successor: tuple[Robot, LatchStore | None] | None = None
 
     @property
     def is_full(self) -> bool:
         """Whether the limit of clients is reached."""
         return self._visitors >= CLIENTS
 
-    def has_seat_for(self, guest: Guest) -> bool:
+    def has_seat_for(self, guest: SocketPeer) -> bool:
         """Return whether another client of `guest` still leaves places for other visitors."""
         most = KNOWN_SEATS if guest.is_known else SEATS
         return not guest.who or self._seats[guest.who] < most
 
     @contextmanager
     def visit(self, who: str = "") -> Iterator[None]:
-        """Count as a client while the context lasts; `who` is that of its `Guest`."""
+        """Count as a client while the context lasts; `who` is that of its `SocketPeer`."""
         self._visitors += 1
         self._seats[who] += 1
         self._stirred.set()
@@ -242,7 +242,7 @@ class Station:
             self._seats += Counter()  # drops zero counts
             self._stirred.set()
 
-    async def live(self) -> Live:
+    async def live(self) -> LiveSession:
         """Return the open session; raise `SessionFailed` if it does not open."""
         try:
             async with asyncio.timeout(OPEN_TIMEOUT_S):
@@ -307,7 +307,7 @@ class Station:
             self._held_off -= 1
             self._stirred.set()
 
-    def replace(self, robot: Robot, latch: LatchFile | None = None) -> None:
+    def replace(self, robot: Robot, latch: LatchStore | None = None) -> None:
         """Switch to another version of the robot; an open session ends, the next one uses it.
 
         For a robot that `is_at_rest`: the switch disconnects it for a moment.
@@ -343,7 +343,7 @@ class Station:
     async def _serve(self, session: SessionLike) -> None:
         each = each_counts(self.robot.profile)
         fanout = Fanout(session.hub, clock=self.clock, each=each)
-        live = Live(session, fanout, secrets.token_hex(8), asyncio.Event())
+        live = LiveSession(session, fanout, secrets.token_hex(8), asyncio.Event())
         self._coming().set_result(live)
         self.controls.trail.attend(session.hub, self.clock.now)
         try:
@@ -396,7 +396,7 @@ class Station:
     def _is_wanted(self) -> bool:
         return (self._visitors > 0 and not self._held_off) or self._successor is not None
 
-    def _coming(self) -> asyncio.Future[Live]:
+    def _coming(self) -> asyncio.Future[LiveSession]:
         if self._next is None:
             self._next = asyncio.get_running_loop().create_future()
         return self._next

@@ -20,7 +20,18 @@ from urc.problems import UrcError
 __all__ = ["Assets", "folder_assets", "import_map", "script", "widget_assets"]
 
 STATIC = Path(__file__).resolve().parents[1] / "static"
-KIT = ("curve", "giving", "kit", "meter", "motion", "padmap", "palette", "scale", "sheet", "stroke")
+KIT = (
+    "response_curve",
+    "command_kit",
+    "kit",
+    "meter",
+    "motion",
+    "gamepad_map",
+    "colour_map",
+    "axis_ticks",
+    "offscreen_canvas",
+    "path_simplify",
+)
 """Modules of URC that widgets import as ``urc/…``."""
 WIDGET_FILES = ("widget.js", "widget.css")
 MOST_FILES = 200

@@ -12,20 +12,20 @@ from typing import Final
 import msgspec
 
 from urc._daemon import in_daemon
-from urc.packages.index import Entry, search
+from urc.packages.index import IndexEntry, search
 from urc.packages.install import withdrawn_lines
 from urc.packages.lock import Lock
-from urc.packages.names import Key, PackageError, parse_key
+from urc.packages.names import PackageError, PackageId, parse_key
 from urc.packages.repositories import Repositories, Repository
-from urc.web.manage.wire import Place
+from urc.web.manage.wire import RepositoryInfo
 
-__all__ = ["FRESH_S", "Catalogue"]
+__all__ = ["FRESH_S", "PackageCatalog"]
 
 FRESH_S: Final = 20.0
 """Age below which a list is not refreshed again, in seconds."""
 
 
-class Catalogue:
+class PackageCatalog:
     """The packages of all repositories that this user added."""
 
     def __init__(self, folder: Path, now: Callable[[], float]) -> None:
@@ -39,8 +39,8 @@ class Catalogue:
         self._now = now
         self._asked_s: float | None = None
         self._asking: asyncio.Task[None] | None = None
-        self.places: tuple[Place, ...] = ()
-        self.found: dict[Key, list[tuple[Entry, str]]] = {}
+        self.places: tuple[RepositoryInfo, ...] = ()
+        self.found: dict[PackageId, list[tuple[IndexEntry, str]]] = {}
         """Every version of every package, with the URL of its repository."""
         self.fault = ""
         """Why the list of repositories cannot be read, or ""."""
@@ -67,16 +67,16 @@ class Catalogue:
             self._asking.cancel()
             await asyncio.wait((self._asking,), timeout=1)
 
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[IndexEntry]:
         """Return every version of every package."""
         return [entry for some in self.found.values() for entry, _ in some]
 
-    def hits(self, words: str, kinds: tuple[str, ...]) -> list[Entry]:
+    def hits(self, words: str, kinds: tuple[str, ...]) -> list[IndexEntry]:
         """Return the newest version of each package of some kinds that has all words."""
         entries = [entry for entry in self.entries() if entry.kind in kinds]
         return search(entries, words.split())
 
-    def versions(self, key: Key) -> list[Entry]:
+    def versions(self, key: PackageId) -> list[IndexEntry]:
         """Return all offered versions of a package, newest first."""
         some = [entry for entry, _ in self.found.get(key, ()) if not entry.why_withdrawn]
         return sorted(some, key=lambda entry: entry.number, reverse=True)
@@ -86,7 +86,7 @@ class Catalogue:
         keys = map(parse_key, lock.packages)
         return withdrawn_lines(lock, [one for key in keys for one, _ in self.found.get(key, ())])
 
-    def origin(self, entry: Entry) -> str:
+    def origin(self, entry: IndexEntry) -> str:
         """Return the URL of its repository."""
         return next((url for one, url in self.found.get(entry.key, ()) if one is entry), "")
 
@@ -100,30 +100,30 @@ class Catalogue:
         answers = await asyncio.gather(
             *(in_daemon(lambda one=one: self._answer(one), f"ask {one.name}") for one in known)  # type: ignore[misc]
         )
-        found: dict[Key, list[tuple[Entry, str]]] = {}
+        found: dict[PackageId, list[tuple[IndexEntry, str]]] = {}
         for place, entries in reversed(answers):  # the first one wins
-            fresh: dict[Key, list[tuple[Entry, str]]] = {}
+            fresh: dict[PackageId, list[tuple[IndexEntry, str]]] = {}
             for entry in entries:
                 fresh.setdefault(entry.key, []).append((entry, place.url))
             found |= fresh
         self.places, self.found = tuple(place for place, _ in answers), found
         self._asked_s = self._now()
 
-    def _answer(self, repository: Repository) -> tuple[Place, tuple[Entry, ...]]:
+    def _answer(self, repository: Repository) -> tuple[RepositoryInfo, tuple[IndexEntry, ...]]:
         """Contact one repository, in a thread."""
         said: list[str] = []
         url, is_plain = repository.name, repository.name.startswith("http:")
         try:
             index = repository.refresh()
-            place = Place(url, index.name, len(index.packages), "", False, is_plain)
+            place = RepositoryInfo(url, index.name, len(index.packages), "", False, is_plain)
             return msgspec.structs.replace(place, keeper=repository.keeper), index.packages
         except PackageError as error:
             said.append(str(error))
         try:
             entries = repository.entries()
         except PackageError:
-            return Place(url, "", 0, said[0], False, is_plain), ()
-        return Place(url, "", len(entries), said[0], True, is_plain), entries
+            return RepositoryInfo(url, "", 0, said[0], False, is_plain), ()
+        return RepositoryInfo(url, "", len(entries), said[0], True, is_plain), entries
 
 
 def _unheard(_: str) -> None:

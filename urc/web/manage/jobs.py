@@ -13,19 +13,19 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from urc._daemon import in_daemon
-from urc._phrases import phrase
-from urc.packages.index import Entry
+from urc._translatable import phrase
+from urc.packages.index import IndexEntry
 from urc.packages.install import origin_lines, plan_file, plan_wish
+from urc.packages.install_plan import InstallPlan
 from urc.packages.lock import Lock
-from urc.packages.names import Key, PackageError, Wish
-from urc.packages.plan import Plan
+from urc.packages.names import PackageError, PackageId, PackageRequirement
 from urc.packages.sources import FileSource, Source
 from urc.packages.store import Store, kinds_in
-from urc.packages.update import Difference, plan_update, staged_difference
+from urc.packages.update import UpdateDiff, plan_update, staged_difference
 from urc.problems import UrcError, printable
-from urc.runtime.apart import Looks
-from urc.runtime.kept import DRIVEN
-from urc.web.manage.given import source_at
+from urc.runtime.isolation import PreviewWorker
+from urc.runtime.settings_store import DRIVEN
+from urc.web.manage.upload_source import source_at
 from urc.web.manage.wire import JobNews, JobState
 from urc.web.words import spoken
 
@@ -38,7 +38,7 @@ _LEFT_MOST: Final = 4
 """Most abandoned threads that still wait for a server."""
 
 
-Wanted = Wish | Path | FileSource | Lock
+Wanted = PackageRequirement | Path | FileSource | Lock
 """A package by name, a path of this machine, an upload, or an update of a lock."""
 
 
@@ -47,7 +47,7 @@ class Busy(UrcError):
 
 
 class _Planned(NamedTuple):
-    plan: Plan
+    plan: InstallPlan
     origins: tuple[str, ...]
     may: tuple[str, ...]
     risks: tuple[str, ...] = ()
@@ -56,7 +56,7 @@ class _Planned(NamedTuple):
     """The version that an update replaces."""
     stays: Lock | None = None
     """The version in use, which stays in use: the new one is installed in addition."""
-    changes: Difference | None = None
+    changes: UpdateDiff | None = None
 
 
 @dataclass
@@ -111,12 +111,12 @@ class _Watched:
     def name(self) -> str:
         return self._source.name
 
-    def entries(self) -> tuple[Entry, ...]:
+    def entries(self) -> tuple[IndexEntry, ...]:
         self._check()
         self._job.line = phrase("asking {place}", place=self._source.name)
         return self._source.entries()
 
-    def fetch(self, entry: Entry) -> bytes:
+    def fetch(self, entry: IndexEntry) -> bytes:
         self._check()
         self._job.done += 1
         self._job.line = phrase("fetching {package} ({size} bytes)", package=entry, size=entry.size)
@@ -136,7 +136,7 @@ class Jobs:
         self,
         store: Store,
         sources: Callable[[Callable[[str], None]], Sequence[Source]],
-        used: Callable[[Key], Lock | None] = lambda _: None,
+        used: Callable[[PackageId], Lock | None] = lambda _: None,
     ) -> None:
         """Prepare.
 
@@ -165,7 +165,7 @@ class Jobs:
         self._task = loop.create_task(self._work(job, partial(self._plan, job, what)))
         return job
 
-    def touched(self, number: int) -> tuple[Key | None, Lock | None]:
+    def touched(self, number: int) -> tuple[PackageId | None, Lock | None]:
         """Return the package that a job installs, and the version in use that must stay."""
         planned = self._asked(number).planned
         if planned is None:
@@ -262,7 +262,7 @@ class Jobs:
             lock = plan.lock
             widgets = [key.name for key in kinds_in(lock, "widget")]
             document = folder / lock.root / f"{lock.key.kind}.yaml"
-            look = Looks()
+            look = PreviewWorker()
             seen = look(document, folder, widgets)
             before, stays = old, None
             used = self._used(lock.key)
@@ -277,8 +277,8 @@ class Jobs:
         return _Planned(plan, tuple(origins), may, tuple(risks), old, stays, changes)
 
     def _changes(
-        self, job: Job, before: Lock | None, plan: Plan, folder: Path, look: Looks
-    ) -> Difference | None:
+        self, job: Job, before: Lock | None, plan: InstallPlan, folder: Path, look: PreviewWorker
+    ) -> UpdateDiff | None:
         """Return the differences from the version before, as far as they are known."""
         if before is None:
             return None
@@ -302,10 +302,10 @@ class Jobs:
             )
             return None
 
-    def _fetched(self, job: Job, what: Wanted, known: Sequence[Source]) -> Plan:
-        if isinstance(what, (Wish, Lock)) and not known:
+    def _fetched(self, job: Job, what: Wanted, known: Sequence[Source]) -> InstallPlan:
+        if isinstance(what, (PackageRequirement, Lock)) and not known:
             raise PackageError("there is no repository: add one first")
-        if isinstance(what, Wish):
+        if isinstance(what, PackageRequirement):
             return plan_wish(what, known, self._store, job.notes.append)
         if isinstance(what, Lock):
             plan = plan_update(what, known, self._store, job.notes.append)

@@ -11,19 +11,19 @@ from urllib.parse import quote
 
 from urc._daemon import in_daemon
 from urc.model.profile import Profile
-from urc.packages.index import Entry
+from urc.packages.index import IndexEntry
 from urc.packages.lock import Lock
-from urc.packages.names import Key, PackageError, Wish, parse_wish
+from urc.packages.names import PackageError, PackageId, PackageRequirement, parse_wish
 from urc.packages.repositories import Repository
 from urc.packages.sources import Source
 from urc.problems import UrcError, printable
-from urc.runtime.kept import DRIVEN, in_use, names_kept, pin
-from urc.web.fleet.fleet import Broken, Fleet
-from urc.web.fleet.garage import Garage
+from urc.runtime.settings_store import DRIVEN, in_use, names_kept, pin
+from urc.web.fleet.fleet import BrokenRobot, Fleet
+from urc.web.fleet.robot_factory import RobotFactory
 from urc.web.fleet.robots import Robot
-from urc.web.manage.catalogue import Catalogue
+from urc.web.manage.catalogue import PackageCatalog
 from urc.web.manage.jobs import Busy, Job, Jobs
-from urc.web.manage.wire import MOST_HITS, Available, Installed, Shelf
+from urc.web.manage.wire import MOST_HITS, Available, Installed, PackageList
 from urc.web.words import spoken
 
 __all__ = ["Manager"]
@@ -36,7 +36,7 @@ class Manager:
 
     def __init__(
         self,
-        garage: Garage,
+        garage: RobotFactory,
         fleet: Fleet,
         now: Callable[[], float],
         renew: Callable[[str, Robot], None],
@@ -52,7 +52,7 @@ class Manager:
         self.garage = garage
         self.fleet = fleet
         self._renew = renew
-        self.catalogue = Catalogue(garage.workshop.data / "packages", now)
+        self.catalogue = PackageCatalog(garage.workshop.data / "packages", now)
         self.jobs = Jobs(garage.store, self._sources, self._used)
         self._parked: dict[str, Lock] = {}
         """Robots that are on the menu because they are installed: name → served version."""
@@ -107,7 +107,7 @@ class Manager:
             self._parked[name] = lock
         except (UrcError, OSError) as error:
             text = str(error).strip().partition("\n")[0]
-            self.fleet.broken[name] = Broken(name, text)
+            self.fleet.broken[name] = BrokenRobot(name, text)
             self._parked.setdefault(name, locks[-1])
 
     def _waits(self, name: str) -> bool:
@@ -193,26 +193,26 @@ class Manager:
         await asyncio.to_thread(known.remove, url)
         self.catalogue.ask(force=True)
 
-    def gone(self, wish: Wish) -> list[str]:
+    def gone(self, wish: PackageRequirement) -> list[str]:
         """Return all packages that a removal would remove, as ``drivers/puppet 1.0.0``; raise."""
         before = self.garage.store.installed()
         meant = self._meant(wish)
         after = [lock for lock in before if lock not in meant]
         return sorted(_all(before) - _all(after))
 
-    def _meant(self, wish: Wish) -> list[Lock]:
+    def _meant(self, wish: PackageRequirement) -> list[Lock]:
         """Return the installed packages that a wish names; raise `PackageError` for none."""
         meant = [
             lock
             for lock in self.garage.store.installed()
-            if lock.key == Key(wish.kind or lock.key.kind, wish.name)
+            if lock.key == PackageId(wish.kind or lock.key.kind, wish.name)
             and wish.range in ("*", lock.version)
         ]
         if not meant:
             raise PackageError(f"{wish} was not installed by itself")
         return meant
 
-    def forgettable(self, wish: Wish) -> list[str]:
+    def forgettable(self, wish: PackageRequirement) -> list[str]:
         """Return the robots whose settings a removal could delete; raise."""
         meant = self._meant(wish)
         left = [lock for lock in self.garage.store.installed() if lock not in meant]
@@ -275,12 +275,12 @@ class Manager:
         await self.changed()
         return old
 
-    def _check_idle_of(self, key: Key) -> None:
+    def _check_idle_of(self, key: PackageId) -> None:
         for name, lock in self._parked.items():
             if lock.key == key or (name == key.name and key.kind in DRIVEN):
                 self.check_idle(name)
 
-    def _used(self, key: Key) -> Lock | None:
+    def _used(self, key: PackageId) -> Lock | None:
         """Return the version of a package in use; for a driven robot, any package of its name."""
         installed = self.garage.store.installed()
         if key.kind in DRIVEN:
@@ -300,7 +300,7 @@ class Manager:
 
     # Data for pages
 
-    def shelf(self, words: str, kinds: tuple[str, ...], *, may_manage: bool) -> Shelf:
+    def shelf(self, words: str, kinds: tuple[str, ...], *, may_manage: bool) -> PackageList:
         """Return the lists of a page; in a thread, since it reads files.
 
         Args:
@@ -315,7 +315,7 @@ class Manager:
         hits = catalogue.hits(words, kinds)
         has = {lock.root: lock.version for lock in sorted(locks, key=lambda lock: lock.number)}
         job = self.jobs.newest
-        return Shelf(
+        return PackageList(
             repositories=catalogue.places,
             installed=tuple(self._installed(lock) for lock in locks if lock.key.kind in kinds),
             available=tuple(self._available(entry, has) for entry in hits[:MOST_HITS]),
@@ -325,7 +325,7 @@ class Manager:
             job=job.news() if job is not None else None,
         )
 
-    def _available(self, entry: Entry, has: dict[str, str]) -> Available:
+    def _available(self, entry: IndexEntry, has: dict[str, str]) -> Available:
         versions = self.catalogue.versions(entry.key)
         return Available(
             package=str(entry.key),

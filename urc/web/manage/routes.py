@@ -16,17 +16,27 @@ from starlette.requests import HTTPConnection, Request
 from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route
 
-from urc.packages.names import FOLDERS, PackageError, Wish, parse_wish
+from urc.packages.names import FOLDERS, PackageError, PackageRequirement, parse_wish
 from urc.problems import UrcError
-from urc.web.manage.given import given_source
 from urc.web.manage.jobs import Busy, Wanted
 from urc.web.manage.manager import Manager
-from urc.web.manage.wire import Add, Agree, Ask, Failure, Gone, JobNews, Line, Package, Url
-from urc.web.show.menu import Nav, Ways
-from urc.web.show.pages import Head, render
+from urc.web.manage.upload_source import given_source
+from urc.web.manage.wire import (
+    Add,
+    Failure,
+    InstallRequest,
+    JobDecision,
+    JobNews,
+    RefreshRequest,
+    RemovedPackages,
+    ResultLine,
+    Url,
+)
+from urc.web.show.menu import Nav, NavigationLinks
+from urc.web.show.pages import PageHead, render
 from urc.web.words import t
 
-__all__ = ["ManageRoutes", "Refusal", "answer", "body_of", "told"]
+__all__ = ["ManageRoutes", "ApiError", "answer", "body_of", "told"]
 
 
 KINDS = {
@@ -41,7 +51,7 @@ KINDS = {
 class ManagePage:
     """``manage.html.j2``: repositories, installed packages and available packages."""
 
-    head: Head
+    head: PageHead
     nav: Nav
     title: str
     about: str
@@ -59,7 +69,7 @@ class ManagePage:
 def manage_page(
     nonce: str,
     which: str,
-    ways: Ways,
+    ways: NavigationLinks,
     *,
     may_manage: bool,
     may_name_paths: bool,
@@ -81,7 +91,7 @@ def manage_page(
         ),
     }[which]
     page = ManagePage(
-        Head(nonce, title),
+        PageHead(nonce, title),
         Nav(which, ways),
         title,
         about,
@@ -101,7 +111,7 @@ _Handler = Callable[["ManageRoutes", Request], Awaitable[Response]]
 ONLY_HERE: Final = "this needs the key in the address that URC printed, or the token of --manage"
 
 
-class Refusal(Exception):
+class ApiError(Exception):
     """An error response: status and one line."""
 
     def __init__(self, status: int, line: str) -> None:
@@ -116,13 +126,13 @@ def answer(value: object, status: int = 200) -> Response:
 
 
 async def body_of(request: Request, kind: type[_T]) -> _T:
-    """Return the JSON body of a request as a `kind`; raise `Refusal`."""
+    """Return the JSON body of a request as a `kind`; raise `ApiError`."""
     if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
-        raise Refusal(415, "expected a body of type application/json")
+        raise ApiError(415, "expected a body of type application/json")
     try:
         return msgspec.json.decode(await request.body(), type=kind)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise Refusal(400, f"the request does not fit: {error}") from None
+        raise ApiError(400, f"the request does not fit: {error}") from None
 
 
 def told(status: int, line: str) -> Response:
@@ -137,7 +147,7 @@ def _api(handler: _Handler) -> _Handler:
     async def handle(self: "ManageRoutes", request: Request) -> Response:
         try:
             return await handler(self, request)
-        except Refusal as refusal:
+        except ApiError as refusal:
             return told(refusal.status, refusal.line)
         except Busy as error:
             return told(409, str(error))
@@ -155,7 +165,7 @@ class ManageRoutes:
     def __init__(
         self,
         manager: Manager,
-        ways: Ways,
+        ways: NavigationLinks,
         is_here: Callable[[HTTPConnection], bool],
         may_manage: Callable[[HTTPConnection], bool],
     ) -> None:
@@ -196,9 +206,9 @@ class ManageRoutes:
         ]
 
     def check(self, connection: HTTPConnection) -> None:
-        """Raise `Refusal` if the visitor may not change anything."""
+        """Raise `ApiError` if the visitor may not change anything."""
         if not self.may_manage(connection):
-            raise Refusal(403, ONLY_HERE)
+            raise ApiError(403, ONLY_HERE)
 
     async def page(self, request: Request) -> Response:
         """Show a manager."""
@@ -232,9 +242,9 @@ class ManageRoutes:
 
         Any visitor may start a refresh, but only now and then.
         """
-        said = await body_of(request, Ask)
+        said = await body_of(request, RefreshRequest)
         self._manager.catalogue.ask(force=said.force and self.may_manage(request))
-        return answer(Line(t("asking the repositories")), 202)
+        return answer(ResultLine(t("asking the repositories")), 202)
 
     @_api
     async def connect(self, request: Request) -> Response:
@@ -245,7 +255,7 @@ class ManageRoutes:
         if "://" not in text:
             text = f"http://{text}"
         await self._manager.connect(text)
-        return answer(Line(t("connected")))
+        return answer(ResultLine(t("connected")))
 
     @_api
     async def disconnect(self, request: Request) -> Response:
@@ -253,13 +263,13 @@ class ManageRoutes:
         self.check(request)
         said = await body_of(request, Url)
         await self._manager.disconnect(said.url)
-        return answer(Line(t("forgotten; what is installed stays")))
+        return answer(ResultLine(t("forgotten; what is installed stays")))
 
     @_api
     async def install(self, request: Request) -> Response:
         """Start the install of a package: download it, and list its permissions."""
         self.check(request)
-        said = await body_of(request, Package)
+        said = await body_of(request, InstallRequest)
         return self._begun(parse_wish(said.package))
 
     @_api
@@ -274,7 +284,7 @@ class ManageRoutes:
         """Start the install of an uploaded package, bundle or interface: the request body."""
         self.check(request)
         if request.headers.get("content-type") != "application/octet-stream":
-            raise Refusal(415, "expected a body of type application/octet-stream")
+            raise ApiError(415, "expected a body of type application/octet-stream")
         name = request.query_params.get("name", "")[:200]
         data = await request.body()
         source = await asyncio.to_thread(
@@ -286,38 +296,38 @@ class ManageRoutes:
     async def update(self, request: Request) -> Response:
         """Start the update of a package: download the newest version, and list its changes."""
         self.check(request)
-        said = await body_of(request, Package)
+        said = await body_of(request, InstallRequest)
         return self._begun(await asyncio.to_thread(self._manager.installed, said.package))
 
     @_api
     async def back(self, request: Request) -> Response:
         """Restore the version before an update."""
         self.check(request)
-        said = await body_of(request, Package)
+        said = await body_of(request, InstallRequest)
         old = await self._manager.back(said.package)
-        return answer(Gone((), t("{name} is back", name=old)))
+        return answer(RemovedPackages((), t("{name} is back", name=old)))
 
     @_api
     async def remove(self, request: Request) -> Response:
         """Remove a package; without ``yes`` only list the packages that would go."""
         self.check(request)
-        said = await body_of(request, Package)
+        said = await body_of(request, InstallRequest)
         if not said.yes:
             wish = parse_wish(said.package)
             gone = await asyncio.to_thread(self._manager.gone, wish)
             filled = await asyncio.to_thread(self._manager.forgettable, wish)
-            return answer(Gone(tuple(gone), "", has_settings=bool(filled)))
+            return answer(RemovedPackages(tuple(gone), "", has_settings=bool(filled)))
         gone = await self._manager.remove(said.package, forgets=said.forget)
         line = t("removed {names}", names=", ".join(gone))
         if not gone:
             line = t("removed; another package needs its files")
-        return answer(Gone(tuple(gone), line))
+        return answer(RemovedPackages(tuple(gone), line))
 
     @_api
     async def agree(self, request: Request) -> Response:
         """Install the planned package."""
         self.check(request)
-        said = await body_of(request, Agree)
+        said = await body_of(request, JobDecision)
         job = await self._manager.agree(said.number, takes_risks=said.takes_risks)
         return answer(job.news())
 
@@ -325,14 +335,14 @@ class ManageRoutes:
     async def cancel(self, request: Request) -> Response:
         """Cancel the job; nothing has changed."""
         self.check(request)
-        said = await body_of(request, Agree)
+        said = await body_of(request, JobDecision)
         return answer(self._manager.jobs.give_up(said.number).news())
 
     def _begun(self, what: Wanted) -> Response:
         news: JobNews = self._manager.jobs.begin(what).news()
         return answer(news, 202)
 
-    def _meant(self, path: str, request: Request) -> Wish | Path:
+    def _meant(self, path: str, request: Request) -> PackageRequirement | Path:
         """Resolve a path: ``/interfaces/wide/`` in a repository, or a path of this machine."""
         inside = path.strip("/")
         if inside.partition("/")[0] in FOLDERS:
@@ -341,7 +351,7 @@ class ManageRoutes:
             except PackageError:
                 pass  # a folder of this machine may have that name
         if not self._is_here(request):
-            raise Refusal(
+            raise ApiError(
                 403, "a path of this machine needs the key in the address that URC printed"
             )
         place = Path(path).expanduser()

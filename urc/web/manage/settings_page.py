@@ -10,10 +10,10 @@ from urllib.parse import quote
 
 from urc.model.profile import Profile, Setting
 from urc.model.values import Value
-from urc.runtime.kept import Kept
+from urc.runtime.settings_store import StoredSettings
 from urc.web.show.cells import spoken
-from urc.web.show.menu import Nav, Ways
-from urc.web.show.pages import Head, render
+from urc.web.show.menu import Nav, NavigationLinks
+from urc.web.show.pages import PageHead, render
 from urc.web.words import t
 
 __all__ = ["Field", "Option", "SettingsPage", "settings_page"]
@@ -68,7 +68,7 @@ class Field:
 class SettingsPage:
     """``settings.html.j2``: driver, interface, and the driver's own settings."""
 
-    head: Head
+    head: PageHead
     nav: Nav
     name: str
     title: str
@@ -92,11 +92,11 @@ def settings_page(
     nonce: str,
     name: str,
     profile: Profile,
-    kept: Kept,
+    kept: StoredSettings,
     given: Mapping[str, Value],
     *,
     withheld: Collection[str] = (),
-    ways: Ways,
+    ways: NavigationLinks,
     driver: str,
     versions: Sequence[str],
     may_manage: bool,
@@ -120,7 +120,7 @@ def settings_page(
     title = profile.title or name
     place = quote(name, safe="")
     page = SettingsPage(
-        head=Head(nonce, t("Settings of {title}", title=title)),
+        head=PageHead(nonce, t("Settings of {title}", title=title)),
         nav=Nav("", ways),
         name=name,
         title=title,
@@ -154,7 +154,7 @@ def _interfaces(profile: Profile, chosen: str) -> tuple[Option, ...]:
 
 
 def _field(
-    setting: Setting, kept: Kept, given: Mapping[str, Value], withheld: Collection[str]
+    setting: Setting, kept: StoredSettings, given: Mapping[str, Value], withheld: Collection[str]
 ) -> Field:
     is_given = setting.name in given
     text = kept.settings.get(setting.name, "")

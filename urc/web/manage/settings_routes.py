@@ -17,18 +17,18 @@ from starlette.routing import Route
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError, printable
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.kept import Kept
-from urc.runtime.probe import Tried, probe
+from urc.runtime.probe import ProbeResult, probe
+from urc.runtime.registries import built_in_catalog
 from urc.runtime.settings import parse_setting
-from urc.web.fleet.robots import Station, missing_settings
+from urc.runtime.settings_store import StoredSettings
+from urc.web.fleet.robots import RobotService, missing_settings
 from urc.web.manage.jobs import Busy
 from urc.web.manage.manager import Manager
-from urc.web.manage.routes import ManageRoutes, Refusal, answer, body_of, told
+from urc.web.manage.routes import ApiError, ManageRoutes, answer, body_of, told
 from urc.web.manage.settings_page import settings_page
-from urc.web.manage.wire import SettingsAnswer, SettingsAsked, TriedLine
+from urc.web.manage.wire import ProbedTransport, SettingsAnswer, SettingsAsked
 from urc.web.show.cells import spoken
-from urc.web.show.menu import Ways
+from urc.web.show.menu import NavigationLinks
 from urc.web.words import t
 
 __all__ = ["SettingsRoutes"]
@@ -41,7 +41,7 @@ _END_S: Final = 5.0
 class SettingsRoutes:
     """The settings pages of all robots."""
 
-    def __init__(self, manager: Manager, manage: ManageRoutes, ways: Ways) -> None:
+    def __init__(self, manager: Manager, manage: ManageRoutes, ways: NavigationLinks) -> None:
         """Prepare.
 
         Args:
@@ -75,7 +75,7 @@ class SettingsRoutes:
         try:
             kept = garage.kept(name).load()
         except UrcError as error:
-            kept, fault = Kept(), str(error)
+            kept, fault = StoredSettings(), str(error)
         profile = self._profile(name)
         if profile is None:
             broken = self._manager.fleet.broken.get(name)
@@ -114,7 +114,7 @@ class SettingsRoutes:
                 return answer(await self._save(name, said))
             finally:
                 self._trying.discard(name)
-        except Refusal as refusal:
+        except ApiError as refusal:
             return told(refusal.status, refusal.line)
         except Busy as error:
             return told(409, str(error))
@@ -124,7 +124,7 @@ class SettingsRoutes:
     async def _save(self, name: str, said: SettingsAsked) -> SettingsAnswer:
         manager, garage = self._manager, self._manager.garage
         if name not in manager.fleet.robots and name not in manager.fleet.broken:
-            raise Refusal(404, "no robot of that name is served here")
+            raise ApiError(404, "no robot of that name is served here")
         manager.check_idle(name)
         before = await asyncio.to_thread(self._kept, name)
         bare = await asyncio.to_thread(self._document, name, said.version)
@@ -134,7 +134,7 @@ class SettingsRoutes:
             return SettingsAnswer(is_saved=False, text=text, faults=faults)
         robot = await asyncio.to_thread(garage.robot, name, bare, kept)
         missing = tuple(one.title or spoken(one.name) for one in missing_settings(robot))
-        lines: tuple[TriedLine, ...] = ()
+        lines: tuple[ProbedTransport, ...] = ()
         if said.test and not missing:
             lines = await self._tried(name, bare, robot.settings)
             if any(one.verdict == "fails" for one in lines) and not said.anyway:
@@ -148,11 +148,11 @@ class SettingsRoutes:
             text = t("saved; not set yet: {names}", names=", ".join(missing))
         return SettingsAnswer(is_saved=True, text=text, missing=missing, lines=lines)
 
-    def _kept(self, name: str) -> Kept:
+    def _kept(self, name: str) -> StoredSettings:
         try:
             return self._manager.garage.kept(name).load()
         except UrcError:
-            return Kept()  # damaged: the new values replace it
+            return StoredSettings()  # damaged: the new values replace it
 
     def _document(self, name: str, version: str) -> Profile:
         """Return the profile of the chosen version, as written in its document."""
@@ -166,8 +166,8 @@ class SettingsRoutes:
         return garage.reread(manager.fleet.robots[name].profile)
 
     def _filled_in(
-        self, profile: Profile, before: Kept, said: SettingsAsked
-    ) -> tuple[Kept, dict[str, str]]:
+        self, profile: Profile, before: StoredSettings, said: SettingsAsked
+    ) -> tuple[StoredSettings, dict[str, str]]:
         """Return the settings to store, and the mistakes by field."""
         texts, faults = _typed(profile, said)
         garage = self._manager.garage
@@ -178,7 +178,7 @@ class SettingsRoutes:
             if text is None and name in profile.settings
         }
         old = {name: text for name, text in untouched.items() if text}
-        kept = Kept(
+        kept = StoredSettings(
             version=said.version,
             interface=said.interface,
             settings=texts | old,
@@ -192,7 +192,7 @@ class SettingsRoutes:
 
     async def _tried(
         self, name: str, profile: Profile, values: Mapping[str, Value]
-    ) -> tuple[TriedLine, ...]:
+    ) -> tuple[ProbedTransport, ...]:
         """Test every transport while the robot is disconnected; a STOP ends the test at once."""
         workshop = self._manager.garage.workshop
         station = self._manager.fleet.stations.get(name)
@@ -212,13 +212,13 @@ class SettingsRoutes:
             return tuple(map(_line, trying.result()))
 
 
-def _epoch(station: Station | None) -> int:
+def _epoch(station: RobotService | None) -> int:
     """Return a number that changes with every STOP and every new operator."""
     return station.controls.desk.lease.state.epoch if station is not None else 0
 
 
-def _line(tried: Tried) -> TriedLine:
-    return TriedLine(
+def _line(tried: ProbeResult) -> ProbedTransport:
+    return ProbedTransport(
         tried.transport,
         tried.type,
         printable(tried.address),

@@ -10,28 +10,28 @@ import msgspec
 __all__ = [
     "MOST_HITS",
     "Add",
-    "Agree",
-    "Ask",
+    "JobDecision",
+    "RefreshRequest",
     "Available",
     "Failure",
-    "Gone",
-    "Healthy",
+    "RemovedPackages",
+    "HealthStatus",
     "Installed",
     "JobNews",
     "JobState",
-    "Line",
-    "Message",
-    "Package",
-    "Place",
+    "ResultLine",
+    "ManageMessage",
+    "InstallRequest",
+    "RepositoryInfo",
     "SettingsAnswer",
     "SettingsAsked",
-    "Shelf",
-    "Started",
-    "Stopped",
-    "TapeAsked",
-    "TapeState",
+    "PackageList",
+    "ReloadResult",
+    "StopResult",
+    "PlaybackRequest",
+    "PlaybackState",
     "Timeline",
-    "TriedLine",
+    "ProbedTransport",
     "Url",
 ]
 
@@ -43,24 +43,24 @@ _Long = Annotated[str, msgspec.Meta(max_length=4096)]
 _Settings = Annotated[dict[_Short, _Long | None], msgspec.Meta(max_length=200)]
 
 
-class Message(msgspec.Struct, frozen=True, rename="camel", forbid_unknown_fields=True):
+class ManageMessage(msgspec.Struct, frozen=True, rename="camel", forbid_unknown_fields=True):
     """Base of all messages of this module."""
 
 
-class Url(Message, frozen=True):
+class Url(ManageMessage, frozen=True):
     """Request to add or remove a repository."""
 
     url: _Short
 
 
-class Ask(Message, frozen=True):
+class RefreshRequest(ManageMessage, frozen=True):
     """Request to refresh the package lists from the repositories."""
 
     force: bool = False
     """Whether to ignore the age of the last refresh."""
 
 
-class Package(Message, frozen=True):
+class InstallRequest(ManageMessage, frozen=True):
     """Request about a package: ``drivers/puppet`` or ``drivers/puppet@1.0.0``."""
 
     package: _Short
@@ -70,13 +70,13 @@ class Package(Message, frozen=True):
     """Whether a removal also deletes the settings of the robot, with its secrets."""
 
 
-class Add(Message, frozen=True):
+class Add(ManageMessage, frozen=True):
     """Request to add a package by its path: in a repository, or on this machine."""
 
     path: _Long
 
 
-class Agree(Message, frozen=True):
+class JobDecision(ManageMessage, frozen=True):
     """Approval or cancellation of a job, after its permissions were shown."""
 
     number: int
@@ -87,7 +87,7 @@ class Agree(Message, frozen=True):
 JobState = Literal["working", "asks", "done", "failed", "cancelled"]
 
 
-class JobNews(Message, frozen=True):
+class JobNews(ManageMessage, frozen=True):
     """State of the current job."""
 
     number: int
@@ -116,7 +116,7 @@ class JobNews(Message, frozen=True):
     """Further notes, for example about a repository that did not respond."""
 
 
-class Place(Message, frozen=True):
+class RepositoryInfo(ManageMessage, frozen=True):
     """A repository."""
 
     url: str
@@ -133,7 +133,7 @@ class Place(Message, frozen=True):
     """Signer of its index, with the fingerprint of the key; "" if it is unsigned."""
 
 
-class Installed(Message, frozen=True):
+class Installed(ManageMessage, frozen=True):
     """A package that a user installed, and no mere dependency."""
 
     package: str
@@ -160,7 +160,7 @@ class Installed(Message, frozen=True):
     """Withdrawn packages among it and its dependencies, with the reason; one a line."""
 
 
-class Available(Message, frozen=True):
+class Available(ManageMessage, frozen=True):
     """A package of a repository."""
 
     package: str
@@ -178,10 +178,10 @@ class Available(Message, frozen=True):
     """Installed version, or ""."""
 
 
-class Shelf(Message, frozen=True):
+class PackageList(ManageMessage, frozen=True):
     """All lists of a manager's page."""
 
-    repositories: tuple[Place, ...]
+    repositories: tuple[RepositoryInfo, ...]
     installed: tuple[Installed, ...]
     available: tuple[Available, ...]
     total: int
@@ -192,13 +192,13 @@ class Shelf(Message, frozen=True):
     job: JobNews | None
 
 
-class Line(Message, frozen=True):
+class ResultLine(ManageMessage, frozen=True):
     """Result of an action, in one line."""
 
     line: str
 
 
-class Gone(Message, frozen=True):
+class RemovedPackages(ManageMessage, frozen=True):
     """Packages that a removal removes."""
 
     gone: tuple[str, ...]
@@ -208,21 +208,21 @@ class Gone(Message, frozen=True):
     """Whether it has settings, which the removal may delete."""
 
 
-class Failure(Message, frozen=True):
+class Failure(ManageMessage, frozen=True):
     """Error response: why a request failed."""
 
     error: str
     """The reason, in one line."""
 
 
-class Healthy(Message, frozen=True):
+class HealthStatus(ManageMessage, frozen=True):
     """Response of the health check."""
 
     status: str
     version: str
 
 
-class Stopped(Message, frozen=True):
+class StopResult(ManageMessage, frozen=True):
     """Result of a STOP."""
 
     latched: str
@@ -231,7 +231,7 @@ class Stopped(Message, frozen=True):
     """Whether the robot's transports have taken the stop."""
 
 
-class ControlState(Message, frozen=True):
+class ControlState(ManageMessage, frozen=True):
     """The holder of the lease, and the state of STOP."""
 
     holder: str
@@ -242,14 +242,14 @@ class ControlState(Message, frozen=True):
     """Whether the robot is emulated or a playback."""
 
 
-class TapeAsked(Message, frozen=True):
+class PlaybackRequest(ManageMessage, frozen=True):
     """Request to change the playback; fields that are left out stay as they are."""
 
     position_s: float | None = None
     is_playing: bool | None = None
 
 
-class TapeState(Message, frozen=True):
+class PlaybackState(ManageMessage, frozen=True):
     """State of a playback."""
 
     began_s: float
@@ -261,7 +261,7 @@ class TapeState(Message, frozen=True):
     """Playback speed; 1 is real time."""
 
 
-class Timeline(Message, frozen=True):
+class Timeline(ManageMessage, frozen=True):
     """Audit log of a robot's motion."""
 
     entries: list[dict[str, Any]]
@@ -269,7 +269,7 @@ class Timeline(Message, frozen=True):
     """Why the log is no longer written, or ""."""
 
 
-class Started(Message, frozen=True):
+class ReloadResult(ManageMessage, frozen=True):
     """Result of a reload of a robot's documents."""
 
     line: str
@@ -277,7 +277,7 @@ class Started(Message, frozen=True):
     """URL of its page."""
 
 
-class SettingsAsked(Message, frozen=True):
+class SettingsAsked(ManageMessage, frozen=True):
     """The submitted settings of a robot."""
 
     settings: _Settings = {}
@@ -290,7 +290,7 @@ class SettingsAsked(Message, frozen=True):
     """Whether to save even if the test fails."""
 
 
-class TriedLine(Message, frozen=True):
+class ProbedTransport(ManageMessage, frozen=True):
     """Test result of one transport."""
 
     transport: str
@@ -301,7 +301,7 @@ class TriedLine(Message, frozen=True):
     advice: str
 
 
-class SettingsAnswer(Message, frozen=True):
+class SettingsAnswer(ManageMessage, frozen=True):
     """Result of a submission of settings."""
 
     is_saved: bool
@@ -310,4 +310,4 @@ class SettingsAnswer(Message, frozen=True):
     """Setting → its mistake, in one line."""
     missing: tuple[str, ...] = ()
     """Titles of settings that have no value."""
-    lines: tuple[TriedLine, ...] = ()
+    lines: tuple[ProbedTransport, ...] = ()

@@ -14,10 +14,10 @@ import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
-from urc.web.serve.crowd import is_stop
+from urc.web.serve.connection_quota import is_stop
 from urc.web.serve.policy import REFUSAL_HEADERS
 
-__all__ = ["CONNECTIONS", "REQUEST_S", "RESERVE", "Connection", "refusal"]
+__all__ = ["CONNECTIONS", "REQUEST_S", "RESERVE", "HttpConnection", "refusal"]
 
 CONNECTIONS = 1024
 """Most open connections, WebSockets included. A further one closes an idle one: the oldest of the
@@ -49,7 +49,7 @@ def _stops(data: bytes) -> bool:
     return is_stop(method.decode("latin-1"), rest.partition(b" ")[0].decode("latin-1"))
 
 
-class Connection(H11Protocol):
+class HttpConnection(H11Protocol):
     """uvicorn's HTTP/1.1 protocol with a time limit on the arrival of a request.
 
     WARNING: it depends on asyncio's protocol methods and on parts of the base class. These are the
@@ -109,9 +109,9 @@ class Connection(H11Protocol):
 
     def _make_room(self) -> bool:
         """Close an idle connection; return whether one was found."""
-        waiting: dict[str, list[Connection]] = {}
+        waiting: dict[str, list[HttpConnection]] = {}
         for one in self.connections:
-            if isinstance(one, Connection) and one is not self and one.only_waits:
+            if isinstance(one, HttpConnection) and one is not self and one.only_waits:
                 peer = one.transport.get_extra_info("peername") or ("",)
                 waiting.setdefault(str(peer[0]), []).append(one)
         if not waiting:

@@ -7,7 +7,7 @@ next frame.
 
 from typing import Final
 
-__all__ = ["Frames", "text_of"]
+__all__ = ["WebSocketFrames", "text_of"]
 
 _TEXT: Final = 0x81
 """First byte of an unfragmented text frame."""
@@ -20,7 +20,7 @@ _PLAIN: Final = bytes(_MASK)
 _CONTROL: Final = 0x08
 
 
-class Frames:
+class WebSocketFrames:
     """The received bytes of one client, from the first byte after the handshake on."""
 
     def __init__(self) -> None:
@@ -75,7 +75,7 @@ class Frames:
 
 
 def text_of(frame: bytes) -> bytes:
-    """Return the text of a whole frame of `Frames.spans`."""
+    """Return the text of a whole frame of `WebSocketFrames.spans`."""
     at = _HEAD + _MASK + (2 if frame[1] & 0x7F == _SHORT else 0)
     return _unmasked(frame[at - _MASK : at], frame[at:])
 

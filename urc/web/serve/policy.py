@@ -18,7 +18,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from urc._addresses import unmapped
 from urc.web.serve.access import Access
-from urc.web.serve.crowd import Places, is_stop
+from urc.web.serve.connection_quota import ConnectionQuota, is_stop
 
 __all__ = [
     "BODY_BYTES",
@@ -197,7 +197,7 @@ class Policy:
         self._access = access
         self._names = frozenset(name.lower().removesuffix(".") for name in allowed_hosts)
         self._own = own_names()
-        self._places = Places()
+        self._places = ConnectionQuota()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse, or call the application and add the headers to its response."""

@@ -20,10 +20,10 @@ from uvicorn.server import ServerState
 
 from urc._addresses import local_addresses
 from urc.problems import UrcError
-from urc.transports.own_doors import OWN_DOORS
-from urc.web.feed.line import SocketFlow
-from urc.web.serve.connection import CONNECTIONS, REQUEST_S, Connection
-from urc.web.serve.frames import Frames, text_of
+from urc.transports.own_listeners import OWN_DOORS
+from urc.web.feed.client_socket import SocketFlow
+from urc.web.serve.connection import CONNECTIONS, REQUEST_S, HttpConnection
+from urc.web.serve.frames import WebSocketFrames, text_of
 from urc.web.wire.messages import INBOUND_BYTES
 
 __all__ = ["reachable_urls", "serve"]
@@ -62,7 +62,7 @@ async def serve(
         UrcError: the server cannot listen on the address.
     """
     listener = _listen(host, port)
-    connection = partial(Connection, request_s=request_s, most=connections)
+    connection = partial(HttpConnection, request_s=request_s, most=connections)
     config = uvicorn.Config(
         app,
         loop="none",
@@ -134,7 +134,7 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
         _loop: asyncio.AbstractEventLoop | None = None,
     ) -> None:
         self._urc_flow = SocketFlow()
-        self._urc_frames: Frames | None = None
+        self._urc_frames: WebSocketFrames | None = None
         """None during the handshake."""
         super().__init__(config, server_state, {**app_state, "flow": self._urc_flow}, _loop)
 
@@ -151,7 +151,7 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
     def data_received(self, data: bytes) -> None:
         """Hand a whole text to the client at once; all else takes uvicorn's usual path."""
         if self._urc_frames is None:
-            self._urc_frames = Frames()
+            self._urc_frames = WebSocketFrames()
             super().data_received(data)
             return
         text = self._urc_frames.whole(data)

@@ -14,7 +14,7 @@ from starlette.routing import Route
 from urc.images import media_type
 from urc.model.driver import Driver
 from urc.model.values import Reading, Signal
-from urc.web.fleet.robots import Station
+from urc.web.fleet.robots import RobotService
 from urc.web.show.cells import spoken
 from urc.web.words import t
 
@@ -33,7 +33,7 @@ class Cards:
         stations: the served robots, by the name in their URL.
     """
 
-    def __init__(self, stations: Callable[[], Mapping[str, Station]]) -> None:
+    def __init__(self, stations: Callable[[], Mapping[str, RobotService]]) -> None:
         self._stations = stations
 
     def routes(self) -> list[Route]:

@@ -17,8 +17,8 @@ from urc.model.profile import Profile
 from urc.model.values import Signal
 from urc.model.widget import Widget
 from urc.web.load.files import linked_options
-from urc.web.load.foreign import Border, frame_url
-from urc.web.show.markup_apart import markup_of
+from urc.web.load.widget_trust import WidgetTrust, frame_url
+from urc.web.show.isolated_markup import markup_of
 from urc.web.show.outputs import inputs_config, output_config
 from urc.web.show.sandbox import TEMPLATE, fault_line, widget_template
 
@@ -81,7 +81,7 @@ def render_widget(widget: Widget, context: WidgetContext) -> Markup:
     return Markup(widget_template(source).render(variables))  # noqa: S704  # autoescaped
 
 
-def render_foreign(uses: Iterable[tuple[WidgetUse, Profile]], border: Border) -> None:
+def render_foreign(uses: Iterable[tuple[WidgetUse, Profile]], border: WidgetTrust) -> None:
     """Render the markup of all third-party widgets of a page at once, which saves time.
 
     Args:
@@ -145,7 +145,7 @@ def widget_cell(
     index: int,
     use: WidgetUse,
     profile: Profile,
-    border: Border = Border(),  # noqa: B008  # frozen
+    border: WidgetTrust = WidgetTrust(),  # noqa: B008  # frozen
     *,
     is_background: bool = False,
 ) -> Cell:

@@ -13,26 +13,26 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from urc.images import media_type
-from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import Argument, Command, Driver, Reply, TransportSpec
-from urc.model.flow import Hold
+from urc.model.exchange import Hold
 from urc.model.interface import Interface, WidgetUse
+from urc.model.payload import ReadSpec, WriteSpec
 from urc.model.profile import Profile
-from urc.model.values import Limits, Signal
-from urc.model.widget import Port, Widget
+from urc.model.values import AlarmLimits, Signal
+from urc.model.widget import Widget, WidgetPort
 from urc.problems import ProblemsError, UrcError
 from urc.source import Document, read_document
 from urc.web.show.demo_shape import check_demo
 from urc.web.wire.messages import encode_hello
 
-__all__ = ["DemoState", "demo_states", "colour_bars"]
+__all__ = ["WidgetState", "demo_states", "colour_bars"]
 
 PICTURE_BYTES = 4 << 20
 """Largest image in a demo, in bytes."""
 _BARS = ((0xC0,) * 3, (0xC0, 0xC0, 0), (0, 0xC0, 0xC0), (0, 0xC0, 0), (0xC0, 0, 0xC0), (0xC0, 0, 0))
 
 
-class DemoState(NamedTuple):
+class WidgetState(NamedTuple):
     """One state of a widget, ready to be rendered."""
 
     name: str
@@ -45,7 +45,7 @@ class DemoState(NamedTuple):
     """Texts that the widget must show."""
 
 
-def demo_states(widget: Widget) -> list[DemoState]:
+def demo_states(widget: Widget) -> list[WidgetState]:
     """Return the states in the widget's ``demo.yaml``, in its order.
 
     Raises:
@@ -59,7 +59,7 @@ def demo_states(widget: Widget) -> list[DemoState]:
     return [_state(widget, document, demo, name) for name in demo["states"]]
 
 
-def _state(widget: Widget, document: Document, demo: Mapping[str, Any], name: str) -> DemoState:
+def _state(widget: Widget, document: Document, demo: Mapping[str, Any], name: str) -> WidgetState:
     shown: Mapping[str, Any] = demo["states"][name] or {}
     signals, inputs, lists = _signals(
         {**(demo.get("signals") or {}), **(shown.get("signals") or {})}
@@ -87,7 +87,7 @@ def _state(widget: Widget, document: Document, demo: Mapping[str, Any], name: st
         "replies": shown.get("replies") or {},
     }
     texts = tuple(str(text) for text in shown.get("shows") or ())
-    return DemoState(name, use, profile, json.dumps(news), texts)
+    return WidgetState(name, use, profile, json.dumps(news), texts)
 
 
 def _signals(
@@ -110,7 +110,7 @@ def _signals(
 
 
 def _signal(name: str, given: Mapping[str, Any]) -> Signal:
-    limits = Limits(**(given.get("limits") or {}))
+    limits = AlarmLimits(**(given.get("limits") or {}))
     states = tuple((str(raw), str(word)) for raw, word in dict(given.get("states") or {}).items())
     return Signal(name, **{**given, "limits": limits, "states": states})
 
@@ -124,11 +124,11 @@ def _commands(
         spec = {"command": given} if isinstance(given, str) else given
         name = str(spec["command"])
         outputs[output] = name
-        commands[name] = _command(name, widget.outputs.get(output, Port(output)), spec)
+        commands[name] = _command(name, widget.outputs.get(output, WidgetPort(output)), spec)
     return commands, outputs
 
 
-def _command(name: str, port: Port, spec: Mapping[str, Any]) -> Command:
+def _command(name: str, port: WidgetPort, spec: Mapping[str, Any]) -> Command:
     given = spec.get("arguments")
     if given is None:
         arguments = {one: Argument(one, min=-1, max=1, default=0.0) for one in port.arguments}

@@ -17,19 +17,19 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
 
-from urc.config.parse.widget import Shelf
+from urc.config.parse.widget import WidgetFolder
 from urc.model.profile import Profile
 from urc.model.widget import Widget
 from urc.problems import Problem, ProblemsError
-from urc.runtime.changes import Watched
-from urc.runtime.shelves import shelf_of
+from urc.runtime.file_watch import FileWatcher
+from urc.runtime.widget_registry import shelf_of
 from urc.shipped import shipped
 from urc.web.load.assets import Assets, widget_assets
-from urc.web.load.foreign import Border
+from urc.web.load.widget_trust import WidgetTrust
 from urc.web.show.cells import Cell, render_foreign, widget_cell
-from urc.web.show.demos import DemoState, demo_states
-from urc.web.show.menu import Nav, Ways
-from urc.web.show.pages import Head, render, with_words
+from urc.web.show.demos import WidgetState, demo_states
+from urc.web.show.menu import Nav, NavigationLinks
+from urc.web.show.pages import PageHead, render, with_words
 from urc.web.words import t
 
 __all__ = ["DemoPage", "Gallery", "GalleryPage"]
@@ -45,7 +45,7 @@ class Found(NamedTuple):
     """Problems of the manifest."""
 
 
-class Lookup:
+class WidgetLookup:
     """The existing widgets.
 
     Args:
@@ -68,7 +68,7 @@ class Lookup:
         profiles = list(self._profiles())
         mine = next((one.widgets[name] for one in profiles if name in one.widgets), None)
         if mine is not None:
-            shelf = Shelf(mine.folder.parent)
+            shelf = WidgetFolder(mine.folder.parent)
             is_read = self._is_fresh and shelf.has(name)
             return _on(shelf, name) if is_read else Found(mine.folder, mine)
         shelves = self._shelves(profiles)
@@ -82,13 +82,13 @@ class Lookup:
         on_shelf = (shelf.place(name) for shelf in shelves if shelf.has(name))
         return next(iter(mine), None) or next(on_shelf, None)
 
-    def _shelves(self, profiles: Iterable[Profile]) -> list[Shelf]:
+    def _shelves(self, profiles: Iterable[Profile]) -> list[WidgetFolder]:
         """Return the folders of widgets; none of them can replace a widget of URC."""
         files = dict.fromkeys(one.file for one in profiles)
-        return [Shelf(shipped("widgets")), *(shelf_of(file) for file in files)]
+        return [WidgetFolder(shipped("widgets")), *(shelf_of(file) for file in files)]
 
 
-def _on(shelf: Shelf, name: str) -> Found:
+def _on(shelf: WidgetFolder, name: str) -> Found:
     widget = shelf.get(name)
     return Found(shelf.place(name), widget, tuple(shelf.problems))
 
@@ -109,7 +109,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class GalleryEntry:
     """One widget in the list."""
 
     name: str
@@ -124,13 +124,13 @@ class Entry:
 class GalleryPage:
     """``widgets.html.j2``: the list of widgets."""
 
-    head: Head
+    head: PageHead
     nav: Nav
-    entries: tuple[Entry, ...]
+    entries: tuple[GalleryEntry, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Exhibit:
+class DemoView:
     """One state of one widget."""
 
     widget: str
@@ -142,18 +142,18 @@ class Exhibit:
     news: str
 
 
-class Shown(NamedTuple):
+class WidgetView(NamedTuple):
     """One widget of a page."""
 
     name: str
     widget: Widget | None
-    states: list[DemoState]
+    states: list[WidgetState]
     problems: tuple[Problem, ...] = ()
     """Why the widget has no states."""
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class WidgetProblem:
     """One problem of a widget that cannot be shown."""
 
     line: str
@@ -165,11 +165,11 @@ class Fault:
 class DemoPage:
     """``widget.html.j2``: widgets in the states of their demos."""
 
-    head: Head
+    head: PageHead
     title: str
     summary: str
-    exhibits: tuple[Exhibit, ...]
-    faults: tuple[Fault, ...]
+    exhibits: tuple[DemoView, ...]
+    faults: tuple[WidgetProblem, ...]
     """Problems of the widgets that cannot be shown."""
     stamp_url: str
     """URL of the stamp, for reloads after an edit, or ""."""
@@ -194,11 +194,11 @@ class Gallery:
         profiles: Callable[[], Iterable[Profile]],
         *,
         is_dev: bool = False,
-        border: Border = Border(),  # noqa: B008  # frozen
-        ways: Ways = Ways(),  # noqa: B008 - it cannot be changed
+        border: WidgetTrust = WidgetTrust(),  # noqa: B008  # frozen
+        ways: NavigationLinks = NavigationLinks(),  # noqa: B008 - it cannot be changed
     ) -> None:
         self._modules = modules
-        self._lookup = Lookup(profiles, is_fresh=is_dev)
+        self._lookup = WidgetLookup(profiles, is_fresh=is_dev)
         self._is_dev = is_dev
         self._ways = ways
         self._border = border
@@ -239,7 +239,7 @@ class Gallery:
     def _page(
         self,
         request: Request,
-        shown: Sequence[Shown],
+        shown: Sequence[WidgetView],
         problems: Iterable[Problem],
         stamp: str,
     ) -> DemoPage:
@@ -254,7 +254,7 @@ class Gallery:
             title=", ".join(titles),
             summary=widgets[0].summary if is_single and widgets else "",
             exhibits=tuple(_exhibits(shown, self._border)),
-            faults=tuple(Fault(one.headline, one.hint) for one in problems),
+            faults=tuple(WidgetProblem(one.headline, one.hint) for one in problems),
             stamp_url="stamp" if self._is_dev else "",
             stamp=stamp,
         )
@@ -276,20 +276,20 @@ class Gallery:
             for path in sorted(folder.rglob("*"))
             if path.is_file()
         ]
-        states = repr((files, Watched(files).states()))
+        states = repr((files, FileWatcher(files).states()))
         return hashlib.blake2b(states.encode(), digest_size=12).hexdigest()
 
-    def _head(self, request: Request, title: str) -> Head:
-        return Head(request.state.nonce, title, import_map=with_words(self._modules))
+    def _head(self, request: Request, title: str) -> PageHead:
+        return PageHead(request.state.nonce, title, import_map=with_words(self._modules))
 
-    def _entries(self) -> list[Entry]:
+    def _entries(self) -> list[GalleryEntry]:
         entries = []
         for name in self._lookup.names():
             found = self._lookup.find(name)
             widget = found and found.widget
             title, summary = (widget.title, widget.summary) if widget else (name, "")
             fault = "" if widget else t("its manifest cannot be read: urc validate says why")
-            entries.append(Entry(name, title, summary, f"/widgets/{quote(name)}/", fault))
+            entries.append(GalleryEntry(name, title, summary, f"/widgets/{quote(name)}/", fault))
         return entries
 
     def _names(self, request: Request) -> list[str]:
@@ -299,26 +299,26 @@ class Gallery:
             raise HTTPException(404, f"A page shows {MOST_AT_ONCE} widgets at most.")
         return wanted
 
-    def _shown(self, name: str) -> Shown:
+    def _shown(self, name: str) -> WidgetView:
         """Return a widget with its states or its problems; raise 404 for an unknown one."""
         found = self._lookup.find(name)
         if found is None:
             raise HTTPException(404, t(NO_WIDGET))
         if found.widget is None:
-            return Shown(name, None, [], found.problems)
+            return WidgetView(name, None, [], found.problems)
         try:
-            return Shown(name, found.widget, demo_states(found.widget))
+            return WidgetView(name, found.widget, demo_states(found.widget))
         except ProblemsError as error:
-            return Shown(name, found.widget, [], error.problems)
+            return WidgetView(name, found.widget, [], error.problems)
 
 
-def _exhibits(shown: Iterable[Shown], border: Border) -> Iterable[Exhibit]:
+def _exhibits(shown: Iterable[WidgetView], border: WidgetTrust) -> Iterable[DemoView]:
     every = [(one.widget, state) for one in shown if one.widget for state in one.states]
     render_foreign(((state.use, state.profile) for _, state in every), border)
     for index, (widget, state) in enumerate(every):
         cell = widget_cell(index, state.use, state.profile, border)
         label = t(state.name) if state.name in EXAMPLES else state.name
-        yield Exhibit(widget.name, state.name, label, widget.title, cell, state.news)
+        yield DemoView(widget.name, state.name, label, widget.title, cell, state.news)
 
 
 async def with_slash(request: Request) -> Response:

@@ -21,7 +21,7 @@ __all__ = [
     "DEBUGGING",
     "DEBUG_STYLES",
     "KEPT",
-    "Choice",
+    "InterfaceChoice",
     "DebugPart",
     "PageTab",
     "choices",
@@ -40,7 +40,7 @@ KEPT: Final = "urc-interface"
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class InterfaceChoice:
     """An interface of the robot."""
 
     name: str
@@ -87,7 +87,9 @@ def chosen(profile: Profile, wanted: str | None, kept: str = "") -> Interface | 
     return known.get(kept) or next(iter(known.values()))
 
 
-def choices(profile: Profile, interface: Interface, url: str, more: str) -> tuple[Choice, ...]:
+def choices(
+    profile: Profile, interface: Interface, url: str, more: str
+) -> tuple[InterfaceChoice, ...]:
     """Return all interfaces of a robot, the debug interface last.
 
     Args:
@@ -98,7 +100,7 @@ def choices(profile: Profile, interface: Interface, url: str, more: str) -> tupl
     """
     every = (*profile.interfaces.values(), DEBUGGING)
     return tuple(
-        Choice(
+        InterfaceChoice(
             each.name,
             words.t("Debug") if each is DEBUGGING else each.title or each.name,
             f"{url}?interface={quote(each.name)}{more}",

@@ -17,7 +17,7 @@ and a cell in two pages keeps its state.
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from urc.model.interface import Grid, Interface, Slot, Tab
+from urc.model.interface import Interface, Layout, Slot, Tab
 
 __all__ = ["grid_css", "mirrored", "needs_turning"]
 
@@ -59,10 +59,10 @@ class _Canvas(NamedTuple):
     """Slot behind all others; it shows through empty cells, which keep their full size."""
 
 
-def _left_hand(page: Tab, right: Mapping[str, Grid], canvas: _Canvas) -> dict[str, Grid]:
+def _left_hand(page: Tab, right: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
     """Return the layouts for left-handed operators: designed, mirrored or unchanged."""
     if page.left_handed:
-        turn = mirrored if page.is_mirrored else Grid._replace
+        turn = mirrored if page.is_mirrored else Layout._replace
         others = {screen: turn(grid) for screen, grid in page.layouts.items()}
         return _placed({**others, **page.left_handed}, canvas)
     if not page.is_mirrored:
@@ -71,7 +71,7 @@ def _left_hand(page: Tab, right: Mapping[str, Grid], canvas: _Canvas) -> dict[st
     return {screen: mirrored(grid) for screen, grid in right.items()}
 
 
-def mirrored(grid: Grid) -> Grid:
+def mirrored(grid: Layout) -> Layout:
     """Return the grid with its columns in reverse order."""
     slots = tuple(
         slot._replace(column=grid.columns - slot.column - slot.column_span) for slot in grid.slots
@@ -86,11 +86,11 @@ def needs_turning(page: Tab, slots: Sequence[str]) -> bool:
     return base is not None and not is_drawn and _cropped(base).columns > PHONE_COLUMNS
 
 
-def _placed(grids: Mapping[str, Grid], canvas: _Canvas) -> dict[str, Grid]:
+def _placed(grids: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
     """Return the grid for each kind of screen, without empty slots."""
     if not grids:
         return {}
-    crop = Grid._replace if canvas.background else _cropped
+    crop = Layout._replace if canvas.background else _cropped
     wide = grids.get("landscape") or next(iter(grids.values()))
     base = _filled(wide, canvas.slots)
     placed = {"base": base}
@@ -108,7 +108,7 @@ def _placed(grids: Mapping[str, Grid], canvas: _Canvas) -> dict[str, Grid]:
     return placed
 
 
-def _screens(place: str, grids: Mapping[str, Grid], canvas: _Canvas) -> str:
+def _screens(place: str, grids: Mapping[str, Layout], canvas: _Canvas) -> str:
     css = ""
     for screen, grid in grids.items():
         rules = _rules(place, grid, canvas, _LOW_ROW if screen == SHORT else _USED_ROW)
@@ -116,12 +116,12 @@ def _screens(place: str, grids: Mapping[str, Grid], canvas: _Canvas) -> str:
     return css
 
 
-def _filled(grid: Grid, names: Sequence[str]) -> Grid:
+def _filled(grid: Layout, names: Sequence[str]) -> Layout:
     """Return the grid without empty slots."""
-    return Grid(grid.rows, grid.columns, tuple(slot for slot in grid.slots if slot.name in names))
+    return Layout(grid.rows, grid.columns, tuple(slot for slot in grid.slots if slot.name in names))
 
 
-def _rules(place: str, grid: Grid, canvas: _Canvas, row: str) -> str:
+def _rules(place: str, grid: Layout, canvas: _Canvas, row: str) -> str:
     empty_row, empty_column = _WINDOW if canvas.background else (_MARGIN, _MARGIN)
     if canvas.background and row == _LOW_ROW:
         empty_row = _MARGIN  # shrinks, so that no control lies below the edge
@@ -153,7 +153,7 @@ def _used(spans: Iterable[tuple[int, int]]) -> set[int]:
     return {place for start, span in spans for place in range(start, start + span)}
 
 
-def _cropped(grid: Grid) -> Grid:
+def _cropped(grid: Layout) -> Layout:
     """Return the grid without the rows and columns in which no slot stands."""
     rows = sorted(_used((slot.row, slot.row_span) for slot in grid.slots))
     columns = sorted(_used((slot.column, slot.column_span) for slot in grid.slots))
@@ -163,11 +163,11 @@ def _cropped(grid: Grid) -> Grid:
         Slot(slot.name, row_of[slot.row], column_of[slot.column], slot.row_span, slot.column_span)
         for slot in grid.slots
     )
-    return Grid(len(rows), len(columns), slots)
+    return Layout(len(rows), len(columns), slots)
 
 
-def _stacked(grid: Grid, first: int) -> Grid:
+def _stacked(grid: Layout, first: int) -> Layout:
     """Return the slots in one column, in reading order, from the row `first`."""
     ordered = sorted(grid.slots, key=lambda slot: (slot.row, slot.column))
     slots = tuple(Slot(slot.name, row, 0) for row, slot in enumerate(ordered, first))
-    return Grid(len(slots) + first, 1, slots)
+    return Layout(len(slots) + first, 1, slots)

@@ -11,17 +11,17 @@ from urllib.parse import quote
 
 from urc.model.profile import Setting
 from urc.model.values import Value
-from urc.web.fleet.fleet import Broken
+from urc.web.fleet.fleet import BrokenRobot
 from urc.web.fleet.robots import Robot, missing_settings
 from urc.web.show.cells import spoken
-from urc.web.show.pages import Head, render
+from urc.web.show.pages import PageHead, render
 from urc.web.words import t
 
-__all__ = ["Card", "MenuPage", "Nav", "SettingRow", "Ways", "menu_page", "setting_row"]
+__all__ = ["Card", "MenuPage", "Nav", "SettingRow", "NavigationLinks", "menu_page", "setting_row"]
 
 
 @dataclass(frozen=True, slots=True)
-class Ways:
+class NavigationLinks:
     """Navigation links of this server."""
 
     has_managers: bool = False
@@ -35,7 +35,7 @@ class Nav:
 
     current: str
     """``menu``, ``drivers``, ``interfaces``, ``widgets``, ``dev``, or "" for none of them."""
-    ways: Ways
+    ways: NavigationLinks
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,18 +84,18 @@ class Card:
 class MenuPage:
     """``menu.html.j2``: the served robots and their settings."""
 
-    head: Head
+    head: PageHead
     nav: Nav
     cards: tuple[Card, ...]
 
 
 def menu_page(
-    head: Head,
+    head: PageHead,
     robots: Mapping[str, Robot],
     *,
-    ways: Ways = Ways(),
+    ways: NavigationLinks = NavigationLinks(),
     drivers: Mapping[str, str] | None = None,
-    broken: Mapping[str, Broken] | None = None,
+    broken: Mapping[str, BrokenRobot] | None = None,
 ) -> str:
     """Return the menu.
 
@@ -130,7 +130,7 @@ def setting_row(setting: Setting, value: Value) -> SettingRow:
     return SettingRow(title, setting.name, shown, setting.description, is_missing)
 
 
-def _card(name: str, robot: Robot, ways: Ways, driver: str) -> Card:
+def _card(name: str, robot: Robot, ways: NavigationLinks, driver: str) -> Card:
     profile = robot.profile
     missing = missing_settings(robot)
     rows = tuple(
@@ -160,7 +160,7 @@ def _utc(time_s: float) -> str:
     return strftime("%Y-%m-%d %H:%M UTC", gmtime(time_s))
 
 
-def _broken(name: str, one: Broken, ways: Ways) -> Card:
+def _broken(name: str, one: BrokenRobot, ways: NavigationLinks) -> Card:
     empty: Sequence[SettingRow] = ()
     url = f"/robots/{quote(name, safe='')}/"
     settings_url = f"{url}settings" if ways.has_managers else ""

@@ -8,16 +8,16 @@ from collections.abc import Mapping
 from urc.model import sequence
 from urc.model.binding import targets
 from urc.model.driver import Argument, Command, Driver
-from urc.model.interface import Given, WidgetUse
+from urc.model.interface import OutputBinding, WidgetUse
 from urc.model.units import conversion
 from urc.model.values import Reading
-from urc.model.widget import Port, Widget
-from urc.web.drive.once import HELD, needs_holding
+from urc.model.widget import Widget, WidgetPort
+from urc.web.drive.one_shot_commands import HELD, needs_holding
 
 __all__ = ["asked_before", "inputs_config", "motion_lines", "output_config"]
 
-_NO_PORT = Port("")
-_NOTHING_GIVEN = Given()
+_NO_PORT = WidgetPort("")
+_NOTHING_GIVEN = OutputBinding()
 
 
 def inputs_config(use: WidgetUse, widget: Widget, driver: Driver) -> dict[str, object]:
@@ -67,7 +67,7 @@ def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -
     }
 
 
-def _moves(command: Command, given: Given) -> bool:
+def _moves(command: Command, given: OutputBinding) -> bool:
     """Return whether the command always starts autonomous motion with these fixed arguments.
 
     Where that depends on a chosen value, the server checks the choice.
@@ -77,7 +77,7 @@ def _moves(command: Command, given: Given) -> bool:
     return is_told and command.moves_with(given.fixed)
 
 
-def _arguments(command: Command | None, given: Given) -> dict[str, dict[str, object]]:
+def _arguments(command: Command | None, given: OutputBinding) -> dict[str, dict[str, object]]:
     """Return the arguments that are not fixed, by their names in the command."""
     found: dict[str, dict[str, object]] = {}
     for name, one in (command.arguments if command is not None else {}).items():
@@ -137,7 +137,9 @@ def _line(command: Command | None, driver: Driver) -> str:
     return "" if is_made_for_it else line
 
 
-def _ranges(command: Command | None, port: Port, given: Given) -> dict[str, dict[str, object]]:
+def _ranges(
+    command: Command | None, port: WidgetPort, given: OutputBinding
+) -> dict[str, dict[str, object]]:
     """Return the meaning of -1 to 1 for each argument that has a range of its own."""
     if command is None:
         return {}
@@ -162,7 +164,7 @@ def _rest(command: Command, argument: Argument, least: float) -> float:
     return float(stop) if is_number else max(0.0, least)  # type: ignore[arg-type]  # it is one
 
 
-def _neutral(command: Command | None, port: Port, given: Given) -> dict[str, Reading]:
+def _neutral(command: Command | None, port: WidgetPort, given: OutputBinding) -> dict[str, Reading]:
     """Return the values that stop the motion of this output, if the command has them."""
     if command is None:
         return {}

@@ -18,14 +18,14 @@ from urc.model.interface import Interface, WidgetUse
 from urc.model.profile import Profile
 from urc.shipped import shipped
 from urc.web import words
-from urc.web.drive.once import can_move
-from urc.web.load.foreign import Border
+from urc.web.drive.one_shot_commands import can_move
+from urc.web.load.widget_trust import WidgetTrust
 from urc.web.show.cells import Cell, render_foreign, widget_cell
 from urc.web.show.interfaces import (
     DEBUG_STYLES,
     DEBUGGING,
-    Choice,
     DebugPart,
+    InterfaceChoice,
     PageTab,
     choices,
     debug_part,
@@ -37,7 +37,7 @@ from urc.web.show.outputs import motion_lines
 
 __all__ = [
     "ErrorPage",
-    "Head",
+    "PageHead",
     "RobotPage",
     "error_page",
     "render",
@@ -46,7 +46,7 @@ __all__ = [
 
 
 @dataclass(frozen=True, slots=True)
-class Head:
+class PageHead:
     """Data for the head of every page."""
 
     nonce: str
@@ -64,11 +64,11 @@ class Head:
 class RobotPage:
     """``robot.html.j2``: one interface of one robot, live."""
 
-    head: Head
+    head: PageHead
     title: str
     socket: str
     """Path and query of the WebSocket."""
-    interfaces: tuple[Choice, ...]
+    interfaces: tuple[InterfaceChoice, ...]
     """All interfaces of the robot."""
     tabs: tuple[PageTab, ...]
     """Pages of this interface; empty if it has only one."""
@@ -95,7 +95,7 @@ class RobotPage:
 class ErrorPage:
     """``error.html.j2``: one sentence, and a link back."""
 
-    head: Head
+    head: PageHead
     status: int
     message: str
 
@@ -112,7 +112,7 @@ def robot_page(
     wire: str = "",
     tape: str = "",
     is_part: bool = False,
-    border: Border = Border(),  # noqa: B008  # frozen
+    border: WidgetTrust = WidgetTrust(),  # noqa: B008  # frozen
 ) -> str:
     """Return the page of one interface.
 
@@ -136,7 +136,7 @@ def robot_page(
     url, watch = f"/robots/{place}/", "&watch" if is_watching else ""
     tabs = page_tabs(interface, tab)
     page = RobotPage(
-        head=Head(
+        head=PageHead(
             nonce=nonce,
             title=profile.title,
             import_map=with_words(modules),
@@ -168,7 +168,7 @@ def with_words(modules: Mapping[str, object]) -> Mapping[str, object]:
 
 def error_page(nonce: str, status: int, message: str) -> str:
     """Return a page with an error message of one sentence."""
-    return render("error.html.j2", ErrorPage(Head(nonce, f"{status}"), status, message))
+    return render("error.html.j2", ErrorPage(PageHead(nonce, f"{status}"), status, message))
 
 
 def render(template: str, page: object) -> str:
@@ -185,7 +185,7 @@ def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
 
 
 def _cells(
-    profile: Profile, interface: Interface, uses: Mapping[str, WidgetUse], border: Border
+    profile: Profile, interface: Interface, uses: Mapping[str, WidgetUse], border: WidgetTrust
 ) -> tuple[Cell, ...]:
     render_foreign(((use, profile) for use in uses.values()), border)
     return tuple(
@@ -195,7 +195,7 @@ def _cells(
 
 
 def _styles(
-    profile: Profile, interface: Interface, uses: Mapping[str, WidgetUse], border: Border
+    profile: Profile, interface: Interface, uses: Mapping[str, WidgetUse], border: WidgetTrust
 ) -> tuple[str, ...]:
     if interface is DEBUGGING:
         return DEBUG_STYLES

@@ -1,7 +1,7 @@
 """The sandboxed Jinja environment for the templates of widgets, with few globals.
 
 Layer 5. It limits neither time nor memory; for third-party widgets
-`urc.web.show.markup_apart` does.
+`urc.web.show.isolated_markup` does.
 """
 
 import traceback

@@ -12,13 +12,13 @@ from jinja2 import TemplateSyntaxError, nodes
 from jinja2.meta import find_undeclared_variables
 
 from urc._files import read_bytes
-from urc.config.suggest import did_you_mean
+from urc.config.spelling_suggestions import did_you_mean
 from urc.model.widget import Widget
 from urc.problems import Problem, ProblemsError, has_errors
-from urc.runtime.shelves import hidden_widget
-from urc.web.load.foreign import OURS, Border
+from urc.runtime.widget_registry import hidden_widget
+from urc.web.load.widget_trust import OURS, WidgetTrust
 from urc.web.show.cells import WidgetContext, render_widget, widget_context
-from urc.web.show.demos import DemoState, demo_states
+from urc.web.show.demos import WidgetState, demo_states
 from urc.web.show.sandbox import TEMPLATE, fault_line, widget_environment
 
 __all__ = ["FILES", "check_widget"]
@@ -41,10 +41,10 @@ def check_widget(widget: Widget, *, with_demo: bool = True) -> list[Problem]:
         with_demo: whether to check the demo, which pages do not need.
     """
     problems: list[Problem] = []
-    if widget.name in OURS and Border().is_foreign(widget):
+    if widget.name in OURS and WidgetTrust().is_foreign(widget):
         problems.append(hidden_widget(str(widget.folder / "widget.yaml"), widget.name))
     template: _TemplateCheck | None = None
-    states: list[DemoState] = []
+    states: list[WidgetState] = []
     try:
         template = _TemplateCheck(widget, _text(widget, TEMPLATE))
         problems += template.problems()
@@ -68,7 +68,9 @@ def _text(widget: Widget, name: str) -> str:
     return read_bytes(str(widget.folder / name), MOST_BYTES).decode("utf-8", "replace")
 
 
-def _rendered(widget: Widget, states: list[DemoState], template: "_TemplateCheck") -> list[Problem]:
+def _rendered(
+    widget: Widget, states: list[WidgetState], template: "_TemplateCheck"
+) -> list[Problem]:
     """Return the first failure to render the template in a state, if any."""
     for state in states:
         context = widget_context(state.use, widget, state.profile, uid="cell-0")

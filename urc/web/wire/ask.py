@@ -7,15 +7,15 @@ from typing import Literal
 
 import msgspec
 
-from urc.protocol.reins import Pull
-from urc.runtime.hub import Progress
+from urc.protocol.sequences.sequence_control import Pull
+from urc.runtime.hub import SequenceProgress
 from urc.web.wire.text import Outbound, cut, encoded, milliseconds
 
 __all__ = [
-    "Agree",
+    "Approval",
     "Arguments",
-    "Prepare",
-    "Steer",
+    "ApprovalRequest",
+    "SequenceAction",
     "encode_ask",
     "encode_asked",
     "encode_progress",
@@ -57,7 +57,7 @@ class _AllProgress(Outbound, tag="progress", omit_defaults=False, frozen=True):
     sequences: list[_Progress]
 
 
-class Agree(msgspec.Struct, tag_field="t", tag="agree", forbid_unknown_fields=True, frozen=True):
+class Approval(msgspec.Struct, tag_field="t", tag="agree", forbid_unknown_fields=True, frozen=True):
     """The answer to question `n`; no from the asking page withdraws it."""
 
     n: int
@@ -69,7 +69,7 @@ Arguments = dict[str, bool | int | float | str | tuple[_Scalar, ...] | None]
 """Arguments of a command, as a page sends them."""
 
 
-class Prepare(
+class ApprovalRequest(
     msgspec.Struct, tag_field="t", tag="prepare", forbid_unknown_fields=True, frozen=True
 ):
     """The operator's confirmation of exactly this command; requests the `token` for it."""
@@ -81,7 +81,9 @@ class Prepare(
     """As in `Run`, whose value counts."""
 
 
-class Steer(msgspec.Struct, tag_field="t", tag="steer", forbid_unknown_fields=True, frozen=True):
+class SequenceAction(
+    msgspec.Struct, tag_field="t", tag="steer", forbid_unknown_fields=True, frozen=True
+):
     """A request about a sequence: pause, step, resume or end."""
 
     command: str
@@ -111,7 +113,7 @@ def encode_token(run: int, token: str) -> str:
     return encoded(_Token(run, token))
 
 
-def encode_progress(all_progress: tuple[Progress, ...]) -> str:
+def encode_progress(all_progress: tuple[SequenceProgress, ...]) -> str:
     """Return the state of the sequences."""
     return encoded(
         _AllProgress(

@@ -7,8 +7,8 @@ from typing import Literal
 
 import msgspec
 
-from urc.motion.hold import Reason
-from urc.motion.lease import REQUEST_S, Client, LeaseState
+from urc.motion.hold_to_run import Reason
+from urc.motion.lease import REQUEST_S, LeaseState, Operator
 from urc.web.wire.text import Outbound, cut, encoded, milliseconds
 
 __all__ = [
@@ -17,7 +17,7 @@ __all__ = [
     "Drive",
     "Driving",
     "Release",
-    "Spare",
+    "JoinRedundant",
     "Stop",
     "Tick",
     "command_of",
@@ -85,7 +85,7 @@ class Drive(msgspec.Struct, tag_field="t", tag="drive", forbid_unknown_fields=Tr
 
 
 class Tick(msgspec.Struct, tag_field="t", tag="tick", forbid_unknown_fields=True, frozen=True):
-    """A sample of a held control. See `urc.motion.fresh.Input`."""
+    """A sample of a held control. See `urc.motion.freshness.ControlInput`."""
 
     command: str
     epoch: int
@@ -127,14 +127,16 @@ Doubled = Tick | Release | Stop
 """Messages that a page may also send on its redundant socket."""
 
 
-class Spare(msgspec.Struct, tag_field="t", tag="spare", forbid_unknown_fields=True, frozen=True):
+class JoinRedundant(
+    msgspec.Struct, tag_field="t", tag="spare", forbid_unknown_fields=True, frozen=True
+):
     """First message of a redundant socket: the key from the page's lease."""
 
     key: str
 
 
 def encode_lease(
-    state: LeaseState, you: Client, *, left_s: float, is_confirmed: bool, spare: str = ""
+    state: LeaseState, you: Operator, *, left_s: float, is_confirmed: bool, spare: str = ""
 ) -> str:
     """Return the lease message for one page; `spare` is the key for its redundant socket."""
     return encoded(
@@ -170,5 +172,5 @@ def encode_refused(about: str, command: str, message: str) -> str:
     return encoded(_Refused(about, cut(message), command))
 
 
-def _person(client: Client | None) -> _Person | None:
+def _person(client: Operator | None) -> _Person | None:
     return None if client is None else _Person(client.id, client.name)

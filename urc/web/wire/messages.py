@@ -40,10 +40,10 @@ import msgspec
 from urc.model.driver import Command, Driver, Poll
 from urc.model.profile import Profile
 from urc.model.values import NOTHING, Reading, Sample, Signal
-from urc.runtime.hub import LinkStatus, Note
-from urc.web.wire.ask import Agree, Arguments, Prepare, Steer
+from urc.runtime.hub import LinkStatus, LogEntry
+from urc.web.wire.ask import Approval, ApprovalRequest, Arguments, SequenceAction
 from urc.web.wire.drive import Drive, Release, Stop, Tick
-from urc.web.wire.picture import Show
+from urc.web.wire.picture import ImageSelection
 from urc.web.wire.text import Outbound, cut, encoded, encoded_bytes, milliseconds, repaired
 
 __all__ = [
@@ -60,7 +60,7 @@ __all__ = [
     "Inbound",
     "Indexes",
     "Ping",
-    "Run",
+    "CommandRequest",
     "decode",
     "encode_error",
     "encode_hello",
@@ -181,19 +181,32 @@ class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True
     c: float
 
 
-class Run(msgspec.Struct, tag_field="t", tag="run", forbid_unknown_fields=True, frozen=True):
+class CommandRequest(
+    msgspec.Struct, tag_field="t", tag="run", forbid_unknown_fields=True, frozen=True
+):
     """One command. The page chooses `id`; exactly one reply carries it."""
 
     id: int
     command: str
     arguments: Arguments = {}
     token: str = ""
-    """Token from `Prepare` if the driver requires a confirmation."""
+    """Token from `ApprovalRequest` if the driver requires a confirmation."""
     stops: int | None = None
     """Number of STOPs that the page knew at the operator's click; None skips the check."""
 
 
-Inbound = Ping | Run | Show | Agree | Prepare | Steer | Drive | Tick | Release | Stop
+Inbound = (
+    Ping
+    | CommandRequest
+    | ImageSelection
+    | Approval
+    | ApprovalRequest
+    | SequenceAction
+    | Drive
+    | Tick
+    | Release
+    | Stop
+)
 
 _Message = TypeVar("_Message")
 
@@ -298,7 +311,7 @@ def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
     )
 
 
-def encode_log(notes: Iterable[Note], first: int, now_s: float) -> str:
+def encode_log(notes: Iterable[LogEntry], first: int, now_s: float) -> str:
     """Return lines of the log; `first` is the number of the first line in its session."""
     lines = [
         _Line(max(0, milliseconds(now_s - note.time_s)), note.level, note.source, cut(note.text))
@@ -308,7 +321,11 @@ def encode_log(notes: Iterable[Note], first: int, now_s: float) -> str:
 
 
 def encode_reply(
-    run: Run, *, values: Mapping[str, Reading] | None = None, code: str = "", message: str = ""
+    run: CommandRequest,
+    *,
+    values: Mapping[str, Reading] | None = None,
+    code: str = "",
+    message: str = "",
 ) -> str:
     """Return the reply to a command: its values, or `code` and `message` of a failure."""
     if code:

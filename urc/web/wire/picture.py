@@ -17,7 +17,7 @@ import msgspec
 
 from urc.images import media_type
 
-__all__ = ["Show", "as_frame", "encode_picture"]
+__all__ = ["ImageSelection", "as_frame", "encode_picture"]
 
 _PICTURE = 1
 _HEADER = struct.Struct(">BBHId")
@@ -27,7 +27,9 @@ _SHORT, _MEDIUM = 126, 1 << 16
 """The length of a frame takes one byte below the first, three below the second, else nine."""
 
 
-class Show(msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True):
+class ImageSelection(
+    msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True
+):
     """Selects the images that the page shows; no others are sent."""
 
     signals: Annotated[

@@ -6,7 +6,7 @@ A peer is started with one way to behave and gives a transport that leads to it.
 
 from typing import Literal, NamedTuple, Protocol
 
-from urc.model.codec import Payload
+from urc.model.payload import Payload
 from urc.transports.base import Transport
 
 __all__ = ["Behaviour", "Peer", "Traits", "WAIT_S"]

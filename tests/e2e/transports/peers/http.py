@@ -5,8 +5,8 @@ from contextlib import suppress
 
 from tests.e2e.transports.peers.base import Behaviour, Traits
 from tests.e2e.transports.peers.tcp import TcpPeer
-from urc.model.codec import Envelope, Payload
-from urc.transports.base import Setup, Subscription, Transport
+from urc.model.payload import Envelope, Payload
+from urc.transports.base import TopicSubscription, Transport, TransportSetup
 from urc.transports.http import from_setup
 
 __all__ = ["HttpPeer"]
@@ -49,10 +49,10 @@ class HttpPeer(TcpPeer):
 
     def transport(self) -> Transport:
         """Return a line that leads here."""
-        flood = (Subscription("/flood", {"stream": "lines"}),)
+        flood = (TopicSubscription("/flood", {"stream": "lines"}),)
         listens = flood if self._behaviour == "floods" else ()
         options = {"url": f"http://127.0.0.1:{self.port}", "response_timeout": "3s"}
-        return from_setup(Setup("wire", options, listens))
+        return from_setup(TransportSetup("wire", options, listens))
 
     async def stop(self) -> None:
         """Let packets pass again and close everything."""

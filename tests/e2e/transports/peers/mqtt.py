@@ -4,8 +4,8 @@ import asyncio
 
 from tests.e2e.transports.peers.base import Behaviour, Traits
 from tests.e2e.transports.peers.tcp import StreamRobot, TcpPeer
-from urc.model.codec import Envelope
-from urc.transports.base import Setup, Subscription, Transport
+from urc.model.payload import Envelope
+from urc.transports.base import TopicSubscription, Transport, TransportSetup
 from urc.transports.mqtt import from_setup
 
 __all__ = ["MqttPeer"]
@@ -86,4 +86,4 @@ class MqttPeer(TcpPeer):
     def transport(self) -> Transport:
         """Return a line that leads here."""
         options = {"host": "127.0.0.1", "port": self.port, "version": "3.1.1"}
-        return from_setup(Setup("wire", options, (Subscription("answer"),)))
+        return from_setup(TransportSetup("wire", options, (TopicSubscription("answer"),)))

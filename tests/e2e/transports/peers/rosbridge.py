@@ -9,9 +9,9 @@ from websockets.exceptions import ConnectionClosed
 
 from tests.e2e.transports.peers.base import Behaviour, Traits
 from tests.e2e.transports.peers.tcp import TcpPeer
-from urc.model.codec import Envelope
-from urc.transports.base import Setup, Subscription, Transport
-from urc.transports.rosbridge import from_setup
+from urc.model.payload import Envelope
+from urc.transports.base import TopicSubscription, Transport, TransportSetup
+from urc.transports.ros.rosbridge import from_setup
 
 __all__ = ["RosbridgePeer"]
 
@@ -46,7 +46,7 @@ class RosbridgePeer(TcpPeer):
     def transport(self) -> Transport:
         """Return a line that leads here."""
         options = {"host": "127.0.0.1", "port": self.port}
-        return from_setup(Setup("wire", options, (Subscription("/answer"),)))
+        return from_setup(TransportSetup("wire", options, (TopicSubscription("/answer"),)))
 
     async def stop(self) -> None:
         """Let packets pass again and cut every client off."""

@@ -13,7 +13,7 @@ import tty
 from pathlib import Path
 
 from tests.e2e.transports.peers.base import Behaviour, Traits
-from urc.transports.base import Setup, Transport
+from urc.transports.base import Transport, TransportSetup
 from urc.transports.serial import from_setup
 
 __all__ = ["SerialPeer"]
@@ -42,7 +42,7 @@ class SerialPeer:
             path.symlink_to(os.ttyname(self._held))
         if behaviour not in ("refuses", "deaf"):
             self._task = asyncio.create_task(self._behave())
-        return from_setup(Setup("wire", {"port": str(path), "baud": 115200}))
+        return from_setup(TransportSetup("wire", {"port": str(path), "baud": 115200}))
 
     async def vanish(self) -> None:
         """Nobody can tell."""

@@ -8,7 +8,7 @@ import asyncssh
 
 from tests.e2e.transports.packets import Loss
 from tests.e2e.transports.peers.base import Behaviour, Traits
-from urc.transports.base import Setup, Transport
+from urc.transports.base import Transport, TransportSetup
 from urc.transports.ssh import from_setup
 from urc.transports.telnet import from_setup as telnet_from_setup
 
@@ -60,10 +60,10 @@ class SshPeer:
         """Return a line that leads here."""
         return from_setup(self.setup("shell"))
 
-    def setup(self, mode: str) -> Setup:
+    def setup(self, mode: str) -> TransportSetup:
         """Return what leads here."""
         pty = {"pty": False} if mode == "shell" else {}
-        return Setup(
+        return TransportSetup(
             "jump",
             {
                 "host": "127.0.0.1",
@@ -130,7 +130,7 @@ class CarriedPeer(SshPeer):
     def transport(self) -> Transport:
         """Return a line that leads through the server."""
         way = from_setup(self.setup("forward"))
-        return telnet_from_setup(Setup("wire", {"host": "10.0.0.20"}, tunnel=way))
+        return telnet_from_setup(TransportSetup("wire", {"host": "10.0.0.20"}, tunnel=way))
 
 
 class _Server(asyncssh.SSHServer):

@@ -6,7 +6,7 @@ from contextlib import suppress
 
 from tests.e2e.transports.packets import Loss
 from tests.e2e.transports.peers.base import Behaviour, Traits
-from urc.transports.base import Setup, Transport
+from urc.transports.base import Transport, TransportSetup
 from urc.transports.tcp import from_setup
 
 __all__ = ["StreamRobot", "TcpPeer"]
@@ -93,7 +93,7 @@ class TcpPeer:
 
     def transport(self) -> Transport:
         """Return a line that leads here."""
-        return from_setup(Setup("wire", {"host": "127.0.0.1", "port": self.port}))
+        return from_setup(TransportSetup("wire", {"host": "127.0.0.1", "port": self.port}))
 
     def _begin(self, port: int) -> None:
         self.port = port

@@ -9,7 +9,7 @@ from pathlib import Path
 from tests.e2e.transports.authority import Authority
 from tests.e2e.transports.peers.base import Behaviour
 from tests.e2e.transports.peers.tcp import StreamRobot, TcpPeer
-from urc.transports.base import Setup, Transport
+from urc.transports.base import Transport, TransportSetup
 from urc.transports.serial import from_setup as serial_from_setup
 from urc.transports.tcp import from_setup
 
@@ -43,7 +43,7 @@ class TlsPeer(TcpPeer):
     def transport(self) -> Transport:
         tls = {"ca": self._authority.file}
         options = {"host": "127.0.0.1", "port": self.port, "tls": tls}
-        return from_setup(Setup("wire", options))
+        return from_setup(TransportSetup("wire", options))
 
     async def stop(self) -> None:
         await super().stop()
@@ -67,7 +67,7 @@ class CallingPeer(TcpPeer):
         return self.transport()
 
     def transport(self) -> Transport:
-        return from_setup(Setup("wire", {"mode": "listen", "port": self.port}))
+        return from_setup(TransportSetup("wire", {"mode": "listen", "port": self.port}))
 
     async def stop(self) -> None:
         if self._task is not None:
@@ -91,4 +91,6 @@ class SocketSerialPeer(TcpPeer):
     """Stands for a server that passes a port's bytes on."""
 
     def transport(self) -> Transport:
-        return serial_from_setup(Setup("wire", {"port": f"socket://127.0.0.1:{self.port}"}))
+        return serial_from_setup(
+            TransportSetup("wire", {"port": f"socket://127.0.0.1:{self.port}"})
+        )

@@ -8,7 +8,7 @@ import asyncio
 import socket
 
 from tests.e2e.transports.peers.base import Behaviour, Traits
-from urc.transports.base import Setup, Transport
+from urc.transports.base import Transport, TransportSetup
 from urc.transports.udp import from_setup
 
 __all__ = ["UdpPeer"]
@@ -44,7 +44,7 @@ class UdpPeer(asyncio.DatagramProtocol):
         elif behaviour != "deaf":
             loop = asyncio.get_running_loop()
             self._line, _ = await loop.create_datagram_endpoint(lambda: self, sock=self._socket)
-        return from_setup(Setup("wire", {"host": "127.0.0.1", "port": port}))
+        return from_setup(TransportSetup("wire", {"host": "127.0.0.1", "port": port}))
 
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
         """Behave."""

@@ -8,7 +8,7 @@ from websockets.exceptions import ConnectionClosed
 
 from tests.e2e.transports.peers.base import Behaviour, Traits
 from tests.e2e.transports.peers.tcp import TcpPeer
-from urc.transports.base import Setup, Transport
+from urc.transports.base import Transport, TransportSetup
 from urc.transports.websocket import from_setup
 
 __all__ = ["WebSocketPeer"]
@@ -40,7 +40,9 @@ class WebSocketPeer(TcpPeer):
     def transport(self) -> Transport:
         """Return a line that leads here."""
         url = f"ws://127.0.0.1:{self.port}/robot"
-        return from_setup(Setup("wire", {"url": url, "ping_interval": "1s", "ping_timeout": "2s"}))
+        return from_setup(
+            TransportSetup("wire", {"url": url, "ping_interval": "1s", "ping_timeout": "2s"})
+        )
 
     async def stop(self) -> None:
         """Let packets pass again and close everything."""

@@ -14,7 +14,7 @@ from urc.runtime.hub import Hub
 from urc.runtime.recording import player as module
 from urc.runtime.recording.events import is_state
 from urc.runtime.recording.player import FASTEST, REFUSAL, Player
-from urc.runtime.recording.reader import Message, Recording
+from urc.runtime.recording.reader import RecordedMessage, Recording
 from urc.runtime.session import CommandFailed
 from urc.testing.clock import FakeClock, settle
 from urc.testing.profile import line_profile
@@ -31,27 +31,27 @@ class Kept(Recording):
     __slots__ = ()
 
     @property
-    def extra(self) -> list[Message]:
+    def extra(self) -> list[RecordedMessage]:
         """Of this test alone."""
         return self.topics  # type: ignore[return-value]
 
-    def messages(self, from_ns: int) -> Iterator[Message]:  # type: ignore[override]
+    def messages(self, from_ns: int) -> Iterator[RecordedMessage]:  # type: ignore[override]
         return (message for message in every(self.extra) if message.time_ns >= from_ns)
 
-    def before(self, until_ns: int) -> list[Message]:
+    def before(self, until_ns: int) -> list[RecordedMessage]:
         told = [one for one in every(self.extra) if one.time_ns < until_ns]
         return sorted({one.topic: one for one in told if is_state(one.topic)}.values())
 
 
-def every(extra: Sequence[Message]) -> list[Message]:
+def every(extra: Sequence[RecordedMessage]) -> list[RecordedMessage]:
     told = [*extra, said(0, "/link/wire", state="live", address="tcp bot:1")]
     told += [said(at, "/signals/battery", value=at) for at in range(LENGTH_S + 1)]
     told.append(said(5, "/log", level=2, name="wire", message="half of it"))
     return sorted(told, key=lambda message: message.time_ns)
 
 
-def said(at_s: float, topic: str, **message: object) -> Message:
-    return Message(START_NS + round(at_s * 1e9), topic, json.dumps(message).encode())
+def said(at_s: float, topic: str, **message: object) -> RecordedMessage:
+    return RecordedMessage(START_NS + round(at_s * 1e9), topic, json.dumps(message).encode())
 
 
 @pytest.fixture(autouse=True)
@@ -190,7 +190,7 @@ async def test_a_file_that_goes_is_told_and_it_stands(
         assert battery(hub) == 4
 
 
-def gone(*_: object) -> list[Message]:
+def gone(*_: object) -> list[RecordedMessage]:
     raise UrcError("bot.mcap cannot be read")
 
 

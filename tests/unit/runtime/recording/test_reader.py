@@ -17,7 +17,7 @@ from mcap.writer import Writer
 
 from urc.model.values import Sample
 from urc.problems import UrcError
-from urc.runtime.hub import LinkStatus, Note
+from urc.runtime.hub import LinkStatus, LogEntry
 from urc.runtime.recording import reader
 from urc.runtime.recording.reader import Recording, open_recording
 from urc.runtime.recording.recorder import Recorder
@@ -38,7 +38,9 @@ def file(tmp_path: Path) -> Path:
     for at in range(COUNT):
         kept.put([Sample("battery", at, 1000.0 + at)])
         if at == 10:
-            kept.put([LinkStatus("wire", "live", "tcp", 1010.0), Note(1010.0, "info", "wire", "x")])
+            kept.put(
+                [LinkStatus("wire", "live", "tcp", 1010.0), LogEntry(1010.0, "info", "wire", "x")]
+            )
     kept.close()
     return made
 

@@ -14,11 +14,11 @@ from mcap.reader import make_reader
 from urc.config.load import load_profile
 from urc.model.values import Sample
 from urc.problems import UrcError
-from urc.runtime.catalog import built_in_catalog
-from urc.runtime.hub import Note
+from urc.runtime.hub import LogEntry
 from urc.runtime.recording import recorder as module
 from urc.runtime.recording.reader import open_recording
 from urc.runtime.recording.recorder import Recorder, named
+from urc.runtime.registries import built_in_catalog
 from urc.shipped import shipped
 from urc.testing.profile import line_profile
 
@@ -229,7 +229,7 @@ def test_a_disk_that_hangs_is_waited_for_a_while_only(
 def test_one_thing_that_cannot_be_written_costs_itself_only(file: Path) -> None:
     """A mistake of ours, or a signal that nobody declared; the file says that something is gone."""
     kept = recorder(file)
-    kept.put([Sample("nobody", 1, 1.0), Note(2.0, "info", "wire", "live")])
+    kept.put([Sample("nobody", 1, 1.0), LogEntry(2.0, "info", "wire", "live")])
     wait(lambda: kept.counts["/log"] == 2)
     kept.close()
     assert kept.fault == ""

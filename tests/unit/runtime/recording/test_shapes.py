@@ -9,10 +9,10 @@ import pytest
 
 from urc.model.driver import Argument, Command, Driver, FramingSpec, Hold, TransportSpec
 from urc.model.values import Reading, Sample, Signal
-from urc.runtime.audit import Entry
-from urc.runtime.hub import LinkStatus, Moved, Note, Tapped, Told, Traffic
+from urc.runtime.audit import AuditEntry
+from urc.runtime.hub import AuditRecord, LinkStatus, LogEntry, MotionRecord, Tapped, Traffic
 from urc.runtime.recording.events import event_of
-from urc.runtime.recording.shapes import DRIVING, LOG, Shapes, channels
+from urc.runtime.recording.shapes import DRIVING, LOG, RecordingEncoder, channels
 from urc.testing.profile import text
 
 BORN_NS = 1_700_000_000_000_000_000
@@ -81,8 +81,8 @@ FOXGLOVE: Mapping[str, Any] = {
 }
 
 
-def shapes() -> Shapes:
-    return Shapes(DRIVER, lambda time_s: BORN_NS + round(time_s * 1e9))
+def shapes() -> RecordingEncoder:
+    return RecordingEncoder(DRIVER, lambda time_s: BORN_NS + round(time_s * 1e9))
 
 
 def told(event: Tapped) -> tuple[str, int, bytes]:
@@ -100,7 +100,7 @@ EVENTS: Mapping[str, Tapped] = {
     "image": Sample("camera", PNG, 1.5),
     "bytes": Sample("dump", b"\x00\xff", 1.5),
     "line": LinkStatus("wire", "silent", "tcp 127.0.0.1:6789", 1.5, "no answer", 2, 3),
-    "note": Note(1.5, "warning", "wire", "it hung up"),
+    "note": LogEntry(1.5, "warning", "wire", "it hung up"),
     "text on the wire": Traffic(1.5, "wire", "received", b"42\n"),
     "bytes on the wire": Traffic(1.5, "udp", "sent", b"\xff\x00\x81"),
 }
@@ -132,11 +132,13 @@ def test_images_and_the_log_have_the_names_that_programs_know() -> None:
 
 
 def test_who_drove_is_a_line_of_the_log_again() -> None:
-    entry = Entry(1_700_000_001.0, "bot", "moved", "screen 1", command="drive", outcome="begins")
-    topic, time_ns, data = told(Told(1.0, entry))
+    entry = AuditEntry(
+        1_700_000_001.0, "bot", "moved", "screen 1", command="drive", outcome="begins"
+    )
+    topic, time_ns, data = told(AuditRecord(1.0, entry))
     assert (topic, time_ns) == (DRIVING, BORN_NS + 1_000_000_000)
     assert json.loads(data)["command"] == "drive"
-    assert event_of(topic, data, 2.0, {}) == Note(
+    assert event_of(topic, data, 2.0, {}) == LogEntry(
         2.0, "info", "driving", "screen 1 moved drive begins"
     )
 
@@ -144,10 +146,10 @@ def test_who_drove_is_a_line_of_the_log_again() -> None:
 def test_motion_is_told_by_its_arguments_and_ends_with_what_stops_it() -> None:
     """So that a plot of them shows what the robot was told, and when that was over."""
     made = shapes()
-    ticks = [made.messages(Moved(1.0 + at, "drive", {"speed": at})) for at in (0, 0.5)]
+    ticks = [made.messages(MotionRecord(1.0 + at, "drive", {"speed": at})) for at in (0, 0.5)]
     told = [(topic, json.loads(data)) for ((topic, _, data),) in ticks]
     assert told == [("/commands/drive", {"speed": 0}), ("/commands/drive", {"speed": 0.5})]
-    ended = made.messages(Told(2.0, Entry(0.0, "bot", "stopped", command="drive")))
+    ended = made.messages(AuditRecord(2.0, AuditEntry(0.0, "bot", "stopped", command="drive")))
     assert [(topic, json.loads(data).get("speed")) for topic, _, data in ended] == [
         (DRIVING, None),
         ("/commands/drive", 0),
@@ -190,7 +192,7 @@ def test_whatever_time_it_says_fits_into_a_file(time_s: float) -> None:
 def test_a_clock_that_is_set_moves_nothing() -> None:
     """An entry of the audit has the time of day; what comes after it has its own time."""
     made = shapes()
-    made.messages(Told(1.0, Entry(1_900_000_000.0, "bot", "lease")))
+    made.messages(AuditRecord(1.0, AuditEntry(1_900_000_000.0, "bot", "lease")))
     ((_, time_ns, _),) = made.messages(Sample("battery", 1, 2.0))
     assert time_ns == BORN_NS + 2_000_000_000
 

@@ -22,8 +22,8 @@ from urc.model.world import (
     WorldSpec,
 )
 from urc.simulator.world.chance import gauss, uniform, wander
-from urc.simulator.world.plan import Plan
-from urc.simulator.world.rays import Faces, first_hits
+from urc.simulator.world.plan import WorldMap
+from urc.simulator.world.rays import EdgeArrays, first_hits
 from urc.simulator.world.sensors import place_on_earth, quaternion
 from urc.simulator.world.world import FARTHEST_S, World
 
@@ -77,8 +77,8 @@ def test_a_wall_to_the_right_is_touched_on_the_right() -> None:
 def test_what_flies_passes_over_a_box() -> None:
     """A box of half a metre holds up what rolls, and not what is higher."""
     plan = PlanSpec(boxes=(Box(1.0, 0.0, 0.4, 0.4, 0.5),))
-    assert Plan(plan).touch(0.75, 0.0, 0.0, 0.2) is not None
-    assert Plan(plan).touch(0.75, 0.0, 0.6, 0.2) is None
+    assert WorldMap(plan).touch(0.75, 0.0, 0.0, 0.2) is not None
+    assert WorldMap(plan).touch(0.75, 0.0, 0.6, 0.2) is None
 
 
 def test_cliff_sensors_look_over_the_edge() -> None:
@@ -98,11 +98,11 @@ def test_cliff_sensors_look_over_the_edge() -> None:
 def test_rays_go_as_far_as_geometry_says() -> None:
     """From the middle of a square: 2 / cos to the nearest side."""
     angles = np.radians(np.arange(0, 360, 7.0))
-    told = first_hits(Faces(Plan(SQUARE)), 0.0, 0.0, 0.1, angles)
+    told = first_hits(EdgeArrays(WorldMap(SQUARE)), 0.0, 0.0, 0.1, angles)
     expected = 2 / np.maximum(np.abs(np.cos(angles)), np.abs(np.sin(angles)))
     assert told == pytest.approx(expected)
-    assert np.isinf(first_hits(Faces(Plan(SQUARE)), 0.0, 0.0, 3.0, angles)).all()
-    assert np.isinf(first_hits(Faces(Plan(PlanSpec())), 0.0, 0.0, 0.1, angles)).all()
+    assert np.isinf(first_hits(EdgeArrays(WorldMap(SQUARE)), 0.0, 0.0, 3.0, angles)).all()
+    assert np.isinf(first_hits(EdgeArrays(WorldMap(PlanSpec())), 0.0, 0.0, 0.1, angles)).all()
 
 
 def test_a_sweep_begins_where_it_says_and_goes_to_the_left() -> None:

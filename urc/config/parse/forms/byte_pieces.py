@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from typing import NamedTuple, cast
 
-from urc.config.part import Part
+from urc.config.node import Node
 from urc.expressions import Template
-from urc.model.codec import WriteSpec
+from urc.model.payload import WriteSpec
 
 __all__ = ["Piece", "Placed", "spec_of", "templates_at"]
 
@@ -38,7 +38,7 @@ def _moved(template: Template, offset: int) -> Template:
     return Template(source, template.python, template.names, template.settings)
 
 
-def templates_at(part: Part, spec: WriteSpec) -> list[tuple[Part, Template]]:
+def templates_at(part: Node, spec: WriteSpec) -> list[tuple[Node, Template]]:
     """Return every expression with its place."""
     uses = cast("tuple[tuple[tuple[int, ...], Template], ...]", spec.options.get("uses", ()))
     return [(part.items()[path[0]] if path else part, template) for path, template in uses]

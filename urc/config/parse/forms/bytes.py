@@ -2,17 +2,17 @@
 
 from collections.abc import Iterable
 
+from urc.config.node import Node, Problems
 from urc.config.parse.bytes import parse_bytes
 from urc.config.parse.form import FormContext
 from urc.config.parse.forms.byte_pieces import Piece, Placed, spec_of, templates_at
-from urc.config.part import Findings, Part
 from urc.expressions import ExpressionError, Template, compile_expression, split_template
-from urc.model.codec import WriteSpec
+from urc.model.payload import WriteSpec
 
 __all__ = ["parse_write", "templates"]
 
 
-def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
     """Return the bytes of the list at `part`."""
     pieces: list[Placed] = []
     for place, inner in enumerate(part.items()):
@@ -27,12 +27,12 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
     return spec_of("bytes", pieces)
 
 
-def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
     """Return every expression in the list."""
     return templates_at(part, spec)
 
 
-def _expression(part: Part, findings: Findings) -> Template | None:
+def _expression(part: Node, findings: Problems) -> Template | None:
     try:
         split = list(split_template(part.data))
         if len(split) != 1 or split[0][2] is None:

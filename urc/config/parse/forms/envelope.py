@@ -7,12 +7,12 @@ An envelope has an address, whose values may be templates, and a body in one of 
 from collections.abc import Iterable
 from typing import Final
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext, body_form
 from urc.config.parse.forms.json_text import compiled_tree, placed_templates, templates_in
 from urc.config.parse.headers import check_headers
-from urc.config.part import Findings, Part
 from urc.expressions import Template
-from urc.model.codec import WriteSpec
+from urc.model.payload import WriteSpec
 
 __all__ = ["parse_write", "templates"]
 
@@ -34,7 +34,7 @@ _STAMPED: Final = {
 """Type of geometry_msgs → its field in the stamped type (common_interfaces)."""
 
 
-def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
     """Return the envelope at `part`, whose key is its verb."""
     body = body_form(part)
     spec = body[1].parse_write(body[0], findings, context) if body else None
@@ -78,7 +78,7 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
     )
 
 
-def _stamped_type(part: Part, kind: object, findings: Findings) -> str | None:
+def _stamped_type(part: Node, kind: object, findings: Problems) -> str | None:
     """Return the type at `part` if it has a stamped type; else report it."""
     package, _, name = str(kind).replace("/msg/", "/").partition("/")
     if package == "geometry_msgs" and name in _STAMPED and "json" in part.data:
@@ -100,7 +100,7 @@ def _stamped(kind: str, spec: WriteSpec) -> WriteSpec:
     return spec._replace(options={"tree": tree})
 
 
-def _unstamped(part: Part, spec: WriteSpec) -> WriteSpec:
+def _unstamped(part: Node, spec: WriteSpec) -> WriteSpec:
     """Return the body as written in the document."""
     tree = spec.options.get("tree")
     if not part.data.get("stamped") or not isinstance(tree, dict):
@@ -108,7 +108,7 @@ def _unstamped(part: Part, spec: WriteSpec) -> WriteSpec:
     return spec._replace(options={"tree": next(reversed(tree.values()))})
 
 
-def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
     """Return every template of the envelope, with its place."""
     attributes = spec.options.get("attributes")
     if isinstance(attributes, dict):

@@ -2,15 +2,15 @@
 
 from collections.abc import Iterable
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext, write_form
-from urc.config.part import Findings, Part
 from urc.expressions import COUNTERS, Template
-from urc.model.codec import WriteSpec, each_of
+from urc.model.payload import WriteSpec, each_of
 
 __all__ = ["parse_write", "templates"]
 
 
-def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
     """Return the frames at `part`, in their order."""
     if context.framing is not None and context.framing.type == "datagram":
         findings.error(
@@ -42,7 +42,7 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
     )
 
 
-def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
     """Return every template in all frames, with its place."""
     for item, one in zip(part.items(), each_of(spec), strict=True):
         inner, form = write_form(item)

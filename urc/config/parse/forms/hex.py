@@ -3,9 +3,9 @@
 import re
 from collections.abc import Iterable
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext
 from urc.config.parse.forms.byte_pieces import Piece, Placed, spec_of, templates_at
-from urc.config.part import Findings, Part
 from urc.expressions import (
     ExpressionError,
     Template,
@@ -15,7 +15,7 @@ from urc.expressions import (
     last_filter,
     split_template,
 )
-from urc.model.codec import WriteSpec
+from urc.model.payload import WriteSpec
 
 __all__ = ["parse_write", "templates"]
 
@@ -23,7 +23,7 @@ _NOT_HEX = re.compile(r"[^0-9A-Fa-f\s]")
 _ODD = re.compile(r"(?<![0-9A-Fa-f])(?:[0-9A-Fa-f]{2})*[0-9A-Fa-f](?![0-9A-Fa-f])")
 
 
-def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
     """Return the bytes at `part`."""
     pieces: list[Placed] = []
     try:
@@ -41,12 +41,12 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
     return spec_of("hex", pieces)
 
 
-def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
     """Return every expression in the text."""
     return templates_at(part, spec)
 
 
-def _digits(part: Part, literal: str, offset: int, findings: Findings) -> bytes | None:
+def _digits(part: Node, literal: str, offset: int, findings: Problems) -> bytes | None:
     wrong = _NOT_HEX.search(literal)
     if wrong is not None:
         text = f"{wrong[0]!r} is not a hex digit"
@@ -63,7 +63,7 @@ def _digits(part: Part, literal: str, offset: int, findings: Findings) -> bytes 
     return bytes.fromhex(literal)
 
 
-def _expression(part: Part, text: str, offset: int, findings: Findings) -> Template | None:
+def _expression(part: Node, text: str, offset: int, findings: Problems) -> Template | None:
     try:
         template = compile_expression(text, allows_bytes=True)
     except ExpressionError as error:

@@ -6,9 +6,9 @@ Plain paths (``a.b[0].c``) become tuples for the engine; only other paths need t
 import re
 from typing import Any
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext
-from urc.config.part import Findings, Part
-from urc.model.codec import ReadSpec
+from urc.model.payload import ReadSpec
 from urc.model.text import JsonPath
 
 __all__ = ["parse_read", "place_of"]
@@ -18,7 +18,7 @@ _PLAIN = re.compile(rf"{_NAME}(?:\.{_NAME}|\[[0-9]{{1,5}}\])*")
 _STEP = re.compile(r'([A-Za-z_][A-Za-z0-9_]*)|"([^"\\]+)"|\[([0-9]+)\]')
 
 
-def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
     """Return the path of each field: plain, or a compiled expression."""
     paths: dict[str, object] = {}
     is_good = True
@@ -29,12 +29,12 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
     return ReadSpec("json", {"paths": paths}, tuple(paths)) if is_good else None
 
 
-def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
     """Return the place of the field."""
     return part.must(field), {"key": True}
 
 
-def _path(part: Part, findings: Findings) -> object:
+def _path(part: Node, findings: Problems) -> object:
     text = part.data.strip()
     if _PLAIN.fullmatch(text):
         return _plain(text)

@@ -3,15 +3,15 @@
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext
-from urc.config.part import Findings, Part
 from urc.expressions import Template
-from urc.model.codec import WriteSpec
+from urc.model.payload import WriteSpec
 
 __all__ = ["compiled_tree", "parse_write", "placed_templates", "templates", "templates_in"]
 
 
-def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
     """Return the value at `part`, with compiled templates."""
     before = len(findings.problems)
     tree = compiled_tree(part, findings)
@@ -23,12 +23,12 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
     return WriteSpec("json", {"tree": tree}, names, settings)
 
 
-def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
     """Return every template of the value, with its place."""
     return placed_templates(part, spec.options.get("tree"))
 
 
-def compiled_tree(part: Part, findings: Findings) -> Any:
+def compiled_tree(part: Node, findings: Problems) -> Any:
     """Return the value at `part`, with each text in braces as a template."""
     if isinstance(part.data, dict):
         for name, inner in part.entries().items():
@@ -52,7 +52,7 @@ def templates_in(tree: Any) -> Iterator[Template]:
             yield from templates_in(inner)
 
 
-def placed_templates(part: Part, tree: Any) -> Iterator[tuple[Part, Template]]:
+def placed_templates(part: Node, tree: Any) -> Iterator[tuple[Node, Template]]:
     """Yield every template in a tree, with its place."""
     if isinstance(tree, Template):
         yield part, tree

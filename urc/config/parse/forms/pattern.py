@@ -3,11 +3,11 @@
 import re
 from typing import Any, Final, cast, get_args
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext
-from urc.config.part import Findings, Part
-from urc.config.suggest import did_you_mean
-from urc.model.codec import ReadSpec
-from urc.model.text import FieldKind, Hole
+from urc.config.spelling_suggestions import did_you_mean
+from urc.model.payload import ReadSpec
+from urc.model.text import FieldKind, PatternField
 
 __all__ = ["parse_read", "place_of"]
 
@@ -26,7 +26,7 @@ class _Fault(Exception):
         self.place: dict[str, Any] = {"offset": offset, "length": length, "hint": hint}
 
 
-def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
     """Return the pattern at `part` with its fields."""
     try:
         holes, tail = _parse(str(part.data))
@@ -37,14 +37,14 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
     return ReadSpec("pattern", {"holes": holes, "tail": tail}, names)
 
 
-def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
     """Return the place of the field in the pattern."""
     return part, {"offset": str(part.data).find("{" + field + ":") + 1, "length": len(field)}
 
 
-def _parse(text: str) -> tuple[tuple[Hole, ...], str]:
+def _parse(text: str) -> tuple[tuple[PatternField, ...], str]:
     """Return the fields with the literal before each, and the literal after the last."""
-    holes: list[Hole] = []
+    holes: list[PatternField] = []
     literal, position = "", 0
     last = (0, 0)
     for piece in _PIECE.finditer(text):
@@ -72,7 +72,7 @@ def _blanks(literal: str) -> str:
     return re.sub(r"\s+", " ", literal)
 
 
-def _hole(inside: str, before: str, offset: int, holes: list[Hole]) -> Hole:
+def _hole(inside: str, before: str, offset: int, holes: list[PatternField]) -> PatternField:
     found = _FIELD.fullmatch(inside)
     if found is None:
         text = f"'{{{inside}}}' is not a field"
@@ -88,10 +88,10 @@ def _hole(inside: str, before: str, offset: int, holes: list[Hole]) -> Hole:
     if found[3] and kind == "rest":
         text = "a field of kind 'rest' has no width: it takes everything to the end"
         raise _Fault(text, offset + found.start(3), len(found[3]))
-    return Hole(before, name, cast("FieldKind", kind), int(found[3] or 0))
+    return PatternField(before, name, cast("FieldKind", kind), int(found[3] or 0))
 
 
-def _check_after(holes: list[Hole], literal: str, last: tuple[int, int]) -> None:
+def _check_after(holes: list[PatternField], literal: str, last: tuple[int, int]) -> None:
     """Raise `_Fault` when the end of the last field is ambiguous."""
     if not holes or holes[-1].width:
         return

@@ -2,18 +2,18 @@
 
 from typing import Any
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext
-from urc.config.part import Findings, Part
-from urc.model.codec import ReadSpec
+from urc.model.payload import ReadSpec
 
 __all__ = ["parse_read", "place_of"]
 
 
-def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec:
+def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec:
     """Return the field at `part`."""
     return ReadSpec("raw", {"field": part.data}, (part.data,))
 
 
-def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
     """Return the place of the field."""
     return part, {}

@@ -2,14 +2,14 @@
 
 from typing import Any
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext
-from urc.config.part import Findings, Part
-from urc.model.codec import ReadSpec
+from urc.model.payload import ReadSpec
 
 __all__ = ["parse_read", "place_of"]
 
 
-def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
     """Return the pattern at `part` with its groups."""
     pattern = findings.pattern(part)
     if pattern is None:
@@ -17,6 +17,6 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
     return ReadSpec("regex", {"pattern": pattern}, pattern.groups)
 
 
-def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
     """Return the place of the group `field` in the pattern."""
     return part, {"offset": str(part.data).find(f"<{field}>") + 1, "length": len(field)}

@@ -2,16 +2,16 @@
 
 from typing import Any
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext
-from urc.config.part import Findings, Part
-from urc.model.codec import ReadSpec
+from urc.model.payload import ReadSpec
 
 __all__ = ["parse_read", "place_of"]
 
 _MORE = "..."
 
 
-def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
     """Return the separator and the names of the parts."""
     names: list[str] = []
     has_more = is_good = True
@@ -41,7 +41,7 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
     return ReadSpec("split", options, tuple(filter(None, names))) if is_good else None
 
 
-def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
     """Return the place of the field."""
     for inner in part.listed("fields"):
         if inner.data in (field, field + _MORE):

@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Iterator
 from typing import Any, cast
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext
 from urc.config.parse.struct.items import ItemParser
-from urc.config.part import Findings, Part
 from urc.expressions import Template
 from urc.model.binary import (
     FRAME_NAMES,
@@ -16,16 +16,16 @@ from urc.model.binary import (
     least_size,
     names_of,
 )
-from urc.model.codec import ReadSpec, WriteSpec
 from urc.model.driver import FramingSpec
 from urc.model.framing import FrameLayout
+from urc.model.payload import ReadSpec, WriteSpec
 
 __all__ = ["parse_read", "parse_write", "place_of", "templates"]
 
 Uses = tuple[tuple[tuple[str | int, ...], Template], ...]
 
 
-def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
     """Return the items at `part`, with their ids as fields."""
     before = len(findings.problems)
     parser = ItemParser(findings, context.types, context.enums, "read", context.encoding)
@@ -36,7 +36,7 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
     return ReadSpec("struct", {"items": items}, tuple(dict.fromkeys(names_of(items))))
 
 
-def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
     """Return the items at `part`, with the ids as arguments unless they are computed."""
     before = len(findings.problems)
     parser = ItemParser(findings, context.types, context.enums, "send", context.encoding)
@@ -61,7 +61,7 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
 
 
 def _check_size(
-    part: Part, items: tuple[Item, ...], framing: FramingSpec | None, findings: Findings
+    part: Node, items: tuple[Item, ...], framing: FramingSpec | None, findings: Problems
 ) -> None:
     """Report items that do not fit the frames of the transport."""
     if framing is None:
@@ -81,18 +81,18 @@ def _check_size(
         findings.error(part, "does-not-fit", text + " at most", hint="raise 'max' of the framing")
 
 
-def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
     """Return every argument and expression with its place."""
     for path, template in cast("Uses", spec.options.get("uses", ())):
         inner = part
         for step in path:
-            inner = Part(inner.document, (*inner.path, step), inner.data[step])
+            inner = Node(inner.document, (*inner.path, step), inner.data[step])
         if isinstance(inner.data, dict):
             inner = inner.must("id") if "id" in inner.data else inner
         yield inner, template
 
 
-def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
     """Return the place of the item that sets `field`."""
     nearest = part
     for place, name in _named(part, ""):
@@ -103,13 +103,13 @@ def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
     return nearest, _inside(nearest, "")
 
 
-def _inside(place: Part, name: str) -> dict[str, Any]:
+def _inside(place: Node, name: str) -> dict[str, Any]:
     if isinstance(place.data, str) and name and " " in place.data:
         return {"offset": place.data.rfind(name), "length": len(name)}
     return {}
 
 
-def _named(part: Part, outer: str) -> Iterator[tuple[Part, str]]:
+def _named(part: Node, outer: str) -> Iterator[tuple[Node, str]]:
     """Yield place and name of every named item, and of nameless types with ""."""
     for item in part.items():
         if isinstance(item.data, str):
@@ -131,7 +131,7 @@ def _named(part: Part, outer: str) -> Iterator[tuple[Part, str]]:
                 yield branch, ""
 
 
-def _bits(part: Part, outer: str) -> Iterator[tuple[Part, str]]:
+def _bits(part: Node, outer: str) -> Iterator[tuple[Node, str]]:
     for item in part.items():
         if isinstance(item.data, str):
             yield item, joined_name(outer, item.data)

@@ -3,15 +3,15 @@
 from collections.abc import Iterable
 from typing import cast
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext
-from urc.config.part import Findings, Part
 from urc.expressions import Template
-from urc.model.codec import WriteSpec
+from urc.model.payload import WriteSpec
 
 __all__ = ["parse_write", "templates"]
 
 
-def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSpec | None:
+def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
     """Return the template at `part`."""
     template = findings.template(part)
     if template is None:
@@ -19,6 +19,6 @@ def parse_write(part: Part, findings: Findings, context: FormContext) -> WriteSp
     return WriteSpec("text", {"template": template}, template.names, template.settings)
 
 
-def templates(part: Part, spec: WriteSpec) -> Iterable[tuple[Part, Template]]:
+def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
     """Return the one template."""
     yield part, cast("Template", spec.options["template"])

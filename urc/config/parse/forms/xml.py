@@ -3,9 +3,9 @@
 import re
 from typing import Any
 
+from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext
-from urc.config.part import Findings, Part
-from urc.model.codec import ReadSpec
+from urc.model.payload import ReadSpec
 from urc.model.text import XmlPath, XmlStep
 
 __all__ = ["parse_read", "place_of"]
@@ -20,7 +20,7 @@ _PIECE = re.compile(r"(?:\[[^\]]*\]|[^/\[])*")
 """Text up to the next slash outside of brackets."""
 
 
-def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec | None:
+def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
     """Return the path of each field."""
     paths: dict[str, XmlPath | None] = {}
     root: XmlStep | None = None
@@ -39,12 +39,12 @@ def parse_read(part: Part, findings: Findings, context: FormContext) -> ReadSpec
     return ReadSpec("xml", {"paths": paths}, tuple(paths))
 
 
-def place_of(part: Part, field: str) -> tuple[Part, dict[str, Any]]:
+def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
     """Return the place of the field."""
     return part.must(field), {"key": True}
 
 
-def _path(part: Part, findings: Findings) -> XmlPath | None:
+def _path(part: Node, findings: Problems) -> XmlPath | None:
     steps: list[XmlStep] = []
     offset = 0
     while True:

@@ -7,10 +7,10 @@ kind of item; `numbers` checks numbers, constants and enums.
 from collections.abc import Mapping
 from typing import Final, Literal
 
+from urc.config.node import Node, Problems
 from urc.config.parse.struct.leaves import LeafParser, kind_of, parse_content
 from urc.config.parse.struct.numbers import check_fits, unknown_type, written_constant
 from urc.config.parse.struct.scope import Scope
-from urc.config.part import Findings, Part
 from urc.model.binary import (
     FRAME_NAMES,
     Extent,
@@ -51,7 +51,7 @@ class ItemParser:
 
     def __init__(
         self,
-        findings: Findings,
+        findings: Problems,
         types: Mapping[str, Items],
         enums: Mapping[str, tuple[tuple[int, str], ...]],
         purpose: Purpose,
@@ -65,7 +65,7 @@ class ItemParser:
         self.scope = Scope(findings, purpose)
         self.leaves = LeafParser(findings, enums, self.scope)
 
-    def items(self, part: Part) -> Items:
+    def items(self, part: Node) -> Items:
         """Return the items of the list at `part`, without the invalid items."""
         found: list[Item | None] = []
         total = 0
@@ -80,7 +80,7 @@ class ItemParser:
         self._check_rest(part, found)
         return tuple(item for item in found if item is not None)
 
-    def _check_rest(self, part: Part, found: list[Item | None]) -> None:
+    def _check_rest(self, part: Node, found: list[Item | None]) -> None:
         """Report an item after another item that takes the rest of the frame."""
         for place, item in enumerate(found[:-1]):
             extents = (item.size, item.times) if item is not None else ()
@@ -92,7 +92,7 @@ class ItemParser:
                     hint="give that item a size, or put it last",
                 )
 
-    def _item(self, part: Part) -> Item | None:
+    def _item(self, part: Node) -> Item | None:
         item = self._short(part) if isinstance(part.data, str) else self._long(part)
         if item is None:
             return None
@@ -104,7 +104,7 @@ class ItemParser:
         self.scope.add(part, item)
         return item
 
-    def _short(self, part: Part) -> Item | None:
+    def _short(self, part: Node) -> Item | None:
         """Return an item such as ``u8 8``, ``i32be rpm`` or ``header``."""
         word, _, rest = part.data.strip().partition(" ")
         rest = rest.strip()
@@ -131,7 +131,7 @@ class ItemParser:
         check_fits(part, number, constant, self.findings)
         return Item(kind_of(number), "", number, const=constant)
 
-    def _long(self, part: Part) -> Item | None:
+    def _long(self, part: Node) -> Item | None:
         """Return an item from a mapping."""
         kind = self._kind(part)
         if kind is None:
@@ -151,7 +151,7 @@ class ItemParser:
         item = item._replace(condition=is_there)
         return item if item.times is None else self._array(part, item)
 
-    def _kind(self, part: Part) -> str | None:
+    def _kind(self, part: Node) -> str | None:
         if "switch" in part.data:
             return "switch"
         named = part.get("type")
@@ -175,7 +175,7 @@ class ItemParser:
             return None
         return kind_of(number)
 
-    def _of_kind(self, kind: str, part: Part) -> Item | None:
+    def _of_kind(self, kind: str, part: Node) -> Item | None:
         name = part.text("id")
         self.scope.check_name(part.get("id") or part, name)
         if kind == "switch":
@@ -200,7 +200,7 @@ class ItemParser:
         start = Item("text" if kind == "text" else "bytes", name, size=size, times=times)
         return parse_content(part, start._replace(value=value), self.encoding, self.findings)
 
-    def _struct(self, part: Part, item: Item) -> Item | None:
+    def _struct(self, part: Node, item: Item) -> Item | None:
         items = self.types[part.text("type")]
         trim = part.integer("trim")
         if trim is not None:
@@ -216,7 +216,7 @@ class ItemParser:
             self.findings.error(part, "misplaced-key", text, at="value", key=True)
         return item._replace(items=items, trim=trim)
 
-    def _array(self, part: Part, item: Item) -> Item | None:
+    def _array(self, part: Node, item: Item) -> Item | None:
         if not item.id and item.kind not in ("struct", "packed"):
             text = "an array needs an 'id'"
             self.findings.error(part, "missing-key", text, key=True, hint="{ size: … } skips bytes")
@@ -233,7 +233,7 @@ class ItemParser:
             return None
         return item
 
-    def _extent(self, part: Part | None) -> Extent | None:
+    def _extent(self, part: Node | None) -> Extent | None:
         """Return a size or count: a number, ``rest``, a type before the item, or an expression."""
         if part is None:
             return None
@@ -251,7 +251,7 @@ class ItemParser:
         expression = self.scope.expression(part)
         return None if expression is None else Extent("expression", expression=expression)
 
-    def _switch(self, part: Part) -> Item | None:
+    def _switch(self, part: Node) -> Item | None:
         by = self.scope.expression(part.must("by"))
         cases: list[tuple[int | str, Items]] = []
         subject = self.scope.get(part.text("by"))
@@ -271,7 +271,7 @@ class ItemParser:
         self.scope.known = after
         return None if by is None else Item("switch", switch=Switch(by, tuple(cases), default))
 
-    def _branch(self, part: Part) -> Items:
+    def _branch(self, part: Node) -> Items:
         if isinstance(part.data, list):
             return self.items(part)
         items = self.types.get(part.data)
@@ -282,7 +282,7 @@ class ItemParser:
             self.scope.know(part, name, None)
         return items
 
-    def _check_case(self, part: Part, subject: Item | None) -> None:
+    def _check_case(self, part: Node, subject: Item | None) -> None:
         """Report a case for a value that the item can never have."""
         key = case_key(part.name)
         if subject is None or subject.kind not in ("number", "coded"):
@@ -299,7 +299,7 @@ class ItemParser:
         elif isinstance(key, int) and subject.number.kind == "integer":
             check_fits(part, subject.number, key, self.findings, key=True)
 
-    def _check_sent(self, part: Part, item: Item) -> None:
+    def _check_sent(self, part: Node, item: Item) -> None:
         """Report an item of a sent struct that has no value."""
         if self.purpose == "send" and asks_for_the_end(item):
             self.findings.error(

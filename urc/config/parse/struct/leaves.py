@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Literal
 
+from urc.config.node import Node, Problems
 from urc.config.parse.bytes import parse_bytes
 from urc.config.parse.struct.numbers import NumberParser, parse_enum, parse_valid
 from urc.config.parse.struct.scope import Scope
-from urc.config.part import Findings, Part
 from urc.model.binary import Extent, Item, Number, number_of, width_of
 
 __all__ = ["LeafParser", "kind_of", "parse_content"]
@@ -21,13 +21,13 @@ class LeafParser:
     """A parser for items without inner items."""
 
     def __init__(
-        self, findings: Findings, enums: Mapping[str, tuple[tuple[int, str], ...]], scope: Scope
+        self, findings: Problems, enums: Mapping[str, tuple[tuple[int, str], ...]], scope: Scope
     ) -> None:
         self.findings = findings
         self.enums = enums
         self.scope = scope
 
-    def number(self, part: Part, name: str, times: Extent | None) -> Item:
+    def number(self, part: Node, name: str, times: Extent | None) -> Item:
         """Return a number, or an array of numbers."""
         parser = NumberParser(part, self.findings)
         number = number_of(part.text("type"))
@@ -45,7 +45,7 @@ class LeafParser:
             value=self.scope.value(part.get("value")),
         )
 
-    def packed(self, part: Part, name: str, times: Extent | None) -> Item | None:
+    def packed(self, part: Node, name: str, times: Extent | None) -> Item | None:
         """Return an array of numbers that take no whole bytes, such as ``u11``."""
         parser, number, count = (
             NumberParser(part, self.findings),
@@ -69,7 +69,7 @@ class LeafParser:
             is_lsb_first=part.text("order", "msb") == "lsb",
         )
 
-    def bits(self, part: Part, name: str) -> Item | None:
+    def bits(self, part: Node, name: str) -> Item | None:
         """Return the bit fields of a whole number."""
         named = part.must("type")
         number = number_of(named.data)
@@ -90,7 +90,7 @@ class LeafParser:
         is_lsb_first = part.text("order", "msb") == "lsb"
         return Item("bits", name, number, is_lsb_first=is_lsb_first, items=tuple(parts))
 
-    def _bit(self, part: Part) -> Item:
+    def _bit(self, part: Node) -> Item:
         if isinstance(part.data, str):
             self.scope.check_name(part, part.data)
             return Item("number", part.data, Number("integer", 1))
@@ -111,7 +111,7 @@ class LeafParser:
         )
 
 
-def parse_content(part: Part, item: Item, encoding: str, findings: Findings) -> Item | None:
+def parse_content(part: Node, item: Item, encoding: str, findings: Problems) -> Item | None:
     """Return `item`, of text or bytes, with its constant, its padding and its end."""
     own = part.text("encoding")
     until = _bytes(part.get("until"), own or encoding, findings)
@@ -144,7 +144,7 @@ def parse_content(part: Part, item: Item, encoding: str, findings: Findings) -> 
     return item._replace(until=until or b"", pad=part.integer("pad") or 0, encoding=own)
 
 
-def _bytes(part: Part | None, encoding: str, findings: Findings) -> bytes | None:
+def _bytes(part: Node | None, encoding: str, findings: Problems) -> bytes | None:
     found = parse_bytes(part, encoding, findings) if part is not None else None
     if part is not None and found == b"":
         findings.error(part, "wrong-size", "expected at least one byte")

@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from urc.config.part import Findings, Part
-from urc.config.suggest import did_you_mean
+from urc.config.node import Node, Problems
+from urc.config.spelling_suggestions import did_you_mean
 from urc.config.values import fraction_of
 from urc.model.binary import WORDS_OF_TYPES, Number, number_of, width_of
 
@@ -41,7 +41,7 @@ def written_constant(text: str) -> int | float | bool | None:
 
 
 def unknown_type(
-    part: Part, word: str, types: Iterable[str], findings: Findings, *, only_types: bool = False
+    part: Node, word: str, types: Iterable[str], findings: Problems, *, only_types: bool = False
 ) -> None:
     """Report a word that is not a type."""
     if width_of(word) is not None and number_of(f"{word}be") is None:
@@ -58,7 +58,7 @@ def unknown_type(
 
 
 def check_fits(
-    part: Part, number: Number, value: object, findings: Findings, *, key: bool = False
+    part: Node, number: Number, value: object, findings: Problems, *, key: bool = False
 ) -> None:
     """Report a constant that its type cannot hold."""
     if number.kind == "float":
@@ -79,7 +79,7 @@ def check_fits(
 class NumberParser:
     """A parser for the keys of one number."""
 
-    def __init__(self, part: Part, findings: Findings) -> None:
+    def __init__(self, part: Node, findings: Problems) -> None:
         self._part = part
         self._findings = findings
 
@@ -115,7 +115,7 @@ class NumberParser:
         return 1 if inner is None else inner.data
 
 
-def parse_valid(part: Part, findings: Findings) -> tuple[float, float] | None:
+def parse_valid(part: Node, findings: Problems) -> tuple[float, float] | None:
     """Return ``valid``."""
     inner = part.get("valid")
     if inner is None:
@@ -128,12 +128,12 @@ def parse_valid(part: Part, findings: Findings) -> tuple[float, float] | None:
     return low, high
 
 
-def parse_enums(part: Part, findings: Findings) -> dict[str, Enum]:
+def parse_enums(part: Node, findings: Problems) -> dict[str, Enum]:
     """Return the driver's ``enums:``."""
     return {name: _enum(inner, findings) for name, inner in part.named("enums").items()}
 
 
-def parse_enum(part: Part, number: Number, enums: Mapping[str, Enum], findings: Findings) -> Enum:
+def parse_enum(part: Node, number: Number, enums: Mapping[str, Enum], findings: Problems) -> Enum:
     """Return ``enum`` of an item: an enum of the driver, or its own."""
     inner = part.get("enum")
     if inner is None:
@@ -166,7 +166,7 @@ def parse_enum(part: Part, number: Number, enums: Mapping[str, Enum], findings: 
     return enum
 
 
-def _enum(part: Part, findings: Findings) -> Enum:
+def _enum(part: Node, findings: Problems) -> Enum:
     found: dict[int, str] = {}
     words: set[str] = set()
     for key, inner in part.entries().items():

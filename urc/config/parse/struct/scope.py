@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from typing import Literal
 
-from urc.config.part import Findings, Part
-from urc.config.suggest import did_you_mean
+from urc.config.node import Node, Problems
+from urc.config.spelling_suggestions import did_you_mean
 from urc.expressions import COUNTERS, Template
 from urc.model.binary import FRAME_NAMES, OUTER_NAMES, Item, names_of, number_of, scope_of
 
@@ -14,10 +14,10 @@ __all__ = ["Scope"]
 class Scope:
     """The names known at one point of a struct, from the items before it."""
 
-    def __init__(self, findings: Findings, purpose: Literal["read", "send", "type"]) -> None:
+    def __init__(self, findings: Problems, purpose: Literal["read", "send", "type"]) -> None:
         self.known: dict[str, Item | None] = {}
         """Name → item; None for a name that is not an item of this struct."""
-        self.uses: list[tuple[Part, Template]] = []
+        self.uses: list[tuple[Node, Template]] = []
         """Expressions over arguments and settings, with their places."""
         self._findings = findings
         self._purpose = purpose
@@ -31,7 +31,7 @@ class Scope:
         """Yield the names that an item adds."""
         yield from names_of((item,))
 
-    def add(self, part: Part, item: Item) -> None:
+    def add(self, part: Node, item: Item) -> None:
         """Add an item; report a second item of the same name at `part`."""
         own = {one.id: one for one in scope_of((item,)) if one.id}
         if item.switch is not None:
@@ -43,7 +43,7 @@ class Scope:
         if self._purpose == "send" and item.kind == "struct":
             self.uses += [(part, one) for one in _outer_values(item.items)]
 
-    def know(self, part: Part, name: str, item: Item | None) -> None:
+    def know(self, part: Node, name: str, item: Item | None) -> None:
         """Add one name."""
         if name in self.known:
             at = "id" if isinstance(part.data, dict) and "id" in part.data else ""
@@ -51,7 +51,7 @@ class Scope:
             self._findings.error(part, "duplicate-name", text, at=at, hint="give each its own name")
         self.known[name] = item
 
-    def check_name(self, part: Part, name: str) -> None:
+    def check_name(self, part: Node, name: str) -> None:
         """Report an id that already has another meaning."""
         if name in FRAME_NAMES or number_of(name) is not None or name == "settings":
             self._findings.error(part, "bad-name", f"{name!r} has another meaning here")
@@ -60,15 +60,15 @@ class Scope:
             hint = "use lower-case letters, digits and underscores"
             self._findings.error(part, "bad-name", text, hint=hint)
 
-    def expression(self, part: Part) -> Template | None:
+    def expression(self, part: Node) -> Template | None:
         """Return the expression at `part`, over the items before it."""
         return self._expression(part, frozenset())
 
-    def _expression(self, part: Part, outer: frozenset[str]) -> Template | None:
+    def _expression(self, part: Node, outer: frozenset[str]) -> Template | None:
         expression = self._findings.expression(part)
         return None if expression is None else self._checked(part, expression, outer)
 
-    def value(self, part: Part | None) -> Template | None:
+    def value(self, part: Node | None) -> Template | None:
         """Return the value to send: an expression, or a plain number."""
         if part is None:
             return None
@@ -79,7 +79,7 @@ class Scope:
 
         return compile_expression(repr(part.data))
 
-    def _checked(self, part: Part, expression: Template, outer: frozenset[str]) -> Template:
+    def _checked(self, part: Node, expression: Template, outer: frozenset[str]) -> Template:
         if self._purpose == "send":
             self.uses.append((part, expression))
             return expression
@@ -119,7 +119,7 @@ def _outer_values(items: tuple[Item, ...]) -> Iterator[Template]:
             yield from _outer_values(item.switch.default or ())
 
 
-def _argument(part: Part, name: str) -> Template:
+def _argument(part: Node, name: str) -> Template:
     """Return the use of an argument; its source is its text in the document."""
     source = part.data if isinstance(part.data, str) else name
     return Template(source, f"ns[{name!r}]", frozenset((name,)), frozenset())

@@ -8,8 +8,8 @@
  * @typedef {import("../core/types.js").StopState} StopState
  */
 import { part } from "../live/badge.js";
-import { whenPressed } from "./press.js";
-import { inTurn } from "../core/texts.js";
+import { whenPressed } from "./pointer_press.js";
+import { inTurn } from "../core/formatting.js";
 import { said, t } from "../core/words.js";
 
 /** @type {Verb[]} */

@@ -8,7 +8,7 @@
  * @typedef {"" | "sending" | "sent" | "failed"} StopPhase State of the last press of STOP, until the
  *   lease reports the latch.
  */
-import { Spare } from "./spare.js";
+import { Spare } from "./redundant_socket.js";
 
 /** Silence of the server after which STOP is also sent by HTTP. */
 const STOP_AGAIN_MS = 300;

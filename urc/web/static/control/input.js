@@ -15,9 +15,9 @@
  * @typedef {import("../core/types.js").GateSpec} GateSpec
  * @typedef {import("../core/types.js").HoldSpec} HoldSpec
  */
-import { Gate } from "./gate.js";
-import { ANY, Control, Grip } from "./grip.js";
-import { Pads } from "./pad.js";
+import { Gate } from "./dead_man.js";
+import { ANY, Control, Grip } from "./held_control.js";
+import { Pads } from "./gamepad.js";
 import { said, t } from "../core/words.js";
 
 const TICK_MS = 50;

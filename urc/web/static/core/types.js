@@ -202,13 +202,13 @@
  * @property {string} id
  * @property {number[]} axes
  * @property {boolean[]} buttons Held state of the buttons.
- * @property {import("../widgets/padmap.js").PadMap | null} map Its mapping, or null if unknown.
+ * @property {import("../widgets/gamepad_map.js").PadMap | null} map Its mapping, or null if unknown.
  * @property {boolean} isStandard Whether the browser knows its layout.
  * @property {boolean} isUsed Whether it is the gamepad in use.
  *
  * @typedef {object} PadDesk
  * @property {() => PadView[]} views
- * @property {(id: string, map: import("../widgets/padmap.js").PadMap | null) => void} setMap Stores a
+ * @property {(id: string, map: import("../widgets/gamepad_map.js").PadMap | null) => void} setMap Stores a
  *   mapping on this device; null restores the browser's layout.
  *
  * @typedef {object} Context The interface between a widget and the page.

@@ -22,7 +22,7 @@
  * @property {(Argument & {description: string})[]} arguments
  */
 import { t } from "urc/kit";
-import { questionsOf } from "../control/asks.js";
+import { questionsOf } from "../control/confirm_dialog.js";
 import { element, visible, wordsOf } from "./bytes.js";
 import { button, field, valuesOf } from "./fields.js";
 

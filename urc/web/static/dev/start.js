@@ -1,6 +1,6 @@
 // @ts-check
 /** The developer start page: its button reloads all documents, and opens the robot. */
-import { ask, reason } from "../core/ask_server.js";
+import { ask, reason } from "../core/api_client.js";
 import { part } from "../live/badge.js";
 
 for (const button of document.querySelectorAll("[data-start]")) {

@@ -12,7 +12,7 @@
  * @typedef {import("../core/types.js").Topics} Topics
  */
 import { t } from "../widgets/kit.js";
-import { Decoder } from "../widgets/picture.js";
+import { Decoder } from "../widgets/image_decoder.js";
 import { loadStyle } from "../widgets/style.js";
 
 const MOST_KEPT = 20_000;

@@ -10,7 +10,7 @@
  * @typedef {import("../core/types.js").Reading} Reading
  * @typedef {import("../core/types.js").WidgetModule} WidgetModule
  */
-import { Budget } from "../widgets/budget.js";
+import { Budget } from "../widgets/render_budget.js";
 import { contextOf } from "./context.js";
 import { Grips } from "./grips.js";
 import { part, t } from "../widgets/kit.js";

@@ -5,20 +5,20 @@
  * @typedef {import("../core/types.js").Reply} Reply
  * @typedef {import("../core/types.js").Value} Value
  */
-import { Alarms } from "./alarms.js";
-import { Asks } from "../control/asks.js";
-import { backSafely } from "./back.js";
+import { Alarms } from "./alarm_announcer.js";
+import { Asks } from "../control/confirm_dialog.js";
+import { backSafely } from "./leave_page.js";
 import { Badge, part } from "./badge.js";
 import { Controls } from "../control/controls.js";
 import { Drive } from "../control/drive.js";
-import { Alerts, Follows, Log, Themes, watched } from "./follow.js";
+import { Alerts, Follows, Log, Themes, watched } from "./page_topics.js";
 import { frameOf } from "./frames.js";
 import { Host } from "../widgets/host.js";
 import { Input } from "../control/input.js";
 import { Panel } from "./panel.js";
 import { FullScreen, WakeLock } from "./screen.js";
 import { Socket } from "./socket.js";
-import { Stage } from "./stage.js";
+import { Stage } from "./view_switch.js";
 import { StopButton } from "../control/stop.js";
 import { Store } from "./store.js";
 import { offerSystems } from "../core/units.js";
@@ -254,7 +254,7 @@ function take(message) {
 /**
  * @param {string} command
  * @param {Record<string, import("../core/types.js").Given>} args
- * @param {import("../control/asks.js").Ticket} [ticket] the confirmation of the command
+ * @param {import("../control/confirm_dialog.js").Ticket} [ticket] the confirmation of the command
  * @returns {Promise<Record<string, Value>>}
  */
 function run(command, args, ticket) {

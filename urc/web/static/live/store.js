@@ -19,13 +19,13 @@
  *
  * @typedef {{value: Held, alarm: Alarm, timeMs: number, serial: number, image?: Picture}} Sample
  */
-import { Each } from "./each.js";
-import { digitsIn } from "../core/figures.js";
-import { ageText, textOf } from "../core/texts.js";
+import { Each } from "./sample_history.js";
+import { digitsIn } from "../core/number_format.js";
+import { ageText, textOf } from "../core/formatting.js";
 import { converted, factorOf, Units } from "../core/units.js";
 import { t } from "../core/words.js";
 
-export { ageText, DASH } from "../core/texts.js";
+export { ageText, DASH } from "../core/formatting.js";
 
 /** Multiple of the largest age after which a value is no longer shown. */
 const GONE_AFTER = 10;

@@ -5,7 +5,7 @@
  *
  * @typedef {import("./rows.js").Shelf} Shelf
  */
-import { ask, reason } from "../core/ask_server.js";
+import { ask, reason } from "../core/api_client.js";
 import { part } from "../live/badge.js";
 import { put, ready } from "../core/dom.js";
 import { JobDialog } from "./job.js";

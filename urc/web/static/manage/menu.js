@@ -1,6 +1,6 @@
 // @ts-check
 /** Search in the menu: the cards that have each of the typed words stay visible. */
-import { fits } from "./find.js";
+import { fits } from "./search.js";
 
 const field = document.querySelector("[data-find-robot]");
 const cards = [...document.querySelectorAll("[data-robot-card]")].filter((el) => el instanceof HTMLElement);

@@ -18,7 +18,7 @@
  * @property {string[]} missing
  * @property {Line[]} lines
  */
-import { ask, reason } from "../core/ask_server.js";
+import { ask, reason } from "../core/api_client.js";
 import { part } from "../live/badge.js";
 import { button, made, ready } from "../core/dom.js";
 import { mark, t } from "../core/words.js";

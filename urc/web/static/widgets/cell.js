@@ -27,21 +27,21 @@
  * @property {Record<string, unknown>} options
  * @property {boolean} [deadMan] Whether it is a dead-man control.
  *
- * @typedef {(command: string, args: Record<string, Given>, ticket?: import("../control/asks.js").Ticket) => Promise<Record<string, Value>>} Run
+ * @typedef {(command: string, args: Record<string, Given>, ticket?: import("../control/confirm_dialog.js").Ticket) => Promise<Record<string, Value>>} Run
  *
  * @typedef {object} Doors Services of the page for widgets.
  * @property {Run} run
- * @property {import("../control/asks.js").Asks} asks
+ * @property {import("../control/confirm_dialog.js").Asks} asks
  * @property {(command: string, verb: string) => void} steer
  * @property {(wish: import("../core/types.js").Wish) => void} drive
  * @property {() => void} wake requests an animation frame
  * @property {() => void} again requests one for widgets alone
  * @property {Pick<import("../control/input.js").Input, "hold" | "gate" | "gated" | "letGo" | "refusal" | "hindrance" | "isDriving"> & {pads: PadDesk}} input
  * @property {Pick<import("../control/stop.js").StopButton, "press" | "follow">} stop
- * @property {Pick<import("../live/follow.js").Follows, "listen">} follows
+ * @property {Pick<import("../live/page_topics.js").Follows, "listen">} follows
  * @property {Store} store
  */
-import { Budget } from "./budget.js";
+import { Budget } from "./render_budget.js";
 import { contextOf } from "./context.js";
 import { t } from "./kit.js";
 import { PICTURES } from "../live/store.js";

@@ -11,11 +11,11 @@
  * @typedef {import("../core/types.js").StopState} StopState
  * @typedef {import("../core/types.js").Topics} Topics
  */
-import { questionsOf } from "../control/asks.js";
+import { questionsOf } from "../control/confirm_dialog.js";
 import { t } from "./kit.js";
-import { memoryOf } from "./memory.js";
+import { memoryOf } from "./tab_storage.js";
 import { argumentsOf, describe } from "./output.js";
-import { Decoder } from "./picture.js";
+import { Decoder } from "./image_decoder.js";
 import { loadStyle } from "./style.js";
 
 /**

@@ -10,8 +10,8 @@
  */
 import { part } from "../live/badge.js";
 import { t } from "./kit.js";
-import { Exhibit } from "./exhibit.js";
-import { Themes } from "../live/follow.js";
+import { Exhibit } from "./demo_robot.js";
+import { Themes } from "../live/page_topics.js";
 import { chosenSystem } from "../core/units.js";
 
 /** Interval for repeating readings, so that they do not become stale. */

@@ -9,7 +9,7 @@
  * @typedef {import("../live/store.js").Store} Store
  */
 import { Cell } from "./cell.js";
-import { Pace } from "./pace.js";
+import { Pace } from "./draw_scheduler.js";
 
 export class Host {
   /**
@@ -81,7 +81,7 @@ export class Host {
    * @param {HTMLElement} el
    */
   async mountForeign(el) {
-    const { Warden } = await import("../frame/warden.js"); // most pages need none
+    const { Warden } = await import("../frame/frame_host.js"); // most pages need none
     if (el.isConnected && !this.cells.has(el)) await this.mount(new Warden(el, this.doors));
   }
 

@@ -10,12 +10,12 @@
  * @typedef {import("../core/types.js").Signal} Signal
  */
 
-import { fixed, rough } from "../core/figures.js";
-import { Sheet } from "./sheet.js";
+import { fixed, rough } from "../core/number_format.js";
+import { Sheet } from "./offscreen_canvas.js";
 import { mark } from "../core/words.js";
 
-export { digitsIn, figure } from "../core/figures.js";
-export { inTurn, wordOf } from "../core/texts.js";
+export { digitsIn, figure } from "../core/number_format.js";
+export { inTurn, wordOf } from "../core/formatting.js";
 export { mark, t } from "../core/words.js";
 
 /** "None": an unknown value is never shown as 0. */

@@ -13,7 +13,7 @@
  * @param {(value: number) => number} factor conversion to the displayed unit
  */
 import { attribute, digitsIn, format, noteOf, number, part, tell, write } from "./kit.js";
-import { ends } from "./scale.js";
+import { ends } from "./axis_ticks.js";
 
 export class Meter {
   /**

@@ -3,11 +3,11 @@
  * The common part of widgets that drive: `import { Motion, signed } from "urc/motion"`.
  *
  * A widget reports the push of the hand, and draws the result. This module adds the options of
- * `urc/curve`, the speed steps with their buttons, keys and gamepad buttons, and the note with the reason
+ * `urc/response_curve`, the speed steps with their buttons, keys and gamepad buttons, and the note with the reason
  * why nothing moves. The template has `.NAME` with `data-phase`, `.NAME-note`, and, for the speed steps,
  * buttons with `data-speed`. A single button for the next step is added for cells of low height.
  *
- * @typedef {import("./curve.js").Push} Push
+ * @typedef {import("./response_curve.js").Push} Push
  * @typedef {import("../core/types.js").Context} Context
  * @typedef {import("../core/types.js").Hand} Hand
  * @typedef {import("../core/types.js").HoldPhase} HoldPhase
@@ -26,7 +26,7 @@
  *   `speed` overrides the chosen step; `isNew` is true in the first call of a gesture.
  * @property {(look: Look) => void} draw
  */
-import { Pipeline, settingsOf, speedsOf } from "./curve.js";
+import { Pipeline, settingsOf, speedsOf } from "./response_curve.js";
 import { attribute, part, write } from "./kit.js";
 
 export class Motion {

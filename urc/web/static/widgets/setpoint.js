@@ -8,10 +8,10 @@
  * @typedef {import("../core/types.js").Outlet} Outlet
  * @typedef {import("../core/types.js").Reading} Reading
  */
-import { boundsOf, keyed, snapped } from "./bounds.js";
-import { Giver } from "./giver.js";
+import { boundsOf, keyed, snapped } from "./number_bounds.js";
+import { Giver } from "./command_state.js";
 import { format, noteOf, number } from "./kit.js";
-import { Wish } from "./wish.js";
+import { Wish } from "./pending_value.js";
 
 export class Setpoint {
   /**

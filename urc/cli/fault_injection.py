@@ -1,0 +1,215 @@
+"""Fault injection for emulated robots: at the start, and by typed lines."""
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
+
+from urc.cli.error_report import Misuse
+from urc.cli.output import complain
+from urc.config.spelling_suggestions import did_you_mean
+from urc.problems import UrcError
+
+if TYPE_CHECKING:
+    from urc.simulator.emulated_robot import EmulatedRobot
+import asyncio
+import os
+import stat
+from collections.abc import AsyncIterator
+from typing import Final, TextIO
+
+__all__ = ["FaultInjector", "add_faults"]
+
+
+_LONGEST: Final = 4096
+"""Maximum bytes of a line; longer lines are dropped."""
+_MOST_WAITING: Final = 64
+"""Maximum unread lines; beyond this number the newest are dropped."""
+
+
+async def typed_lines(stream: TextIO | None) -> AsyncIterator[str]:
+    """Yield the lines of a stream until it ends; none if it cannot be read.
+
+    A process in the background of a terminal reads nothing: the terminal would stop the process.
+
+    Args:
+        stream: a pipe or terminal, or None.
+    """
+    try:
+        handle = -1 if stream is None else stream.fileno()
+    except (OSError, ValueError):
+        return
+    if stream is None or handle < 0:
+        return
+    if stat.S_ISREG(os.fstat(handle).st_mode):
+        for text in await asyncio.to_thread(stream.readlines, _MOST_WAITING * _LONGEST):
+            yield text.rstrip("\n")
+        return
+    loop, lines = asyncio.get_running_loop(), asyncio.Queue[str | None](_MOST_WAITING)
+    rest = bytearray()
+
+    def read() -> None:
+        if not _is_ours(handle):
+            return
+        try:
+            data = os.read(handle, _LONGEST)
+        except OSError:
+            data = b""
+        *whole, last = (bytes(rest) + data).split(b"\n")
+        rest[:] = last[:_LONGEST]
+        for line in whole if data else [*whole, last]:
+            with suppress(asyncio.QueueFull):
+                lines.put_nowait(line.decode("utf-8", "replace"))
+        if not data:
+            loop.remove_reader(handle)
+            with suppress(asyncio.QueueFull):
+                lines.put_nowait(None)
+
+    try:
+        loop.add_reader(handle, read)
+    except (NotImplementedError, OSError, ValueError):
+        return  # the event loop of this system only supports sockets
+    try:
+        while (line := await lines.get()) is not None:
+            yield line
+    finally:
+        loop.remove_reader(handle)
+
+
+def _is_ours(handle: int) -> bool:
+    """Return whether reading is allowed: a terminal belongs to its foreground process."""
+    try:
+        return not os.isatty(handle) or os.tcgetpgrp(handle) == os.getpgrp()
+    except (AttributeError, OSError):
+        return True
+
+
+def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
+    """Add the option for faults from the start; `has_names` if there may be several robots."""
+    which = " with emulated robots: FAULT with all, ROBOT:FAULT with one," if has_names else ","
+    name = "tello:" if has_names else ""
+    parser.add_argument(
+        "--fault",
+        dest="faults",
+        action="append",
+        default=[],
+        metavar="FAULT",
+        help=f"a fault{which} such as delay=200ms, loss=5%%, silent, noise=2x,"
+        " dropout=SIGNAL, stuck=SIGNAL, low-battery; repeatable, and changed by"
+        f" lines on standard input: 'fault {name}loss=10%%', 'mend', 'faults'",
+    )
+
+
+class FaultInjector:
+    """The emulated robots of one process, and their injected faults.
+
+    A robot keeps its faults when it is emulated again, for example after a change of its settings.
+    """
+
+    def __init__(self, now: Callable[[], float] = time.time) -> None:
+        """Start without a robot.
+
+        Args:
+            now: seconds since the epoch.
+        """
+        self._now = now
+        self._twins: dict[str, list[EmulatedRobot]] = {}
+        self._wrong: dict[str, dict[str, str]] = {}
+        """Robot → its faults as written, for its next emulation."""
+
+    @contextmanager
+    def watch(self, name: str, twin: "EmulatedRobot") -> Iterator[None]:
+        """Inject the faults of a robot during the context."""
+        twins = self._twins.setdefault(name, [])
+        for text in self._wrong.get(name, {}).values():
+            with suppress(UrcError):  # another version may lack that signal
+                twin.inject(text, self._now())
+        twins.append(twin)
+        try:
+            yield
+        finally:
+            twins.remove(twin)
+
+    def begin(self, texts: Sequence[str]) -> None:
+        """Inject the faults of the command line; raise `Misuse` for an impossible fault."""
+        for text in texts:
+            try:
+                self.inject(text)
+            except UrcError as error:
+                raise Misuse(f"--fault: {error}") from None
+
+    def inject(self, text: str) -> None:
+        """Inject a fault: ``loss=5%``, or ``tello:loss=5%``.
+
+        Without a name, it applies to every robot that can have it.
+
+        Raises:
+            UrcError: an unknown robot or fault, or a fault that no robot here can have; one line.
+        """
+        from urc.simulator.faults import parse_fault
+
+        robot, colon, fault = text.strip().rpartition(":")
+        names = self._named(robot) if colon else [*self._twins]
+        said = parse_fault(fault)
+        refusals = []
+        for name in names:
+            try:
+                for twin in self._twins[name]:
+                    twin.inject(fault, self._now())
+            except UrcError as error:
+                refusals.append(error)
+            else:
+                self._wrong.setdefault(name, {})[f"{said.name} {said.signal}"] = said.text
+        if refusals and len(refusals) == len(names):
+            raise refusals[0]
+
+    def mend(self, robot: str = "") -> None:
+        """Remove all faults, of one robot or of all robots.
+
+        Raises:
+            UrcError: an unknown robot; one line.
+        """
+        for name in self._named(robot) if robot else [*self._twins]:
+            self._wrong.pop(name, None)
+            for twin in self._twins[name]:
+                twin.mend()
+
+    def _named(self, robot: str) -> list[str]:
+        if robot in self._twins:
+            return [robot]
+        hint = did_you_mean(robot, self._twins, "robots")
+        raise UrcError(f"no robot {robot!r} is emulated here" + (f"; {hint}" if hint else ""))
+
+    def __str__(self) -> str:
+        """Return the injected faults, for people."""
+        found = []
+        for name, twins in self._twins.items():
+            faults = ", ".join(twins[0].faults if twins else self._wrong.get(name, {}).values())
+            if faults:
+                found.append(faults if len(self._twins) == 1 else f"{name}: {faults}")
+        return f"faults: {'; '.join(found) or 'none'}"
+
+    def obey(self, line: str) -> None:
+        """Execute a typed line, and print the injected faults."""
+        verb, _, rest = line.strip().partition(" ")
+        try:
+            if verb == "fault" and rest:
+                self.inject(rest)
+            elif verb == "mend":
+                self.mend(rest.strip())
+            elif line.strip() not in ("", "faults"):
+                raise UrcError(
+                    f"{line.strip()[:60]!r} is not a command; write fault …, mend or faults"
+                )
+        except UrcError as error:
+            complain(str(error))
+            return
+        if verb:
+            print(self, flush=True)
+
+    async def listen(self) -> None:
+        """Execute all lines of standard input, until it ends."""
+        async for line in typed_lines(sys.stdin):
+            self.obey(line)

@@ -1,0 +1,110 @@
+"""The entrance of a dashboard: the printed addresses, and the keys in them."""
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import AsyncExitStack, ExitStack
+from ipaddress import ip_address
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+from urllib.parse import urlsplit
+
+from urc.cli.arguments import is_loopback
+from urc.cli.error_report import Misuse
+from urc.cli.output import complain
+from urc.problems import UrcError
+
+if TYPE_CHECKING:
+    from urc.web.serve.access import Access
+
+__all__ = ["ReadyDashboard", "access_for", "announce", "print_entrance", "token_in"]
+
+_SHORTEST = 16
+_LONGEST = 200
+
+
+class ReadyDashboard(NamedTuple):
+    """The addresses of a dashboard that is ready."""
+
+    url: str
+    """Without a key."""
+    access: "Access"
+
+    @property
+    def address(self) -> str:
+        """The address with all rights, for the user who started the dashboard."""
+        return self.access.address(self.url)
+
+    @property
+    def address_once(self) -> str:
+        """The address for the browser that URC starts: it works once."""
+        return self.access.address_once(self.url)
+
+    def lines(self) -> Iterator[str]:
+        """Yield the lines to print: first the address with all rights."""
+        yield f"dashboard {self.address}"
+        if self.access.is_open:
+            yield f"for others {self.url}   (without a key: watch and drive)"
+        if managers := self.access.address_of_managers(self.url):
+            yield f"for managers {managers}"
+
+
+def print_entrance(entrance: ReadyDashboard) -> None:
+    """Print the addresses."""
+    print("\n".join(entrance.lines()), flush=True)
+
+
+def access_for(host: str, token: str = "") -> "Access":
+    """Return the keys of a dashboard that listens on `host`."""
+    from urc.web.serve.access import Access
+
+    return Access(is_open=not is_loopback(host), token=token)
+
+
+def token_in(file: Path) -> str:
+    """Return the token in a file; create the file if it is missing.
+
+    Raises:
+        UrcError: the file cannot be read or written, or has no token.
+    """
+    from urc.private_files import put_private
+
+    try:
+        if not file.exists():
+            put_private(file, secrets.token_urlsafe(24).encode() + b"\n")
+        token = file.read_text("ascii").strip()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "it is not plain text"
+        raise UrcError(f"--token: cannot use {file}: {reason}") from error
+    if not _SHORTEST <= len(token) <= _LONGEST or not token.isprintable() or " " in token:
+        raise Misuse(
+            f"--token: {file} must have {_SHORTEST} to {_LONGEST} characters without spaces;"
+            " remove the file, and URC creates one"
+        )
+    return token
+
+
+def announce(
+    stack: ExitStack | AsyncExitStack, data: Path, host: str, entrance: ReadyDashboard
+) -> None:
+    """Let other programs of this user find a dashboard until `stack` ends."""
+    from urc.runtime.running_servers import RunningServer, announced
+
+    server = RunningServer(_near(entrance.url, host), entrance.access.key, os.getpid())
+    try:
+        stack.enter_context(announced(data, entrance.access.instance, server))
+    except OSError as error:
+        reason = error.strerror or error
+        complain(f"urc: cannot write into {data}: {reason}; 'urc send' will not find this server")
+
+
+def _near(url: str, host: str) -> str:
+    """Return the address for programs of this machine."""
+    port = urlsplit(url).port
+    try:
+        address = ip_address(host)
+    except ValueError:
+        return url
+    if not address.is_unspecified:
+        return url
+    return f"http://127.0.0.1:{port}/" if address.version == 4 else f"http://[::1]:{port}/"

@@ -1,0 +1,78 @@
+"""Commands with autonomous motion: their key, their sequences, and their limits."""
+
+from collections.abc import Mapping
+
+from urc.config.node import Node, Problems
+from urc.config.spelling_suggestions import did_you_mean
+from urc.expressions import Template
+from urc.model.driver import Command
+from urc.model.sequence import RunStep, all_steps
+from urc.model.values import Reading
+
+__all__ = ["link_moves", "parse_moves", "refuse_moving", "runs_what_moves", "with_moving_steps"]
+
+
+def parse_moves(part: Node, findings: Problems) -> tuple[bool, Template | None]:
+    """Return whether a command starts autonomous motion, and the condition for it, if any."""
+    said = part.get("moves")
+    if said is None or isinstance(said.data, bool):
+        return bool(said and said.data), None
+    return True, findings.expression(said)
+
+
+def link_moves(findings: Problems, part: Node, command: Command) -> None:
+    """Report names in the condition under ``moves`` that are no arguments."""
+    condition = command.moves_if
+    if condition is None:
+        return
+    for name in sorted(condition.names - command.arguments.keys()):
+        findings.error(
+            part.must("moves"),
+            "unknown-name",
+            f"{name!r} is not an argument of {command.name!r}",
+            offset=condition.source.find(name),
+            hint=did_you_mean(name, command.arguments, "arguments"),
+        )
+
+
+def runs_what_moves(command: Command, arguments: Mapping[str, Template | Reading]) -> bool:
+    """Return whether a command with these arguments may start autonomous motion."""
+    is_told = not any(isinstance(value, Template) for value in arguments.values())
+    return command.moves_with(arguments) if is_told else command.moves
+
+
+def with_moving_steps(commands: Mapping[str, Command]) -> dict[str, Command]:
+    """Return the commands; a sequence moves when one of its commands moves or is held."""
+    found = dict(commands)
+
+    def does(step: object) -> bool:
+        if not isinstance(step, RunStep) or step.command not in found:
+            return False
+        command = found[step.command]
+        return command.hold is not None or runs_what_moves(command, step.arguments)
+
+    while True:
+        more = [
+            name
+            for name, one in found.items()
+            if not one.moves and any(map(does, all_steps(one.steps)))
+        ]
+        if not more:
+            return found
+        found |= {name: found[name]._replace(moves=True) for name in more}
+
+
+def refuse_moving(
+    findings: Problems,
+    part: Node,
+    command: Command,
+    arguments: Mapping[str, Template | Reading],
+) -> None:
+    """Report autonomous motion of a command at a place where it runs automatically."""
+    if runs_what_moves(command, arguments):
+        findings.error(
+            part,
+            "wrong-command",
+            f"{command.name!r} starts autonomous motion, and would run automatically here",
+            hint="run a command without motion, and leave this one to people",
+        )

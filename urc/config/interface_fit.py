@@ -1,0 +1,83 @@
+"""The fit of an interface that a user adds to a robot, and the widgets that it needs."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from urc.config.gather import gather
+from urc.config.link.interface import link_interface
+from urc.config.node import Problems
+from urc.config.parse.interface import parse_interface
+from urc.config.parse.widget import WidgetFolder
+from urc.model.interface import Interface
+from urc.model.profile import Profile
+from urc.model.values import NOTHING
+from urc.model.widget import Widget
+from urc.problems import has_errors
+
+__all__ = ["InterfaceFit", "fit_interface"]
+
+
+class InterfaceFit(NamedTuple):
+    """The result for one interface on one robot."""
+
+    interface: Interface | None
+    """None when it does not fit."""
+    widgets: Mapping[str, Widget] = NOTHING
+    """The widgets in use."""
+    fault: str = ""
+    """The reason for a misfit, in one line."""
+
+
+class _Known(WidgetFolder):
+    """The widgets of a profile and of a folder, in this order of precedence."""
+
+    def __init__(self, widgets: Mapping[str, Widget], behind: WidgetFolder) -> None:
+        super().__init__(Path())
+        self._mine = widgets
+        self._behind = behind
+        self.problems = behind.problems
+
+    def names(self) -> list[str]:
+        """Return the names of all widgets."""
+        return sorted({*self._mine, *self._behind.names()})
+
+    def get(self, name: str) -> Widget | None:
+        """Return a widget, or None."""
+        return self._mine.get(name) or self._behind.get(name)
+
+    def has(self, name: str) -> bool:
+        """Return whether a widget has this name."""
+        return name in self._mine or self._behind.has(name)
+
+
+def fit_interface(path: str, profile: Profile, shelf: WidgetFolder) -> InterfaceFit:
+    """Return an interface with the slots of a robot's driver.
+
+    Args:
+        path: the interface's document.
+        profile: of the robot.
+        shelf: more widgets for the document, after the robot's own.
+    """
+    gathered = gather(path)
+    sources = gathered.sources
+    if sources is None or sources.kind != "interface":
+        faults = [one.message for one in gathered.problems if one.severity == "error"]
+        return InterfaceFit(None, fault=next(iter(faults), "it is not an interface"))
+    findings = Problems()
+    interface = parse_interface(sources.root, sources.root.text("name"), findings)
+    known = _Known(profile.widgets, shelf)
+    if not has_errors(findings):
+        interface = link_interface(
+            sources.root, interface, profile.slots, profile.driver, known, findings
+        )
+    errors = [one.message for one in (*findings, *shelf.problems) if one.severity == "error"]
+    if errors:
+        return InterfaceFit(None, fault=errors[0])
+    uses = {
+        name: interface.widgets.get(name) or profile.slots.get(name) for name in interface.shown
+    }
+    widgets = {use.widget: known.get(use.widget) for use in uses.values() if use is not None}
+    if not widgets:
+        return InterfaceFit(None, fault="this robot fills none of its slots")
+    return InterfaceFit(interface, {name: one for name, one in widgets.items() if one is not None})

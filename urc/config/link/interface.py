@@ -1,0 +1,308 @@
+"""Names of an interface: the widget of each slot, and its bindings."""
+
+from collections.abc import Mapping
+from typing import NamedTuple, TypeVar
+
+from urc.config.link.outputs import link_output, takes
+from urc.config.link.required_together import link_together
+from urc.config.link.resources import link_files, link_pages
+from urc.config.node import Node, Problems
+from urc.config.parse.widget import WidgetFolder
+from urc.config.shape.check import check_options
+from urc.config.sources import Sources
+from urc.config.spelling_suggestions import did_you_mean, listed
+from urc.model.driver import Driver
+from urc.model.interface import Interface, OutputBinding, WidgetUse
+from urc.model.units import conversion, quantity_of
+from urc.model.values import Signal
+from urc.model.widget import Widget, WidgetPort
+
+__all__ = ["link_interface", "link_slots", "misfit"]
+
+_T = TypeVar("_T")
+
+
+def link_slots(
+    sources: Sources, driver: Driver, shelf: WidgetFolder, findings: Problems
+) -> dict[str, WidgetUse]:
+    """Return the widget of each slot, before the changes of an interface."""
+    slots: dict[str, WidgetUse] = {}
+    for slot, parts in sources.slots.items():
+        use: WidgetUse | None = None
+        for part in parts:
+            use = _use(part, use, driver, shelf, findings) or use
+        if use is not None:
+            slots[slot] = use
+    return slots
+
+
+def link_interface(
+    part: Node,
+    interface: Interface,
+    slots: Mapping[str, WidgetUse],
+    driver: Driver | None,
+    shelf: WidgetFolder,
+    findings: Problems,
+) -> Interface:
+    """Return the interface with its own changes to the slots.
+
+    `slots` has the slots of the driver. Without a driver, the interface is checked alone.
+    """
+    shown = set(interface.shown)
+    uses = {}
+    for slot, inner in part.named("widgets").items():
+        if slot not in shown:
+            findings.warn(
+                inner,
+                "slot-not-shown",
+                f"no grid of this interface has a slot {slot!r}",
+                key=True,
+                hint=did_you_mean(slot, shown, "slots"),
+            )
+        use = _use(inner, slots.get(slot), driver, shelf, findings)
+        if use is not None:
+            uses[slot] = use
+    if interface.background and driver is not None:
+        _check_background(part, interface, {**slots, **uses}, findings)
+    return interface._replace(widgets=uses)
+
+
+def _check_background(
+    part: Node, interface: Interface, slots: Mapping[str, WidgetUse], findings: Problems
+) -> None:
+    name = interface.background
+    if name not in slots:
+        findings.warn(
+            part,
+            "slot-not-filled",
+            f"no widget fills the background {name!r}",
+            at="background",
+            hint=did_you_mean(name, slots, "slots"),
+        )
+
+
+def _use(
+    part: Node,
+    base: WidgetUse | None,
+    driver: Driver | None,
+    shelf: WidgetFolder,
+    findings: Problems,
+) -> WidgetUse | None:
+    """Return the slot `base` with the changes at `part`; None when they were reported."""
+    name = part.text("use", base.widget if base else "")
+    if not name:
+        if driver is not None:
+            findings.error(
+                part,
+                "missing-key",
+                f"'use' is missing: no widget fills {part.name!r}",
+                key=True,
+                hint=shelf.hint(""),
+            )
+        return None
+    widget = shelf.get(name)
+    if widget is None:
+        if not shelf.has(name):
+            findings.error(
+                part,
+                "unknown-widget",
+                f"there is no widget {name!r}",
+                at="use",
+                hint=shelf.hint(name),
+            )
+        return None  # a broken manifest is reported in its own file
+    bound = _bindings(part, widget, base, driver, findings)
+    options, files, pages = _options(part, widget, base, findings)
+    use = WidgetUse(
+        slot=part.name,
+        widget=name,
+        inputs=bound.inputs,
+        outputs=bound.outputs,
+        options=options,
+        title=part.text("title", base.title if base else ""),
+        given=bound.given,
+        lists=bound.lists,
+        files=files,
+        pages=pages,
+    )
+    if driver is not None:
+        link_together(part, use, widget, driver, findings)
+    return use
+
+
+class _Bound(NamedTuple):
+    """The bindings so far, with the fields of `WidgetUse`."""
+
+    inputs: dict[str, str]
+    lists: dict[str, tuple[str, ...]]
+    outputs: dict[str, str]
+    given: dict[str, OutputBinding]
+
+
+def _bindings(
+    part: Node, widget: Widget, base: WidgetUse | None, driver: Driver | None, findings: Problems
+) -> _Bound:
+    old = base or WidgetUse("", "")
+    outputs = _kept(old.outputs, widget.outputs)
+    given = {key: one for key, one in old.given.items() if key in outputs}
+    bound = _Bound(
+        _kept(
+            old.inputs, {key: port for key, port in widget.inputs.items() if not port.is_multiple}
+        ),
+        _kept(old.lists, {key: port for key, port in widget.inputs.items() if port.is_multiple}),
+        outputs,
+        given,
+    )
+    for key, inner in part.named("bind").items():
+        if key in widget.inputs:
+            _bind_input(inner, widget, bound, driver, findings)
+        elif key not in widget.outputs:
+            findings.error(
+                inner,
+                "unknown-input",
+                f"widget {widget.name!r} has no input {key!r}",
+                key=True,
+                hint=did_you_mean(key, (*widget.inputs, *widget.outputs), "inputs"),
+            )
+        elif isinstance(inner.data, list):
+            findings.error(
+                inner,
+                "wrong-type",
+                f"{key!r} is an output, so it needs the name of a command",
+                hint="only an input of many signals takes a list",
+            )
+        else:
+            port = widget.outputs[key]
+            outputs[key], given[key] = link_output(inner, port, widget, driver, findings)
+    if driver is not None:
+        _check_required(part, widget, {**bound.inputs, **bound.lists, **outputs}, driver, findings)
+    return bound
+
+
+def _bind_input(
+    part: Node, widget: Widget, bound: _Bound, driver: Driver | None, findings: Problems
+) -> None:
+    """Add the signal, or the signals, of one input."""
+    port = widget.inputs[part.name]
+    if isinstance(part.data, dict):
+        findings.error(
+            part,
+            "wrong-type",
+            f"{port.name!r} is an input, so it needs the name of a signal",
+            hint="only outputs take a command with its arguments",
+        )
+    elif isinstance(part.data, list) and not port.is_multiple:
+        findings.error(
+            part,
+            "wrong-type",
+            f"{port.name!r} of widget {widget.name!r} takes one signal, not a list",
+        )
+    elif port.is_multiple:
+        each = part.items() if isinstance(part.data, list) else [part]
+        bound.lists[port.name] = tuple(inner.data for inner in each)
+        if driver is not None:
+            for inner in each:
+                _check_signal(inner, widget, port, driver, findings)
+    else:
+        bound.inputs[port.name] = part.data
+        if driver is not None:
+            _check_signal(part, widget, port, driver, findings)
+
+
+def _check_required(
+    part: Node, widget: Widget, bound: Mapping[str, object], driver: Driver, findings: Problems
+) -> None:
+    tried = part.named("bind")  # their problems are already reported
+    for port in (*widget.inputs.values(), *widget.outputs.values()):
+        if port.is_required and port.name not in bound and port.name not in tried:
+            findings.error(
+                part,
+                "unbound-input",
+                f"{port.name!r} of widget {widget.name!r} is not bound",
+                at="bind" if "bind" in part.data else "",
+                key=True,
+                hint=_output_hint(port, driver)
+                if port.name in widget.outputs
+                else _binding_hint(port, driver),
+            )
+
+
+def _kept(bound: Mapping[str, _T], ports: Mapping[str, WidgetPort]) -> dict[str, _T]:
+    return {key: target for key, target in bound.items() if key in ports}
+
+
+def _binding_hint(port: WidgetPort, driver: Driver) -> str:
+    fitting = [signal.name for signal in driver.signals.values() if not misfit(port, signal)]
+    return f"possible signals: {listed(fitting)}" if fitting else "no signal of the driver fits"
+
+
+def _output_hint(port: WidgetPort, driver: Driver) -> str:
+    fitting = [one.name for one in driver.commands.values() if takes(one, port)]
+    if fitting:
+        return f"possible commands: {listed(fitting)}"
+    held = "a command with 'hold'" if port.is_held else "a command without 'hold'"
+    return f"no command of the driver fits this output, which needs {held}"
+
+
+def _check_signal(
+    part: Node, widget: Widget, port: WidgetPort, driver: Driver, findings: Problems
+) -> None:
+    signal = driver.signals.get(part.data)
+    if signal is None:
+        findings.unknown(part, "unknown-signal", part.data, driver.signals)
+        return
+    wrong = misfit(port, signal)
+    if wrong:
+        code = "wrong-unit" if wrong.startswith("unit") else "wrong-type"
+        findings.error(
+            part,
+            code,
+            f"signal {signal.name!r} does not fit {port.name!r} of widget {widget.name!r}: {wrong}",
+        )
+
+
+def misfit(port: WidgetPort, signal: Signal) -> str:
+    """Return why a signal cannot be bound to an input, or "" when it can."""
+    types = (*port.types, "integer") if "number" in port.types else port.types
+    if signal.type not in types:
+        return f"type {' or '.join(port.types)} is expected, the signal is {signal.type}"
+    if signal.type == "array":
+        of = (*port.items, "integer") if "number" in port.items else port.items
+        if of and signal.items not in of:
+            wanted = " or ".join(port.items)
+            return f"an array of {wanted} is expected, the signal is of {signal.items}"
+        if None not in (port.size, signal.size) and port.size != signal.size:
+            return f"an array of {port.size} elements is expected, the signal has {signal.size}"
+    if port.unit and conversion(signal.unit, port.unit) is None:
+        has = f"in {signal.unit!r}" if signal.unit else "without a unit"
+        return f"unit {port.unit!r} is expected, the signal is {has}"
+    measured = quantity_of(signal.unit)
+    if port.quantity and measured not in ("", port.quantity):
+        return f"unit of {port.quantity} is expected, the signal is in {signal.unit!r}"
+    return ""
+
+
+def _options(
+    part: Node, widget: Widget, base: WidgetUse | None, findings: Problems
+) -> tuple[dict[str, object], dict[str, str], dict[str, tuple[str, ...]]]:
+    """Return the options with the manifest's defaults, and the files and pages in them."""
+    options: dict[str, object] = {
+        name: schema["default"]
+        for name, schema in widget.options.items()
+        if isinstance(schema, dict) and "default" in schema
+    }
+    files: dict[str, str] = {}
+    pages: dict[str, tuple[str, ...]] = {}
+    if base is not None and base.widget == widget.name:
+        options |= base.options
+        files |= base.files
+        pages |= base.pages
+    given = part.get("options")
+    if given is not None:
+        problems = check_options(given.document, given.path, given.data, widget.options)
+        findings.problems += problems
+        options |= given.data
+        if not problems:
+            files |= link_files(given, widget, findings)
+            pages |= link_pages(given, widget, findings)
+    return options, files, pages

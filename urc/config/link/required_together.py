@@ -1,0 +1,238 @@
+"""Relations between the bindings and options of one widget, as its manifest declares them."""
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from urc.config.link.resources import named_texts
+from urc.config.node import Node, Problems
+from urc.config.spelling_suggestions import did_you_mean, listed
+from urc.model.binding import targets
+from urc.model.driver import Argument, Driver
+from urc.model.interface import OutputBinding, WidgetUse
+from urc.model.units import are_apart
+from urc.model.widget import Widget, WidgetPort
+
+__all__ = ["link_together"]
+
+_NOTHING_GIVEN: Final = OutputBinding()
+_LOCAL: Final = re.compile(r"/(?![/\\])")
+"""Start of an address on the same server."""
+
+
+def link_together(
+    part: Node, use: WidgetUse, widget: Widget, driver: Driver, findings: Problems
+) -> None:
+    """Check bindings and options that depend on each other.
+
+    `part` is the slot in this document, with some keys of `use`, the complete slot.
+    """
+    bound = {**use.inputs, **use.lists, **use.outputs}
+    _check_needs(part, use, widget, bound, findings)
+    _check_groups(part, widget, bound, findings)
+    _check_instead(part, widget, bound, findings)
+    _check_units(part, use, widget, driver, findings)
+    _check_order(part, use, widget, findings)
+    _check_local(part, widget, findings)
+    _check_given(part, use, widget, driver, findings)
+
+
+def _check_needs(
+    part: Node, use: WidgetUse, widget: Widget, bound: Mapping[str, object], findings: Problems
+) -> None:
+    tried = part.named("bind")  # their problems are already reported
+    given = {name for name, value in use.options.items() if value not in ("", None)}
+    if widget.at_least_one_of and not {*bound, *tried, *given} & {*widget.at_least_one_of}:
+        options = [name for name in widget.at_least_one_of if name in widget.options]
+        ports = [name for name in widget.at_least_one_of if name not in widget.options]
+        ways = [f"bind {_one_of(ports)}"] if ports else []
+        ways += [f"give the option {_one_of(options)}"] if options else []
+        findings.error(
+            part,
+            "unbound-input",
+            f"widget {widget.name!r} has no bindings, so it would be empty",
+            key=True,
+            hint=", or ".join(ways),
+        )
+
+
+def _one_of(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"one of {listed(names)}"
+
+
+def _check_groups(
+    part: Node, widget: Widget, bound: Mapping[str, object], findings: Problems
+) -> None:
+    tried = part.named("bind")
+    for group in widget.required_together:
+        there = [name for name in group if name in bound or name in tried]
+        missing = [name for name in group if name not in there]
+        mine = [name for name in there if name in tried]
+        if mine and missing:
+            findings.error(
+                tried[mine[0]],
+                "half-bound",
+                f"{mine[0]!r} of widget {widget.name!r} needs {listed(missing)}",
+                key=True,
+                hint=f"bind {listed(missing)} too, or remove {mine[0]}",
+            )
+
+
+def _check_instead(
+    part: Node, widget: Widget, bound: Mapping[str, object], findings: Problems
+) -> None:
+    """Warn of a binding in this document that another binding of the slot overrides.
+
+    An interface may override a binding of the driver, which is no mistake of the driver.
+    """
+    said = (*part.named("bind").items(), *part.named("options").items())
+    for port in widget.inputs.values():
+        lost = [inner for name, inner in said if port.name in bound and name in port.replaces]
+        for inner in lost:
+            findings.warn(
+                inner,
+                "unused-binding",
+                f"{inner.name!r} of widget {widget.name!r} has no effect with {port.name!r}",
+                key=True,
+                hint=f"remove {inner.name}, or do not bind {port.name}",
+            )
+
+
+# ---- units
+
+
+def _check_units(
+    part: Node, use: WidgetUse, widget: Widget, driver: Driver, findings: Problems
+) -> None:
+    """Report two bindings with different units where the widget compares them."""
+    mine = part.named("bind")
+    for port in (*widget.inputs.values(), *widget.outputs.values()):
+        place = mine.get(port.name) or mine.get(port.unit_of)
+        other = widget.inputs.get(port.unit_of) or widget.outputs.get(port.unit_of)
+        if place is None or other is None:
+            continue
+        wanted = next(_units(use, other, driver), ("", ""))
+        for what, unit in _units(use, port, driver):
+            if are_apart(unit, wanted[1]):
+                findings.error(
+                    place,
+                    "wrong-unit",
+                    f"{port.name!r} and {other.name!r} of widget {widget.name!r} need the same"
+                    f" unit: {what} is in {unit!r}, {wanted[0]} in {wanted[1]!r}",
+                    hint="the widget does not convert; bind other ones, or compute a signal in"
+                    " that unit",
+                )
+                break
+
+
+def _units(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[tuple[str, str]]:
+    """Yield the signals or arguments of a port, as text, with their units."""
+    single = use.inputs.get(port.name)
+    for name in (single,) if single is not None else use.lists.get(port.name, ()):
+        signal = driver.signals.get(name)
+        if signal is not None:
+            yield f"signal {name!r}", port.unit or signal.unit
+    for argument in _arguments(use, port, driver):
+        yield f"argument {argument.name!r}", argument.unit
+
+
+def _arguments(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[Argument]:
+    """Yield the arguments that take the values of an output."""
+    command = driver.commands.get(use.outputs.get(port.name, ""))
+    if command is not None:
+        taken = targets(command, port, use.given.get(port.name, _NOTHING_GIVEN))
+        yield from (command.arguments[name] for name in taken if name in command.arguments)
+
+
+# ---- options
+
+
+def _check_order(part: Node, use: WidgetUse, widget: Widget, findings: Problems) -> None:
+    """Report an option that is not below the option that limits it."""
+    own = part.named("options")
+    for name, schema in widget.options.items():
+        above = schema.get("less_than") if isinstance(schema, Mapping) else None
+        if above is None or not (name in own or above in own):
+            continue
+        low, high = use.options.get(name), use.options.get(above)
+        if isinstance(low, (int, float)) and isinstance(high, (int, float)) and low >= high:
+            findings.error(
+                own.get(name) or own[above],
+                "wrong-order",
+                f"option {name!r} is {low:g}, which must be below {above!r}, {high:g}",
+                hint="change one of the two" if above in own else f"give the option {above} too",
+            )
+
+
+def _check_local(part: Node, widget: Widget, findings: Problems) -> None:
+    """Report an address on another server."""
+    options = part.get("options")
+    for name, inner in named_texts(options, widget.options, "same_origin") if options else ():
+        if inner.data and not _LOCAL.match(inner.data):
+            findings.error(
+                inner,
+                "not-local",
+                f"option {name!r} must be an address on this dashboard's server,"
+                f" found {inner.data!r}",
+                hint="a page loads nothing from other servers; start it with one slash",
+            )
+
+
+def _check_given(
+    part: Node, use: WidgetUse, widget: Widget, driver: Driver, findings: Problems
+) -> None:
+    """Report a text of the options that does not fit its argument."""
+    options = part.get("options")
+    if options is None:
+        return
+    for name, inner in named_texts(options, widget.options, "argument_of"):
+        schema: Any = widget.options[name]
+        is_item = "argument_of" not in schema
+        port = widget.outputs[schema["items"]["argument_of"] if is_item else schema["argument_of"]]
+        text = inner.data.partition("=")[0] if is_item else inner.data
+        for argument in _arguments(use, port, driver):
+            _check_text(inner, text, argument, use.outputs[port.name], findings)
+
+
+def _check_text(
+    part: Node, text: str, argument: Argument, command: str, findings: Problems
+) -> None:
+    value = _read(text, argument)
+    if value is None:
+        code, wrong = "wrong-type", f"takes {argument.type}"
+    elif argument.choices and value not in argument.choices:
+        code, wrong = "unknown-word", "has other choices"
+    elif not isinstance(value, str) and _is_outside(value, argument):
+        code, wrong = "out-of-range", f"is from {_bound(argument.min)} to {_bound(argument.max)}"
+    else:
+        return
+    choices = [str(one) for one in argument.choices]
+    findings.error(
+        part,
+        code,
+        f"command {command!r} cannot take {text!r}: its argument {argument.name!r} {wrong}",
+        hint=did_you_mean(text, choices, "choices") if choices else "",
+    )
+
+
+def _read(text: str, argument: Argument) -> bool | float | str | None:
+    """Return the value that a page reads from a text for an argument; None when it cannot."""
+    if argument.type == "boolean":
+        return {"true": True, "false": False}.get(text)
+    if argument.type not in ("integer", "number"):
+        return text
+    try:
+        number = float(text)
+    except ValueError:
+        return None
+    is_whole = number.is_integer()
+    return number if is_whole or argument.type == "number" else None
+
+
+def _is_outside(value: float, argument: Argument) -> bool:
+    low, high = argument.min, argument.max
+    return (low is not None and value < low) or (high is not None and value > high)
+
+
+def _bound(value: float | None) -> str:
+    return "any" if value is None else f"{value:g}"

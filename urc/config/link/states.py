@@ -1,0 +1,61 @@
+"""Comparisons of signals with texts that their states lack."""
+
+import ast
+from collections.abc import Iterable, Mapping
+
+from urc.config.node import Node, Problems
+from urc.config.spelling_suggestions import did_you_mean
+from urc.expressions import Template
+from urc.model.values import Signal
+
+__all__ = ["check_words"]
+
+
+def check_words(
+    findings: Problems, part: Node, template: Template, signals: Mapping[str, Signal]
+) -> None:
+    """Warn of each text in a comparison that is not a state of its signal."""
+    worded = {
+        name: dict(signals[name].states)
+        for name in template.names
+        if name in signals and signals[name].states and signals[name].type != "boolean"
+    }
+    if not worded:
+        return
+    for name, text in _compared(template.python):
+        states = worded.get(name)
+        if states is None or text in states.values():
+            continue
+        hint = f"write {states[text]!r}" if text in states else ""
+        found = template.source.find(text)
+        findings.warn(
+            part,
+            "unknown-word",
+            f"{name!r} is never {text!r}: its values are its states",
+            offset=max(0, found),
+            length=len(text) if found >= 0 else len(template.source),
+            hint=hint or did_you_mean(text, states.values(), "words"),
+        )
+
+
+def _compared(python: str) -> Iterable[tuple[str, str]]:
+    """Return name and text of each comparison of a name with a text, or with a list of texts."""
+    for node in ast.walk(ast.parse(python, mode="eval")):
+        if not isinstance(node, ast.Compare):
+            continue
+        sides = [node.left, *node.comparators]
+        names = [name for side in sides if (name := _name(side))]
+        if len(names) != 1:
+            continue
+        for side in sides:
+            items = side.elts if isinstance(side, ast.List) else [side]
+            for item in items:
+                if isinstance(item, ast.Constant) and isinstance(item.value, str) and item.value:
+                    yield names[0], item.value
+
+
+def _name(node: ast.expr) -> str:
+    """Return the name of a value read there; "" for anything else."""
+    if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
+        return str(node.slice.value) if isinstance(node.value, ast.Name) else ""
+    return ""

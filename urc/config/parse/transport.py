@@ -1,0 +1,112 @@
+"""Transports of a driver: mapping → `TransportSpec`."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from urc.config.node import Node, Problems
+from urc.config.parse.forms.json_text import compiled_tree, placed_templates
+from urc.config.parse.framing import parse_framing
+from urc.config.parse.headers import check_headers
+from urc.config.renames import renamed_value_hint
+from urc.config.spelling_suggestions import did_you_mean
+from urc.expressions import Template
+from urc.model.driver import Backoff, FramingSpec, Timeouts, TransportSpec
+from urc.registry import Registries
+
+__all__ = ["option_templates", "parse_transport"]
+
+_COMMON: Final = (
+    "type", "connection", "framing", "send_framing", "encoding", "timeouts", "reconnect", "min_gap",
+    "queue", "keepalive", "on_connect", "on_close", "stale_after", "tunnel",
+    "replies", "duplex", "errors",
+)  # fmt: skip
+
+
+def parse_transport(part: Node, findings: Problems, catalog: Registries) -> TransportSpec:
+    """Return one transport."""
+    kind = part.must("type")
+    if catalog.transports.get(kind.data) is None:
+        findings.error(
+            kind,
+            "unknown-transport-type",
+            f"there is no transport of type {kind.data!r}",
+            hint=renamed_value_hint("type", kind.data)
+            or did_you_mean(kind.data, catalog.transports, "types"),
+        )
+    check_headers(part, findings)
+    encoding = part.text("encoding", "utf-8")
+    options = {
+        name: _option(inner, findings)
+        for name, inner in part.entries().items()
+        if name not in _COMMON
+    }
+    persistent = part.text("connection", "persistent") == "persistent"
+    return TransportSpec(
+        name=part.name,
+        type=kind.data,
+        options=options,
+        connection="persistent" if persistent else "per_request",
+        framing=_framing(part, encoding, findings, catalog),
+        encoding=encoding,
+        timeouts=_timeouts(part.get("timeouts"), findings),
+        backoff=_backoff(part.get("reconnect"), findings),
+        min_gap_s=findings.duration(part, "min_gap", 0.0, least=0.0, most=3600),
+        tunnel=part.text("tunnel"),
+        is_half_duplex=part.text("duplex") == "half",
+        never_replies=part.text("replies") == "never",
+    )
+
+
+def _framing(part: Node, encoding: str, findings: Problems, catalog: Registries) -> FramingSpec:
+    """Return the framing of received frames, with the framing of sent frames if it differs."""
+    own = part.get("framing")
+    if own is None:
+        return FramingSpec("datagram")  # the schema requires 'framing' for streams
+    framing = parse_framing(own, encoding, findings, catalog)
+    sent = part.get("send_framing")
+    if sent is None:
+        return framing
+    return framing._replace(sent=parse_framing(sent, encoding, findings, catalog))
+
+
+def _option(part: Node, findings: Problems) -> object:
+    """Return an option: plain, a template, or a list or mapping of them."""
+    tree = compiled_tree(part, findings)
+    if isinstance(tree, Template) and tree.is_constant:
+        return tree.evaluate({})
+    return tree
+
+
+def _timeouts(part: Node | None, findings: Problems) -> Timeouts:
+    if part is None:
+        return Timeouts()
+    return Timeouts(
+        connect_s=findings.duration(part, "connect", 3.0, least=0.01, most=300),
+        reply_s=findings.duration(part, "reply", 2.0, most=3600),
+        idle_s=findings.duration(part, "idle", 0.0, least=0.01) or None,
+        on_connect_s=findings.duration(part, "on_connect", 0.0, least=0.01, most=3600) or None,
+    )
+
+
+def _backoff(part: Node | None, findings: Problems) -> Backoff:
+    if part is None:
+        return Backoff()
+    default = Backoff()
+    initial = findings.duration(part, "initial", default.initial_s, least=0.01, most=3600)
+    longest = findings.duration(part, "max", max(default.max_s, initial), least=0.01, most=3600)
+    if initial > longest:
+        findings.error(
+            part,
+            "wrong-order",
+            "the first wait is longer than the longest wait",
+            at="initial",
+            hint="'initial' is the first wait, 'max' the longest",
+        )
+    jitter = part.number("jitter")
+    return Backoff(initial, longest, default.jitter if jitter is None else jitter)
+
+
+def option_templates(part: Node, spec: TransportSpec) -> Iterator[tuple[Node, Template]]:
+    """Yield every template in the options of the transport at `part`, with its place."""
+    for name, tree in spec.options.items():
+        yield from placed_templates(part.must(name), tree)

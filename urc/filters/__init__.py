@@ -1,0 +1,1 @@
+"""Filters of Jinja expressions, by subject."""

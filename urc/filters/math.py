@@ -1,0 +1,53 @@
+"""Angles, roots and rounding for expressions.
+
+Private to `urc.filters.table`. Angles are in radians. An undefined result (the root of a negative
+number, the arc sine of 2) raises ValueError, as everywhere in expressions.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, Final
+
+__all__ = ["GEOMETRY_FILTERS"]
+
+
+def _number(value: object) -> float:
+    if isinstance(value, (int, float)):
+        return value
+    text = repr(value)
+    raise TypeError(f"a number is expected, found {text if len(text) <= 40 else text[:37] + '...'}")
+
+
+def _of(name: str, function: Callable[..., float], where: str = "") -> Callable[..., float]:
+    """Return `function` over numbers; `where` describes its domain in errors."""
+
+    def filtered(*values: object) -> float:
+        numbers = [_number(value) for value in values]
+        try:
+            return function(*numbers)
+        except (ValueError, OverflowError):
+            shown = " and ".join(f"{number:g}" for number in numbers)
+            reason = f"'{name}' has no value for {shown}"
+            raise ValueError(f"{reason}; {where}" if where else reason) from None
+
+    return filtered
+
+
+GEOMETRY_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
+    "acos": (_of("acos", math.acos, "it takes -1 to 1"), (0, 0)),
+    "asin": (_of("asin", math.asin, "it takes -1 to 1"), (0, 0)),
+    "atan": (_of("atan", math.atan), (0, 0)),
+    "atan2": (_of("atan2", math.atan2), (1, 1)),
+    "ceil": (_of("ceil", math.ceil), (0, 0)),
+    "cos": (_of("cos", math.cos), (0, 0)),
+    "degrees": (_of("degrees", math.degrees), (0, 0)),
+    "exp": (_of("exp", math.exp), (0, 0)),
+    "floor": (_of("floor", math.floor), (0, 0)),
+    "hypot": (_of("hypot", math.hypot), (1, 1)),
+    "log": (_of("log", math.log, "it takes numbers above 0"), (0, 0)),
+    "radians": (_of("radians", math.radians), (0, 0)),
+    "sin": (_of("sin", math.sin), (0, 0)),
+    "sqrt": (_of("sqrt", math.sqrt, "it takes numbers from 0"), (0, 0)),
+    "tan": (_of("tan", math.tan), (0, 0)),
+}
+"""Filter → function, and its least and largest number of arguments after the subject."""

@@ -1,0 +1,177 @@
+"""Filters that parse the content of one field: tables, digits, packed numbers.
+
+Private to `urc.filters.table`. Each filter accepts every value of a document, takes linear time,
+and returns at most `MAX_PARTS` values. A filter returns a result, or raises TypeError or ValueError
+with a text for people.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import Any, Final
+
+from urc._number_codec import reader_of
+from urc._number_types import number_of
+
+__all__ = ["CUT_FILTERS"]
+
+MAX_PARTS: Final = 65536
+_MOST_BITS: Final = 64
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _list(value: object) -> Sequence[Any]:
+    if isinstance(value, (list, tuple)):
+        return value
+    raise TypeError(f"a list is expected, found {_short(value)}")
+
+
+def _text(value: object) -> str:
+    if isinstance(value, str):
+        return value
+    raise TypeError(f"text is expected, found {_short(value)}")
+
+
+def _whole(value: object, what: str, least: int, most: int) -> int:
+    if isinstance(value, int) and not isinstance(value, bool) and least <= value <= most:
+        return value
+    raise ValueError(f"{what} is a whole number from {least} to {most}, found {_short(value)}")
+
+
+def _check_count(count: int, what: str) -> None:
+    if count > MAX_PARTS:
+        raise ValueError(f"there are more than {MAX_PARTS} {what}")
+
+
+def _column(value: Any, key: Any, between: Any = None) -> list[Any]:
+    """Return one part of every row, by name, by position, or by position in a separated text."""
+    rows = _list(value)
+    if between is not None:
+        if not _text(between):
+            raise ValueError("'column' needs a separator for rows of text")
+        # Count before splitting: one text may be in the list many times.
+        rows = [_text(row) for row in rows if row]
+        _check_count(sum(row.count(between) + 1 for row in rows), "parts")
+    found = []
+    for row in rows:
+        if between is not None:
+            row = row.split(between)
+        if (isinstance(row, Mapping) and key in row) or _is_place(row, key):
+            found.append(row[key])
+        else:
+            raise ValueError(f"the row {_short(row)} has no part {_short(key)}")
+    return found
+
+
+def _is_place(row: Any, key: Any) -> bool:
+    is_row = isinstance(row, (list, tuple)) and isinstance(key, int) and not isinstance(key, bool)
+    return is_row and -len(row) <= key < len(row)
+
+
+def _cut(value: Any, start: Any, stop: Any = None) -> list[Any]:
+    """Return the part from `start` up to `stop` of every text or list in a list."""
+    begin = _whole(start, "a place", -MAX_PARTS, MAX_PARTS)
+    end = None if stop is None else _whole(stop, "a place", -MAX_PARTS, MAX_PARTS)
+    for row in _list(value):
+        if not isinstance(row, (str, list, tuple)):
+            raise TypeError(f"{_short(row)} has no parts in a row")
+    _check_count(sum(len(range(len(row))[begin:end]) for row in value), "parts")
+    return [row[begin:end] for row in value]
+
+
+def _digits(value: Any, width: Any, base: Any, zero: Any = 48) -> list[int]:
+    """Return the numbers with `width` characters each, the highest digit first."""
+    text, size = _text(value), _whole(width, "a width", 1, 16)
+    radix = _whole(base, "a base", 2, 256)
+    first = ord(zero) if isinstance(zero, str) and len(zero) == 1 else zero
+    least = _whole(first, "the code of the digit zero", 0, 0x10FFFF)
+    if len(text) % size:
+        raise ValueError(f"{len(text)} characters cannot be split into numbers of {size} each")
+    numbers, number = [], 0
+    for place, char in enumerate(text, 1):
+        digit = ord(char) - least
+        if not 0 <= digit < radix:
+            raise ValueError(f"{char!r} is not a digit of base {radix}")
+        number = number * radix + digit
+        if place % size == 0:
+            numbers.append(number)
+            number = 0
+    return numbers
+
+
+def _signed(value: Any, bits: Any) -> int:
+    """Return the value of a two's complement number of `bits` bits."""
+    size = _whole(bits, "the bits", 1, _MOST_BITS)
+    number = _whole(value, "the number", 0, (1 << size) - 1)
+    return number - (1 << size) if number >> size - 1 else number
+
+
+class _Short(ValueError):
+    """The bytes contain no such number."""
+
+
+@cache  # the type names are few
+def _reader(name: str) -> Callable[[bytes, int, int], tuple[Any, int]]:
+    number = number_of(name)
+    if number is None:
+        raise ValueError(f"a type such as 'u16le' is expected, found {_short(name)}")
+    return reader_of(number, _Short)
+
+
+def _bytes(value: Any) -> bytes:
+    if isinstance(value, bytes):
+        return value
+    raise TypeError(f"bytes are expected, as 'hexbytes' gives them; found {_short(value)}")
+
+
+def _unpack(value: Any, name: Any, at: Any = 0) -> int | float:
+    """Return the number of that type at an offset of the bytes."""
+    read = _reader(_text(name))
+    data, place = _bytes(value), _whole(at, "a place", 0, MAX_PARTS)
+    try:
+        number: int | float = read(data, place, len(data))[0]
+    except _Short:
+        raise ValueError(f"{len(data)} bytes have no {name!r} at {place}") from None
+    return number
+
+
+def _numbers(value: Any, name: Any) -> list[int | float]:
+    """Return all consecutive numbers of that type in the bytes."""
+    read, data = _reader(_text(name)), _bytes(value)
+    _check_count(len(data), "bytes")
+    found, place = [], 0
+    while place < len(data):
+        try:
+            number, place = read(data, place, len(data))
+        except _Short:
+            raise ValueError(f"{len(data)} bytes have no {name!r} at {place}") from None
+        found.append(number)
+    return found
+
+
+def _hexdigits(value: Any) -> str:
+    return _bytes(value).hex().upper()
+
+
+def _ramp(value: Any, step: Any, count: Any) -> list[float]:
+    """Return `count` numbers from the subject upwards, with the distance `step`."""
+    for one in (value, step):
+        if not isinstance(one, (int, float)):
+            raise TypeError(f"a number is expected, found {_short(one)}")
+    return [value + place * step for place in range(_whole(count, "a number of steps", 0, 8192))]
+
+
+CUT_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
+    "column": (_column, (1, 2)),
+    "cut": (_cut, (1, 2)),
+    "digits": (_digits, (2, 3)),
+    "hexdigits": (_hexdigits, (0, 0)),
+    "numbers": (_numbers, (1, 1)),
+    "ramp": (_ramp, (2, 2)),
+    "signed": (_signed, (1, 1)),
+    "unpack": (_unpack, (1, 2)),
+}
+"""Filter → function, and its least and largest number of arguments after the subject."""

@@ -1,0 +1,454 @@
+"""One line of the robot, as the guard keeps it.
+
+Theory of operation. One task lives at a time: it opens the transport, reads it to its end, and
+closes it. The engine says when to open and to close, and gets what arrives for as long as it takes
+it (credit). When the line is cut while the robot may be moving, nobody waits for the engine, which
+may be frozen or dead: the line is opened again by the guard itself (a *rescue*), the stop is the
+first thing written, and the open line is kept for the engine, which finds it at its next attempt.
+"""
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Callable, Coroutine
+from functools import partial
+from typing import Any, Final
+
+from urc.guard import messages
+from urc.guard.liveness_watch import LivenessWatch
+from urc.guard.motion_scheduler import MotionScheduler
+from urc.guard.pipe import UNFIT
+from urc.guard.send_queue import LaneClock, SendQueue, TimerHandle, why_broken
+from urc.guard.sent_counters import SentCounters
+from urc.model.payload import Payload
+from urc.transports.base import (
+    PeerClosed,
+    Prompt,
+    SupportsAbort,
+    SupportsOffer,
+    Transport,
+    TransportError,
+)
+from urc.transports.connect_race import HURRY, ConnectRace
+
+__all__ = ["WINDOW_BYTES", "GuardedConnection"]
+
+WINDOW_BYTES: Final = 65536
+"""What may be on its way to the engine before it has taken any."""
+_GRACE_S: Final = 1.0
+"""What a transport may take beyond the time it promised."""
+_CLOSE_S: Final = 1.0
+_RESCUE_S: Final = 90.0
+"""A robot that cannot be reached for this long is left to the engine's own attempts."""
+_KEPT_S: Final = 6.0
+"""How long a rescued line is kept for the engine."""
+_EVERY_S: Final = 0.05
+"""Shortest time between two attempts; where opening is dear, five times that."""
+_SHORTEST_S: Final = 0.07
+_LONGEST_S: Final = 2.0
+"""Bounds of an attempt's time: some times what good ones take. One that was begun while the robot
+was away is lost, and holds the next one up."""
+_REMEMBERED: Final = 5
+_TIMES: Final = 4.0
+_LOG_IN_S: Final = 6.0
+_GROWTH: Final = 1.25
+_LONG_S: Final = 0.5
+"""Where tries cannot overlap, each has more time than the one before, up to this."""
+_USUAL_S: Final = 0.25
+_WITHIN_S: Final = 0.7
+"""Repeats of a stop, and what a slow line needs for the last one."""
+_PAUSE_S: Final = 0.01
+
+Emit = Callable[[messages.FromGuard], int]
+"""Passes a message on; returns about how many bytes it takes."""
+
+log = logging.getLogger(__name__)
+
+
+class GuardedConnection:
+    """A transport, its movers, and its connection."""
+
+    def __init__(
+        self, make: messages.MakeTransport, transport: Transport, emit: Emit, clock: LaneClock
+    ) -> None:
+        """Prepare; nothing is opened yet."""
+        self.name = make.line
+        self.transport = transport
+        self._emit = emit
+        self._clock = clock
+        self._is_dear = make.is_strict
+        self._tally = SentCounters()
+        self.reins = MotionScheduler(
+            transport,
+            clock,
+            stalled_s=make.stalled_s,
+            is_strict=make.is_strict,
+            told=lambda control, reason, number: self._told(control, reason, number),
+            failed=self._stall,
+            tally=self._tally,
+            counted=self._tell_counted,
+        )
+        self._hearing = LivenessWatch(
+            transport,
+            clock,
+            silent_s=make.silent_s,
+            is_moving=lambda: self.reins.is_moving,
+            failed=self._stall,
+        )
+        self._offer = transport.offer if isinstance(transport, SupportsOffer) else None
+        self._prompt = transport if isinstance(transport, Prompt) else None
+        self._abort = transport.abort if isinstance(transport, SupportsAbort) else None
+        self._lane: SendQueue[int] = SendQueue(
+            transport,
+            clock,
+            self._sent,
+            after=self.reins.lane,  # type: ignore[arg-type]
+        )
+        self._task: asyncio.Task[None] | None = None
+        self._turn = 0
+        self._is_open = False
+        self._is_handed = False
+        """Whether the engine has the open connection."""
+        self._handed = asyncio.Event()
+        self._is_rescuing = False
+        self._waiting: TimerHandle | None = None
+        """Set while the engine waits for a rescue to succeed; rings when its time is up."""
+        self._fault = ""
+        self._patience_s = _USUAL_S
+        self._took_s: deque[float] = deque(maxlen=_REMEMBERED)
+        """By the last that were good: the shortest says what the way takes, without this machine's
+        own delays."""
+        self._hurry = ConnectRace(_SHORTEST_S)
+        self._credit = 0
+        self._credited = asyncio.Event()
+        self._is_reading = False
+        self._acked = 0
+        self._counted = 0
+        """Number of the newest frame with counters that the engine sent, and that has left."""
+        self._round = 0
+        """How often what the engine sent was refused because its numbers were used up."""
+
+    # -- what the engine says
+
+    def open(self, turn: int, timeout_s: float) -> None:
+        """Open the line; told by `LineOpened` or `OpenFailed`."""
+        self._turn = turn
+        if not self._is_rescuing:
+            self._switch(self._live(timeout_s))
+        elif self._is_open:
+            self._hand_over()
+        else:
+            self._forget_waiting()
+            self._waiting = self._clock.call_at(self._clock.now() + timeout_s, self._in_vain)
+
+    def close(self, turn: int) -> None:
+        """Close the line, after the stop of what moves; told by `LineClosed`."""
+        if turn != self._turn or self._is_rescuing:
+            self._forget_waiting()
+            self._emit(messages.LineClosed(self.name, turn))
+        else:
+            self.reins.stop_all()
+            self.reins.step()
+            self.reins.look()
+            self._switch(self._shut(turn))
+
+    def send(self, said: messages.SendBytes) -> None:
+        """Send what is no motion; told by `SendDone`, `Refused` or `SendStale`."""
+        if said.turn != self._turn or not self._is_handed or said.round != self._round:
+            return  # of an earlier connection, or made again meanwhile
+        data, number = said.data, said.number
+        offer = self._offer if self._is_free() and isinstance(data, bytes) else None
+        if offer is not None and not self._tally.fits(said.count):
+            self._refuse(number)
+        elif offer is None or not offer(data):  # type: ignore[arg-type] # no envelope, see above
+            self._lane.put(partial(self._leave, said), number)
+        else:
+            self._count(said)
+            if self._prompt is not None and self._prompt.is_clogged:
+                self._lane.put(lambda: b"", number)  # is handed over with the rest
+            else:
+                self._acked = number
+
+    def _leave(self, said: messages.SendBytes) -> Payload | None:
+        """Return what is sent, now that its turn has come; None: it must not be sent any more."""
+        if said.round != self._round:
+            return None
+        if not self._tally.fits(said.count):
+            self._refuse(said.number)
+            return None
+        self._count(said)
+        # Told once the transport has the frame: the engine may answer at once.
+        asyncio.get_running_loop().call_soon(self.reins.tell_counted)
+        return said.data
+
+    def _count(self, said: messages.SendBytes) -> None:
+        self._tally.left(said.count)
+        if said.count is not None:
+            self._counted = said.number
+
+    def _refuse(self, number: int) -> None:
+        """Send nothing of this round any more: other frames have used its numbers up."""
+        self._round += 1
+        self._emit(messages.SendStale(self.name, self._turn, number, self._tally.stand))
+
+    def credit(self, turn: int, amount: int) -> None:
+        """Take note that the engine has taken so much."""
+        if turn == self._turn:
+            self._credit += amount
+            self._credited.set()
+
+    def settle(self) -> None:
+        """Do what follows from all that was said."""
+        if self._acked:
+            number, self._acked = self._acked, 0
+            self._emit(messages.SendDone(self.name, self._turn, number))
+        self.reins.tell_counted()
+        self._hearing.start()
+
+    def rescue(self) -> None:
+        """Open the line by ourselves, because a stop is owed."""
+        if not self._is_open and not self._is_rescuing and self._task is None:
+            self._switch(self._rescue())
+
+    async def finish(self, within_s: float) -> None:
+        """Stop what moves, wait until that has gone out, and close; takes `within_s` and little."""
+        self.reins.stop_all()
+        self.reins.step()
+        until_s = self._clock.now() + within_s
+        while self._clock.now() < until_s and not self._is_quiet:
+            await self._clock.sleep(_PAUSE_S)
+        task, self._task = self._task, None
+        if task is not None:
+            task.cancel()
+            await asyncio.wait({task}, timeout=_CLOSE_S)
+        self._is_open = False
+        self._hearing.end()
+        self.reins.cut()
+        self._lane.end()
+        await self._close_transport()
+
+    @property
+    def _is_quiet(self) -> bool:
+        reins = self.reins
+        return reins.is_settled and not reins.owes and not reins.is_in_doubt
+
+    def _is_free(self) -> bool:
+        return self._lane.is_idle and self.reins.lane.is_idle
+
+    # -- one connection
+
+    def _switch(self, work: Coroutine[Any, Any, None]) -> None:
+        """Let `work` take the place of the task that lives."""
+        self._task = asyncio.get_running_loop().create_task(self._after(self._task, work))
+
+    async def _after(self, old: asyncio.Task[None] | None, work: Coroutine[Any, Any, None]) -> None:
+        try:
+            if old is not None and not old.done():
+                old.cancel()
+                await asyncio.wait({old})
+            await work
+        finally:
+            work.close()
+            if self._task is asyncio.current_task():
+                self._task = None
+
+    async def _live(self, timeout_s: float) -> None:
+        fault = await self._attempt(timeout_s)
+        if fault:
+            self._emit(messages.OpenFailed(self.name, self._turn, fault))
+            if self.reins.owes:
+                await self._rescue()
+            return
+        self._begin()
+        self._hand_over()
+        await self._serve()
+
+    async def _attempt(self, timeout_s: float) -> str:
+        """Open the transport; return why that failed, or "" when it did not."""
+        began_s = self._clock.now()
+        try:
+            async with asyncio.timeout(timeout_s + _GRACE_S):
+                await self.transport.open(timeout_s)
+        except TransportError as refused:
+            return str(refused)
+        except TimeoutError:
+            await self._close_transport()
+            return f"no answer from {self.transport.address} within {timeout_s:g} s"
+        except Exception as bug:  # supervisor: a foreign transport may raise what it likes
+            return why_broken(bug)
+        self._took_s.append(self._clock.now() - began_s)
+        self._patience_s = min(max(_TIMES * min(self._took_s), _SHORTEST_S), _LONGEST_S)
+        return ""
+
+    def _begin(self) -> None:
+        self._is_open = True
+        self._handed.clear()
+        self._hearing.begin()
+        self.reins.begin()
+
+    def _hand_over(self) -> None:
+        self._forget_waiting()
+        self._is_rescuing = False
+        self._is_handed = True
+        self._acked = self._counted = self._round = 0
+        self._credit = WINDOW_BYTES
+        self._handed.set()
+        if self._prompt is not None:
+            self._prompt.divert(self._arrived)
+        address, stand = self.transport.address, self._tally.stand
+        self._emit(messages.LineOpened(self.name, self._turn, address, stand))
+
+    async def _serve(self) -> None:
+        try:
+            reason = await self._read()
+        except TransportError as fault:
+            reason = str(fault)
+        except Exception as bug:  # supervisor, as in `_attempt`
+            reason = why_broken(bug)
+        # In a task of its own: one that went on here would grow with every cut.
+        self._switch(self._recover(reason))
+
+    async def _read(self) -> str:
+        while True:
+            while self._credit <= 0:
+                self._credited.clear()
+                await self._credited.wait()
+                self._hearing.heard()  # it is the engine that was slow
+            self._is_reading = True
+            try:
+                data = await self.transport.receive()
+            finally:
+                self._is_reading = False
+            self._pass_on(data)
+            await asyncio.sleep(0)  # a line that has always something must not hold up the stops
+
+    def _arrived(self, data: bytes) -> bool:
+        """Pass on what has just arrived, where nothing comes before it."""
+        if not self._is_reading or self._credit <= 0 or not self._is_handed:
+            return False
+        self._pass_on(data)
+        return True
+
+    def _pass_on(self, data: Payload) -> None:
+        self._hearing.heard()
+        try:
+            self._credit -= self._emit(messages.BytesReceived(self.name, self._turn, data))
+        except UNFIT as fault:
+            raise PeerClosed(f"what the robot sent cannot be passed on ({fault})") from fault
+
+    async def _recover(self, reason: str, *, is_abort: bool = False) -> None:
+        """Close what is broken, tell the engine, and stop the robot if that is owed."""
+        is_abort = is_abort or self.reins.is_in_doubt  # else the kernel would send it later
+        self._cut(reason)
+        await self._close_transport(is_abort=is_abort)
+        if self.reins.owes:
+            await self._rescue()
+
+    def _cut(self, reason: str) -> None:
+        self._is_open = False
+        self._hearing.end()
+        self.reins.cut()
+        self._lane.end()
+        if self._is_handed:
+            self._is_handed = False
+            self._emit(messages.LineLost(self.name, self._turn, reason))
+
+    async def _shut(self, turn: int) -> None:
+        until_s = self._clock.now() + _WITHIN_S
+        while self._is_open and not self._is_quiet and self._clock.now() < until_s:
+            await self._clock.sleep(_PAUSE_S)
+        self._is_handed = False
+        is_abort = self.reins.is_in_doubt
+        self._cut("")
+        await self._close_transport(is_abort=is_abort)
+        self._emit(messages.LineClosed(self.name, turn))
+        if self.reins.owes:
+            await self._rescue()
+
+    async def _close_transport(self, *, is_abort: bool = False) -> None:
+        close = self._abort if is_abort else None
+        try:
+            async with asyncio.timeout(_CLOSE_S):
+                await (close or self.transport.close)()
+        except TimeoutError:
+            log.error("%s did not close in time", self.transport.address)
+        except Exception as bug:  # supervisor, as in `_attempt`
+            why_broken(bug)
+
+    # -- rescue
+
+    def _stall(self, reason: str) -> None:
+        """Reset the line: what waits in the kernel must not arrive later."""
+        if self._is_open:
+            self._is_open = False
+            self._hearing.end()
+            self._switch(self._recover(reason, is_abort=True))
+
+    async def _rescue(self) -> None:
+        self._is_rescuing = True
+        every_s = 5 * _EVERY_S if self._is_dear else _EVERY_S
+        until_s = self._clock.now() + _RESCUE_S
+        hurry = HURRY.set(self._hurry)
+        try:
+            while self.reins.owes and self._clock.now() < until_s:
+                began_s = self._clock.now()
+                # Where tries overlap, a way that has become long is no reason to give up.
+                enough_s = _LOG_IN_S if self._is_dear else _LONGEST_S
+                is_hurried = self._hurry.is_used
+                self._fault = await self._attempt(enough_s if is_hurried else self._patience_s)
+                if not self._fault:
+                    HURRY.set(None)
+                    self._begin()
+                    if self._waiting is not None:
+                        self._hand_over()
+                    await self._serve_rescued()
+                    return
+                self._patience_s = min(self._patience_s * _GROWTH, _LONG_S)
+                await self._clock.sleep(max(0.0, began_s + every_s - self._clock.now()))
+            self._in_vain()
+        finally:
+            HURRY.reset(hurry)
+            self._is_rescuing = False
+
+    async def _serve_rescued(self) -> None:
+        """Wait for the engine to take the line, and serve it then."""
+        alarm = self._clock.call_at(self._clock.now() + _KEPT_S, self._handed.set)
+        try:
+            await self._handed.wait()
+        finally:
+            alarm.cancel()
+        if self._is_handed:
+            await self._serve()
+        else:
+            self._switch(self._recover("nobody has asked for the line"))
+
+    def _in_vain(self) -> None:
+        """Tell the engine, if it waits, that its time is up."""
+        if self._waiting is not None:
+            self._forget_waiting()
+            fault = self._fault or f"no answer from {self.transport.address}"
+            self._emit(messages.OpenFailed(self.name, self._turn, fault))
+
+    def _forget_waiting(self) -> None:
+        if self._waiting is not None:
+            self._waiting.cancel()
+            self._waiting = None
+
+    # -- what the lanes say
+
+    def _told(self, control: str, reason: str, number: int) -> None:
+        self._emit(messages.StopWritten(control, reason, number))  # type: ignore[arg-type]
+
+    def _tell_counted(self, stale: list[tuple[str, int]]) -> None:
+        if self._is_handed:
+            stand = self._tally.stand
+            self._emit(
+                messages.CountersAdvanced(self.name, self._turn, self._counted, stand, stale)
+            )
+
+    def _sent(self, number: int, fault: TransportError | None) -> None:
+        if fault is None:
+            self._emit(messages.SendDone(self.name, self._turn, number))
+            return
+        is_closed = isinstance(fault, PeerClosed)
+        self._emit(messages.SendRefused(self.name, self._turn, number, str(fault), is_closed))

@@ -1,0 +1,103 @@
+"""Watches over the program at the other end of a line for as long as something moves there."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Final
+
+from urc.guard.send_queue import LaneClock, TimerHandle, why_broken
+from urc.motion.liveness import ASKED_EVERY_S, SILENCE_S, Liveness
+from urc.transports.base import SupportsProbe, Transport, TransportError
+
+__all__ = ["LivenessWatch"]
+
+_LOOK_S: Final = ASKED_EVERY_S
+
+
+class LivenessWatch:
+    """Of one line, over all its connections."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        clock: LaneClock,
+        *,
+        silent_s: float | None,
+        is_moving: Callable[[], bool],
+        failed: Callable[[str], None],
+    ) -> None:
+        """Prepare.
+
+        Args:
+            transport: asked for a sign of life where it is a `SupportsProbe`.
+            clock: the time.
+            silent_s: how long the robot may say nothing unasked; None: for ever.
+            is_moving: whether anything moves.
+            failed: told why when the program stands still.
+        """
+        self._transport = transport if isinstance(transport, SupportsProbe) else None
+        self._clock = clock
+        self._silent_s = silent_s
+        self._is_moving = is_moving
+        self._failed = failed
+        self._hearing = Liveness(silent_s)
+        self._is_open = False
+        self._alarm: TimerHandle | None = None
+        self._asking: asyncio.Task[None] | None = None
+
+    @property
+    def is_able(self) -> bool:
+        """Whether there is a way to know."""
+        return self._transport is not None or self._silent_s is not None
+
+    def begin(self) -> None:
+        """Take note that the line is open."""
+        self._is_open = True
+        self._hearing = Liveness(self._silent_s)
+        self.heard()
+
+    def end(self) -> None:
+        """Take note that the line is closed."""
+        self._is_open = False
+        if self._alarm is not None:
+            self._alarm.cancel()
+            self._alarm = None
+        if self._asking is not None:
+            self._asking.cancel()
+            self._asking = None
+
+    def heard(self) -> None:
+        """Take note that something came, or that nothing is read because of us."""
+        self._hearing.heard(self._clock.now())
+
+    def start(self) -> None:
+        """Watch, where something moves, until nothing does."""
+        if self._alarm is None and self._is_open and self.is_able and self._is_moving():
+            self._look()
+
+    def _look(self) -> None:
+        self._alarm = None
+        if not (self._is_open and self._is_moving()):
+            return
+        now = self._clock.now()
+        if now >= self._hearing.deadline:
+            ms = 1000 * (SILENCE_S if self._hearing.is_asked else self._silent_s or SILENCE_S)
+            self._failed(f"the robot's side has said nothing for {ms:.0f} ms while it moved")
+            return
+        if self._transport is not None:
+            self._hearing.asked(now)
+            if self._asking is None:
+                self._asking = asyncio.get_running_loop().create_task(self._ask(self._transport))
+        at_s = min(now + _LOOK_S, self._hearing.deadline)
+        self._alarm = self._clock.call_at(at_s, self._look)
+
+    async def _ask(self, transport: SupportsProbe) -> None:
+        try:
+            await transport.probe()
+            self.heard()
+        except TransportError:
+            pass  # whoever reads the line is told
+        except Exception as bug:  # supervisor: a foreign transport may raise what it likes
+            why_broken(bug)
+        finally:
+            if self._asking is asyncio.current_task():
+                self._asking = None

@@ -1,0 +1,389 @@
+"""The held commands of one line: writes what they have to say, and sees that the line takes it.
+
+Theory of operation. `step` asks every mover what is due: stops first, whatever waits, then motion
+where the line is clear. It is called after everything that was told, and by an alarm at the next
+time that matters; between a write and the moment when the other side has acknowledged it, that is
+every few milliseconds, because nobody tells when the kernel has got rid of its bytes.
+
+*In doubt* is a control of which something was written that may not have arrived. When the line is
+cut, it is owed a stop.
+"""
+
+import asyncio
+from collections.abc import Callable
+from functools import partial
+from typing import Final
+
+from urc.guard.send_queue import LaneClock, SendQueue, TimerHandle
+from urc.guard.sent_counters import SentCounters
+from urc.model.payload import Count, Numbered, Payload
+from urc.motion.hold_to_run import HoldTerms, HoldToRun, Reason
+from urc.motion.stall import IN_FLIGHT_S, StallWatch
+from urc.transports.base import (
+    SupportsForget,
+    SupportsOffer,
+    SupportsUnsent,
+    Transport,
+    TransportError,
+)
+
+__all__ = ["MotionScheduler"]
+
+_LOOK_S: Final = 0.005
+"""How soon one looks at a line that is not clear; nothing else is due sooner than that."""
+_LONGEST_LOOK_S: Final = 0.02
+"""One looks half as often each time, down to this, where nothing waits for it to be clear."""
+
+
+class MotionScheduler:
+    """The movers of one line."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        clock: LaneClock,
+        *,
+        stalled_s: float,
+        is_strict: bool,
+        told: Callable[[str, Reason, int], None],
+        failed: Callable[[str], None],
+        tally: SentCounters | None = None,
+        counted: Callable[[list[tuple[str, int]]], None] | None = None,
+    ) -> None:
+        """Prepare; nothing is written before `begin`.
+
+        Args:
+            transport: where everything goes; used better where it is a `SupportsUnsent`,
+                `SupportsOffer` or `SupportsForget`.
+            clock: the time.
+            stalled_s: age of unsent bytes at which the line counts as stalled.
+            is_strict: motion waits until nothing at all is unsent.
+            told: has each stop that was written: control, reason, number of its newest tick.
+            failed: told why when the line is stalled, or takes nothing any more.
+            tally: the counters of the line.
+            counted: told when these have changed, with control and number of each tick that cannot
+                be written any more.
+        """
+        self._clock = clock
+        self._unsent = transport.unsent if isinstance(transport, SupportsUnsent) else None
+        self._offer = transport.offer if isinstance(transport, SupportsOffer) else None
+        self._forget = transport.forget if isinstance(transport, SupportsForget) else None
+        self._is_strict = is_strict or self._forget is not None
+        self._told = told
+        self._failed = failed
+        self._tally = tally or SentCounters()
+        self._counted = counted
+        self._counts: dict[str, Count | None] = {}
+        """Control → what its newest tick does to the counters."""
+        self._stale: list[tuple[str, int]] = []
+        self._watch = StallWatch(stalled_s)
+        self.lane: SendQueue[tuple[str, bool]] = SendQueue(transport, clock, self._sent)
+        """For what cannot be handed over at once."""
+        self._movers: dict[str, HoldToRun] = {}
+        self._numbers: dict[str, int] = {}
+        self._doubtful: set[str] = set()
+        self._is_stop_under_way = False
+        """Whether a stop is among what may not have arrived."""
+        self._is_open = False
+        self._alarm: TimerHandle | None = None
+        self._alarm_s = 0.0
+        self._look_s = _LOOK_S
+
+    @property
+    def owes(self) -> bool:
+        """Whether a control is to be stopped as soon as the line is open again."""
+        return any(mover.owes_stop for mover in self._movers.values())
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether a control is held."""
+        return any(mover.state == "moving" for mover in self._movers.values())
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether nothing moves, and every stop was handed over, as often as it is to be."""
+        return self.lane.is_idle and all(one.state == "idle" for one in self._movers.values())
+
+    @property
+    def is_in_doubt(self) -> bool:
+        """Whether something may not have arrived."""
+        return bool(self._doubtful)
+
+    # -- what controls are told
+
+    def arm(self, control: str, terms: HoldTerms) -> None:
+        """Take ticks of `control`."""
+        self._mover(control, terms).arm()
+
+    def tick(
+        self, control: str, number: int, data: Payload, at_s: float, count: Count | None = None
+    ) -> None:
+        """Take sampled input of the time `at_s`; no bytes renew the lease and write nothing."""
+        mover = self._movers.get(control)
+        if mover is None:
+            return
+        self._numbers[control] = number
+        self._counts[control] = count
+        now = self._clock.now()
+        if now - at_s >= mover.terms.lease_s:
+            return  # it waited so long that it renews nothing
+        is_stale = not self._tally.fits(count)
+        if mover.tick(None if is_stale else data or None, min(at_s, now)) and is_stale:
+            self._stale.append((control, number))
+
+    def renew(self, control: str, stop: Payload, stops: tuple[Numbered, ...] = ()) -> None:
+        """Stop `control` with `stop` from now on."""
+        mover = self._movers.get(control)
+        if mover is not None:
+            mover.renew(mover.terms._replace(stop=stop, stops=stops))
+
+    def release(self, control: str) -> None:
+        """Stop what was let go."""
+        mover = self._movers.get(control)
+        if mover is not None:
+            mover.stop("released", self._clock.now())
+
+    def stop(self, control: str, terms: HoldTerms) -> None:
+        """Stop `control`, whether it moves or not."""
+        mover = self._mover(control, terms)
+        mover.stop("stopped", self._clock.now())
+        if not self._is_open:
+            mover.cut()
+
+    def owe(self, control: str, terms: HoldTerms) -> None:
+        """Take note that `control` may be moving: it is stopped as soon as the line is open."""
+        self._mover(control, terms).cut(is_doubtful=True)
+
+    def stop_all(self) -> None:
+        """Stop what moves, because the line is to be closed."""
+        now = self._clock.now()
+        for mover in self._movers.values():
+            if mover.state == "moving":
+                mover.stop("revoked", now)
+            mover.is_armed = False
+
+    def _mover(self, control: str, terms: HoldTerms) -> HoldToRun:
+        mover = self._movers.get(control)
+        if mover is None:
+            mover = self._movers[control] = HoldToRun(terms)
+        else:
+            mover.renew(terms)
+        return mover
+
+    def look(self) -> None:
+        """Take note of what has arrived by now; only of a line that works."""
+        if self._unsent is not None and self.lane.is_idle and not self._unsent():
+            self._all_arrived()
+
+    def _all_arrived(self) -> None:
+        self._doubtful.clear()
+        self._is_stop_under_way = False
+
+    # -- the line
+
+    def begin(self) -> None:
+        """Take note that the line is open: what is owed is written first."""
+        self._is_open = True
+        self._tally.begin()
+        self._stale.clear()
+        self._watch.reset()
+        now = self._clock.now()
+        for mover in self._movers.values():
+            mover.restored(now)
+        self.step()
+
+    def cut(self) -> None:
+        """Take note that the line is closed: nothing that waits is kept."""
+        self._is_open = False
+        for control, is_stop in self.lane.end():
+            if is_stop:
+                self._doubtful.add(control)
+        for control, mover in self._movers.items():
+            mover.cut(is_doubtful=control in self._doubtful)
+        self._all_arrived()
+        if self._alarm is not None:
+            self._alarm.cancel()
+            self._alarm = None
+
+    def step(self) -> None:
+        """Write what is due."""
+        if not self._is_open:
+            return
+        now = self._clock.now()
+        waiting: list[tuple[str, HoldToRun]] = []
+        for control, mover in self._movers.items():
+            if mover.must_stop(now):
+                data = mover.due(now, is_clear=False)
+                if data is not None:
+                    self._write(control, data, now, is_stop=True)
+            elif mover.is_waiting:
+                waiting.append((control, mover))
+        for control, mover in waiting:
+            if self._tally.fits(self._counts.get(control)) and self._is_clear(now):
+                data = mover.due(now, is_clear=True)
+                if data is not None:
+                    self._write(control, data, now, is_stop=False)
+        self._set_alarm(now)
+        self.tell_counted()
+
+    def tell_counted(self) -> None:
+        """Tell how the counters stand, where they have changed, and what cannot be written now."""
+        if self._tally.is_changed:
+            for control, mover in self._movers.items():
+                if mover.is_waiting and not self._tally.fits(self._counts.get(control)):
+                    mover.forget()
+                    self._stale.append((control, self._numbers[control]))
+        elif not self._stale:
+            return
+        self._tally.is_changed = False
+        stale, self._stale = self._stale, []
+        if self._counted is not None:
+            self._counted(stale)
+
+    def _is_clear(self, now: float) -> bool:
+        if not self.lane.is_idle:
+            return False
+        if self._unsent is None or not (self._doubtful or self._is_strict):
+            return True  # all that was written has gone: asking the system would take its time
+        unsent = self._unsent()
+        self._watch.saw(unsent, now)
+        if not unsent:
+            self._all_arrived()
+        return not unsent or (not self._is_strict and self._watch.age_s(now) < IN_FLIGHT_S)
+
+    def _write(self, control: str, data: Payload, now: float, *, is_stop: bool) -> None:
+        if is_stop and self._unsent is not None:
+            self._watch.saw(self._unsent(), now)
+        if is_stop and self._forget is not None and not self._is_stop_under_way:
+            # Motion that is still on its way would come after its stop. Where another stop is, no
+            # motion has gone since, and that one is not to be given up.
+            self._forget()
+            self._watch.gave_up()
+        if data == b"":  # the step that moves the robot ends by itself
+            self._tell(control)
+            return
+        self._is_stop_under_way |= is_stop
+        offer = self._offer
+        data, count = self._turn(control, data, is_stop=is_stop)
+        if offer is None or type(data) is not bytes or not self.lane.is_idle or not offer(data):
+            self._doubtful.add(control)
+            if is_stop:
+                self.lane.put(partial(self._leave_stop, control, data), (control, is_stop))
+            else:
+                self.lane.put(partial(self._leave, control, data, count), (control, is_stop))
+        else:
+            self._tally.left(count)
+            if is_stop:
+                self._tell(control)
+        if self._unsent is not None:
+            # What a message takes on the line is seen at the next look; a guess that is too high
+            # would make it seem that something had left.
+            self._watch.wrote(len(data) if isinstance(data, bytes) else 0, now)
+            self._doubtful.add(control)
+            self._look_s = _LOOK_S
+
+    def _turn(self, control: str, data: Payload, *, is_stop: bool) -> tuple[Payload, Count | None]:
+        """Return what is written now, and what it does to the counters."""
+        if not is_stop:
+            return data, self._counts.get(control)
+        stops = self._movers[control].terms.stops
+        return self._tally.choose(stops) if stops else (data, None)
+
+    def _leave_stop(self, control: str, data: Payload) -> Payload:
+        """Return a stop, now that its turn in the lane has come."""
+        data, count = self._turn(control, data, is_stop=True)
+        self._tally.left(count)
+        self._tell_soon()
+        return data
+
+    def _leave(self, control: str, data: Payload, count: Count | None) -> Payload | None:
+        """Return a frame of motion in its turn; None: its numbers were used up before."""
+        fits = self._tally.fits(count)
+        if fits:
+            self._tally.left(count)
+        else:
+            self._stale.append((control, self._numbers[control]))
+        self._tell_soon()
+        return data if fits else None
+
+    def _tell_soon(self) -> None:
+        """Tell of the counters once the transport has the frame: the engine may answer at once."""
+        asyncio.get_running_loop().call_soon(self.tell_counted)
+
+    def _sent(self, tag: tuple[str, bool], fault: TransportError | None) -> None:
+        control, is_stop = tag
+        if fault is not None:
+            self._doubtful.add(control)
+            self._failed(str(fault))
+            return
+        if self._unsent is None:
+            self._doubtful.discard(control)
+        if is_stop:
+            self._tell(control)
+        self.step()
+
+    def _tell(self, control: str) -> None:
+        mover = self._movers[control]
+        if mover.reason is not None and not mover.is_told:
+            mover.is_told = True
+            self._told(control, mover.reason, self._numbers.get(control, 0))
+
+    # -- time
+
+    def _set_alarm(self, now: float) -> None:
+        # What is due already waits for the line to be clear.
+        dues = [one.deadline for one in self._movers.values() if one.state != "idle"]
+        at_s = min((due for due in dues if due is not None), default=float("inf"))
+        at_s = max(at_s, now + _LOOK_S)
+        if self._is_watched or not self.lane.is_idle:
+            # The end of a line's time is looked for when it comes, not a look later.
+            stalled_s = self._watch.deadline or at_s
+            at_s = min(at_s, now + self._look_s, max(stalled_s, now))
+        elif at_s == float("inf"):
+            return
+        if self._alarm is not None and self._alarm_s <= at_s:
+            return  # one that rings early finds nothing to do, and is set anew
+        if self._alarm is not None:
+            self._alarm.cancel()
+        self._alarm_s = at_s
+        self._alarm = self._clock.call_at(at_s, self._ring)
+
+    def _ring(self) -> None:
+        self._alarm = None
+        if not self._is_open:
+            return
+        now = self._clock.now()
+        if self._is_stalled(now):
+            limit_ms = self._watch.limit_s * 1000
+            self._failed(f"the robot has taken nothing for {limit_ms:.0f} ms while it moved")
+            return
+        self.step()
+
+    def _is_stalled(self, now: float) -> bool:
+        since = self.lane.busy_since_s
+        if since is not None and now - since >= self._watch.limit_s:
+            return True
+        if self._unsent is None or not self._is_watched:
+            return False
+        unsent = self._unsent()
+        if not unsent and self._forget is not None and not self.lane.is_idle:
+            # What was given up has left nothing, and what came after it has no connection yet.
+            return self._watch.age_s(now) >= self._watch.limit_s
+        if not unsent and self.lane.is_idle:
+            self._all_arrived()
+        self._look_s = _LOOK_S if self._is_wanted else min(2 * self._look_s, _LONGEST_LOOK_S)
+        return self._watch.saw(unsent, now)
+
+    @property
+    def _is_wanted(self) -> bool:
+        """Whether motion waits to be written."""
+        return any(mover.is_waiting for mover in self._movers.values())
+
+    @property
+    def _is_watched(self) -> bool:
+        """Whether bytes that do not leave matter: motion is among them, or waits for all of them.
+
+        The second is so where opening is dear: a ping that fell into a cut would hold a robot up
+        for as long as that lasts, and let it go on afterwards, as if nothing had been.
+        """
+        return bool(self._doubtful) or (self._is_strict and self._is_wanted)

@@ -1,0 +1,99 @@
+"""How fast the values of a held command may grow: a limit on speeding up, never on stopping.
+
+A value is measured from its rest, the one that stops the motion. Coming nearer to rest is always
+allowed at once; going away from it takes time. Crossing it is both: down to rest at once, and up
+from there at the rate.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+from urc.model.values import Reading
+
+__all__ = ["SlewRateLimiter"]
+
+_LONGEST_S: Final = 1.0
+"""No lease is longer: what comes later belongs to another motion."""
+
+
+class SlewRateLimiter:
+    """The limits of one held command, and how far it has got."""
+
+    __slots__ = ("_first_s", "_last_s", "_per_s", "_reached", "_rest")
+
+    def __init__(
+        self, per_s: Mapping[str, float], rest: Mapping[str, Reading], first_s: float
+    ) -> None:
+        """Begin at rest.
+
+        Args:
+            per_s: argument → most that it may grow in a second, in its own unit.
+            rest: argument → value that means standstill; 0 where there is none.
+            first_s: time that the first value of a motion is worth.
+        """
+        self._per_s = per_s
+        self._rest = {name: rest.get(name) for name in per_s}
+        self._first_s = first_s
+        self._reached: dict[str, tuple[float, ...]] = {}
+        """Argument → how far each of its elements is from rest."""
+        self._last_s: float | None = None
+
+    def begin(self) -> None:
+        """Take note that it stands: the next motion begins at rest."""
+        self._reached.clear()
+        self._last_s = None
+
+    def limit(self, values: Mapping[str, Reading], now: float) -> dict[str, Reading]:
+        """Return `values` with each at most as far from rest as it may be at `now`.
+
+        What is no number is left as it is; whoever checks the arguments refuses it.
+        """
+        last_s, self._last_s = self._last_s, now
+        passed_s = self._first_s if last_s is None else min(max(0.0, now - last_s), _LONGEST_S)
+        limited = dict(values)
+        for name, per_s in self._per_s.items():
+            if name in values:
+                limited[name] = self._value(name, values[name], per_s * passed_s)
+        return limited
+
+    def _value(self, name: str, wanted: Reading, room: float) -> Reading:
+        given = wanted if isinstance(wanted, (tuple, list)) else (wanted,)
+        numbers = [one for one in given if _is_number(one)]
+        if len(numbers) < len(given):
+            return wanted
+        rests = self._rests(name, len(given))
+        before = self._reached.get(name, ())
+        reached: list[float] = []
+        for place, (one, rest) in enumerate(zip(numbers, rests, strict=True)):
+            was = before[place] if place < len(before) else 0.0
+            reached.append(_grown(float(one) - rest, was, room))
+        self._reached[name] = tuple(reached)
+        made = tuple(
+            _written(one, rest, far) for one, rest, far in zip(numbers, rests, reached, strict=True)
+        )
+        return made if isinstance(wanted, (tuple, list)) else made[0]
+
+    def _rests(self, name: str, count: int) -> list[float]:
+        rest = self._rest[name]
+        found = rest if isinstance(rest, (tuple, list)) else (rest,) * count
+        numbers = [one if isinstance(one, (int, float)) else 0.0 for one in found]
+        return (numbers + [0.0] * count)[:count]
+
+
+def _grown(wanted: float, was: float, room: float) -> float:
+    """Return how far from rest it may be, where it was `was` and may grow by `room`."""
+    start = abs(was) if was * wanted > 0 else 0.0
+    return math.copysign(min(abs(wanted), start + room), wanted)
+
+
+def _written(wanted: float, rest: float, far: float) -> float:
+    """Return the value at `far` from rest: as it was given where nothing was cut off."""
+    if abs(wanted - rest) <= abs(far):
+        return wanted
+    return int(rest) + math.trunc(far) if isinstance(wanted, int) else rest + far
+
+
+def _is_number(value: object) -> bool:
+    is_plain = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return is_plain and math.isfinite(value)  # type: ignore[arg-type]

@@ -1,0 +1,381 @@
+"""The folder of a repository: source packages, and the files for any web server to serve.
+
+DIR/drivers/puppet/package.yaml …     source of a package, edited by the maintainer
+DIR/archives/drivers/puppet/1.0.0.zip every version that was ever listed
+DIR/archives/drivers/puppet/1.0.0.sig its signature, if any
+DIR/archives/drivers/puppet/1.0.0.json its origin, and whether it is withdrawn
+DIR/index.json                        all versions, with a number that grows with each change
+DIR/index/head.json                   its number and digest, signed by the maintainer, see `head`
+DIR/drivers/puppet/urcpm.json         the same in the thesis's form
+"""
+
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import msgspec
+
+from urc.packages import atomic_files
+from urc.packages.archive import PACKAGE
+from urc.packages.index import INDEX, INDEX_BYTES, Index, IndexEntry, entry_of, in_order, read_index
+from urc.packages.index_head import (
+    HEAD,
+    HEAD_BYTES,
+    IndexHead,
+    IndexSigner,
+    check_key,
+    next_head,
+    read_head,
+)
+from urc.packages.manifest import MANIFEST, Manifest
+from urc.packages.names import FOLDERS, PackageError, PackageId, parse_key
+from urc.packages.package import Package, open_package, pack_folder, sha256
+from urc.packages.signature import Signature, Signer
+from urc.packages.version_notes import Notes, Provenance, read_notes, write_notes
+
+__all__ = [
+    "IndexListing",
+    "changing",
+    "head_in",
+    "keep",
+    "make_index",
+    "notes_of",
+    "read_signature",
+    "renew",
+    "urcpm",
+    "withdraw",
+    "write_index",
+]
+
+_THESIS: Final = ("driver", "interface", "widget")
+_PACKAGES_MOST: Final = 20_000
+_SIGNED: Final = ".sig"
+
+
+class IndexListing(NamedTuple):
+    """Result of a scan of a repository's folder."""
+
+    listed: Index
+    faults: tuple[str, ...]
+    """One line for each rejected package."""
+
+
+def make_index(
+    folder: Path, name: str, examine: Callable[[Path], list[str]], seal: IndexSigner | None = None
+) -> IndexListing:
+    """Check every package in a folder, list the valid ones, and write `index.json`.
+
+    Args:
+        folder: folder of the repository.
+        name: name of the repository.
+        examine: returns the errors of a package's document, one line each.
+        seal: signer of the maintainer, for the index and for new source packages.
+
+    Raises:
+        PackageError: the folder is missing or not writable.
+    """
+    if not folder.is_dir():
+        raise PackageError(f"{folder}: the folder does not exist")
+    try:
+        with changing(folder) as work:
+            faults: list[str] = []
+            signer = seal.signer if seal is not None else None
+            for home in _homes(folder):
+                faults += _take(folder, home, work, examine, signer)
+            entries = []
+            known = _known(folder)
+            for file in _archives(folder):
+                try:
+                    entries.append(_entry(folder, file, known))
+                except PackageError as error:
+                    faults.append(str(error))
+            index = write_index(folder, name, entries, work, seal)
+    except OSError as error:
+        raise PackageError(f"{error.filename or folder}: {error.strerror or error}") from None
+    return IndexListing(index, tuple(faults))
+
+
+@contextmanager
+def changing(folder: Path) -> Iterator[Path]:
+    """Lock a repository against other processes; yield a folder for incomplete files.
+
+    Raises:
+        PackageError: another process holds the lock for longer than ten seconds.
+    """
+    work = folder / ".work"
+    with atomic_files.exclusive(folder / ".changing"):
+        shutil.rmtree(work, ignore_errors=True)
+        try:
+            yield work
+        finally:
+            shutil.rmtree(work, ignore_errors=True)
+
+
+def keep(
+    folder: Path,
+    package: Package,
+    signature: Signature | None,
+    work: Path,
+    notes: Notes | None = None,
+) -> IndexEntry:
+    """Put an archive into a repository; the next index lists it.
+
+    Signature and notes are written first, so an existing archive is always complete.
+    """
+    entry = entry_of(package, signature, notes)
+    archive = folder / entry.file
+    write_notes(archive, notes or Notes(), work)
+    if signature is not None:
+        atomic_files.put_file(
+            archive.with_suffix(_SIGNED), msgspec.json.encode(signature) + b"\n", work
+        )
+    elif not archive.is_file():
+        archive.with_suffix(_SIGNED).unlink(missing_ok=True)  # from an interrupted attempt
+    if not archive.is_file():
+        atomic_files.put_file(archive, package.data, work)
+    return entry
+
+
+def notes_of(entry: IndexEntry) -> Notes:
+    """Return the notes about a version in an index; raise `PackageError`."""
+    provenance = entry.provenance if isinstance(entry.provenance, Provenance) else None
+    try:
+        return Notes(entry.why_withdrawn, provenance)
+    except ValueError as error:
+        raise PackageError(f"{entry}: {error}") from None
+
+
+def withdraw(
+    folder: Path, key: PackageId, version: str, why: str, seal: IndexSigner | None
+) -> IndexEntry:
+    """Withdraw a version, or offer it again; return its entry of the index.
+
+    Args:
+        folder: folder of the repository.
+        key: the package.
+        version: its version.
+        why: reason for users who have it installed; "" to offer it again.
+        seal: signer of the maintainer, for a signed index.
+
+    Raises:
+        PackageError: the version is not listed, or the repository is not writable.
+    """
+    try:
+        with changing(folder) as work:
+            with open(folder / INDEX, "rb") as file:
+                index = read_index(file.read(INDEX_BYTES + 1), INDEX)
+            head = head_in(folder)
+            check_key(head, seal)  # before any write
+            before = _listed(index, key, version)
+            after = msgspec.structs.replace(before, withdrawn=why or msgspec.UNSET)
+            notes = _checked(notes_of(after))
+            entries = [after if one is before else one for one in index.packages]
+            # The note goes first, so that an index written in between agrees with it.
+            write_notes(folder / before.file, notes, work)
+            is_signed = head is not None and head.signed is not None
+            write_index(folder, index.name, entries, work, seal if is_signed else None)
+    except OSError as error:
+        raise PackageError(f"{error.filename or folder}: {error.strerror or error}") from None
+    return after
+
+
+def _listed(index: Index, key: PackageId, version: str) -> IndexEntry:
+    for one in index.packages:
+        if (one.key, one.version) == (key, version):
+            return one
+    there = ", ".join(one.version for one in index.packages if one.key == key)
+    raise PackageError(f"{key} {version} is not listed; listed: {there or 'nothing'}")
+
+
+def _checked(notes: Notes) -> Notes:
+    """Return notes after a check that they can be read; raise `PackageError`."""
+    try:
+        return msgspec.json.decode(msgspec.json.encode(notes), type=Notes)
+    except msgspec.DecodeError as error:
+        raise PackageError(f"--why: {error}") from None
+
+
+def renew(folder: Path, seal: IndexSigner) -> None:
+    """Sign an index again if that is due; raise `PackageError`, or `OSError`."""
+    with changing(folder) as work:
+        with open(folder / INDEX, "rb") as file:
+            index = read_index(file.read(INDEX_BYTES + 1), INDEX)
+        write_index(folder, index.name, index.packages, work, seal)
+
+
+def write_index(
+    folder: Path,
+    name: str,
+    entries: Sequence[IndexEntry],
+    work: Path,
+    seal: IndexSigner | None = None,
+) -> Index:
+    """Write the index of a repository, then its head.
+
+    After an interruption every served file is complete, and the next call repairs the rest.
+
+    Args:
+        folder: folder of the repository, locked against other processes.
+        name: name of the repository.
+        entries: all versions.
+        work: folder for incomplete files.
+        seal: signer of the maintainer, for the head.
+
+    Raises:
+        PackageError: the index is signed with another key; nothing has changed.
+        OSError: the disk is full, for example.
+    """
+    before, number = _before(folder)
+    index = Index(1, name, in_order(entries), number)
+    is_new = before is None or (before.name, before.packages) != (index.name, index.packages)
+    if is_new:
+        number += 1
+        index = Index(1, name, index.packages, number)
+    data = index.to_bytes()
+    head = next_head(head_in(folder), number, sha256(data), seal).to_bytes()
+    if is_new:
+        atomic_files.put_file(folder / INDEX, data, work)
+    if _content(folder / HEAD, HEAD_BYTES) != head:
+        atomic_files.put_file(folder / HEAD, head, work)
+    return index
+
+
+def _before(folder: Path) -> tuple[Index | None, int]:
+    """Return the current index, None for a damaged one, and the last number."""
+    data = _content(folder / INDEX, INDEX_BYTES + 1)
+    with suppress(PackageError):
+        if data is not None:
+            index = read_index(data, INDEX)
+            # A number identifies exact bytes, so an index in other bytes gets a new number.
+            return (index if data == index.to_bytes() else None), index.number
+    head = head_in(folder)
+    return None, head.number if head is not None else 0
+
+
+def head_in(folder: Path) -> IndexHead | None:
+    """Return the head in a repository's folder, or None without a valid one."""
+    with suppress(PackageError):
+        return read_head(_content(folder / HEAD, HEAD_BYTES) or b"", HEAD)
+    return None
+
+
+def _content(file: Path, most: int) -> bytes | None:
+    try:
+        with open(file, "rb") as opened:
+            return opened.read(most)
+    except FileNotFoundError:
+        return None
+
+
+def _homes(folder: Path) -> list[Path]:
+    """Return the folders of the maintainer's source packages."""
+    return sorted(
+        home
+        for kind in FOLDERS
+        if (folder / kind).is_dir()
+        for home in (folder / kind).iterdir()
+        if (home / MANIFEST).is_file()
+    )
+
+
+def _take(
+    folder: Path,
+    home: Path,
+    work: Path,
+    examine: Callable[[Path], list[str]],
+    signer: Signer | None,
+) -> list[str]:
+    """Write the archive of a new version; return its errors."""
+    try:
+        package = pack_folder(home)
+    except PackageError as error:
+        return [str(error)]
+    said = package.manifest
+    wanted = folder / str(said.key)
+    if home != wanted:
+        return [f"{home}: {said.key} belongs in {wanted}"]
+    entry = entry_of(package)
+    archive = folder / entry.file
+    if archive.is_file():
+        if archive.read_bytes() != package.data:
+            return [f"{home}: it has changed since {entry} was listed; give it a new version"]
+    else:
+        if faults := examine(home / said.main):
+            return faults
+        signature = signer.sign(said.key, said.version, package.digest) if signer else None
+        keep(folder, package, signature, work)
+    if said.key.kind in _THESIS:
+        atomic_files.put_file(home / "urcpm.json", urcpm(said, package.files), work)
+    return []
+
+
+def _known(folder: Path) -> dict[str, IndexEntry]:
+    """Return the entries of the last index by file, so that known archives are not read again."""
+    try:
+        with open(folder / INDEX, "rb") as file:
+            index = read_index(file.read(INDEX_BYTES + 1), INDEX)
+    except (OSError, PackageError):
+        return {}
+    return {entry.file: entry for entry in index.packages}
+
+
+def _archives(folder: Path) -> list[Path]:
+    found = sorted((folder / "archives").glob("*/*/*.zip"))
+    if len(found) > _PACKAGES_MOST:
+        raise PackageError(f"{folder}: more than {_PACKAGES_MOST} archives")
+    return found
+
+
+def _entry(folder: Path, file: Path, known: Mapping[str, IndexEntry]) -> IndexEntry:
+    with open(file, "rb") as opened:
+        data = opened.read(PACKAGE.archive_bytes + 1)
+    signature, notes = read_signature(file), read_notes(file)
+    entry = known.get(file.relative_to(folder).as_posix())
+    is_known = entry is not None and entry.sha256 == sha256(data) and entry.signed == signature
+    if entry is None or not is_known or notes_of(entry) != notes:
+        package = open_package(data, str(file))
+        entry = entry_of(package, signature, notes)
+        if signature is not None:
+            signature.check(entry.key, entry.version, entry.sha256)
+    if folder / entry.file != file:
+        raise PackageError(f"{file}: this is {entry}, which belongs in {folder / entry.file}")
+    return entry
+
+
+def read_signature(archive: Path) -> Signature | None:
+    """Return the signature of an archive, or None; raise `PackageError`."""
+    file = archive.with_suffix(_SIGNED)
+    try:
+        with open(file, "rb") as opened:
+            return msgspec.json.decode(opened.read(4096), type=Signature)
+    except FileNotFoundError:
+        return None
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise PackageError(f"{file}: this is not a signature: {error}") from None
+
+
+def urcpm(said: Manifest, files: Mapping[str, bytes]) -> bytes:
+    """Return a package in the form of the thesis's figure B.2."""
+    needed = [key for key in map(parse_key, said.needs) if key.kind in _THESIS]
+    styles = sorted(path for path in files if path.endswith(".css"))
+    found: dict[str, object] = {
+        "name": said.key.name,
+        "description": said.summary,
+        "type": said.key.kind,
+        "main": "widget.js" if said.key.kind == "widget" and "widget.js" in files else said.main,
+        "dependencies": sorted(
+            path for path in files if path.endswith(".js") and path != "widget.js"
+        ),
+    }
+    if said.key.kind == "driver":
+        found["css"] = {Path(path).stem: path for path in styles}
+        found["widgets"] = [f"/{key}/" for key in needed if key.kind == "widget"]
+        found["interfaces"] = [f"/{key}/" for key in needed if key.kind == "interface"]
+    else:
+        found["css"] = styles
+    if said.key.kind == "widget":
+        rest = set(files) - set(styles) - {MANIFEST}
+        found["resources"] = {path: path for path in sorted(rest) if not path.endswith(".js")}
+    return msgspec.json.format(msgspec.json.encode(found), indent=1) + b"\n"

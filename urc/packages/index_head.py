@@ -1,0 +1,135 @@
+"""The head of an index: its number, its digest, its signature, and its expiry.
+
+A maintainer with a key signs the head, and thereby the digest of the whole index. A signature is
+valid for some days, so an attacker cannot hide newer versions from a client for longer.
+"""
+
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from typing import Annotated, Final, NamedTuple
+
+import msgspec
+
+from urc.packages.names import PackageError
+from urc.packages.signature import Signature, Signer
+
+__all__ = [
+    "HEAD",
+    "HEAD_BYTES",
+    "VALID_S",
+    "IndexHead",
+    "IndexSigner",
+    "check_key",
+    "next_head",
+    "read_head",
+]
+
+HEAD: Final = "index/head.json"
+HEAD_BYTES: Final = 4096
+VALID_S: Final = 14 * 86400.0
+"""Default validity of a signed head, in seconds."""
+_STATEMENT: Final = "URC index signature 1\n{number}\n{sha256}\n{expires}\n{by}\n"
+_TIME: Final = "%Y-%m-%dT%H:%M:%SZ"
+
+
+class IndexSigner(NamedTuple):
+    """The maintainer's signer of an index."""
+
+    signer: Signer
+    valid_s: float = VALID_S
+    now: Callable[[], float] = time.time
+
+
+class IndexHead(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The head, which clients request first."""
+
+    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
+    number: Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]
+    sha256: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
+    """Digest of `index.json`."""
+    expires: str = ""
+    """End of its validity, such as ``2026-12-05T20:00:00Z``; "" without a signature."""
+    signature: Signature | msgspec.UnsetType = msgspec.UNSET
+
+    def __post_init__(self) -> None:
+        """Reject invalid times, and a time without a signature."""
+        if self.expires:
+            datetime.strptime(self.expires, _TIME)  # noqa: DTZ007 (the format has a Z)
+        if bool(self.expires) != isinstance(self.signature, Signature):
+            raise ValueError("a time of expiry goes with a signature")
+
+    @property
+    def signed(self) -> Signature | None:
+        """Signature, or None."""
+        return self.signature if isinstance(self.signature, Signature) else None
+
+    def left_s(self, now_s: float) -> float:
+        """Return the rest of its validity, in seconds."""
+        end = datetime.strptime(self.expires, _TIME).replace(tzinfo=UTC)
+        return end.timestamp() - now_s
+
+    def is_sound(self) -> bool:
+        """Return whether its signature, if any, is valid."""
+        signature = self.signed
+        return signature is None or signature.verifies(_statement(self, signature.by))
+
+    def to_bytes(self) -> bytes:
+        """Return the bytes of the file."""
+        return msgspec.json.encode(self) + b"\n"
+
+
+def read_head(data: bytes, where: str) -> IndexHead:
+    """Return a head from an untrusted source; raise `PackageError`."""
+    try:
+        return msgspec.json.decode(data, type=IndexHead)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise PackageError(f"{where}: this is not a head of an index: {error}") from None
+
+
+def check_key(old: IndexHead | None, seal: IndexSigner | None) -> None:
+    """Raise `PackageError` if the key of a signed head is not available.
+
+    Clients have pinned that key, so they would reject a head with another one.
+    """
+    signed = old.signed if old is not None else None
+    if signed is not None and (seal is None or seal.signer.key != signed.key):
+        raise PackageError(
+            f"the index is signed by {signed}: name that key with --key; if it is lost, remove"
+            f" {HEAD}, and ask all users to remove the repository and to add it again"
+        )
+
+
+def next_head(
+    old: IndexHead | None, number: int, digest: str, seal: IndexSigner | None
+) -> IndexHead:
+    """Return the head of an index, or the old one while it is still valid.
+
+    Args:
+        old: the current head, if it is valid.
+        number: number of the index.
+        digest: digest of its bytes.
+        seal: signer of the maintainer; None without a signature.
+
+    Raises:
+        PackageError: the key of the signed old head is not available.
+    """
+    signed = old.signed if old is not None else None
+    is_same = old is not None and (old.number, old.sha256) == (number, digest)
+    if seal is None and is_same and old is not None:
+        return old
+    check_key(old, seal)
+    if seal is None:
+        return IndexHead(1, number, digest)
+    now_s = seal.now()
+    if is_same and old is not None and signed and old.left_s(now_s) > seal.valid_s / 2:
+        return old
+    expires = datetime.fromtimestamp(now_s + seal.valid_s, UTC).strftime(_TIME)
+    by = seal.signer.by
+    statement = _STATEMENT.format(number=number, sha256=digest, expires=expires, by=by)
+    return IndexHead(1, number, digest, expires, seal.signer.signs(statement.encode()))
+
+
+def _statement(head: IndexHead, by: str) -> bytes:
+    said = {"number": head.number, "sha256": head.sha256, "expires": head.expires, "by": by}
+    return _STATEMENT.format(**said).encode()

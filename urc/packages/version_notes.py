@@ -1,0 +1,85 @@
+"""Notes of a repository about a version: its origin, and its withdrawal.
+
+They are stored in a small file next to the archive, and in the index.
+"""
+
+import re
+from pathlib import Path
+from typing import Annotated, Final
+
+import msgspec
+
+from urc.packages import atomic_files
+from urc.packages.names import PackageError
+
+__all__ = ["PROVENANCE", "Notes", "Provenance", "notes_beside", "read_notes", "write_notes"]
+
+PROVENANCE: Final = "urc-provenance"
+"""Header of an upload: the origin as JSON, in base64."""
+_LONGEST: Final = 300
+_COMMIT: Final = re.compile("[0-9a-f]{7,64}", re.ASCII)
+
+
+class Provenance(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The origin of a package, as declared by its publisher.
+
+    In an index of another repository, it may break the rules of `check`.
+    """
+
+    source: Annotated[str, msgspec.Meta(max_length=_LONGEST)] = ""
+    """Address of the source."""
+    commit: Annotated[str, msgspec.Meta(max_length=100)] = ""
+    tool: Annotated[str, msgspec.Meta(max_length=100)] = ""
+    """Packaging program, with its version."""
+
+    def check(self) -> None:
+        """Raise `PackageError` for an origin that is not accepted from a publisher."""
+        if not self.source.startswith(("https://", "http://", "ssh://")):
+            raise PackageError("a source begins with https://, http:// or ssh://")
+        if self.commit and not _COMMIT.fullmatch(self.commit):
+            raise PackageError("a commit is 7 to 64 hex digits, in small letters")
+        if not (self.source + self.tool).isprintable():
+            raise PackageError("text on one line is expected")
+
+    def __str__(self) -> str:
+        at = f" at {self.commit}" if self.commit else ""
+        by = f" by {self.tool}" if self.tool else ""
+        return f"made from {self.source or 'somewhere'}{at}{by}"
+
+
+class Notes(msgspec.Struct, frozen=True, omit_defaults=True):
+    """All notes about one version."""
+
+    withdrawn: Annotated[str, msgspec.Meta(max_length=_LONGEST)] = ""
+    """Reason of a withdrawal, or ""."""
+    provenance: Provenance | None = None
+
+    def __post_init__(self) -> None:
+        """Reject text with hidden characters."""
+        if not self.withdrawn.isprintable():
+            raise ValueError("a reason on one line is expected")
+
+
+def notes_beside(archive: Path) -> Path:
+    """Return the path of the notes about an archive."""
+    return archive.with_suffix(".json")
+
+
+def read_notes(archive: Path) -> Notes:
+    """Return the notes about an archive; raise `PackageError` for a damaged file."""
+    file = notes_beside(archive)
+    try:
+        with open(file, "rb") as opened:
+            return msgspec.json.decode(opened.read(8192), type=Notes)
+    except FileNotFoundError:
+        return Notes()
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise PackageError(f"{file}: these are not notes about a package: {error}") from None
+
+
+def write_notes(archive: Path, notes: Notes, work: Path) -> None:
+    """Write the notes about an archive."""
+    if notes == Notes():
+        notes_beside(archive).unlink(missing_ok=True)
+    else:
+        atomic_files.put_file(notes_beside(archive), msgspec.json.encode(notes) + b"\n", work)

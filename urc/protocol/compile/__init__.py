@@ -1,0 +1,1 @@
+"""Python source, generated from a driver and compiled at load."""

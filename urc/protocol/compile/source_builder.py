@@ -1,0 +1,37 @@
+"""Builder for the source text of a generated struct function.
+
+Pure. WARNING: the lines are compiled and run. The lines may contain only text of this package, the
+`repr()` of a constant, or a name made by `SourceBuilder.bind`; never text of a document.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from urc.protocol.compile.source import function_of
+
+__all__ = ["BUILTINS", "SourceBuilder"]
+
+BUILTINS = {"bytes": bytes, "int": int, "len": len, "round": round, "type": type}
+
+
+class SourceBuilder:
+    """A function under construction."""
+
+    def __init__(self) -> None:
+        self.scope: dict[str, Any] = dict(BUILTINS)
+        """Global names of the function."""
+        self.lines: list[str] = []
+
+    def bind(self, word: str, value: object) -> str:
+        """Bind `value` to a new global name that starts with `word`; return the name."""
+        name = f"_{word}{len(self.scope) - len(BUILTINS)}"
+        self.scope[name] = value
+        return name
+
+    def add(self, line: str, depth: int = 1) -> None:
+        """Add a line, indented `depth` times."""
+        self.lines.append("    " * depth + line)
+
+    def compile(self, name: str, argument: str) -> Callable[[Any], Any]:
+        """Return the function."""
+        return function_of(name, argument, self.lines, self.scope)

@@ -1,0 +1,1 @@
+"""Forms of a message on the wire: text, JSON, XML, hexadecimal and others."""

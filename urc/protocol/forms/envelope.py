@@ -1,0 +1,169 @@
+"""The form of envelopes: publish, call, goal, request.
+
+Pure. An envelope has an address (attributes) and a body. Another form writes the body. JSON stays
+data, because such transports have an encoding of their own.
+"""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Final, NamedTuple, cast
+from urllib.parse import quote, unquote
+
+from urc.expressions import Template, compile_template, quoted, split_template, text_of
+from urc.model.payload import Envelope, Payload, WriteSpec
+from urc.protocol.forms.json_text import JsonWriter, filled
+from urc.protocol.forms.table import build_writer
+from urc.protocol.values.payload import CodecContext, Frame, NotWritable, PayloadWriter
+
+__all__ = ["EnvelopeWriter", "place_writer"]
+
+
+_SETTINGS: Final = frozenset(("settings",))
+_WILD: Final = ("+", "#", "\0")
+_UP: Final = (".", "..")
+
+
+class _Piece(NamedTuple):
+    template: Template
+    is_value: bool
+    """Whether it is an argument, and not part of the document or its settings."""
+
+
+class PathTemplate:
+    """Writes an address: the path of a request, or a topic.
+
+    A value is one segment of its address and cannot redirect it. A value that is the whole address
+    may have several segments. Settings are as trusted as the document.
+    """
+
+    def __init__(self, pieces: tuple[_Piece, ...], written: Callable[[str, bool], str]) -> None:
+        """Initialise with `pieces`; `written` converts a value, which may be the whole address."""
+        self._pieces = pieces
+        self._written = written
+
+    def write(self, namespace: Mapping[str, object]) -> str:
+        """Return the address; raise `NotWritable` or `ExpressionError`."""
+        is_whole = len(self._pieces) == 1
+        words = [
+            self._written(text, is_whole) if is_value else text
+            for text, is_value in (
+                (text_of(one.template.evaluate(namespace)), one.is_value) for one in self._pieces
+            )
+        ]
+        return "".join(words)
+
+
+def place_writer(name: str, tree: object) -> PathTemplate | None:
+    """Return the writer of the attribute `name`; None if it needs no check.
+
+    Args:
+        name: ``path``, ``topic`` …
+        tree: the compiled attribute.
+    """
+    written = _WRITTEN.get(name)
+    if written is None or not isinstance(tree, Template) or tree.names <= _SETTINGS:
+        return None
+    pieces = []
+    for _, literal, expression in split_template(tree.source):
+        one = compile_template(literal if expression is None else f"{{{{{expression}}}}}")
+        pieces.append(_Piece(one, not one.names <= _SETTINGS))
+    return PathTemplate(tuple(pieces), written)
+
+
+def _path(text: str, is_whole: bool) -> str:
+    """Return a value as a part of a path."""
+    parts = text.split("/") if is_whole else [text]
+    if any(part in _UP for part in parts):
+        raise NotWritable(f"{quoted(text)} would lead to another path")
+    return quote(text, safe="/" if is_whole else "")
+
+
+def _name(text: str, is_whole: bool, *, what: str) -> str:
+    """Return a value as a part of the name of a topic, a service or an action."""
+    for sign in (*_WILD, *(() if is_whole else ("/",))):
+        if sign in text:
+            raise NotWritable(
+                f"{quoted(text)} would lead to another {what}: {sign!r} may not be in it"
+            )
+    return text
+
+
+_WRITTEN: Final[Mapping[str, Callable[[str, bool], str]]] = {
+    "path": _path,
+    **{what: partial(_name, what=what) for what in ("topic", "service", "action")},
+}
+
+
+_ADDRESS: Final = ("topic", "service", "action", "method", "path", "url", "query")
+"""Attributes that identify an envelope; all others are delivery options."""
+_TEXTS: Final = ("query", "headers")
+"""Mappings whose values are text on the wire."""
+
+
+class EnvelopeWriter:
+    """Writes an envelope, or reads one back into the values of its names."""
+
+    def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
+        self._verb = cast("str", spec.options["verb"])
+        self._attributes = cast("Mapping[str, Any]", spec.options["attributes"])
+        places = {name: place_writer(name, tree) for name, tree in self._attributes.items()}
+        self._places = {name: one for name, one in places.items() if one is not None}
+        self._rest = {
+            name: tree for name, tree in self._attributes.items() if name not in self._places
+        }
+        body = cast("WriteSpec | None", spec.options["body"])
+        self._body: PayloadWriter | None = None if body is None else build_writer(body, context)
+        self._context = context
+
+    def write(self, namespace: Mapping[str, object]) -> Payload:
+        """Return the envelope; raise `NotWritable` or `ExpressionError`."""
+        attributes = filled(self._rest, namespace)
+        for name, place in self._places.items():
+            attributes[name] = place.write(namespace)
+        for name in _TEXTS:
+            if name in attributes:
+                values = attributes[name].items()
+                attributes[name] = {key: text_of(value) for key, value in values}
+        if isinstance(self._body, JsonWriter):
+            return Envelope(self._verb, attributes, self._body.value(namespace))
+        return Envelope(self._verb, attributes, self._body and self._body.write(namespace))
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return the values of the names, or None for another envelope."""
+        envelope = frame.payload
+        if not isinstance(envelope, Envelope) or envelope.verb != self._verb:
+            return None
+        found: dict[str, object] = {}
+        for name in _ADDRESS:
+            # The robot receives a URL as its path.
+            value = envelope.attributes.get("path" if name == "url" else name)
+            if name == "path" and name in self._places and isinstance(value, str):
+                value = unquote(value)
+            if name in self._attributes and not self._is_here(self._attributes[name], value, found):
+                return None
+        if self._body is None:
+            return found
+        body = envelope.body
+        if "type" in self._attributes and isinstance(self._body, JsonWriter):
+            body = self._body.completed(body)
+            envelope = envelope._replace(body=body)
+        said = self._body.read(
+            Frame(body if isinstance(body, bytes) else envelope, self._context.encoding)
+        )
+        return None if said is None else {**found, **said}
+
+    def _is_here(self, tree: Any, value: Any, found: dict[str, object]) -> bool:
+        """Return whether `value` matches `tree`; add the values of its names to `found`."""
+        if isinstance(tree, Mapping):
+            if not isinstance(value, Mapping) or tree.keys() != value.keys():
+                return False
+            return all(self._is_here(inner, value[name], found) for name, inner in tree.items())
+        if not isinstance(tree, Template):
+            return text_of(tree) == text_of(value)
+        if tree.names <= {"settings"}:
+            return text_of(tree.evaluate({"settings": self._context.settings})) == text_of(value)
+        written = WriteSpec("text", {"template": tree}, tree.names, tree.settings)
+        text = Frame(text_of(value).encode(), "utf-8")
+        said = build_writer(written, self._context._replace(encoding="utf-8")).read(text)
+        found.update(said or {})
+        return said is not None

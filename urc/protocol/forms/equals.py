@@ -1,0 +1,71 @@
+"""The plain forms ``equals``, ``raw``, ``any`` and ``silence``."""
+
+from collections.abc import Mapping
+from typing import cast
+
+from urc.expressions import quoted
+from urc.model.payload import Payload, ReadSpec
+from urc.model.values import NOTHING
+from urc.protocol.values.payload import CodecContext, Frame, NotWritable
+from urc.protocol.values.text_values import encoded
+
+__all__ = ["AnyReader", "EqualsReader", "RawReader", "SilenceReader"]
+
+
+class SilenceReader:
+    """Matches no frame: the robot stays silent on success, and the timeout is the reply."""
+
+    def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
+        """Ignore both arguments: the form has no options."""
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return None: any frame is another frame."""
+
+
+class EqualsReader:
+    """Matches exactly one frame."""
+
+    def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
+        self._payload = encoded(cast("str", spec.options["text"]), context.encoding)
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return no fields for that frame, or None for any other."""
+        return NOTHING if frame.payload == self._payload else None
+
+    def write(self, fields: Mapping[str, object]) -> Payload:
+        """Return that frame."""
+        return self._payload
+
+
+class AnyReader:
+    """Matches every frame, for replies whose content is irrelevant."""
+
+    def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
+        """Ignore both arguments: the form has no options."""
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return no fields."""
+        return NOTHING
+
+    def write(self, fields: Mapping[str, object]) -> Payload:
+        """Return an empty frame."""
+        return b""
+
+
+class RawReader:
+    """Reads every frame of bytes as one field."""
+
+    def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
+        self._field = cast("str", spec.options["field"])
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return the bytes of the frame; None for a message without bytes."""
+        payload = frame.payload
+        return {self._field: payload} if isinstance(payload, bytes) else None
+
+    def write(self, fields: Mapping[str, object]) -> Payload:
+        """Return the bytes of the field; raise `NotWritable` for any other value."""
+        value = fields.get(self._field)
+        if not isinstance(value, bytes):
+            raise NotWritable(f"{self._field}: expected bytes, found {quoted(value)}")
+        return value

@@ -1,0 +1,60 @@
+"""Status and headers of an HTTP response, as fields.
+
+Pure. The reader wraps the reader of the body, in both directions.
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+from urc.expressions import text_of
+from urc.model.payload import Envelope, Payload, ReadSpec
+from urc.protocol.values.payload import Frame, NotWritable, PayloadReader
+
+__all__ = ["LOCATION", "STATUS", "HeadReader", "is_redirect"]
+
+STATUS: Final = "status"
+"""Name of the status among the headers."""
+_REDIRECTS: Final = 3
+"""First digit of redirect statuses."""
+LOCATION: Final = "location"
+"""Header with the target of a redirect."""
+
+
+def is_redirect(frame: Frame) -> bool:
+    """Return whether a response is a redirect."""
+    status = frame.attributes.get(STATUS)
+    return isinstance(status, int) and status // 100 == _REDIRECTS
+
+
+class HeadReader:
+    """Reads the status and headers, and delegates the body. A missing header gives no field."""
+
+    def __init__(self, reader: PayloadReader, spec: ReadSpec) -> None:
+        self._reader = reader
+        self._head = dict(spec.head)
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return the fields, or None for another kind of frame."""
+        found = self._reader.read(frame)
+        if found is None:
+            return None
+        headers = frame.attributes.get("headers")
+        known: dict[str, object] = {}
+        if isinstance(headers, Mapping):
+            known = {str(name).lower(): value for name, value in headers.items()}
+        known[STATUS] = frame.attributes.get(STATUS)
+        head = {field: known.get(name) for field, name in self._head.items()}
+        return {**found, **{field: value for field, value in head.items() if value is not None}}
+
+    def write(self, fields: Mapping[str, object]) -> Payload:
+        """Return the response that reads as `fields`; raise `NotWritable`."""
+        body = self._reader.write({k: v for k, v in fields.items() if k not in self._head})
+        if not isinstance(body, bytes):
+            raise NotWritable("only an HTTP response has a status and headers")
+        named = {name: fields[field] for field, name in self._head.items() if field in fields}
+        status = named.pop(STATUS, 200)
+        if not isinstance(status, int):
+            status = 200  # a default for values that are no status
+        headers = {name: text_of(value) for name, value in named.items()}
+        attributes = {"ok": status < 400, "status": status, "headers": headers}
+        return Envelope("response", attributes, body)

@@ -1,0 +1,105 @@
+"""The form ``json`` for sending: JSON text, with typed values in the places of templates."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from urc.expressions import Template, quoted
+from urc.model.payload import Envelope, Payload, WriteSpec
+from urc.protocol.values.payload import BadText, CodecContext, Frame, NotWritable
+from urc.protocol.values.text_values import counter_in
+
+__all__ = ["JsonWriter", "filled", "matches"]
+
+
+class JsonWriter:
+    """Writes a value as compact JSON; reads back the leaves that are plain names or counters."""
+
+    def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
+        self._tree: Any = spec.options["tree"]
+        self._encoding = context.encoding
+        # Other characters become \uXXXX in ASCII, which every connection can carry.
+        is_ascii = context.encoding != "utf-8"
+        self._encode = json.JSONEncoder(
+            ensure_ascii=is_ascii, allow_nan=False, separators=(",", ":")
+        ).encode
+
+    def write(self, namespace: Mapping[str, object]) -> Payload:
+        """Return the JSON text; raise `NotWritable` or `ExpressionError`."""
+        try:
+            return self._text(filled(self._tree, namespace)).encode(self._encoding)
+        except UnicodeEncodeError as error:
+            wrong = error.object[error.start]
+            raise NotWritable(f"{quoted(wrong)} cannot be written in {self._encoding}") from None
+
+    def _text(self, value: object) -> str:
+        try:
+            return self._encode(value)
+        except TypeError as error:
+            raise NotWritable(f"this cannot be written as JSON: {error}") from None
+        except ValueError:
+            raise NotWritable("JSON has no infinite number and no not-a-number") from None
+
+    def value(self, namespace: Mapping[str, object]) -> object:
+        """Return the data of `write`; raise `NotWritable` or `ExpressionError`."""
+        value = filled(self._tree, namespace)
+        self._text(value)
+        return value
+
+    def completed(self, value: object) -> object:
+        """Return a ROS message with zeros for missing members, as a bridge reads it."""
+        return _completed(self._tree, value)
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return the values in the places of plain names, or None when the rest differs."""
+        payload = frame.payload
+        try:
+            value = payload.body if isinstance(payload, Envelope) else json.loads(frame.text)
+        except (BadText, ValueError, RecursionError):
+            return None
+        found: dict[str, object] = {}
+        return found if matches(self._tree, value, found) else None
+
+
+def filled(tree: Any, namespace: Mapping[str, object]) -> Any:
+    """Return `tree` with its templates evaluated."""
+    if isinstance(tree, Template):
+        return tree.evaluate(namespace)
+    if isinstance(tree, dict):
+        return {name: filled(inner, namespace) for name, inner in tree.items()}
+    if isinstance(tree, list):
+        return [filled(inner, namespace) for inner in tree]
+    return tree
+
+
+def _completed(tree: Any, value: Any) -> Any:
+    if not isinstance(tree, dict) or not isinstance(value, dict):
+        return value
+    lacks = tree.keys() - value.keys()
+    missing: dict[str, Any] = {name: {} if isinstance(tree[name], dict) else 0 for name in lacks}
+    return {name: _completed(tree.get(name), inner) for name, inner in {**value, **missing}.items()}
+
+
+def matches(tree: Any, value: Any, found: dict[str, object]) -> bool:
+    """Return whether `value` matches `tree`; add the values of plain names to `found`."""
+    if isinstance(tree, Template):
+        name = tree.source.strip().removeprefix("{{").removesuffix("}}").strip()
+        if name.isidentifier() and name in tree.names:
+            found[name] = value
+        elif counter := counter_in(name):
+            found[f"seq.{counter}"] = value
+        return True
+    if isinstance(tree, dict):
+        return (
+            isinstance(value, dict)
+            and tree.keys() == value.keys()
+            and all(matches(inner, value[name], found) for name, inner in tree.items())
+        )
+    if isinstance(tree, list):
+        return (
+            isinstance(value, list)
+            and len(tree) == len(value)
+            and all(matches(*pair, found) for pair in zip(tree, value, strict=True))
+        )
+    # JSON writers treat 0 and 0.0 as the same number, but true is different
+    return isinstance(tree, bool) is isinstance(value, bool) and bool(tree == value)

@@ -1,0 +1,91 @@
+"""The form ``text``: a template, as under ``send:``."""
+
+import re
+from collections.abc import Mapping
+from functools import cached_property
+from typing import NamedTuple, cast
+
+from urc.expressions import Template, quoted, split_template, text_of
+from urc.model.payload import Payload, WriteSpec
+from urc.protocol.values.payload import BadText, CodecContext, Frame, NotWritable
+from urc.protocol.values.text_values import counter_in
+
+__all__ = ["TextWriter"]
+
+_NAME = re.compile(
+    r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*"
+    r"(?:\|\s*(?:fixed|round|int|float|string|pad|trim|join)\s*(?:\([^()]*\))?\s*)*"
+)
+"""A name with formatting filters only, so that its value can be read back."""
+
+
+class TextWriter:
+    """Writes a rendered template; reads one back if its expressions are plain names."""
+
+    def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
+        self._template = cast("Template", spec.options["template"])
+        self._encoding = context.encoding
+
+    def write(self, namespace: Mapping[str, object]) -> Payload:
+        """Return the rendered text in the encoding of the connection."""
+        text = text_of(self._template.evaluate(namespace))
+        try:
+            return text.encode(self._encoding)
+        except UnicodeEncodeError as error:
+            wrong = error.object[error.start]
+            raise NotWritable(f"{quoted(wrong)} cannot be written in {self._encoding}") from None
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return the text in the places of the plain names.
+
+        The number of a counter has the key ``seq.NAME``. If a field could end in several places, it
+        ends at the first.
+        """
+        try:
+            text = frame.text
+        except BadText:
+            return None
+        first, *pieces = self._pieces
+        if not text.startswith(first.literal) or (not pieces and text != first.literal):
+            return None
+        found: dict[str, object] = {}
+        position = len(first.literal)
+        for piece in pieces:
+            if piece is pieces[-1]:
+                end = len(text) - len(piece.literal)
+                end = end if text.endswith(piece.literal) and end >= position else -1
+            else:
+                end = text.find(piece.literal, position)
+            if end < 0:
+                return None
+            if piece.name:
+                found.setdefault(piece.name, text[position:end])
+            position = end + len(piece.literal)
+        return found
+
+    @cached_property
+    def _pieces(self) -> tuple["_Piece", ...]:
+        pieces = [_Piece("", "")]
+        for _, literal, expression in split_template(self._template.source):
+            if expression is None:
+                last = pieces.pop()
+                pieces.append(_Piece(last.name, last.literal + literal))
+            else:
+                pieces.append(_Piece(_name_in(expression), ""))
+        return tuple(pieces)
+
+
+class _Piece(NamedTuple):
+    """A field and the literal text after it; the first piece has no field."""
+
+    name: str
+    """Name of the field; "" if it is unknown."""
+    literal: str
+
+
+def _name_in(expression: str) -> str:
+    name = _NAME.fullmatch(expression)
+    if name is not None:
+        return name[1]
+    counter = counter_in(expression)
+    return f"seq.{counter}" if counter else ""

@@ -1,0 +1,134 @@
+"""Topics and subscriptions of a driver on a transport that carries messages.
+
+Pure. A topic may have wildcards as in MQTT (version 5.0, section 4.7): ``+`` stands for one level,
+``#`` at the end for all following levels.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+
+from urc.expressions import ExpressionError
+from urc.model.driver import Driver, Reply
+from urc.model.payload import Envelope, Payload, ReadSpec
+from urc.model.sequence import ExpectStep, all_steps
+from urc.model.values import Value
+from urc.problems import UrcError
+from urc.protocol.values.payload import CodecContext, Frame, NotWritable, PayloadReader
+
+__all__ = ["TopicReader", "frame_of", "listened", "matches", "topic_of"]
+
+FEEDBACK = "/feedback"
+"""Suffix of the feedback topic of an action."""
+
+
+class TopicReader:
+    """Reads the messages of one topic by another form.
+
+    With wildcards, the field ``_topic`` has the actual topic.
+    """
+
+    def __init__(self, reader: PayloadReader, spec: ReadSpec, context: CodecContext) -> None:
+        self._reader = reader
+        self._topic = topic_of(spec, context.settings)
+        self._fits = matches(self._topic)
+        self._is_plain = not _WILD.search(self._topic)
+
+    def read(self, frame: Frame) -> Mapping[str, object] | None:
+        """Return the fields, or None for another topic or another kind of message."""
+        topic = frame.topic
+        if topic != self._topic if self._is_plain else topic is None or not self._fits(topic):
+            return None
+        found = self._reader.read(frame)
+        return found if found is None or self._is_plain else {**found, "_topic": topic}
+
+    def write(self, fields: Mapping[str, object]) -> Payload:
+        """Return the message that reads as `fields`; raise `NotWritable`."""
+        topic = str(fields.get("_topic") or _WILD.sub("x", self._topic))
+        if not self._fits(topic):
+            raise NotWritable(f"{topic!r} is not a topic of {self._topic!r}")
+        body = self._reader.write({name: raw for name, raw in fields.items() if name != "_topic"})
+        return Envelope("message", {"topic": topic}, body)
+
+
+_WILD = re.compile(r"(?<![^/])[+#](?![^/])")
+
+
+def matches(topic: str) -> Callable[[str], bool]:
+    """Return the function that tells whether a name matches `topic`, wildcards included."""
+    if not _WILD.search(topic):
+        return lambda name: name == topic
+    levels = topic.split("/")
+    is_open = levels[-1] == "#"
+    fixed = levels[:-1] if is_open else levels
+
+    def fits(name: str) -> bool:
+        found = name.split("/")
+        if len(found) < len(fixed) or (len(found) > len(fixed) and not is_open):
+            return False
+        return all(want in ("+", has) for want, has in zip(fixed, found, strict=False))
+
+    return fits
+
+
+def topic_of(spec: ReadSpec, settings: Mapping[str, object]) -> str:
+    """Return the topic of a frame; raise `UrcError` when its template fails."""
+    try:
+        return "" if spec.topic is None else str(spec.topic.evaluate({"settings": settings}))
+    except ExpressionError as error:
+        raise UrcError(f"a topic: {error}") from None
+
+
+def frame_of(payload: Payload, encoding: str) -> Frame:
+    """Return a received payload as a frame; the bytes of an envelope become its payload."""
+    if not isinstance(payload, Envelope):
+        return Frame(payload, encoding)
+    attributes, body = payload.attributes, payload.body
+    topic = attributes.get("topic")
+    if payload.verb == "feedback" and topic is None:
+        topic = f"{attributes.get('action')}{FEEDBACK}"
+    frame = Frame(body if isinstance(body, bytes) else payload, encoding)
+    frame.topic = None if topic is None else str(topic)
+    frame.attributes = attributes
+    return frame
+
+
+def listened(
+    driver: Driver, transport: str, settings: Mapping[str, object]
+) -> dict[str, Mapping[str, Value]]:
+    """Return topic → subscription options, for all topics of a driver on a transport.
+
+    For repeated topics, the first options take precedence, and later ones add missing keys.
+    """
+    topics: dict[str, dict[str, Value]] = {}
+    for read in _reads(driver, transport):
+        if read.topic is not None:
+            mine = topics.setdefault(topic_of(read, settings), {})
+            for name, value in read.listen.items():
+                mine.setdefault(name, value)
+    return dict(topics)
+
+
+def _reads(driver: Driver, transport: str) -> Iterator[ReadSpec]:
+    for message in driver.messages.values():
+        if message.transport == transport:
+            yield message.read
+    yield from (fault.read for fault in driver.transports[transport].faults)
+    replies = [(one.transport, one.reply) for one in driver.commands.values()]
+    replies += [(one.transport, one.reply) for one in driver.polls]
+    for name, reply in replies:
+        if name == transport and reply is not None:
+            yield from _of_reply(reply)
+    scripts = [spec.on_connect + spec.on_close for spec in driver.transports.values()]
+    scripts += [command.steps for command in driver.commands.values()]
+    for script in scripts:
+        for step in all_steps(script):
+            if isinstance(step, ExpectStep) and step.transport == transport:
+                yield step.read
+
+
+def _of_reply(reply: Reply) -> Iterator[ReadSpec]:
+    yield reply.read
+    yield from (stage.read for stage in reply.stages)
+    asides = (reply.asides, *(stage.asides for stage in reply.stages))
+    yield from (read for one in asides for read in (one.resend, one.extend) if read is not None)
+    yield from (fault.read for fault in reply.faults)

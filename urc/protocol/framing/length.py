@@ -1,0 +1,147 @@
+"""The framings ``fixed`` and ``length``: the first bytes of a frame determine its size.
+
+Theory of operation. If the frame has start bytes, the decoder advances to the next ones; otherwise
+every byte may begin a frame. An invalid frame (bad length, wrong end bytes, wrong checksum) costs
+only its first byte: the true frame may begin right after it. Only checksums would then scan the
+same bytes again and again, so `RescanBudget` limits them; after that, the whole candidate is
+dropped.
+"""
+
+from typing import NamedTuple
+
+from urc.model.driver import FramingSpec
+from urc.model.framing import FrameLayout
+from urc.protocol.framing.base import (
+    SKIPPED,
+    Decoder,
+    FrameFault,
+    Framing,
+    StreamDecoder,
+    seal_of,
+    sealed,
+)
+from urc.protocol.framing.frame import BadFrame, FrameCodec
+from urc.protocol.framing.receive_buffer import ReceiveBuffer, RescanBudget
+
+__all__ = ["LengthFraming"]
+
+
+class LengthFraming(NamedTuple):
+    """Frames of a fixed size, or with a length field; the same in both directions."""
+
+    seal: FrameCodec
+    max_bytes: int
+
+    @classmethod
+    def from_spec(cls, spec: FramingSpec) -> Framing:
+        """Return the framing for the option ``layout``."""
+        return cls(seal_of(spec) or FrameCodec(FrameLayout()), spec.max_bytes)
+
+    def encode(self, payload: bytes) -> bytes:
+        """Return the bytes of one frame, or raise `FramingError`."""
+        return sealed(self.seal, payload, self.max_bytes)
+
+    def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
+        """Return a new decoder."""
+        return _MeasuredDecoder(stream, self.seal, self.max_bytes)
+
+    def reversed(self) -> "LengthFraming":
+        """Return the same framing for the other end of the connection."""
+        return self
+
+
+class _MeasuredDecoder(StreamDecoder):
+    def __init__(self, stream: ReceiveBuffer | None, seal: FrameCodec, max_bytes: int) -> None:
+        super().__init__(stream, max_bytes)
+        layout = seal.layout
+        self._seal = seal
+        self._start, self._end = layout.start, layout.end
+        self._size, self._length = layout.size, seal.length
+        self._header = self._length.end if self._length else 0
+        parts = (layout.head + layout.tail, self._header + layout.tail, len(layout.start))
+        self._least = max(*parts, 1)
+        self._credit = RescanBudget()
+        size = self._size or 0
+        self._plain = (
+            0 if self._start or self._end or not self._least <= size <= max_bytes else size
+        )
+        """Size of every frame, if no check precedes its decoding; else 0."""
+
+    def next(self, now: float = 0.0) -> bytes | FrameFault | None:
+        stream, data = self._stream, self._stream.data
+        if self._plain:
+            end = stream.at + self._plain
+            if len(data) < end:
+                return None
+            try:
+                payload = self._seal.open(bytes(data[stream.at : end]))
+            except BadFrame:
+                pass  # reported below
+            else:
+                stream.at, self._is_lost = end, False
+                self._credit.earn(self._plain)
+                return payload
+        while True:
+            fault = self._to_start()
+            if fault is not None:
+                return fault
+            at, there = stream.at, len(stream)
+            if there < len(self._start) or there < self._header or not there:
+                return None
+            size = self._size or (self._length.total(data, at) if self._length else 0)
+            if size is None:
+                return self._endless(there)
+            if not self._least <= size <= self._max_bytes:
+                fault = self._bad_length(size)
+            elif there < size:
+                return None
+            elif not data.startswith(self._end, at + size - len(self._end)):
+                fault = self._leave(1)
+            else:
+                frame = self._frame(bytes(data[at : at + size]))
+                if frame is not None:
+                    return frame
+            if fault is not None:
+                return fault
+
+    def _to_start(self) -> FrameFault | None:
+        """Advance to the next start bytes, or to their possible beginning."""
+        stream, start = self._stream, self._start
+        if not start or stream.data.startswith(start, stream.at):
+            return None
+        gone = self._before(start)
+        return self._leave(gone) if gone else None
+
+    def _frame(self, frame: bytes) -> bytes | FrameFault | None:
+        """Return the payload, a violation, or None for a violation that was already reported."""
+        try:
+            payload = self._seal.open(frame)
+        except BadFrame as error:
+            if error.code == SKIPPED:
+                self._move(len(frame))
+                return self._refused(error)
+            affordable = self._credit.spend(len(frame))
+            self._move(1 if affordable else len(frame))
+            return self._lost(error.code, str(error), closes=error.closes)
+        self._move(len(frame))
+        self._is_lost = False
+        return payload
+
+    def _leave(self, count: int) -> FrameFault | None:
+        self._credit.earn(count)
+        return self._skip(count)
+
+    def _move(self, count: int) -> None:
+        self._credit.earn(count)
+        self._stream.at += count
+
+    def _endless(self, there: int) -> FrameFault | None:
+        """Wait for the rest of a length field of variable size."""
+        return self._bad_length(there) if there >= self._max_bytes else None
+
+    def _bad_length(self, size: int) -> FrameFault | None:
+        self._move(1)
+        if size > self._max_bytes:
+            text = f"a frame claims {size} bytes, more than the limit of {self._max_bytes}"
+            return self._lost("frame-too-long", text)
+        return self._lost("bad-length", "a frame has an invalid length field; skipped")

@@ -1,0 +1,287 @@
+"""The framings ``regex`` and ``brackets``, which search for frames."""
+
+import re
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple, cast
+
+from urc.model.driver import FramingSpec
+from urc.model.framing import FrameLayout
+from urc.protocol.framing.base import (
+    Decoder,
+    FrameFault,
+    Framing,
+    FramingError,
+    Open,
+    StreamDecoder,
+    seal_of,
+    sealed,
+)
+from urc.protocol.framing.delimited import DelimiterDecoder
+from urc.protocol.framing.frame import BadFrame, FrameCodec
+from urc.protocol.framing.receive_buffer import ReceiveBuffer
+
+__all__ = ["BracketsDecoder", "BracketsFraming", "RegexFraming"]
+
+Search = Callable[[bytes | bytearray, int], Any]
+"""Search function: data and start offset → a match of `re` or RE2, or None."""
+
+_SMALL: Final = 256
+"""Buffer size up to which every receive searches again, in bytes."""
+_GROWTH: Final = 8
+"""A larger buffer is searched again after growing by one part in `_GROWTH`, or after `_QUIET_S`."""
+_QUIET_S: Final = 0.005
+
+
+class RegexFraming(NamedTuple):
+    """Frames that match a pattern.
+
+    With `tx`, a sent frame need not match: it ends with `tx`, as the other end expects.
+    """
+
+    search: Search
+    tx: bytes
+    seal: FrameCodec | None
+    max_bytes: int
+    is_reversed: bool = False
+
+    @classmethod
+    def from_spec(cls, spec: FramingSpec) -> "RegexFraming":
+        """Return the framing for the options ``pattern`` (its text) and ``tx`` (bytes)."""
+        search = _searcher(cast("str", spec.options["pattern"]))
+        tx = cast("bytes", spec.options.get("tx", b""))
+        return cls(search, tx, seal_of(spec), spec.max_bytes)
+
+    def encode(self, payload: bytes) -> bytes:
+        """Return the bytes of one frame, or raise `FramingError`."""
+        frame = sealed(self.seal, payload, self.max_bytes)
+        if self.tx and not self.is_reversed:
+            if self.tx in frame:
+                raise FramingError(f"{payload!r} contains {self.tx!r}: it would be two frames")
+            return frame + self.tx
+        found = self.search(frame, 0)
+        if found is None or found.span() != (0, len(frame)):
+            raise FramingError(f"{payload!r} does not match the pattern of the framing")
+        return frame
+
+    def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
+        """Return a new decoder."""
+        if self.tx and self.is_reversed:
+            opened = None if self.seal is None else self.seal.open
+            return DelimiterDecoder(stream, self.tx, self.max_bytes, opened)
+        return _RegexDecoder(stream, self.search, self.seal, self.max_bytes)
+
+    def reversed(self) -> "RegexFraming":
+        """Return the same framing for the other end of the connection."""
+        return self._replace(is_reversed=not self.is_reversed)
+
+
+def _searcher(pattern: str) -> Search:
+    """Return the search over bytes; each character of the pattern is the byte of that number."""
+    source = pattern.removeprefix("^").encode("latin-1")
+    try:
+        import re2
+    except ImportError:
+        # The loader accepts only patterns with linear time at each start position.
+        compiled: Search = re.compile(source).search
+        return compiled
+    options = re2.Options()
+    options.log_errors = False
+    options.max_mem = 1 << 20  # the limit of all patterns
+    options.encoding = re2.Options.Encoding.LATIN1
+    searched: Search = re2.compile(source, options).search
+    return searched
+
+
+class _RegexDecoder(StreamDecoder):
+    def __init__(
+        self, stream: ReceiveBuffer | None, search: Search, seal: FrameCodec | None, max_bytes: int
+    ) -> None:
+        super().__init__(stream, max_bytes)
+        self._search = search
+        self._seal = seal
+        self._tried = 0
+        """Number of searched bytes without a match."""
+        self._newest = 0.0
+
+    @property
+    def deadline(self) -> float | None:
+        return self._newest + _QUIET_S if len(self._stream) > self._tried else None
+
+    def restart(self) -> None:
+        super().restart()
+        self._tried = 0
+
+    def push(self, data: bytes, now: float = 0.0) -> None:
+        super().push(data, now)
+        self._newest = now
+
+    def next(self, now: float = 0.0) -> bytes | FrameFault | None:
+        there = len(self._stream)
+        is_due = there > self._tried and (
+            there <= _SMALL or there >= self._tried + self._tried // _GROWTH
+        )
+        return self._find() if is_due else None
+
+    def tick(self, now: float) -> list[bytes | FrameFault]:
+        frames: list[bytes | FrameFault] = []
+        if len(self._stream) <= self._tried or now < self._newest + _QUIET_S:
+            return frames
+        while (frame := self._find()) is not None:
+            frames.append(frame)
+        return frames
+
+    def _find(self) -> bytes | FrameFault | None:
+        stream = self._stream
+        while len(stream) > self._tried:
+            found = self._search(stream.data, stream.at)
+            if found is None:
+                return self._wait()
+            start, stop = found.span()
+            self._tried = 0
+            if start > stream.at:
+                fault = self._skip(start - stream.at)
+                if fault is not None:
+                    return fault
+            frame = bytes(stream.data[start:stop])
+            stream.at = stop
+            if len(frame) > self._max_bytes:
+                text = f"a frame has {len(frame)} bytes, more than {self._max_bytes}; dropped"
+                return FrameFault("frame-too-long", text)
+            self._is_lost = False
+            try:
+                return frame if self._seal is None else self._seal.open(frame)
+            except BadFrame as error:
+                fault = self._refused(error)
+            if fault is not None:
+                return fault
+        return None
+
+    def _wait(self) -> FrameFault | None:
+        """Keep the newest bytes, which may contain the beginning of a frame."""
+        fault = None
+        surplus = len(self._stream) - self._max_bytes
+        if surplus > 0:
+            fault = self._skip(surplus)
+        self._tried = len(self._stream)
+        return fault
+
+
+class BracketsFraming(NamedTuple):
+    """Frames between two markers; markers and bytes between frames are not part of the payload.
+
+    Frames are not nested: at a second opening marker, the frame begins again.
+    """
+
+    seal: FrameCodec
+    max_bytes: int
+
+    @classmethod
+    def from_spec(cls, spec: FramingSpec) -> Framing:
+        """Return the framing for the option ``layout``, with its start and end."""
+        return cls(seal_of(spec) or FrameCodec(FrameLayout()), spec.max_bytes)
+
+    def encode(self, payload: bytes) -> bytes:
+        """Return the bytes of one frame, or raise `FramingError`."""
+        frame = sealed(self.seal, payload, self.max_bytes)
+        layout = self.seal.layout
+        inner = frame[len(layout.start) : len(frame) - len(layout.end)]
+        for mark in (layout.start, layout.end):
+            if mark in inner:
+                raise FramingError(f"{payload!r} contains {mark!r}, a marker of the framing")
+        if layout.start == layout.end and not inner:
+            raise FramingError("an empty frame cannot be sent between two equal markers")
+        return frame
+
+    def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
+        """Return a new decoder."""
+        layout = self.seal.layout
+        return BracketsDecoder(stream, layout.start, layout.end, self.seal.open, self.max_bytes)
+
+    def reversed(self) -> "BracketsFraming":
+        """Return the same framing for the other end of the connection."""
+        return self
+
+
+class BracketsDecoder(StreamDecoder):
+    """A decoder that remembers its search position for the closing marker."""
+
+    def __init__(
+        self, stream: ReceiveBuffer | None, start: bytes, end: bytes, opened: Open, max_bytes: int
+    ) -> None:
+        super().__init__(stream, max_bytes)
+        self._opened = opened
+        self._open, self._close = start, end
+        self._searched = 0
+        """Number of scanned bytes without a closing marker; 0 before an opening marker."""
+
+    def restart(self) -> None:
+        """Reset the state: a `switch` begins a frame here."""
+        super().restart()
+        self._searched = 0
+
+    def next(self, now: float = 0.0) -> bytes | FrameFault | None:
+        """Return one frame or violation, or None if incomplete."""
+        stream, data = self._stream, self._stream.data
+        while True:
+            if not self._searched:
+                fault = self._to_open()
+                if fault is not None or not self._searched:
+                    return fault
+            close = data.find(self._close, stream.at + self._searched)
+            if close < 0:
+                self._searched = max(len(self._open), len(stream) - len(self._close) + 1)
+                if len(stream) <= self._max_bytes:
+                    return None
+                fault = self._overflow()
+            else:
+                # Another opening marker: the frame before it has lost its end.
+                last = data.rfind(self._open, stream.at + len(self._open), close)
+                if last < 0:
+                    frame = self._frame(close)
+                    if frame is not None:
+                        return frame
+                    continue
+                fault = self._skip(last - stream.at)
+                self._searched = max(len(self._open), close - last)
+            if fault is not None:
+                return fault
+
+    def _to_open(self) -> FrameFault | None:
+        gone = self._before(self._open)
+        if len(self._stream) >= gone + len(self._open):
+            self._searched = len(self._open)
+        return self._skip(gone) if gone else None
+
+    def _overflow(self) -> FrameFault | None:
+        """Continue at the newest opening marker, the only one that can still be closed in time."""
+        stream = self._stream
+        fault = self._too_long()
+        last = stream.data.rfind(self._open, stream.at + len(self._open))
+        gone = last - stream.at if last >= 0 else 1
+        stream.at += gone
+        self._searched = max(len(self._open), self._searched - gone) if last >= 0 else 0
+        return fault
+
+    def _too_long(self) -> FrameFault | None:
+        text = f"a frame has more than {self._max_bytes} bytes without {self._close!r}; dropped"
+        return self._lost("frame-too-long", text)
+
+    def _frame(self, close: int) -> bytes | FrameFault | None:
+        """Remove the frame that ends with the marker at `close`; return None for an empty one."""
+        stream = self._stream
+        stop = close + len(self._close)
+        if self._open == self._close and close == stream.at + len(self._open):
+            # Two adjacent equal markers: the second one opens a frame.
+            stream.at = close
+            self._searched = len(self._open)
+            return None
+        frame = bytes(stream.data[stream.at : stop])
+        stream.at = stop
+        self._searched = 0
+        if len(frame) > self._max_bytes:
+            return self._too_long()
+        self._is_lost = False
+        try:
+            return self._opened(frame)
+        except BadFrame as error:
+            return self._refused(error)

@@ -1,0 +1,112 @@
+"""Declared byte stuffing: escape sequences for bytes with a meaning in the framing.
+
+Pure. Three methods cover common robots. An escape byte precedes a replaced byte (HDLC and PPP: 7D
+and the byte xor 20; a table, as in SLIP). An escape byte is doubled (DLE DLE). A byte is inserted
+after a sequence (FF FF FD is followed by another FD).
+"""
+
+import re
+from collections.abc import Mapping
+from typing import Final, NoReturn
+
+from urc.model.framing import EscapeSpec
+from urc.protocol.framing.checksums import BadFrame
+
+__all__ = ["Stuffing", "Unstuffer"]
+
+_ANY: Final = range(256)
+
+
+class Stuffing:
+    """One method of byte stuffing, in both directions; each takes linear time."""
+
+    def __init__(self, spec: EscapeSpec) -> None:
+        self.spec = spec
+        self.escape = bytes((spec.byte,))
+        self.is_doubled = not spec.after and spec.table.get(spec.byte) == spec.byte
+        """Whether the escape byte itself may begin a marker."""
+        self.meant = _meant(spec)
+        """Byte after the escape → decoded byte of the pair."""
+        if spec.after:
+            self._plain, self._inserted = spec.after, bytes((spec.insert,))
+            self._pair = re.compile(re.escape(spec.after) + b"(.?)", re.DOTALL)
+        else:
+            letters = b"".join(re.escape(bytes((one,))) for one in spec.table)
+            self._hidden = re.compile(b"[" + letters + b"]")
+            self._pair = re.compile(re.escape(self.escape) + b"(.?)", re.DOTALL)
+            self._written = {
+                bytes((plain,)): self.escape + bytes((second,))
+                for plain, second in spec.table.items()
+            }
+
+    def stuff(self, data: bytes) -> bytes:
+        """Return `data` in its wire form."""
+        if self.spec.after:
+            return data.replace(self._plain, self._plain + self._inserted)
+        written = self._written
+        return self._hidden.sub(lambda found: written[found[0]], data)
+
+    def unstuff(self, data: bytes) -> bytes:
+        """Return the original bytes of `data`; raise `BadFrame` for invalid stuffing."""
+        if self.spec.after:
+            return self._pair.sub(self._before, data) if self._plain in data else data
+        return self._pair.sub(self._one, data) if self.escape in data else data
+
+    def _before(self, found: "re.Match[bytes]") -> bytes:
+        return self._plain if found[1] == self._inserted else self._refuse(found[0])
+
+    def _one(self, found: "re.Match[bytes]") -> bytes:
+        second = found[1]
+        meant = self.meant.get(second[0]) if second else None
+        return self._refuse(found[0]) if meant is None else bytes((meant,))
+
+    @staticmethod
+    def _refuse(shown: bytes) -> NoReturn:
+        text = f"{shown.hex(' ')} is invalid byte stuffing for this framing; the frame is dropped"
+        raise BadFrame("bad-stuffing", text)
+
+
+def _meant(spec: EscapeSpec) -> Mapping[int, int]:
+    if spec.xor is not None:
+        # A sender may escape any byte.
+        return {second: second ^ spec.xor for second in _ANY}
+    return {second: plain for plain, second in spec.table.items()}
+
+
+class Unstuffer:
+    """Decodes byte stuffing incrementally, byte by byte."""
+
+    def __init__(self, stuffing: Stuffing) -> None:
+        self._stuffing = stuffing
+        self.plain = bytearray()
+        self._is_escaped = False
+        self._tail = b""
+        """Newest bytes, as many as the sequence before an inserted byte."""
+
+    def take(self, byte: int) -> bool:
+        """Process one byte; return False when it is invalid here."""
+        spec = self._stuffing.spec
+        if spec.after:
+            if self._is_escaped:
+                self._is_escaped, self._tail = False, b""
+                return byte == spec.insert
+            self._tail = (self._tail + bytes((byte,)))[-len(spec.after) :]
+            self._is_escaped = self._tail == spec.after
+            self.plain.append(byte)
+            return True
+        if self._is_escaped:
+            self._is_escaped = False
+            meant = self._stuffing.meant.get(byte)
+            if meant is None:
+                return False
+            self.plain.append(meant)
+        elif byte == spec.byte:
+            self._is_escaped = True
+        else:
+            self.plain.append(byte)
+        return True
+
+    @property
+    def is_between(self) -> bool:
+        """Whether the next byte completes an escape."""
+        return self._is_escaped

@@ -1,0 +1,150 @@
+"""Timeout and removal of escape sequences, for any framing.
+
+Theory of operation. An incomplete frame blocks all later ones: a corrupted length field may demand
+bytes that never arrive. With a timeout, silence after the newest byte ends the wait. The beginning
+of the frame is then dropped byte by byte, and the frames in the remaining bytes are reported.
+Terminal escape sequences are removed before framing, so that they split neither markers nor texts.
+"""
+
+import re
+from typing import Final, NamedTuple
+
+from urc.protocol.framing.base import SKIPPED, Decoder, FrameFault, Framing
+from urc.protocol.framing.delimited import DelimiterFraming
+from urc.protocol.framing.receive_buffer import ReceiveBuffer
+
+__all__ = ["TimeoutFraming"]
+
+_SEQUENCE: Final = re.compile(
+    rb"\x1b(?:\[[0-?]{0,64}[ -/]{0,8}[@-~]|\][^\x07\x1b]{0,256}(?:\x07|\x1b\\)"
+    rb"|[ -/]{0,8}[0-Z\\^-~])"
+)
+"""ECMA-48: a control sequence, a command to the terminal such as its title, or a single escape."""
+_MOST_TRIES: Final = 4096
+"""Limit of attempts to find the beginning of another frame; each may scan all remaining bytes."""
+_LONGEST: Final = 300
+"""Longest incomplete escape sequence, in bytes."""
+
+
+class TimeoutFraming(NamedTuple):
+    """A framing with a timeout within frames, or with removal of escape sequences."""
+
+    framing: Framing
+    timeout_s: float | None
+    strips_ansi: bool
+
+    def encode(self, payload: bytes) -> bytes:
+        """Return the bytes of one frame, or raise `FramingError`."""
+        return self.framing.encode(payload)
+
+    def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
+        """Return a new decoder."""
+        return _PatientDecoder(ReceiveBuffer() if stream is None else stream, self)
+
+    def reversed(self) -> "TimeoutFraming":
+        """Return the same framing for the other end of the connection."""
+        return self._replace(framing=self.framing.reversed())
+
+
+class _PatientDecoder:
+    """Delegates to another decoder and adds the timeout."""
+
+    def __init__(self, stream: ReceiveBuffer, framing: TimeoutFraming) -> None:
+        self._stream = stream
+        self._framing = framing
+        self._decoder = framing.framing.decoder(stream)
+        self._newest: float | None = None
+        """Time of the newest byte; None before the first one."""
+        self._told: list[bytes | FrameFault] = []
+        """Frames and violations that the timeout has released."""
+        self._held = b""
+        """Beginning of an incomplete escape sequence."""
+
+    @property
+    def pending(self) -> int:
+        """Bytes held back."""
+        return self._decoder.pending + len(self._held)
+
+    @property
+    def deadline(self) -> float | None:
+        """End of the timeout, or the deadline of the framing itself."""
+        if self._told:
+            return float("-inf")
+        own, timeout = self._decoder.deadline, self._framing.timeout_s
+        if timeout is None or not self.pending or self._newest is None:
+            return own
+        ends = self._newest + timeout
+        return ends if own is None else min(own, ends)
+
+    def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
+        """Append bytes and return the completed frames, in order."""
+        self.push(data, now)
+        frames: list[bytes | FrameFault] = []
+        while (frame := self.next(now)) is not None:
+            frames.append(frame)
+        return frames
+
+    def push(self, data: bytes, now: float = 0.0) -> None:
+        """Append bytes for `next`."""
+        self._give_up(now)
+        if self._framing.strips_ansi:
+            data = self._stripped(data)
+        self._decoder.push(data, now)
+        self._newest = now
+
+    def next(self, now: float = 0.0) -> bytes | FrameFault | None:
+        """Return one frame or violation, or None if incomplete."""
+        if self._newest is None and len(self._stream):
+            self._newest = now  # bytes left by another decoder
+        if self._told:
+            return self._told.pop(0)
+        return self._decoder.next(now)
+
+    def tick(self, now: float) -> list[bytes | FrameFault]:
+        """Return the frames that the silence until `now` has completed or released."""
+        frames = self._decoder.tick(now)
+        self._give_up(now)
+        told, self._told = self._told, []
+        return told + frames
+
+    def _give_up(self, now: float) -> None:
+        """Drop the beginning of a stalled frame; record the frames after it."""
+        timeout, stream = self._framing.timeout_s, self._stream
+        if timeout is None or self._newest is None or now < self._newest + timeout:
+            return
+        self._held = b""
+        self._newest = None
+        is_lost, left = False, _MOST_TRIES
+        while len(stream):
+            before = stream.at
+            found = self._decoder.next(now) if is_lost else None
+            if isinstance(found, bytes):
+                self._told.append(found)
+                continue
+            if found is None:
+                left -= 1
+                if not left or isinstance(self._framing.framing, DelimiterFraming):
+                    before = len(stream.data)  # no further beginning of a frame exists
+                # No further bytes will arrive, so the buffered bytes are no frame.
+                stream.at = min(max(before + 1, stream.at), len(stream.data))
+                if not is_lost:
+                    text = f"a frame was incomplete for {timeout:g} s; dropped"
+                    self._told.append(FrameFault("frame-timeout", text))
+                is_lost = True
+                self._decoder = self._framing.framing.decoder(stream)
+            elif found.code == SKIPPED and stream.at == before:
+                stream.at += 1
+
+    def _stripped(self, data: bytes) -> bytes:
+        whole = self._held + data
+        self._held = b""
+        if b"\x1b" not in whole:
+            return whole
+        text = _SEQUENCE.sub(b"", whole)
+        place = text.find(b"\x1b")
+        if place < 0:
+            return text
+        if len(text) - place <= _LONGEST:
+            self._held = text[place:]
+            return text[:place]
+        return text.replace(b"\x1b", b"")

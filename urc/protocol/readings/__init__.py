@@ -1,0 +1,1 @@
+"""Signals from decoded fields: conversion, alarms and change filters."""

@@ -1,0 +1,68 @@
+"""Dead band and debounce of samples.
+
+Pure: time is passed in. See ``deadband`` and ``debounce`` of a signal.
+"""
+
+from urc.model.values import Reading, Sample, Signal
+
+__all__ = ["DataChangeFilter"]
+
+
+class DataChangeFilter:
+    """The last reported sample of one signal, and the pending one."""
+
+    __slots__ = ("_band", "_pending", "_settle_s", "_since", "_told")
+
+    def __init__(self, signal: Signal) -> None:
+        self._band = signal.deadband
+        self._settle_s = signal.debounce_s
+        self._told: Sample | None = None
+        self._pending: Sample | None = None
+        self._since = 0.0
+        """Time of the first sample with the value of `_pending`."""
+
+    @property
+    def deadline(self) -> float | None:
+        """Time at which `tick` has a sample to report."""
+        return None if self._pending is None else self._since + self._settle_s
+
+    def take(self, sample: Sample, now: float) -> Sample | None:
+        """Return the sample to report: the new one, an update of the last one, or None."""
+        told = self._told
+        if told is not None and sample.alarm == told.alarm and self._is_same(sample, told):
+            self._pending = None
+            self._told = sample._replace(value=told.value)
+            return self._told
+        if told is None or not self._settle_s:
+            return self._tell(sample)
+        if self._pending is None or not self._is_same(sample, self._pending):
+            self._since = now
+        self._pending = sample
+        return self.tick(now)
+
+    def tick(self, now: float) -> Sample | None:
+        """Return the pending sample if its value has lasted long enough by `now`, else None."""
+        due = self.deadline
+        if self._pending is None or due is None or now < due:
+            return None
+        return self._tell(self._pending)
+
+    def _tell(self, sample: Sample) -> Sample:
+        self._pending = None
+        self._told = sample
+        return sample
+
+    def _is_same(self, one: Sample, other: Sample) -> bool:
+        return _is_within(one.value, other.value, self._band)
+
+
+def _is_within(one: Reading, other: Reading, band: float) -> bool:
+    if not band:
+        return one == other
+    if isinstance(one, tuple) and isinstance(other, tuple):
+        return len(one) == len(other) and all(
+            _is_within(a, b, band) for a, b in zip(one, other, strict=True)
+        )
+    if isinstance(one, (int, float)) and isinstance(other, (int, float)):
+        return abs(one - other) < band
+    return one == other

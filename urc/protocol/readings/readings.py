@@ -1,0 +1,225 @@
+"""Samples of one engine: conversion of fields, alarms, and computed signals.
+
+Pure: time is passed in. Each engine has one `Readings`. A signal that several frames set has one
+alarm state, and a computed signal reads the newest value of each input.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import NamedTuple
+
+from urc.expressions import ExpressionError, Template, defaulted_names
+from urc.model.values import NOTHING, Alarm, AlarmLimits, Reading, Sample, Signal
+from urc.protocol.readings.alarms import AlarmMonitor
+from urc.protocol.readings.data_change_filter import DataChangeFilter
+from urc.protocol.values.convert import BadValue
+from urc.protocol.values.decode import Convert, build_converter
+
+__all__ = ["Decode", "Readings"]
+
+Decode = Callable[[Mapping[str, object], float], tuple[list[Sample], list[str]]]
+"""Fields of a frame and the time → samples, and one text for each refused value."""
+
+
+class _Computed(NamedTuple):
+    name: str
+    formula: Template
+    inputs: tuple[str, ...]
+    spare: frozenset[str]
+    """Optional inputs: the formula works without them."""
+    shortest_s: float
+    """Shortest ``stale_after`` of its inputs, in seconds."""
+    convert: Convert
+
+
+class Readings:
+    """The newest values of the inputs of formulas, and the alarm states of all signals.
+
+    Args:
+        signals: as loaded: no computed signal depends on itself.
+        names: names for formulas besides signals, such as ``settings``.
+    """
+
+    def __init__(
+        self, signals: Mapping[str, Signal], names: Mapping[str, object] = NOTHING
+    ) -> None:
+        self.signals = signals
+        self.settings: Mapping[str, object] = names.get("settings", NOTHING)  # type: ignore[assignment]
+        self._converters: dict[str, Convert] = {}
+        self._judges = {
+            name: AlarmMonitor(one.limits)
+            for name, one in signals.items()
+            if one.limits != AlarmLimits()
+        }
+        self._steady = {
+            name: DataChangeFilter(one)
+            for name, one in signals.items()
+            if one.deadband or one.debounce_s
+        }
+        self._timed = tuple(name for name in self._judges if signals[name].limits.for_s > 0)
+        self._last: dict[str, Sample] = {}
+        """Newest sample of each input of a formula, and of each signal in `_timed`."""
+        self._namespace: dict[str, object] = dict(names)
+        self._computed = tuple(self._in_order())
+        inputs = (name for one in self._computed for name in one.inputs)
+        self._kept = frozenset((*inputs, *self._timed))
+
+    def decoder(self, fields: Iterable[str]) -> Decode:
+        """Return the function that converts the fields of one kind of frame to samples.
+
+        Fields whose name starts with ``_`` are private to the document and give no samples.
+        """
+        converters = {name: self._converter(name) for name in fields if not name.startswith("_")}
+
+        def decode(found: Mapping[str, object], now: float) -> tuple[list[Sample], list[str]]:
+            samples: list[Sample] = []
+            refused: list[str] = []
+            for name, raw in found.items():
+                convert = converters.get(name)
+                if convert is None:
+                    continue
+                try:
+                    value = convert(raw)
+                except BadValue as error:
+                    refused.append(f"{name}: {error}")
+                else:
+                    sample = Sample(name, value, now, self.alarm(name, value, now))
+                    told = self._told(sample, now) if self._steady else sample
+                    if told is not None:
+                        samples.append(told)
+            if self._kept:
+                self.follow(samples, refused, now)
+            return samples, refused
+
+        return decode
+
+    def put(self, values: Mapping[str, object], now: float) -> tuple[list[Sample], list[str]]:
+        """Convert values from another source than a frame, as a decoder converts fields."""
+        return self.decoder(values)(values, now)
+
+    def alarm(self, name: str, value: Reading, now: float) -> Alarm:
+        """Update the alarm state of a signal, and return it."""
+        judge = self._judges.get(name)
+        return "" if judge is None else judge.judge(value, now)
+
+    def judges(self, name: str) -> bool:
+        """Return whether the signal has limits."""
+        return name in self._judges
+
+    def keeps(self, name: str) -> bool:
+        """Return whether a formula or a timed alarm uses the signal, for `follow`."""
+        return name in self._kept
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether time alone can change a sample."""
+        return bool(self._timed or self._steady)
+
+    @property
+    def deadline(self) -> float | None:
+        """Time at which `tick` may have samples; None when only a frame can change them."""
+        if not self._timed and not self._steady:
+            return None
+        times = [self._judges[name].deadline for name in self._timed]
+        times += [one.deadline for one in self._steady.values()]
+        return min((time for time in times if time is not None), default=None)
+
+    def tick(self, now: float) -> list[Sample]:
+        """Return the samples that time alone has changed until `now`, with their own times.
+
+        The list has the newest samples of signals with a new alarm, and debounced values.
+        """
+        samples: list[Sample] = []
+        if self._steady:
+            settled = (one.tick(now) for one in self._steady.values())
+            samples += [sample for sample in settled if sample is not None]
+            self.follow(samples, [], now)
+        for name in self._timed:
+            due = self._judges[name].deadline
+            if due is not None and due <= now:
+                sample = self._last[name]._replace(alarm=self._judges[name].tick(now))
+                self._last[name] = sample
+                samples.append(sample)
+        return samples
+
+    def follow(self, samples: list[Sample], refused: list[str], now: float) -> None:
+        """Append to `samples` all signals that are computed from them."""
+        changed = set()
+        for taken in samples:
+            if taken.signal in self._kept:
+                self._keep(taken)
+                changed.add(taken.signal)
+        for computed in self._computed:
+            if changed.isdisjoint(computed.inputs):
+                continue
+            try:
+                sample = self._compute(computed, now)
+            except (BadValue, ExpressionError) as error:
+                refused.append(f"{computed.name}: {error}")
+                continue
+            if sample is not None and self._steady:
+                sample = self._told(sample, now)
+            if sample is not None:
+                samples.append(sample)
+                self._keep(sample)
+                changed.add(computed.name)
+
+    def _told(self, sample: Sample, now: float) -> Sample | None:
+        """Return the sample to report; None while dead band or debounce suppress it."""
+        steady = self._steady.get(sample.signal)
+        return sample if steady is None else steady.take(sample, now)
+
+    def _keep(self, sample: Sample) -> None:
+        if sample.signal in self._kept:
+            self._last[sample.signal] = sample
+            self._namespace[sample.signal] = sample.value
+
+    def _compute(self, computed: _Computed, now: float) -> Sample | None:
+        """Return the sample, or None while a required input has never been read."""
+        time_s, is_absent = now, False
+        for name in computed.inputs:
+            sample = self._last.get(name)
+            if sample is None:
+                if name in computed.spare:
+                    continue
+                return None
+            # A computed sample becomes stale together with the first of its inputs.
+            left_s = self.signals[name].stale_after_s - computed.shortest_s
+            time_s = min(time_s, sample.time_s + left_s)
+            is_absent |= sample.value is None
+        try:
+            value = computed.convert(computed.formula.evaluate(self._namespace))
+        except ExpressionError:
+            if not is_absent:
+                raise
+            value = None
+        return Sample(computed.name, value, time_s, self.alarm(computed.name, value, now))
+
+    def _converter(self, name: str) -> Convert:
+        if name not in self._converters:
+            self._converters[name] = build_converter(self.signals[name])
+        return self._converters[name]
+
+    def _in_order(self) -> Iterable[_Computed]:
+        """Yield the computed signals, each after its inputs."""
+        waiting = {name: one for name, one in self.signals.items() if one.formula is not None}
+        while waiting:
+            ready = [
+                name
+                for name, one in waiting.items()
+                if one.formula and not any(other in waiting for other in one.formula.names)
+            ]
+            if not ready:
+                raise ValueError(f"signals depend on each other: {', '.join(waiting)}")
+            for name in ready:
+                formula = waiting.pop(name).formula
+                if formula is not None:
+                    inputs = tuple(one for one in sorted(formula.names) if one in self.signals)
+                    ages = [self.signals[one].stale_after_s for one in inputs]
+                    yield _Computed(
+                        name,
+                        formula,
+                        inputs,
+                        defaulted_names(formula),
+                        min(ages, default=0.0),
+                        self._converter(name),
+                    )

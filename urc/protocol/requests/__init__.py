@@ -1,0 +1,1 @@
+"""Requests and replies on one line: queue, rate limit, matching, timeouts."""

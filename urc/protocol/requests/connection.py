@@ -1,0 +1,188 @@
+"""State of the connection of one transport: opening, readiness, and closing.
+
+Pure. See `urc.protocol.requests.conversation` for the theory of operation.
+"""
+
+from collections.abc import Callable
+from typing import Literal
+
+from urc.model.driver import TransportSpec
+from urc.protocol.events import Close, Ready, Violation
+from urc.protocol.framing.base import Framing
+from urc.protocol.framing.table import build_framing
+from urc.protocol.requests.exchange import (
+    ConnectionClosing,
+    Exchange,
+    ExchangeEnded,
+    ExchangeOutcome,
+    LineEvent,
+)
+from urc.protocol.requests.frame_receiver import FrameReceiver
+from urc.protocol.requests.hold_replies import HoldReplies
+from urc.protocol.requests.pending_replies import PendingReplies
+from urc.protocol.requests.rate import Counters
+from urc.protocol.requests.reply_match import Matcher
+from urc.protocol.requests.request_queue import RequestQueue
+
+__all__ = ["Connection"]
+
+
+class Connection:
+    """The parts of a conversation, and their handling of an opened or closed transport."""
+
+    def __init__(self, spec: TransportSpec, messages: list[Matcher]) -> None:
+        self.spec = spec
+        self.is_per_request = spec.connection == "per_request"
+        """Whether each request opens its own connection."""
+        self.framing: Framing = build_framing(spec.framing)
+        self.state: Literal["closed", "opening", "open"] = "closed"
+        self.is_ready = False
+        """Whether all requests may be sent; otherwise only those of the login and of the close."""
+        self.last_sent = float("-inf")
+        """Time of the last sent frame that resets the watchdog of the robot."""
+        self.counting: frozenset[str] | None = None
+        """Labels of requests that reset the watchdog of the robot; None: all."""
+        self.counters = Counters()
+        self.learnt: dict[str, object] = {}
+        """Names read by the steps of this connection: ``_name`` → value."""
+        self.on_ready: Callable[[], None] | None = None
+        """Called when the connection is ready; must not call the conversation back."""
+        self.on_refused: Callable[[str, str], None] | None = None
+        """Called with a held command and the refusal of the robot; must not call the conversation
+        back."""
+        self._flights = PendingReplies()
+        self._outbox = RequestQueue(spec, self._flights, self._size_of)
+        self.inbox = FrameReceiver(spec, self.framing, messages)
+        self.held = HoldReplies()
+        """Replies to hold-to-run commands."""
+        self.is_behind = False
+        """Whether received frames wait for `go_on`."""
+        self._askers: dict[object, object] = {}
+        """Numbers of requests made by steps → owner of the expected reply, if any."""
+        self._is_leaving = False
+        self._misses = 0
+        """Missing replies in a row."""
+        self._silent_at: float | None = None
+        """Time at which the connection counts as stale."""
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the transport is connected."""
+        return self.state == "open"
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether the robot has been silent for longer than `stale_after`."""
+        return self.is_open and self.spec.stale_after_s is not None and self._silent_at is None
+
+    def opened(self, now: float) -> list[LineEvent]:
+        """Record a new connection, on which nothing has been received yet."""
+        events = (
+            self._lose("the connection was replaced by a new one") if self.state == "open" else []
+        )
+        self._reset("open")
+        self.last_sent = now
+        self._hear(now)
+        if not self.spec.on_connect:
+            self._get_ready()
+        return events + self._pump(now)
+
+    def ready(self, now: float) -> list[LineEvent]:
+        """Allow all requests: the login is complete."""
+        self._get_ready()
+        return [Ready(self.spec.name), *self._pump(now)]
+
+    def _get_ready(self) -> None:
+        self.is_ready = True
+        if self.on_ready is not None:
+            self.on_ready()
+
+    def closed(self, reason: str, now: float) -> list[LineEvent]:
+        """Record that the transport is not connected."""
+        if self.state == "closed":
+            return []
+        events: list[LineEvent] = []
+        was_open, pending = self.state == "open", self.inbox.decoder.pending
+        if was_open and pending:
+            text = f"the connection ended in the middle of a frame ({pending} bytes)"
+            events.append(Violation(self.spec.name, "cut-frame", text))
+        events += self._lose(reason or "the robot closed the connection")
+        return events + self._pump(now)
+
+    def give_up(self, reason: str, now: float) -> list[LineEvent]:
+        """Close the connection for a reason; its requests fail."""
+        if self.state == "closed":
+            return []
+        reason = self.inbox.secrets.hide(reason)
+        events = self._lose(reason)
+        events.append(Close(self.spec.name, reason))
+        return events + self._pump(now)
+
+    def leave(self, now: float) -> list[LineEvent]:
+        """Begin an orderly close: run ``on_close`` if declared, otherwise close at once."""
+        if self.state != "open":
+            return []
+        if self.spec.on_close:
+            lost = self._lost()
+            self.is_ready, self._is_leaving = False, True
+            return [
+                *_disconnected(lost, "the connection is being closed"),
+                ConnectionClosing(self.spec.name),
+            ]
+        return self.shut(now)
+
+    def shut(self, now: float) -> list[LineEvent]:
+        """Close after the steps of ``on_close``."""
+        events = self._lose("the connection was closed")
+        return [*events, Close(self.spec.name), *self._pump(now)]
+
+    def _lose(self, reason: str) -> list[LineEvent]:
+        """Discard the connection, and fail its requests."""
+        lost = self._lost()
+        for exchange in tuple(self._outbox):
+            if exchange.is_privileged:
+                self._outbox.remove(exchange)
+        self._reset("closed")
+        return _disconnected(lost, self.inbox.secrets.hide(reason))
+
+    def _lost(self) -> list[Exchange]:
+        """Remove the requests that end with this connection, and return them."""
+        lost = self._flights.drain()
+        if not self.is_per_request:
+            return lost + self._outbox.drain()
+        if not (self.is_ready or self._is_leaving):
+            for exchange in list(self._outbox)[:1]:  # its connection did not become ready
+                self._outbox.remove(exchange)
+                lost.append(exchange)
+        return lost
+
+    def _reset(self, state: Literal["closed", "open"]) -> None:
+        self.state = state
+        self.is_ready = self._is_leaving = False
+        self._flights.clear()
+        self.held.forget()
+        self.inbox.reset(is_new=state == "open")
+        self._misses = 0
+        self._silent_at = None
+        self.is_behind = False
+        self.learnt = {}
+        self._askers.clear()
+        if state == "open":
+            self.counters.begin()
+
+    def _hear(self, now: float) -> None:
+        if self.spec.stale_after_s is not None:
+            self._silent_at = now + self.spec.stale_after_s
+
+    def _size_of(self, exchange: Exchange) -> int:
+        """Return the size of a request on the wire, in bytes."""
+        raise NotImplementedError
+
+    def _pump(self, now: float) -> list[LineEvent]:
+        """Send queued requests, as far as the state of the connection allows."""
+        raise NotImplementedError
+
+
+def _disconnected(lost: list[Exchange], reason: str) -> list[LineEvent]:
+    outcome = ExchangeOutcome("disconnected", reason)
+    return [ExchangeEnded(exchange, outcome) for exchange in lost]

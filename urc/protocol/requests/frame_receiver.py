@@ -1,0 +1,286 @@
+"""Received frames of one connection that are no replies.
+
+Pure. See `urc.protocol.requests.conversation` for the theory of operation.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Final
+
+from urc.expressions import quoted
+from urc.model.driver import TransportSpec
+from urc.model.payload import CountedFrame
+from urc.model.values import Sample
+from urc.patterns import Pattern
+from urc.protocol.events import Samples, Send, Violation
+from urc.protocol.forms.http_head import is_redirect
+from urc.protocol.framing.base import Decoder, Framing, StreamDecoder
+from urc.protocol.framing.receive_buffer import ReceiveBuffer
+from urc.protocol.requests.exchange import LineEvent
+from urc.protocol.requests.message_effects import Acknowledgements, Collector
+from urc.protocol.requests.messages import Messages
+from urc.protocol.requests.reply_match import (
+    Expectation,
+    Fields,
+    Matched,
+    Matcher,
+    MatchResult,
+    shown,
+)
+from urc.protocol.values.payload import BadText, Frame
+
+__all__ = ["FrameReceiver"]
+
+
+_HIDDEN: Final = "•••"
+_MOST_SECRETS: Final = 8
+_SHORTEST: Final = 3
+"""Shorter secrets would redact parts of many words, so the whole message is hidden."""
+
+
+class SentSecrets:
+    """Secrets sent on a connection, hidden even when the robot echoes them."""
+
+    __slots__ = ("_texts",)
+
+    def __init__(self) -> None:
+        self._texts: deque[str] = deque(maxlen=_MOST_SECRETS)
+
+    def add(self, data: bytes, encoding: str) -> None:
+        """Register bytes that contain a secret."""
+        text = data.decode(encoding, "replace").strip()
+        if text:
+            self._texts.append(text)
+
+    def hide(self, text: str) -> str:
+        """Return a message with its secrets redacted."""
+        for secret in self._texts:
+            if secret in text:
+                text = text.replace(secret, _HIDDEN) if len(secret) >= _SHORTEST else _HIDDEN
+        return text
+
+
+new = tuple.__new__
+"""Makes a named tuple faster than its class does; every frame needs one."""
+_SHOWN_BYTES = 20
+"""Bytes of an unknown frame that messages show."""
+_NO_MATCH = "nothing declared matches "
+
+
+class FrameReceiver:
+    """The received stream of one connection: framing, messages and expectations."""
+
+    def __init__(self, spec: TransportSpec, framing: Framing, messages: list[Matcher]) -> None:
+        self._spec = spec
+        self._name = spec.name
+        self._framing = framing
+        self.messages = Messages(messages)
+        self._stream = ReceiveBuffer()
+        self._cut(framing)
+        self.secrets = SentSecrets()
+        self.replies = Acknowledgements()
+        """Acknowledgements of messages that wait to be sent."""
+        self.collectors: list[Collector] = []
+        """Collectors of messages, cleared with the connection."""
+        self._ears: list[Expectation] = []
+        self._prompt: tuple[Pattern, Expectation] | None = None
+        self.is_listening = False
+        """Whether an expectation waits for a frame or a prompt."""
+        self._stray: tuple[float, str] = (float("-inf"), "")
+
+    def reset(self, *, is_new: bool) -> None:
+        """Clear the state of a connection.
+
+        Secrets stay until the next connection, for late messages.
+        """
+        self._stream = ReceiveBuffer()
+        self._cut(self._framing)
+        self._ears.clear()
+        self._prompt = None
+        self.is_listening = False
+        self.replies.clear()
+        for one in self.collectors:
+            one.forget()
+        if is_new:
+            self.secrets = SentSecrets()
+
+    def cut_by(self, framing: Framing) -> None:
+        """Use `framing` from now on, beginning with the remaining bytes."""
+        if framing is not self._cut_by:
+            self._cut(framing)
+
+    @property
+    def has_more(self) -> bool:
+        """Whether bytes remain that may contain frames."""
+        return self._stream.at < len(self._stream.data)
+
+    def _cut(self, framing: Framing) -> None:
+        self._cut_by = framing
+        self.decoder: Decoder = framing.decoder(self._stream)
+        self.is_timed = getattr(type(self.decoder), "deadline", None) is not StreamDecoder.deadline
+        """Whether a timeout alone may complete a frame."""
+
+    def tell(self, frame: Frame, now: float) -> list[LineEvent]:
+        """Return the events of a frame that is no reply."""
+        heard = self._listeners(frame, now) if self._ears else None
+        told = self.message(frame, now)
+        if heard is None and told is None:
+            fault = self._unknown(frame)
+            self._stray = (now, fault.message)
+            return [fault]
+        return told or [] if heard is None else heard + (told or [])
+
+    def came_since(self, since: float, instead: str) -> str:
+        """Return an addition to "no answer": the frame that arrived instead, or "".
+
+        Args:
+            since: start of the wait.
+            instead: end of the sentence "which is …", such as "no answer to home".
+        """
+        time_s, text = self._stray
+        if time_s < since:
+            return ""
+        shown = text.removeprefix(_NO_MATCH)
+        return f"; {shown} came, which is {instead}" if shown != text else f"; {text}"
+
+    def listen(self, ear: Expectation) -> None:
+        """Add an expectation for frames that are no replies."""
+        self._ears.append(ear)
+        self.is_listening = True
+
+    @property
+    def framing(self) -> Framing | None:
+        """Framing of the expectations; None: that of the connection."""
+        return next((ear.answer.framing for ear in self._ears if ear.answer.framing), None)
+
+    def look_for(self, pattern: Pattern, ear: Expectation) -> list[LineEvent]:
+        """Look for `pattern` in the text after the last whole frame, for `ear`."""
+        self._prompt = (pattern, ear)
+        self.is_listening = True
+        return self.look()
+
+    def unlisten(self, ear: Expectation) -> None:
+        """Remove an expectation."""
+        self._ears = [one for one in self._ears if one is not ear]
+        if self._prompt is not None and self._prompt[1] is ear:
+            self._prompt = None
+        self.is_listening = bool(self._ears) or self._prompt is not None
+
+    @property
+    def is_prompted(self) -> bool:
+        """Whether an expectation waits for a prompt."""
+        return self._prompt is not None
+
+    def look(self) -> list[LineEvent]:
+        """Look for the expected prompt."""
+        if self._prompt is None:
+            return []
+        pattern, ear = self._prompt
+        stream = self._stream
+        text = stream.data[stream.at :].decode(self._spec.encoding, "replace")
+        if not text or pattern.search(text) is None:
+            return []
+        stream.at = len(stream.data)
+        self._cut(self._cut_by)
+        self._prompt = None
+        self.is_listening = bool(self._ears)
+        return [Matched(ear, MatchResult({}))]
+
+    def message(self, frame: Frame, now: float) -> list[LineEvent] | None:
+        """Return the events of a declared message, or None for other frames."""
+        taken = self.messages.take(frame, now)
+        return None if taken is None else self.told(*taken)
+
+    def _listeners(self, frame: Frame, now: float) -> list[LineEvent] | None:
+        for ear in self._ears:
+            offer = ear.offer(frame)
+            if offer is not None:
+                return self._said(ear, offer, now)
+        return None
+
+    def _said(self, ear: Expectation, offer: MatchResult, now: float) -> list[LineEvent]:
+        """Return the events of a frame that matches an expectation."""
+        events: list[LineEvent] = self.dropped(offer)
+        if offer.fields is not None:
+            events += self.samples(ear.answer.matcher, offer.fields, now)[0]
+        elif offer.told is not None:
+            events += self.samples(*offer.told, now)[0]
+        if offer.fields is not None or offer.refusal:
+            self.unlisten(ear)
+            events.append(Matched(ear, offer))
+        return events
+
+    def answered(self, asker: object, frame: Frame, refusal: str, now: float) -> list[LineEvent]:
+        """Return the events of a reply to a request of `asker`, for the step that expects it.
+
+        Args:
+            asker: the sequence that made the request; only it receives the reply.
+            frame: the reply.
+            refusal: the refusal of the robot; "" for none.
+            now: the time.
+        """
+        ear = next((one for one in self._ears if one.owner is asker), None)
+        if ear is None:
+            return []
+        offer = ear.offer(frame)
+        is_redirected = ear.answer.takes_redirects and is_redirect(frame)
+        if refusal and not is_redirected and (offer is None or not offer.refusal):
+            offer = MatchResult(refusal=refusal)
+        if offer is None:
+            offer = MatchResult(refusal=f"its reply does not match the declaration: {shown(frame)}")
+        return self._said(ear, offer, now)
+
+    def dropped(self, offer: MatchResult) -> list[LineEvent]:
+        """Return the events for collected lines that were no reply."""
+        return [Violation(self._spec.name, "no-match", offer.dropped)] if offer.dropped else []
+
+    def _unknown(self, frame: Frame) -> Violation:
+        """Return the violation for an unknown frame."""
+        fault = getattr(frame, "fault", "")
+        if fault:
+            return Violation(self._spec.name, "bad-value", self.secrets.hide(fault))
+        if frame.topic is not None:
+            where = f"nothing declared matches the data on {frame.topic!r}"
+            return Violation(self._spec.name, "no-match", self.secrets.hide(where))
+        was_text_wanted = getattr(frame, "was_text_wanted", False)
+        try:
+            text = self.secrets.hide(frame.text)
+        except BadText as error:
+            if was_text_wanted:
+                return Violation(self._spec.name, "bad-text", str(error))
+            return Violation(self._spec.name, "no-match", f"{_NO_MATCH}{self._in_hex(frame)}")
+        return Violation(self._spec.name, "no-match", f"{_NO_MATCH}{quoted(text, most=60)}")
+
+    def samples(
+        self, matcher: Matcher, found: Fields, now: float
+    ) -> tuple[list[LineEvent], list[Sample]]:
+        """Return the events for the fields of a frame, and their samples."""
+        samples, refused = matcher.decode(found, now)
+        return self.told(samples, refused), samples
+
+    def told(self, samples: list[Sample], refused: Sequence[str]) -> list[LineEvent]:
+        """Return the events for samples and refused values.
+
+        A valid frame without values gives an event, too: it shows that the robot is alive.
+        """
+        if not refused and not self.replies:
+            return [new(Samples, (self._name, tuple(samples)))]
+        name = self._spec.name
+        events: list[LineEvent] = []
+        if samples or not refused:
+            events.append(Samples(name, tuple(samples)))
+        events += [Violation(name, "bad-value", line) for line in refused]
+        if self.replies:
+            for one in self.replies:
+                shared = one if isinstance(one, CountedFrame) else None
+                data = one.numbered.data if isinstance(one, CountedFrame) else one
+                events.append(Send(name, data, counted=shared))
+            self.replies.clear()
+        return events
+
+    def _in_hex(self, frame: Frame) -> str:
+        data = frame.payload if isinstance(frame.payload, bytes) else b""
+        text = data.decode(self._spec.encoding, "replace")
+        if self.secrets.hide(text) != text:
+            return f"{len(data)} bytes, with a secret among them"
+        return data[:_SHOWN_BYTES].hex(" ") + (" …" if len(data) > _SHOWN_BYTES else "")

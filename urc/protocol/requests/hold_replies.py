@@ -1,0 +1,142 @@
+"""Replies to frames of motion: acknowledgements and refusals.
+
+Pure. Frames of motion bypass the queue of their connection, so they have no pending reply. A robot
+that replies to each frame is handled here: an acknowledgement is no stray frame, and a refusal ends
+the motion. An unsolicited refusal counts as well, such as that of a controller with an open guard.
+
+In half duplex, frames of motion wait for an outstanding reply, and queued requests wait for the
+replies to motion. Both waits are short, because a lost reply must not prevent motion. A stop
+bypasses this module and never waits.
+
+A command expects replies from its first frame on, until the reply timeout of the newest frame.
+"""
+
+from collections.abc import Mapping
+from typing import Final, NamedTuple
+
+from urc.expressions import ExpressionError, Template
+from urc.protocol.requests.reply_match import CompiledReply, Expectation, Fields, MatchResult
+from urc.protocol.values.payload import Frame
+from urc.protocol.values.wire_text import WireText
+
+__all__ = ["LONGEST_WAIT_S", "HoldReplies", "HoldRejected"]
+
+LONGEST_WAIT_S: Final = 0.1
+"""Longest wait for an outstanding reply in half duplex, in seconds."""
+_NOTHING: Mapping[str, object] = {}
+
+
+class HoldRejected(NamedTuple):
+    """A refusal of a held command by the robot."""
+
+    command: str
+    offer: MatchResult
+
+
+class _Listening:
+    """The newest frame of one held command."""
+
+    __slots__ = ("_match", "ear", "names", "until_s")
+
+    def __init__(self, answer: CompiledReply, match: Template | None) -> None:
+        self.ear = Expectation(answer)
+        # Many frames are pending, so a number cannot be assigned to one of them: any number
+        # matches.
+        self._match = None if match is None or "seq" in match.names else match
+        self.names = _NOTHING
+        self.until_s = float("-inf")
+
+    def is_mine(self, fields: Fields) -> bool:
+        """Return whether the fields of a frame belong to this command."""
+        if self._match is None:
+            return True
+        names: dict[str, object] = dict(self.names)
+        names |= {
+            name: WireText(raw) if isinstance(raw, str) else raw for name, raw in fields.items()
+        }
+        try:
+            return bool(self._match.evaluate(names))
+        except ExpressionError:
+            return False
+
+
+class HoldReplies:
+    """The held commands of one connection that have replies."""
+
+    def __init__(self) -> None:
+        self._all: dict[str, _Listening] = {}
+        self._until_s = float("-inf")
+        self.owed_until_s = float("-inf")
+        """End of the wait for a reply to motion."""
+        self._waits_since_s: float | None = None
+
+    def add(self, command: str, answer: CompiledReply, match: Template | None) -> None:
+        """Expect the replies to a command, once it has been sent."""
+        self._all[command] = _Listening(answer, match)
+
+    def gave(self, command: str, names: Mapping[str, object], now: float) -> None:
+        """Record that a frame of a command is sent, with its `names`."""
+        one = self._all.get(command)
+        if one is not None:
+            self.owed_until_s = now + min(one.ear.answer.timeout_s, LONGEST_WAIT_S)
+            one.names = names
+            one.until_s = now + one.ear.answer.timeout_s
+            self._until_s = max(self._until_s, one.until_s)
+
+    def forget(self) -> None:
+        """Discard the state of a closed connection."""
+        self._until_s = self.owed_until_s = float("-inf")
+        self._waits_since_s = None
+        for one in self._all.values():
+            one.until_s = float("-inf")
+
+    def must_wait(self, now: float, *, is_owed: bool) -> bool:
+        """Return whether a frame of motion has to wait in half duplex.
+
+        Args:
+            now: the time.
+            is_owed: whether another reply is outstanding.
+        """
+        if not is_owed and now >= self.owed_until_s:
+            self._waits_since_s = None
+            return False
+        if self._waits_since_s is None:
+            self._waits_since_s = now
+        if now - self._waits_since_s < LONGEST_WAIT_S:
+            return True
+        self._waits_since_s = None
+        return False
+
+    def is_listening(self, now: float) -> bool:
+        """Return whether a reply to a frame of motion may still arrive."""
+        return now < self._until_s
+
+    def refusals(self, frame: Frame, now: float) -> list[HoldRejected]:
+        """Return all held commands that a frame may refuse."""
+        found = [
+            HoldRejected(name, offer)
+            for name, one in self._listening(now)
+            if (offer := one.ear.beside(frame, one.is_mine)) is not None and offer.refusal
+        ]
+        if found:
+            self.owed_until_s = float("-inf")
+        return found
+
+    def refuse(self, frame: Frame, reason: str, now: float) -> list[HoldRejected]:
+        """Return the refusals of a known error reply, with the texts of the driver."""
+        plain = [
+            HoldRejected(name, MatchResult(refusal=reason)) for name, _ in self._listening(now)
+        ]
+        return self.refusals(frame, now) or plain
+
+    def accepted(self, frame: Frame, now: float) -> tuple[CompiledReply, MatchResult] | None:
+        """Return the match result of an acknowledgement, or None for other frames."""
+        for _, one in self._listening(now):
+            offer = one.ear.offer(frame, one.is_mine)
+            if offer is not None:
+                self.owed_until_s = float("-inf")
+                return one.ear.answer, offer
+        return None
+
+    def _listening(self, now: float) -> list[tuple[str, _Listening]]:
+        return [(name, one) for name, one in self._all.items() if now < one.until_s]

@@ -1,0 +1,146 @@
+"""Effects of messages besides their samples: collection over several frames, and acknowledgement.
+
+Pure. Both effects belong to the step from fields to samples, which runs exactly once per message.
+Collected values are cleared with the connection. Acknowledgements wait in `Acknowledgements` until
+the conversation has reported the frame.
+"""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Final
+
+from urc.expressions import COUNTERS, ExpressionError, Template
+from urc.model.payload import Collect, CountedFrame, Numbered, Payload
+from urc.protocol.readings.readings import Decode
+from urc.protocol.requests.encode import BadArgument, Encode
+from urc.protocol.requests.rate import Counters
+from urc.protocol.values.convert import Unusable
+
+__all__ = ["Collector", "Acknowledgements", "answering", "collecting"]
+
+MOST_REPLIES: Final = 256
+"""Largest number of pending acknowledgements; each frame makes at most one."""
+
+
+class Acknowledgements(list[Payload | CountedFrame]):
+    """Pending acknowledgements of messages, in order."""
+
+
+class Collector:
+    """One value that is collected from several frames."""
+
+    def __init__(self, spec: Collect) -> None:
+        self._spec = spec
+        self._parts: list[object] | None = None
+        self._size = 0
+        self.forget()
+
+    def forget(self) -> None:
+        """Reset for a new connection: without ``begin``, the first frame is the first part."""
+        self._parts = [] if self._spec.begin is None else None
+        self._size = 0
+
+    def take(self, names: Mapping[str, object]) -> object:
+        """Process the fields of a frame; return the complete value, or None."""
+        spec, whole = self._spec, None
+        if spec.begin is not None and _holds(spec.begin, names):
+            if spec.end is None and self._parts is not None:
+                whole = _joined(self._parts)
+            self._parts, self._size = [], 0
+        if self._parts is None:
+            if spec.begin is None and _holds(spec.end, names):
+                self.forget()
+            return whole
+        try:
+            value = spec.value.evaluate(names)
+        except ExpressionError as error:
+            self._parts = None
+            return Unusable(f"a part cannot be collected: {error}")
+        self._size += len(value) if isinstance(value, (list, tuple, bytes)) else 1
+        if self._size > spec.max:
+            self._parts = None
+            return Unusable(f"more than {spec.max} values came before the last; dropped")
+        self._parts.append(value)
+        if spec.end is not None and _holds(spec.end, names):
+            whole = _joined(self._parts)
+            self.forget()
+        return whole
+
+
+def _holds(condition: Template | None, names: Mapping[str, object]) -> bool:
+    try:
+        return condition is not None and bool(condition.evaluate(names))
+    except ExpressionError:
+        return False  # it reads a field of another frame
+
+
+def _joined(parts: list[object]) -> object:
+    """Return bytes joined, lists joined, and other values as a list."""
+    if parts and all(isinstance(part, bytes) for part in parts):
+        return b"".join(part for part in parts if isinstance(part, bytes))
+    whole: list[object] = []
+    for part in parts:
+        whole += part if isinstance(part, (list, tuple)) else (part,)
+    return whole
+
+
+def collecting(
+    collectors: Mapping[str, Collector], settings: Mapping[str, object], decode: Decode
+) -> Decode:
+    """Return a variant of `decode` that adds the collected values to the fields."""
+
+    def decode_collected(found: Mapping[str, object], now: float) -> object:
+        names = {"settings": settings, **found}
+        fields = dict(found)
+        for name, collector in collectors.items():
+            whole = collector.take(names)
+            if whole is not None:
+                fields[name] = whole
+        return decode(fields, now)
+
+    return decode_collected  # type: ignore[return-value]  # the result of `decode`
+
+
+def answering(
+    encode: Encode,
+    names: Callable[[float, Mapping[str, object]], Mapping[str, object]],
+    counters: Callable[[], Counters] | None,
+    replies: Acknowledgements,
+    decode: Decode,
+) -> Decode:
+    """Return a variant of `decode` that also makes the acknowledgement of the frame.
+
+    Args:
+        encode: renders the acknowledgement.
+        names: returns the namespace for a time and fields.
+        counters: counters of the connection; None without counters in the frame.
+        replies: receives the acknowledgement.
+        decode: converts the fields to samples.
+    """
+
+    def decode_answered(found: Mapping[str, object], now: float) -> tuple[list[object], list[str]]:
+        samples, refused = decode(found, now)
+        try:
+            reply = made(now, found)
+        except BadArgument as error:
+            return samples, [*refused, f"the answer cannot be sent: {error}"]  # type: ignore[return-value]
+        if len(replies) < MOST_REPLIES:
+            replies.append(reply)
+        return samples, refused  # type: ignore[return-value]
+
+    def made(now: float, found: Mapping[str, object]) -> Payload | CountedFrame:
+        if counters is None:
+            return encode(names(now, found))
+        own = counters()
+        numbered = drawn(own, now, found)
+        if not own.is_shared:
+            return numbered.data
+        return CountedFrame(numbered, partial(drawn, own, now, found))
+
+    def drawn(own: Counters, now: float, found: Mapping[str, object]) -> Numbered:
+        draw = own.draw()
+        numbered = Numbered(encode(names(now, {**found, COUNTERS: draw})), draw.count)
+        own.count(draw)
+        return numbered
+
+    return decode_answered  # type: ignore[return-value]

@@ -1,0 +1,247 @@
+"""Pending replies: the requests in flight on one connection.
+
+A `PendingReply` is one transmission of a request. Pure. See `urc.protocol.requests.conversation`
+for the theory of operation.
+"""
+
+from collections.abc import Mapping
+
+from urc.expressions import ExpressionError
+from urc.model.values import Reading, Sample
+from urc.protocol.framing.base import Framing
+from urc.protocol.requests.exchange import Exchange
+from urc.protocol.requests.reply_match import Expectation, Fields, MatchResult, shown
+from urc.protocol.values.payload import Frame
+from urc.protocol.values.wire_text import WireText
+
+__all__ = ["PendingReply", "PendingReplies"]
+
+
+class PendingReply:
+    """One transmission of a request, until its last reply arrives or times out."""
+
+    __slots__ = (
+        "_ear",
+        "due",
+        "exchange",
+        "is_extended",
+        "is_late",
+        "number",
+        "since",
+        "size",
+        "stage",
+        "values",
+    )
+
+    def __init__(self, exchange: Exchange, now: float) -> None:
+        self.exchange = exchange
+        ask = exchange.ask
+        self.stage = 0
+        self._ear: Expectation | None = None
+        self.due = now + ask.answers[0].timeout_s
+        """Time at which its reply is overdue. For a late transmission, time at which it is
+        removed."""
+        self.size = 0
+        """Size in the receive buffer of the robot, in bytes."""
+        self.since = now
+        """Start of the wait for the present reply."""
+        self.is_extended = False
+        """Whether the robot has extended the timeout."""
+        self.is_late = False
+        """Whether it has timed out. The late reply may still arrive, and must not match another
+        request."""
+        self.values: dict[str, Reading] = {}
+        self.number: int | None = None
+        """Number that its reply repeats; None: its reply has no number."""
+
+    @property
+    def ear(self) -> Expectation:
+        """Expectation of the present reply, created on demand, since a plain reply needs none."""
+        if self._ear is None:
+            self._ear = Expectation(self.exchange.ask.answers[self.stage])
+        return self._ear
+
+    def answer(self, frame: Frame) -> MatchResult:
+        """Return the match result of a frame with the number of this request."""
+        offer = self.ear.offer(frame)
+        if offer is None:
+            return MatchResult(refusal=f"its reply does not match the declaration: {shown(frame)}")
+        return offer
+
+    def refused(self, frame: Frame, reason: str) -> MatchResult:
+        """Return the refusal of the robot, with the text of the driver if it declares one."""
+        offer = self.ear.offer(frame)
+        return offer if offer is not None and offer.refusal else MatchResult(refusal=reason)
+
+    def offer(self, frame: Frame, *, is_message: bool = False) -> MatchResult | None:
+        """Return the match result of a frame, or None when it belongs to another request.
+
+        With `is_message`, only provisional and error replies count.
+        """
+        if self.number is not None:
+            return None  # its reply would carry the number, see `answer`
+        is_mine = None if self.exchange.ask.match is None else self._is_mine
+        return self.ear.beside(frame, is_mine) if is_message else self.ear.offer(frame, is_mine)
+
+    def extend(self, now: float) -> None:
+        """Extend the timeout by one reply time, within the limit of the driver."""
+        answer = self.ear.answer
+        self.is_extended = True
+        late_s = answer.timeout_s if self.is_late else 0.0
+        self.due = min(now + answer.timeout_s, self.since + answer.extend_s + late_s)
+
+    def waited(self, now: float) -> str:
+        """Return the elapsed timeout as text for people."""
+        answer = self.ear.answer
+        if not self.is_extended:
+            return f"within {answer.timeout_s:g} s"
+        if now >= self.since + answer.extend_s:
+            return f"within {answer.extend_s:g} s, for which the robot was busy"
+        return f"within {answer.timeout_s:g} s after the robot said that it was busy"
+
+    def next_stage(self, now: float) -> bool:
+        """Start the wait for the next reply; return False after the last one."""
+        answers = self.exchange.ask.answers
+        self.stage += 1
+        if self.stage == len(answers):
+            return False
+        self._ear, self.since, self.is_extended = None, now, False
+        self.due = now + answers[self.stage].timeout_s
+        return True
+
+    def take(self, fields: Fields, samples: list[Sample]) -> None:
+        """Keep the samples and private fields of a reply."""
+        for name, raw in fields.items():
+            if name.startswith("_"):
+                self.values[name[1:]] = _plain(raw)
+        for sample in samples:
+            self.values[sample.signal] = sample.value
+
+    def _is_mine(self, fields: Fields) -> bool:
+        match = self.exchange.ask.match
+        if match is None:
+            return True
+        names: dict[str, object] = {"seq": self.exchange.numbers, **self.exchange.namespace}
+        for name, raw in fields.items():
+            names[name] = WireText(raw) if isinstance(raw, str) else raw
+        try:
+            return bool(match.evaluate(names))
+        except ExpressionError:
+            return False
+
+
+class PendingReplies(list[PendingReply]):
+    """Transmissions in the order of sending. Late transmissions stay until their deadline."""
+
+    __slots__ = ()
+
+    def drain(self) -> list[Exchange]:
+        """Remove all; return the requests that still waited for a reply."""
+        waited = [flight.exchange for flight in self if not flight.is_late]
+        self.clear()
+        return waited
+
+    @property
+    def waiting(self) -> int:
+        """Number of pending replies, without real-time requests."""
+        return sum(1 for flight in self if not flight.is_late and not flight.exchange.is_realtime)
+
+    @property
+    def size(self) -> int:
+        """Unacknowledged bytes, which may still be in the receive buffer of the robot."""
+        return sum(flight.size for flight in self if not flight.exchange.is_realtime)
+
+    @property
+    def deadline(self) -> float | None:
+        """Time of the first timeout."""
+        if len(self) == 1:
+            return self[0].due
+        return min((flight.due for flight in self), default=None)
+
+    def may_confuse(self, exchange: Exchange) -> bool:
+        """Return whether a late reply could be taken for the reply to this request.
+
+        A late reply to an earlier transmission of the same request is as good as a new one.
+        """
+        if not (exchange.ask.answers and exchange.ask.is_in_order):
+            return False
+        return any(
+            flight.is_late
+            and flight.exchange is not exchange
+            and flight.exchange.ask.is_in_order
+            and not flight.exchange.is_realtime
+            for flight in self
+        )
+
+    def again(self, exchange: Exchange) -> PendingReply | None:
+        """Return the pending transmission of `exchange`, or None."""
+        return next((one for one in self if one.exchange is exchange and not one.is_late), None)
+
+    def has(self, label: str) -> bool:
+        """Return whether a request with that label awaits its reply."""
+        return any(flight.exchange.ask.label == label and not flight.is_late for flight in self)
+
+    def overdue(self, now: float) -> list[PendingReply]:
+        """Return the transmissions whose timeout has passed."""
+        return [flight for flight in self if flight.due <= now] if self else []
+
+    def framing(self) -> Framing | None:
+        """Return the framing of a pending reply that declares its own, or None."""
+        for flight in self:
+            if flight.exchange.ask.framing is not None:
+                return flight.exchange.ask.framing
+        return None
+
+    def collects_lines(self) -> bool:
+        """Return whether any frame at all may be part of a reply."""
+        return any(flight.ear.answer.lines is not None for flight in self)
+
+    def plain(self) -> PendingReply | None:
+        """Return the only transmission, if its reply is pending and consists of samples alone."""
+        if len(self) != 1 or self[0].is_late or self[0].exchange.ask.plain is None:
+            return None
+        return self[0]
+
+    def numbered(self, number: object) -> PendingReply | None:
+        """Return the transmission whose reply carries `number`."""
+        return next((one for one in self if one.number is not None and one.number == number), None)
+
+    def offer(
+        self, frame: Frame, *, is_message: bool = False
+    ) -> tuple[PendingReply, MatchResult] | None:
+        """Return the transmission that the frame answers, with the match result; or None."""
+        if len(self) == 1:
+            only = self[0].offer(frame, is_message=is_message)
+            return None if only is None else (self[0], only)
+        has_first, has_first_realtime = False, False
+        collecting: list[PendingReply] = []
+        for flight in self:
+            if flight.exchange.ask.is_in_order:
+                is_realtime = flight.exchange.is_realtime
+                if has_first_realtime if is_realtime else has_first:
+                    continue
+                # Late replies may never arrive, and silence never does: neither blocks other
+                # replies.
+                if not (flight.is_late or flight.ear.answer.is_silence):
+                    has_first_realtime |= is_realtime
+                    has_first |= not is_realtime
+            if flight.ear.answer.lines is not None:
+                collecting.append(flight)
+                continue
+            offer = flight.offer(frame, is_message=is_message)
+            if offer is not None:
+                return flight, offer
+        for flight in collecting:  # last: any frame could be one of its lines
+            offer = flight.offer(frame, is_message=is_message)
+            if offer is not None:
+                return flight, offer
+        return None
+
+
+def _plain(raw: object) -> Reading:
+    """Return a raw value as a valid reply value."""
+    if isinstance(raw, (list, tuple)):
+        return tuple(map(_plain, raw))
+    if raw is None or isinstance(raw, (bool, int, float, str, bytes, Mapping)):
+        return raw
+    return str(raw)

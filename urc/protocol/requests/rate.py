@@ -1,0 +1,213 @@
+"""Admission of frames: the queue of a connection, rate limits, counters.
+
+Pure. Everything is bounded, and dropped requests are returned so that they can be reported.
+"""
+
+from bisect import insort, insort_left
+from collections.abc import Callable, Mapping
+from typing import Final, Protocol, TypeVar
+
+from urc.model.exchange import Priority
+from urc.model.payload import Count, FrameVariants, Numbered, Payload
+
+__all__ = ["RANKS", "REALTIME", "GcraLimiter", "Counters", "FrameCounters", "Made", "PriorityQueue"]
+
+RANKS: Final[dict[Priority, int]] = {"realtime": 0, "high": 1, "normal": 2, "low": 3}
+"""Priority → rank; the lower rank is sent first."""
+REALTIME: Final = 0
+
+
+class GcraLimiter:
+    """A rate limiter: the generic cell rate algorithm, with one period of tolerance.
+
+    After a pause, two calls may pass at once; the long-term rate stays constant. A minimum gap
+    would lower the rate: a call slightly too early would lose half a period.
+    """
+
+    __slots__ = ("_next_s", "_period_s")
+
+    def __init__(self, rate_per_s: float) -> None:
+        self._period_s = 1 / rate_per_s
+        self._next_s = float("-inf")
+        """Time at which the next call is due by the rate itself."""
+
+    @property
+    def free_at(self) -> float:
+        """Earliest time of the next call."""
+        return self._next_s - self._period_s
+
+    def take(self, now: float) -> None:
+        """Count one call."""
+        self._next_s = max(self._next_s, now) + self._period_s
+
+
+Stand = tuple[tuple[str, int], ...]
+"""Last numbers of the counters, as pairs sorted by name."""
+Made = dict[Stand, Numbered]
+
+
+class FrameCounters:
+    """The counters of one frame; the same counter always gives the same number."""
+
+    __slots__ = ("_last", "values")
+
+    def __init__(self, last: Mapping[str, int]) -> None:
+        self._last = last
+        self.values: dict[str, int] = {}
+        """Counter → number in the frame."""
+
+    def __call__(self, name: str, low: int, high: int) -> int:
+        """Return the number after the last sent one; `low` follows `high`."""
+        if name not in self.values:
+            last = self._last.get(name, high)
+            self.values[name] = last + 1 if low <= last < high else low
+        return self.values[name]
+
+    @property
+    def count(self) -> Count:
+        """The effect of the frame on the counters."""
+        before = {name: self._last[name] for name in self.values if name in self._last}
+        return Count(before, dict(self.values))
+
+
+class Counters:
+    """The counters of one connection.
+
+    Numbers are assigned in the order of transmission. A connection with the engine as its only
+    writer has that order by itself. A connection on which the guard sends motion is *shared*: the
+    engine only proposes numbers, and learns the true values later.
+    """
+
+    __slots__ = ("_known", "_last", "ahead", "counted", "is_shared")
+
+    def __init__(self) -> None:
+        self._last: Mapping[str, int] = {}
+        """Counter values once all frames have been transmitted."""
+        self._known: Mapping[str, int] = {}
+        """Last confirmed counter values."""
+        self.ahead = 0
+        """Frames counted since the last confirmation."""
+        self.is_shared = False
+        self.counted: Callable[[], None] | None = None
+        """Callback after a counted frame; it must not count any."""
+
+    def draw(self) -> FrameCounters:
+        """Return the numbers of the next frame without counting it."""
+        return FrameCounters(self._last)
+
+    def draw_urgent(self) -> FrameCounters:
+        """Return the numbers of a frame that overtakes all pending ones."""
+        return FrameCounters(self._known)
+
+    def count(self, draw: FrameCounters) -> None:
+        """Count the frame that was rendered with `draw`."""
+        if not draw.values:
+            return
+        self._last = {**self._last, **draw.values}
+        if self.is_shared:
+            self.ahead += 1
+        else:
+            self._known = self._last
+        if self.counted is not None:
+            self.counted()
+
+    def told(self, stand: Mapping[str, int], *, is_settled: bool) -> None:
+        """Update shared counters with confirmed values.
+
+        Args:
+            stand: counter → last transmitted number.
+            is_settled: whether all counted frames have been transmitted.
+        """
+        self._known = dict(stand)
+        if is_settled:
+            self._last, self.ahead = self._known, 0
+
+    def series(
+        self, encode: Callable[[FrameCounters], Payload], length: int, made: Made
+    ) -> FrameVariants:
+        """Render a frame for each of the next numbers, and for the first of a new connection.
+
+        Args:
+            encode: renders a frame.
+            length: number of frames.
+            made: cache of rendered frames; receives those of this series.
+        """
+        frames: dict[Stand, Numbered] = {}
+        for begin, most in ((self._known, length + self.ahead), ({}, length)):
+            stand: Mapping[str, int] = begin
+            for _ in range(most):
+                key = tuple(sorted(stand.items()))
+                one = frames.get(key) or made.get(key)
+                if one is None:
+                    draw = FrameCounters(stand)
+                    one = Numbered(encode(draw), draw.count)
+                frames[key] = one
+                stand = {**stand, **one.takes.after}
+        made.clear()
+        made.update(frames)
+        return FrameVariants(tuple(frames.values()))
+
+    def is_near(self, made: Made, most: int) -> bool:
+        """Return whether at most `most` numbers have been used since the series was rendered."""
+        key = tuple(sorted(self._known.items()))
+        place = next((at for at, one in enumerate(made) if one == key), most)
+        return place + self.ahead < most
+
+    def begin(self) -> None:
+        """Reset the counters for a new connection. Shared counters wait for their confirmation."""
+        if not self.is_shared:
+            self._last = self._known = {}
+
+
+class Prioritized(Protocol):
+    """An item of a priority queue."""
+
+    @property
+    def rank(self) -> int:
+        """Priority rank; lower ranks are sent first."""
+
+    @property
+    def latest_key(self) -> str:
+        """Key of requests that replace each other; "" for no replacement."""
+
+
+Item = TypeVar("Item", bound=Prioritized)
+
+
+class PriorityQueue(list[Item]):
+    """A priority queue; requests of equal rank keep their order of arrival."""
+
+    __slots__ = ("_depth",)
+
+    def __init__(self, depth: int) -> None:
+        super().__init__()
+        self._depth = depth
+
+    def put(self, item: Item) -> Item | None:
+        """Add `item`; return the item that was displaced, possibly `item` itself."""
+        if item.latest_key:
+            for place, other in enumerate(self):
+                if other.latest_key == item.latest_key:
+                    self[place] = item  # keep the place, so that updates cannot starve it
+                    return other
+        crowded_out: Item | None = None
+        if len(self) >= self._depth:
+            if self[-1].rank <= item.rank:
+                return item
+            crowded_out = self.pop()
+        insort(self, item, key=_rank)
+        return crowded_out
+
+    def put_back(self, item: Item) -> None:
+        """Add a request for a retry, in front of its rank."""
+        insort_left(self, item, key=_rank)
+
+    def drain(self) -> list[Item]:
+        """Remove and return all items."""
+        items = list(self)
+        self.clear()
+        return items
+
+
+def _rank(item: Prioritized) -> int:
+    return item.rank

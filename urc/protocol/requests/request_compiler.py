@@ -1,0 +1,224 @@
+"""Compiles the declared requests of a driver, once for each engine. Pure."""
+
+from collections.abc import Mapping
+from functools import partial
+
+from urc.expressions import COUNTERS, NONCE, NOW
+from urc.model.driver import Argument, Command, Driver, Message, Poll, Reply, TransportSpec
+from urc.model.exchange import RESENDS, ProvisionalReplies, Stage
+from urc.model.payload import NUMBERED, ReadSpec, WriteSpec
+from urc.model.sequence import ExpectStep, SendStep
+from urc.model.values import NOTHING
+from urc.protocol.forms.http_head import LOCATION
+from urc.protocol.forms.table import build_reader
+from urc.protocol.framing.table import build_framing
+from urc.protocol.readings.compiled import build_fast_read
+from urc.protocol.readings.readings import Readings
+from urc.protocol.requests.bounds import queue_limit_s
+from urc.protocol.requests.condition_scope import SignalState
+from urc.protocol.requests.conversation import Conversation
+from urc.protocol.requests.encode import build_encode
+from urc.protocol.requests.exchange import CompiledRequest
+from urc.protocol.requests.message_effects import Acknowledgements, Collector, answering, collecting
+from urc.protocol.requests.rate import RANKS, GcraLimiter
+from urc.protocol.requests.reply_match import Aside, CompiledReply, Matcher
+from urc.protocol.values.payload import CodecContext
+from urc.protocol.values.time_and_nonce import FIXED, TimeAndNonce
+
+__all__ = ["RequestCompiler"]
+
+
+class RequestCompiler:
+    """Compiles the requests of one driver.
+
+    Raises:
+        BadArgument: from every method, when a constant frame contains its own delimiter or cannot
+            be encoded.
+    """
+
+    def __init__(
+        self,
+        driver: Driver,
+        readings: Readings,
+        known: SignalState,
+        fresh: TimeAndNonce = FIXED,
+        *,
+        is_compiled: bool = False,
+    ) -> None:
+        self._driver = driver
+        self._fresh = fresh
+        self._is_compiled = is_compiled
+        self._readings = readings
+        self._known = known
+        self.lines: dict[str, Conversation] = {}
+        for name, spec in driver.transports.items():
+            messages = [one for one in driver.messages.values() if one.transport == name]
+            context = CodecContext(spec.encoding, self._readings.settings, fresh, is_compiled)
+            matchers = [self._message(one.read, context) for one in messages]
+            if any(one.acknowledge or one.read.collects for one in messages):
+                self._react(spec, messages, matchers, context)
+            else:
+                self.lines[name] = Conversation(spec, matchers)
+
+    def _react(
+        self,
+        spec: TransportSpec,
+        messages: list[Message],
+        matchers: list[Matcher],
+        context: CodecContext,
+    ) -> None:
+        """Wrap the matchers of messages that are acknowledged or collected."""
+        replies, kept = Acknowledgements(), list[Collector]()
+        framing, name = build_framing(spec.framing), spec.name
+        for place, (one, matcher) in enumerate(zip(messages, matchers, strict=True)):
+            decode = matcher.decode
+            if one.read.collects:
+                collectors = {key: Collector(what) for key, what in one.read.collects.items()}
+                kept += collectors.values()
+                decode = collecting(collectors, self._readings.settings, decode)
+            if one.acknowledge is not None:
+                encode = build_encode(one.acknowledge, framing, context)
+                counts = COUNTERS in one.acknowledge.names
+                counters = (lambda: self.lines[name].counters) if counts else None
+                decode = answering(encode, partial(self._view, name), counters, replies, decode)
+            if decode is not matcher.decode:
+                matchers[place] = Matcher(matcher.reader, decode)
+        line = self.lines[name] = Conversation(spec, matchers)
+        line.inbox.replies, line.inbox.collectors = replies, kept
+
+    def _view(self, line: str, now: float, found: Mapping[str, object]) -> Mapping[str, object]:
+        """Return the namespace of an acknowledgement: fields, signals and names of the login."""
+        return self._known.view(now, {**self.lines[line].learnt, **found})
+
+    def command(self, command: Command) -> CompiledRequest:
+        """Return the compiled request of a command."""
+        ask = self._ask(
+            command.name, command.transport, command.send, command.reply, command.arguments
+        )
+        return ask._replace(
+            rank=RANKS[command.priority],
+            is_latest_only=command.is_latest_only,
+            bucket=GcraLimiter(command.rate_per_s) if command.rate_per_s else None,
+            retries=command.retries or ask.retries,
+            is_repeated=command.is_idempotent and command.retries > 0,
+            retry=command.retry,
+            is_motion=command.hold is not None,
+        )
+
+    def poll(self, poll: Poll, label: str) -> CompiledRequest:
+        """Return the compiled request of a poll."""
+        ask = self._ask(label, poll.transport, poll.send, poll.reply)
+        return ask._replace(rank=RANKS[poll.priority], is_miss_harmless=poll.offline is not None)
+
+    def plain(self, label: str, transport: str, send: WriteSpec) -> CompiledRequest:
+        """Return a request that expects no reply."""
+        return self._ask(label, transport, send, None)
+
+    def step(self, label: str, step: SendStep) -> CompiledRequest:
+        """Return the request of a step.
+
+        The normal rank keeps the order of the steps.
+        """
+        return self.plain(label, step.transport, step.send)._replace(rank=RANKS["normal"])
+
+    def expected(self, step: ExpectStep) -> CompiledReply:
+        """Return the reply that a step expects."""
+        stage = Stage(step.read, step.errors, step.faults, step.timeout_s)
+        answer = self._answer(step.transport, stage)
+        return answer._replace(framing=step.framing and build_framing(step.framing))
+
+    def reply_s(self, transport: str) -> float:
+        """Return the default reply timeout of a transport, in seconds."""
+        return self.lines[transport].spec.timeouts.reply_s
+
+    def _ask(
+        self,
+        label: str,
+        transport: str,
+        send: WriteSpec,
+        reply: Reply | None,
+        arguments: Mapping[str, Argument] = NOTHING,
+    ) -> CompiledRequest:
+        line = self.lines[transport]
+        context = CodecContext(
+            line.spec.encoding, self._readings.settings, self._fresh, self._is_compiled
+        )
+        encode = build_encode(send, line.framing, context, arguments)
+        has_counters = COUNTERS in send.names
+        is_fresh = bool((send.names & {NOW, NONCE}) - arguments.keys())
+        learnt = (send.names & self._driver.learnt(transport)) - arguments.keys()
+        is_numbered = send.options.get("verb") in NUMBERED
+        is_local = send.names <= {*arguments, COUNTERS}
+        if reply is None:
+            return CompiledRequest(
+                label,
+                encode,
+                has_counters=has_counters,
+                is_numbered=is_numbered,
+                is_local=is_local,
+                learnt=learnt,
+                is_fresh=is_fresh,
+                queue_s=queue_limit_s(line.spec, None),
+            )
+        reply = reply.with_errors(line.spec.errors, line.spec.faults)
+        stages = (
+            Stage(reply.read, reply.errors, reply.faults, reply.timeout_s, reply.asides),
+            *reply.stages,
+        )
+        answers = tuple(self._answer(transport, one) for one in stages)
+        return CompiledRequest(
+            label,
+            encode,
+            answers,
+            match=reply.match,
+            retries=RESENDS if reply.is_asked_again else 0,
+            framing=None if reply.framing is None else build_framing(reply.framing),
+            has_counters=has_counters,
+            is_numbered=is_numbered,
+            is_local=is_local and reply.match is None,
+            learnt=learnt,
+            is_fresh=is_fresh,
+            queue_s=queue_limit_s(line.spec, answers[0].timeout_s),
+            plain=self._message(reply.read, context)
+            if _is_plain(reply) and not is_numbered
+            else None,
+        )
+
+    def _answer(self, transport: str, stage: Stage) -> CompiledReply:
+        spec = self.lines[transport].spec
+        context = CodecContext(spec.encoding, self._readings.settings)
+        asides: tuple[tuple[Aside, ReadSpec | None], ...]
+        asides = (("resend", stage.asides.resend), ("extend", stage.asides.extend))
+        return CompiledReply(
+            self._matcher(stage.read, context),
+            spec.timeouts.reply_s if stage.timeout_s is None else stage.timeout_s,
+            stage.errors,
+            tuple((self._matcher(one.read, context), one.text) for one in stage.faults),
+            stage.read.lines,
+            asides=tuple(
+                (kind, self._matcher(read, context)) for kind, read in asides if read is not None
+            ),
+            extend_s=stage.asides.extend_s,
+            is_silence=stage.read.form == "silence",
+            takes_redirects=LOCATION in stage.read.head.values(),
+        )
+
+    def _message(self, read: ReadSpec, context: CodecContext) -> Matcher:
+        matcher = self._matcher(read, context)
+        if not context.is_compiled or read.topic is not None:
+            return matcher  # compiled functions don't check topics
+        compiled = build_fast_read(
+            read, matcher.reader, self._readings, matcher.take, context.encoding
+        )
+        return Matcher(matcher.reader, matcher.decode, compiled)
+
+    def _matcher(self, read: ReadSpec, context: CodecContext) -> Matcher:
+        return Matcher(build_reader(read, context), self._readings.decoder(read.fields))
+
+
+def _is_plain(reply: Reply) -> bool:
+    """Return whether a reply is a single frame with samples and nothing else."""
+    read = reply.read
+    has_own = any(name.startswith("_") for name in read.fields)
+    has_more = reply.errors or reply.faults or reply.stages or reply.match or reply.framing
+    return not (has_more or has_own or read.lines or reply.asides != ProvisionalReplies())

@@ -1,0 +1,134 @@
+"""The request queue of one connection, and the time of the next request.
+
+Pure. See `urc.protocol.requests.conversation` for the theory of operation.
+"""
+
+from collections.abc import Callable, Mapping
+
+from urc.expressions import COUNTERS
+from urc.model.driver import TransportSpec
+from urc.model.payload import Count, Numbered
+from urc.protocol.requests.exchange import Exchange, ExchangeOutcome
+from urc.protocol.requests.pending_replies import PendingReplies
+from urc.protocol.requests.rate import Counters, PriorityQueue
+
+__all__ = ["RequestQueue", "written"]
+
+
+class RequestQueue(PriorityQueue[Exchange]):
+    """The queue of one connection, with its shortest gap and its limit of requests in flight."""
+
+    __slots__ = ("_flights", "_limit", "_spec", "next_send", "size_of")
+
+    def __init__(
+        self, spec: TransportSpec, flights: PendingReplies, size_of: Callable[[Exchange], int]
+    ) -> None:
+        super().__init__(spec.queue.depth)
+        self._spec = spec
+        self._flights = flights
+        self.size_of = size_of
+        """Function that returns the size of a request on the wire, in bytes."""
+        self._limit = spec.queue.in_flight if spec.connection == "persistent" else 1
+        self.next_send = float("-inf")
+        """End of the shortest gap after the last request."""
+
+    def take(self, exchange: Exchange) -> tuple[Exchange, ExchangeOutcome] | None:
+        """Queue a request; return the displaced one with its outcome, or None."""
+        gone = self.put(exchange)
+        if gone is None:
+            return None
+        if gone is not exchange and gone.latest_key and gone.latest_key == exchange.latest_key:
+            return gone, ExchangeOutcome(
+                "superseded", "a newer request replaced it before it was sent"
+            )
+        text = f"{self._spec.queue.depth} requests already wait on {self._spec.name}"
+        return gone, ExchangeOutcome("queue-full", text)
+
+    def has(self, label: str) -> bool:
+        """Return whether a request with that label is queued."""
+        return any(exchange.ask.label == label for exchange in self)
+
+    def sent(self, exchange: Exchange, now: float) -> None:
+        """Record that a request is sent now."""
+        self.next_send = now + self._spec.min_gap_s
+        if exchange.ask.bucket is not None:
+            exchange.ask.bucket.take(now)
+
+    def next(self, now: float, *, is_ready: bool) -> Exchange | None:
+        """Return the next request to send, without removing it.
+
+        Args:
+            now: the time.
+            is_ready: whether the connection is ready; otherwise only privileged requests count.
+        """
+        if not self:
+            return None
+        is_full = self._flights.waiting >= self._limit
+        for exchange in self:
+            if not (is_ready or exchange.is_privileged) or _free_at(exchange) > now:
+                continue
+            if self._flights.may_confuse(exchange):
+                continue
+            is_full = is_full or not self._has_room(exchange)
+            return None if is_full or now < self.next_send else exchange
+        return None
+
+    def _has_room(self, exchange: Exchange) -> bool:
+        """Return whether the request fits into the buffer of the robot."""
+        most = self._spec.queue.most_bytes
+        return most is None or self._flights.size + self.size_of(exchange) <= most
+
+    def is_free(self, exchange: Exchange, now: float) -> bool:
+        """Return whether `exchange` may bypass the empty queue."""
+        if self or self._flights or now < self.next_send:
+            return False
+        return self._has_room(exchange) and _free_at(exchange) <= now
+
+    def wants_line(self, now: float) -> bool:
+        """Return whether a request waits only for a connection."""
+        return any(_free_at(exchange) <= now for exchange in self)
+
+    def may_send_at(self, *, is_ready: bool) -> float | None:
+        """Return the time at which a request may be sent; None when it waits for a reply."""
+        if not self or self._flights.waiting >= self._limit:
+            return None
+        first: float | None = None
+        barred_from = float("inf")
+        """A request without room in the buffer blocks those behind it once it is due."""
+        for exchange in self:
+            if not (is_ready or exchange.is_privileged) or self._flights.may_confuse(exchange):
+                continue
+            time = max(self.next_send, _free_at(exchange))
+            if not self._has_room(exchange):
+                barred_from = min(barred_from, time)
+            elif time < barred_from and (first is None or time < first):
+                first = time
+        return first
+
+
+def _free_at(exchange: Exchange) -> float:
+    """Return the earliest time by its rate limit and by the wait before a retry."""
+    bucket = exchange.ask.bucket
+    return exchange.waits_until if bucket is None else max(bucket.free_at, exchange.waits_until)
+
+
+def written(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]) -> Numbered:
+    """Render a frame with the next numbers of its counters; a retry keeps its numbers.
+
+    Args:
+        exchange: a request that is rendered when it is sent.
+        counters: counters of the connection.
+        learnt: names read by the login.
+
+    Raises:
+        BadArgument: the frame cannot be written; its numbers are used up nevertheless.
+    """
+    draw = counters.draw()
+    count = Count({}, {})
+    try:
+        data = exchange.ask.encode({**learnt, **exchange.namespace, COUNTERS: draw})
+        count = draw.count
+    finally:
+        counters.count(draw)
+    exchange.data, exchange.numbers = data, draw.values
+    return Numbered(data, count)

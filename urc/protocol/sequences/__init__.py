@@ -1,0 +1,1 @@
+"""Sequences of steps, and the commands that run them."""

@@ -1,0 +1,289 @@
+"""Execution of sequences: ordered steps on the connections of one engine.
+
+Pure. Each step becomes a function when the engine is built. A `SequenceRunner` calls them in order
+until one must wait: for a reply, a frame, a prompt, a condition, or time. The engine settles the
+events and calls `advance` again. Every loop is bounded and every wait has a timeout, so every
+sequence ends.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import NamedTuple, Protocol
+
+from urc.expressions import Template
+from urc.protocol.readings.readings import Readings
+from urc.protocol.requests.bounds import queue_limit_s
+from urc.protocol.requests.condition_scope import SignalState
+from urc.protocol.requests.conversation import Conversation
+from urc.protocol.requests.exchange import DONE, Exchange, ExchangeOutcome, LineEvent
+from urc.protocol.requests.reply_match import Expectation, MatchResult
+from urc.protocol.sequences.sequence_control import PAUSE_S, SequenceControl
+
+__all__ = ["Action", "SequenceHost", "CompiledSequence", "SequenceRunner", "Sink", "Unless"]
+
+Sink = Callable[[ExchangeOutcome, float], list[LineEvent]]
+"""Receives the outcome and the time; returns the resulting events."""
+Unless = Callable[[], str]
+"""Returns why the request is obsolete, or ""."""
+
+
+class SequenceHost(Protocol):
+    """The interface of the engine for sequences."""
+
+    lines: Mapping[str, Conversation]
+    known: SignalState
+    readings: Readings
+
+    def run(
+        self,
+        command: str,
+        arguments: Mapping[str, object],
+        sink: Sink,
+        now: float,
+        *,
+        privileged_on: str,
+        confirmed_by: tuple[str, ...],
+        unless: Unless,
+    ) -> list[LineEvent]:
+        """Run a command or sequence; its outcome goes to `sink`."""
+
+
+Action = Callable[["SequenceRunner", float], list[LineEvent]]
+"""One step, compiled."""
+
+
+class CompiledSequence(NamedTuple):
+    """A sequence, compiled."""
+
+    label: str
+    actions: tuple[Action, ...]
+    transports: frozenset[str]
+    """Transports that the sequence uses directly."""
+    reins: SequenceControl
+    """Control state; only one run at a time uses it."""
+
+
+class SequenceRunner:
+    """One run of a sequence."""
+
+    def __init__(
+        self,
+        host: SequenceHost,
+        program: CompiledSequence,
+        sink: Sink,
+        privileged_on: str = "",
+        confirmed_by: tuple[str, ...] = (),
+        ends_at: float | None = None,
+    ) -> None:
+        """Initialise a run.
+
+        Args:
+            host: the engine.
+            program: the compiled sequence.
+            sink: receives the outcome, once.
+            privileged_on: name of the transport for a login or close sequence; "" for others.
+            confirmed_by: people who have confirmed the sequence and thus all its commands.
+            ends_at: deadline of the whole run; None for no deadline.
+        """
+        self.host = host
+        self.program = program
+        self.privileged_on = privileged_on
+        self.confirmed_by = confirmed_by
+        self.variables: dict[str, object] = {}
+        """Fields of replies, as ``_field``."""
+        self.due: float | None = None
+        """End of the present wait."""
+        self.ends_at = ends_at
+        self.is_waiting = False
+        self._sink: Sink | None = sink
+        self._outcome: ExchangeOutcome | None = None
+        self._stack: list[Iterator[Action]] = [iter(program.actions)]
+        self._listening: tuple[Conversation, Expectation] | None = None
+        self._awaited: Template | None = None
+        self._began_at = 0.0
+        self._otherwise: tuple[Action, ...] | None = None
+        self._late_text = ""
+        self._logins: list[Conversation] = []
+        """Connections whose logins must complete before the first step."""
+        program.reins.begin()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the outcome has been delivered."""
+        return self._sink is None
+
+    @property
+    def can_go_on(self) -> bool:
+        """Whether `advance` has work."""
+        if self._logins and all(line.is_ready for line in self._logins):
+            return not self.is_over
+        return not self.is_over and (self._outcome is not None or not self.is_waiting)
+
+    @property
+    def deadline(self) -> float | None:
+        """Time for the next `expire`."""
+        if self.due is None or self.ends_at is None:
+            return self.ends_at if self.due is None else self.due
+        return min(self.due, self.ends_at)
+
+    def advance(self, now: float) -> list[LineEvent]:
+        """Run steps until one must wait or all are done."""
+        events: list[LineEvent] = []
+        if self._logins and all(line.is_ready for line in self._logins):
+            self._logins = []
+            self._resume()
+        self._obey()
+        while self._outcome is None and not self.is_waiting:
+            is_outermost = len(self._stack) == 1
+            if self.program.reins.halts(is_outermost=is_outermost):
+                self.sleep(now + PAUSE_S)
+                break
+            action = next(self._stack[-1], None) if self._stack else None
+            if action is not None:
+                if is_outermost:
+                    self.program.reins.step()
+                events += action(self, now)
+            elif self._stack:
+                self._stack.pop()
+            else:
+                self._outcome = DONE
+        if self._outcome is not None and self._sink is not None:
+            sink, self._sink = self._sink, None
+            self.program.reins.end(self._outcome.message if self._outcome.code else "")
+            events += sink(self._outcome, now)
+        return events
+
+    def wait_for_logins(self, now: float) -> None:
+        """Wait for the logins of all open connections, no longer than a queued command would."""
+        lines = (self.host.lines[name] for name in self.program.transports)
+        self._logins = [
+            line
+            for line in lines
+            if line.is_open
+            and not (line.is_ready or line.is_per_request or line.spec.name == self.privileged_on)
+        ]
+        if self._logins:
+            limit_s = max(queue_limit_s(line.spec, None) for line in self._logins)
+            self._late_text = "the login of the connection did not finish in time"
+            self.sleep(now + limit_s)
+
+    def _obey(self) -> None:
+        """Apply the requests of the operator."""
+        reins = self.program.reins
+        if reins.is_aborted:
+            self.stop("aborted", "somebody ended it")
+        elif reins.goes_on():
+            self._resume()
+
+    def expire(self, now: float) -> None:
+        """Handle the end of the present wait."""
+        if self.ends_at is not None and self.ends_at <= now:
+            self.stop("timed-out", "it took too long")
+            return
+        if self.program.reins.is_paused:
+            self.stop("timed-out", f"it was paused for {PAUSE_S:g} s")
+            return
+        if self._logins:
+            self.stop("timed-out", self._late_text)
+            return
+        if self._listening is None and self._awaited is None:
+            self._resume()
+            return
+        inbox = self._listening[0].inbox if self._listening else None
+        came = "" if inbox is None else inbox.came_since(self._began_at, "not what it expects")
+        self._stop_listening()
+        if self._otherwise is None:
+            self.stop("timed-out", self._late_text + came)
+            return
+        self._stack.append(iter(self._otherwise))
+        self._resume()
+
+    def stop(self, code: str, reason: str) -> None:
+        """End without success."""
+        self._stop_listening()
+        if self._outcome is None:
+            self._outcome = ExchangeOutcome(code, reason)
+
+    def why_over(self) -> str:
+        """Return why its further frames are obsolete, or ""."""
+        return self._outcome.message if self._outcome is not None else ""
+
+    # -- called by the engine
+
+    def look(self, now: float) -> None:
+        """Check the awaited condition after new samples, or at the start of the wait."""
+        if self._awaited is not None and self.host.known.holds(self._awaited, now, self.variables):
+            self._awaited = None
+            self._resume()
+
+    def ended(self, exchange: Exchange, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
+        """Record the outcome of a sent frame."""
+        return self.done(outcome, now)
+
+    def done(self, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
+        """Record the outcome of a command that a step has run."""
+        if outcome.code:
+            self.stop(outcome.code, outcome.message)
+        self.variables |= {f"_{name}": value for name, value in outcome.values.items()}
+        self._resume()
+        return []
+
+    def heard(self, ear: Expectation, offer: MatchResult, now: float) -> None:
+        """Process the match result of the expected frame."""
+        self._listening = None
+        if offer.refusal:
+            self.stop("refused", offer.refusal)
+            return
+        fields = offer.fields or {}
+        self.variables |= {name: raw for name, raw in fields.items() if name.startswith("_")}
+        self._resume()
+
+    # -- for the actions
+
+    def names(self, now: float) -> Mapping[str, object]:
+        """Return the namespace of the expressions."""
+        return self.host.known.view(now, self.variables)
+
+    def push(self, actions: Iterator[Action]) -> None:
+        """Do these next."""
+        self._stack.append(actions)
+
+    def sleep(self, due: float) -> None:
+        """Wait until `due`."""
+        self.is_waiting, self.due = True, due
+
+    def begin(self) -> None:
+        """Wait for the call of `done`."""
+        self.is_waiting = True
+
+    def listen(
+        self,
+        line: Conversation,
+        ear: Expectation,
+        now: float,
+        due: float,
+        otherwise: tuple[Action, ...] | None,
+        text: str,
+    ) -> None:
+        """Wait from `now` until `due` for a match of `ear`."""
+        self._listening = (line, ear)
+        self._began_at = now
+        self._otherwise, self._late_text = otherwise, text
+        self.sleep(due)
+
+    def wait_for(
+        self, condition: Template, due: float, otherwise: tuple[Action, ...] | None, text: str
+    ) -> None:
+        """Wait until `condition` is true."""
+        self._awaited = condition
+        self._otherwise, self._late_text = otherwise, text
+        self.sleep(due)
+
+    def _resume(self) -> None:
+        self.is_waiting, self.due = False, None
+
+    def _stop_listening(self) -> None:
+        self._awaited = None
+        if self._listening is not None:
+            line, ear = self._listening
+            line.inbox.unlisten(ear)
+            self._listening = None

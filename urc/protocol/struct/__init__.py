@@ -1,0 +1,1 @@
+"""The binary form: fixed and variable fields in a frame."""

@@ -1,0 +1,43 @@
+"""Text forms of values, for every form that writes text."""
+
+import re
+from collections.abc import Mapping
+
+from urc.expressions import quoted
+from urc.protocol.values.convert import spelt
+from urc.protocol.values.payload import NotWritable
+
+__all__ = ["counter_in", "encoded", "field_text", "written_differently"]
+
+_COUNTER = re.compile(r"\s*seq\s*\(\s*['\"]([a-z][a-z0-9_]*)['\"][^()]*\)\s*")
+
+
+def counter_in(expression: str) -> str:
+    """Return the name of the counter if the expression is a single counter, else ""."""
+    found = _COUNTER.fullmatch(expression)
+    return found[1] if found else ""
+
+
+def field_text(value: object) -> str:
+    """Return a value as text forms write it: ``true``, ``3``, ``2.5``; lists with blanks."""
+    if value is None:
+        return ""
+    if isinstance(value, (list, tuple)):
+        return " ".join(map(field_text, value))
+    return spelt(value)
+
+
+def encoded(text: str, encoding: str) -> bytes:
+    """Return the text in the given encoding; raise `NotWritable` if it cannot be encoded."""
+    try:
+        return text.encode(encoding)
+    except UnicodeEncodeError as error:
+        raise NotWritable(f"{quoted(error.object)} does not exist in {encoding}") from None
+
+
+def written_differently(fields: Mapping[str, object], found: Mapping[str, object] | None) -> str:
+    """Return the first of `fields` that a written frame does not read back, or ""."""
+    for name, value in fields.items():
+        if found is None or field_text(found.get(name)) != field_text(value):
+            return name
+    return ""

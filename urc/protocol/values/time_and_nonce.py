@@ -1,0 +1,44 @@
+"""Times and nonces of sent frames.
+
+Pure. Times and nonces come from injected sources: a clock and a generator for a robot, fixed ones
+for tests. The same document then always gives the same frames in tests.
+"""
+
+from collections.abc import Callable
+from typing import Final, NamedTuple
+
+from urc.expressions import NONCE, NOW
+
+__all__ = ["FIXED", "FIXED_UNIX_S", "TimeAndNonce", "fixed_bytes"]
+
+FIXED_UNIX_S: Final = 946684800.0
+"""2000-01-01T00:00:00Z."""
+
+
+class TimeAndNonce(NamedTuple):
+    """The sources of time and randomness."""
+
+    unix_s: Callable[[], float]
+    """Function that returns the seconds since 1970, UTC."""
+    random: Callable[[int], bytes]
+    """Size → random bytes that never repeat."""
+
+    def names(self) -> dict[str, object]:
+        """Return the namespace of one frame, with a constant time and nonce."""
+        made: dict[int, bytes] = {}
+
+        def nonce(size: int) -> bytes:
+            if size not in made:
+                made[size] = self.random(size)
+            return made[size]
+
+        return {NOW: self.unix_s(), NONCE: nonce}
+
+
+def fixed_bytes(size: int) -> bytes:
+    """Return 00 01 02 …, for tests."""
+    return bytes(range(size))
+
+
+FIXED: Final = TimeAndNonce(lambda: FIXED_UNIX_S, fixed_bytes)
+"""Fixed sources for tests of frames."""

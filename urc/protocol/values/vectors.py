@@ -1,0 +1,114 @@
+"""Composite values: arrays, objects, and bytes such as images.
+
+Pure. The input is JSON-like data, bytes, or text. The elements of an array in text are separated by
+blanks, commas or semicolons; bytes in text are base64. The size of the frame bounds the size of the
+values.
+"""
+
+import re
+from binascii import Error as Base64Error
+from binascii import a2b_base64, b2a_base64
+from collections.abc import Callable, Mapping
+
+from urc.expressions import quoted
+from urc.images import MAX_PIXELS, picture_size, pixels
+from urc.model.values import Reading, Signal, Value
+from urc.protocol.values.convert import BadValue
+
+__all__ = ["MAX_BYTES", "MAX_ELEMENTS", "array_converter", "bytes_converter", "bytes_text"]
+__all__ += ["elements_of", "object_converter"]
+
+MAX_ELEMENTS = 65536
+"""Largest number of elements in one array."""
+MAX_BYTES = 1 << 24
+"""Largest image or blob without a declared ``size``, in bytes."""
+_BETWEEN = re.compile(r"[\s,;]+")
+_AROUND = " \t\r\n[]()"
+
+
+def array_converter(
+    signal: Signal, element: Callable[[object], Value]
+) -> Callable[[object], Reading]:
+    """Return the function from raw elements to a tuple of values, each converted by `element`."""
+    wanted = signal.size
+
+    def convert(raw: object) -> Reading:
+        if raw is None:
+            return None
+        items = elements_of(raw)
+        if wanted is not None and len(items) != wanted:
+            raise BadValue(f"expected {wanted} elements, found {len(items)}")
+        if len(items) > MAX_ELEMENTS:
+            raise BadValue(f"expected at most {MAX_ELEMENTS} elements, found {len(items)}")
+        values = []
+        for place, item in enumerate(items):
+            try:
+                values.append(element(item))
+            except BadValue as error:
+                raise BadValue(f"element {place}: {error}") from None
+        return tuple(values)
+
+    return convert
+
+
+def elements_of(raw: object) -> list[object] | tuple[object, ...]:
+    """Return the elements of a list, of bytes, or of separated text."""
+    if isinstance(raw, (list, tuple)):
+        return raw
+    if isinstance(raw, (bytes, bytearray)):
+        return list(raw)
+    if isinstance(raw, str):
+        inner = raw.strip(_AROUND)
+        return list(_BETWEEN.split(inner)) if inner else []
+    raise BadValue(f"{quoted(raw)} is not a list")
+
+
+def object_converter(raw: object) -> Reading:
+    """Return a mapping unchanged; raise `BadValue` for any other value."""
+    if raw is None or isinstance(raw, Mapping):
+        return raw
+    raise BadValue(f"{quoted(raw)} is not a mapping")
+
+
+def bytes_converter(signal: Signal) -> Callable[[object], Reading]:
+    """Return the function from raw bytes, or their base64, to bytes."""
+    most = signal.size or MAX_BYTES
+
+    def convert(raw: object) -> Reading:
+        if raw is None:
+            return None
+        if isinstance(raw, (bytes, bytearray, memoryview)):
+            data = bytes(raw)
+        elif isinstance(raw, str):
+            data = _from_base64(raw)
+        elif isinstance(raw, (list, tuple)):
+            data = _from_numbers(raw)
+        else:
+            raise BadValue(f"{quoted(raw)} is neither bytes nor base64")
+        if len(data) > most:
+            raise BadValue(f"expected at most {most} bytes, found {len(data)}")
+        if signal.type == "image" and pixels(data) > MAX_PIXELS:
+            width, height = picture_size(data) or (0, 0)
+            raise BadValue(f"an image of {width} by {height} pixels; the limit is {MAX_PIXELS}")
+        return data
+
+    return convert
+
+
+def bytes_text(data: bytes) -> str:
+    """Return bytes as base64."""
+    return b2a_base64(data, newline=False).decode("ascii")
+
+
+def _from_base64(text: str) -> bytes:
+    try:
+        return a2b_base64(text, strict_mode=True)
+    except (Base64Error, ValueError):
+        raise BadValue(f"{quoted(text)} is not base64") from None
+
+
+def _from_numbers(numbers: list[object] | tuple[object, ...]) -> bytes:
+    try:
+        return bytes(numbers)  # type: ignore[arg-type]  # the handlers below check it
+    except (TypeError, ValueError):
+        raise BadValue(f"{quoted(numbers)} is not a list of bytes") from None

@@ -1,0 +1,22 @@
+"""Received text in a correlation. Pure."""
+
+__all__ = ["WireText"]
+
+
+class WireText(str):
+    """Received text that equals the number it spells, so that ``_id == id`` works."""
+
+    __slots__ = ()
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, (int, float)) and not isinstance(other, bool):
+            try:
+                return float(self) == other if len(self) <= 40 else False
+            except ValueError:
+                return False
+        return str.__eq__(self, other)
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    __hash__ = str.__hash__

@@ -1,0 +1,280 @@
+"""The audit entries of one robot: two for each motion, not one for each tick.
+
+Layer 4, synchronous; callers pass the time. Motion calls these functions, so they never wait or
+raise. Each motion has an entry for its start and one for its end, with its first and last values. A
+repeated refusal gets one entry per second, with its count. So the audit log shows the cause of each
+motion, and its size does not grow with every tick.
+"""
+
+import json
+import logging
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import wraps
+from typing import Concatenate, Final, ParamSpec
+
+from urc.model.payload import Payload, traffic_of
+from urc.model.values import NOTHING, Reading
+from urc.motion.lease import LeaseState, Operator
+from urc.runtime.audit import AuditEntry, shown
+from urc.runtime.hub import AuditRecord, Hub, MotionRecord
+from urc.runtime.secret_forms import HIDDEN, SecretForms
+
+__all__ = ["AuditRecorder"]
+
+_NOBODY: Final = Operator("", "", "viewer")
+_AGAIN_S: Final = 1.0
+"""Shortest time between entries for the same refusal, in seconds."""
+_MOST_KEPT: Final = 64
+"""Limit of different refusals with a count."""
+_MOST_TOLD: Final = 16
+"""Limit of refusal entries per second, so that a hostile page cannot fill the file."""
+_MOST_SECRETS: Final = 256
+_LONGEST_NAME: Final = 100
+_LONGEST_TEXT: Final = 1000
+
+log = logging.getLogger(__name__)
+_P = ParamSpec("_P")
+
+
+def _harmless(
+    take: "Callable[Concatenate[AuditRecorder, _P], None]",
+) -> "Callable[Concatenate[AuditRecorder, _P], None]":
+    """Catch every exception, so that a bug here cannot stop motion; log only the first one."""
+
+    @wraps(take)
+    def taken(self: "AuditRecorder", /, *args: _P.args, **named: _P.kwargs) -> None:
+        try:
+            take(self, *args, **named)
+        except Exception:  # supervisor: motion and STOP must go on
+            if not self.is_faulty:
+                log.exception("the audit log lacks an event of %s", self.robot)
+            self.is_faulty = True
+
+    return taken
+
+
+@dataclass(slots=True)
+class _Motion:
+    client: Operator
+    epoch: int
+    began_s: float
+    count: int = 0
+    arguments: Mapping[str, Reading] = field(default_factory=dict)
+    data: Payload = b""
+
+
+@dataclass(slots=True)
+class _Refusal:
+    told_s: float
+    count: int = 0
+
+
+class AuditRecorder:
+    """A writer of the audit entries of one robot."""
+
+    def __init__(
+        self,
+        robot: str,
+        note: Callable[[AuditEntry], None],
+        *,
+        utc: Callable[[], float],
+        secrets: Iterable[str] = (),
+    ) -> None:
+        """Start without motion.
+
+        Args:
+            robot: name of the robot.
+            note: receives the entries; must not block.
+            utc: source of UTC time, in seconds since 1970.
+            secrets: texts to redact, such as the values of secret settings.
+        """
+        self.robot = robot
+        self.is_faulty = False
+        """Whether a bug in URC has prevented an entry."""
+        self._note = note
+        self._hub: Hub | None = None
+        self._now: Callable[[], float] = _never
+        self._utc = utc
+        self._secrets: tuple[str, ...] = ()
+        self._disguises = SecretForms()
+        self.hide(secrets)
+        self._motions: dict[str, _Motion] = {}
+        self._refusals: dict[tuple[str, str, str], _Refusal] = {}
+        self._lease = LeaseState()
+        self._told_s = float("-inf")
+        self._told = 0
+        """Number of refusal entries in the current second."""
+
+    def attend(self, hub: Hub | None, now: Callable[[], float]) -> None:
+        """Also report to the taps of a session's hub, with its clock; None ends that."""
+        self._hub, self._now = hub, now
+
+    def hide(self, secrets: Iterable[str]) -> None:
+        """Redact these texts too, from now on."""
+        known = dict.fromkeys((*(one for one in secrets if one), *self._secrets))
+        self._secrets = tuple(known)[:_MOST_SECRETS]
+        self._disguises = SecretForms(self._secrets)
+
+    @_harmless
+    def moved(
+        self,
+        client: Operator,
+        epoch: int,
+        command: str,
+        arguments: Mapping[str, Reading],
+        data: Payload,
+        now: float,
+    ) -> None:
+        """Note an accepted tick and its frame."""
+        if self._hub is not None and self._hub.is_tapped:
+            self._hub.tell(MotionRecord(now, command, arguments))
+        motion = self._motions.get(command)
+        if motion is None or motion.client != client or motion.epoch != epoch:
+            self.stopped(command, "taken over", now)
+            motion = self._motions[command] = _Motion(client, epoch, now)
+            self._put(
+                "moved",
+                client,
+                epoch=epoch,
+                command=command,
+                arguments=self._arguments(arguments),
+                data=self._data(data),
+                outcome="begins",
+            )
+        motion.count += 1
+        motion.arguments, motion.data = arguments, data
+
+    @_harmless
+    def stopped(self, command: str, reason: str, now: float) -> None:
+        """Note the stop of a control, and its reason."""
+        motion = self._motions.pop(command, None)
+        if motion is None:
+            return
+        self._put(
+            "stopped",
+            motion.client,
+            epoch=motion.epoch,
+            command=command,
+            arguments=self._arguments(motion.arguments),
+            data=self._data(motion.data),
+            outcome=reason,
+            times=motion.count,
+            lasted_s=round(now - motion.began_s, 3),
+        )
+
+    @_harmless
+    def refused(self, client: Operator, about: str, message: str, now: float) -> None:
+        """Note the refusal of a tick or request; `about` is the control or the request."""
+        about, message = about[:_LONGEST_NAME], message[:_LONGEST_TEXT]
+        key = (client.id, about, message)
+        known = self._refusals.get(key)
+        if known is None:
+            while len(self._refusals) >= _MOST_KEPT:
+                self._refusals.pop(next(iter(self._refusals)))
+            known = self._refusals[key] = _Refusal(now - _AGAIN_S)
+        known.count += 1
+        if now - known.told_s >= _AGAIN_S and self._may_tell(now):
+            outcome = self._hidden(message)
+            self._put("refused", client, command=about, outcome=outcome, times=known.count)
+            known.told_s, known.count = now, 0
+
+    @_harmless
+    def leased(self, state: LeaseState, now: float) -> None:
+        """Note a change of the lease: the holder, or the latch of STOP."""
+        before, self._lease = self._lease, state
+        if state.latched_by and not before.latched_by:
+            self._put("STOP", _NOBODY, epoch=state.epoch, outcome=f"by {state.latched_by}")
+        elif before.latched_by and not state.latched_by:
+            self._put("reset", _NOBODY, epoch=state.epoch, outcome="may be driven again")
+        if state.holder != before.holder:
+            who = state.holder or before.holder or _NOBODY
+            outcome = "has the controls" if state.holder else "gave the controls back"
+            self._put("lease", who, epoch=state.epoch, outcome=outcome)
+        if state.asked_by is not None and state.asked_by != before.asked_by:
+            self._put("lease", state.asked_by, epoch=state.epoch, outcome="asks for the controls")
+
+    @_harmless
+    def ran(
+        self,
+        client: Operator,
+        command: str,
+        arguments: Mapping[str, Reading],
+        outcome: str,
+        data: Payload = b"",
+        answer: Mapping[str, Reading] = NOTHING,
+    ) -> None:
+        """Note a command without hold, and its outcome: ``done`` or the reason of the failure."""
+        if answer:
+            outcome = f"{outcome}: {_json(answer)}"
+        self._put(
+            "ran",
+            client,
+            command=command,
+            arguments=self._arguments(arguments),
+            data=self._data(data),
+            outcome=self._hidden(outcome),
+        )
+
+    def _may_tell(self, now: float) -> bool:
+        if now - self._told_s >= _AGAIN_S:
+            self._told_s, self._told = now, 0
+        self._told += 1
+        return self._told <= _MOST_TOLD
+
+    def _put(
+        self,
+        what: str,
+        who: Operator,
+        *,
+        epoch: int = 0,
+        command: str = "",
+        arguments: str = "",
+        data: str = "",
+        outcome: str = "",
+        times: int = 1,
+        lasted_s: float = 0.0,
+    ) -> None:
+        entry = AuditEntry(
+            at=self._utc(),
+            robot=self.robot,
+            what=what,
+            who=who.name,
+            role=who.role if who is not _NOBODY else "",
+            client=who.id,
+            epoch=epoch,
+            command=command,
+            arguments=arguments,
+            data=data,
+            outcome=outcome,
+            times=times,
+            lasted_s=lasted_s,
+        )
+        self._note(entry)
+        if self._hub is not None:
+            self._hub.tell(AuditRecord(self._now(), entry))
+
+    def _arguments(self, arguments: Mapping[str, Reading]) -> str:
+        return self._hidden(_json(arguments))
+
+    def _data(self, data: Payload) -> str:
+        shown_bytes = traffic_of(data)
+        if self._disguises.are_in(shown_bytes):
+            return HIDDEN
+        return shown(shown_bytes) if shown_bytes else ""
+
+    def _hidden(self, text: str) -> str:
+        """Return a text without the secrets in any of their encodings."""
+        return self._disguises.hide(text)
+
+
+def _never() -> float:
+    return 0.0
+
+
+def _json(values: Mapping[str, Reading]) -> str:
+    return json.dumps(dict(values), default=_plain, ensure_ascii=False)
+
+
+def _plain(value: object) -> str:
+    return f"{len(value)} bytes" if isinstance(value, bytes) else repr(value)

@@ -1,0 +1,153 @@
+"""The published status of one transport: its state, its counts, and a rate-limited log."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from urc.model.payload import Envelope, Payload, traffic_of
+from urc.protocol.events import Violation
+from urc.runtime.clock import Clock, Timer
+from urc.runtime.hub import Hub, LinkState, LinkStatus, LogEntry, Traffic
+from urc.runtime.redaction import REDACTED
+
+__all__ = ["REDACTED", "LinkReport", "LogRateLimiter"]
+
+BURST = 4
+"""Number of log entries of one kind before the rate limit applies."""
+REFILL_S = 10.0
+"""Interval of further log entries of one kind, in seconds."""
+HELD_S = 0.3
+"""Delay of the possible beginning of a secret, in seconds."""
+KINDS = 64
+"""Limit of kinds; further kinds of a third-party engine share one limit."""
+
+
+@dataclass(slots=True)
+class _Kind:
+    tokens: float
+    told_s: float
+    untold: int = 0
+
+
+class LogRateLimiter:
+    """A token bucket for each kind of log entry."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._kinds: dict[str, _Kind] = {}
+
+    def admit(self, kind: str) -> int | None:
+        """Return the number of suppressed entries of this kind, or None to suppress this one."""
+        now = self._clock.now()
+        if kind not in self._kinds:
+            kind = kind if len(self._kinds) < KINDS else ""
+            self._kinds.setdefault(kind, _Kind(BURST, now))
+        known = self._kinds[kind]
+        known.tokens = min(BURST, known.tokens + (now - known.told_s) / REFILL_S)
+        known.told_s = now
+        if known.tokens < 1:
+            known.untold += 1
+            return None
+        known.tokens -= 1
+        untold, known.untold = known.untold, 0
+        return untold
+
+
+class LinkReport:
+    """The published state of one transport, sent to the hub."""
+
+    def __init__(self, transport: str, address: str, hub: Hub, clock: Clock) -> None:
+        self._transport = transport
+        self._address = address
+        self._hub = hub
+        self._clock = clock
+        self._since_s = clock.now()
+        self._detail = ""
+        self._is_changed = True
+        self._limiter = LogRateLimiter(clock)
+        self._telling: Timer | None = None
+        self.state: LinkState = "idle"
+        self.attempts = 0
+        """Number of failed attempts since the last good frame."""
+        self.faults = 0
+        self.publish()
+
+    @property
+    def is_well(self) -> bool:
+        """Whether a good frame would change nothing."""
+        return self.state == "live" and not self.attempts and not self._detail
+
+    def show(self, state: LinkState, detail: str = "") -> None:
+        """Set the state. A new state is logged; a new detail is only shown."""
+        if state == self.state and detail == self._detail:
+            return
+        if state != self.state:
+            self.state = state
+            self._since_s = self._clock.now()
+            self._note_state(state, detail)
+        self._detail = detail
+        self._is_changed = True
+
+    def fail(self, state: LinkState, detail: str) -> None:
+        """Count a failed attempt."""
+        self.attempts += 1
+        self._is_changed = True
+        self.show(state, detail)
+
+    def count(self, fault: Violation) -> None:
+        """Count a protocol violation, and log it at a limited rate."""
+        self.faults += 1
+        self._is_changed = True
+        if self.state == "connecting" and self._detail:
+            # Connected without a good frame: the violation is the detail that helps most.
+            self._detail = f"connected; {fault.message}"
+        if fault.code == "no-data" and self.state != "silent":
+            return  # the following change of state says the same
+        self.note("warning", f"fault {fault.code}", f"{fault.code}: {fault.message}")
+
+    def note(self, level: Literal["info", "warning", "error"], kind: str, text: str) -> None:
+        """Log an entry, within the rate limit of its kind."""
+        untold = self._limiter.admit(kind)
+        if untold is None:
+            return
+        more = f" (and {untold} more like it)" if untold else ""
+        self._hub.note(LogEntry(self._clock.now(), level, self._transport, text + more))
+
+    def saw(self, direction: Literal["sent", "received"], data: Payload) -> None:
+        """Record traffic while it has readers."""
+        if self._hub.traffic_watchers:
+            envelope = data if isinstance(data, Envelope) else None
+            shown, now = traffic_of(data), self._clock.now()
+            self._hub.saw(Traffic(now, self._transport, direction, shown, envelope))
+            if self._hub.holds_back:
+                if self._telling is not None:
+                    self._telling.cancel()
+                self._telling = self._clock.call_at(now + HELD_S, self._tell_rest)
+
+    def _tell_rest(self) -> None:
+        self._telling = None
+        self._hub.tell_rest(self._clock.now())
+
+    def publish(self) -> None:
+        """Send the state to the hub if it has changed."""
+        if not self._is_changed:
+            return
+        self._is_changed = False
+        self._hub.set_link(
+            LinkStatus(
+                transport=self._transport,
+                state=self.state,
+                address=self._address,
+                since_s=self._since_s,
+                detail=self._detail,
+                attempts=self.attempts,
+                faults=self.faults,
+            )
+        )
+
+    def _note_state(self, state: LinkState, detail: str) -> None:
+        level: Literal["info", "warning"] = "warning" if state in ("silent", "lost") else "info"
+        if state == "connecting":
+            text = f"connecting to {self._address}"  # the only entry with the address
+        else:
+            text = f"{state}: {detail}" if detail else state
+        self.note(level, f"state {state}", text)

@@ -1,0 +1,417 @@
+"""The motion controller of one robot: the lease, and the state of each held command.
+
+Theory of operation. Pages send ticks of sampled input, and releases. For each tick, the controller
+checks three things: the lease of the page, the age of the tick, and the arguments, by the engine.
+It then hands the frame to the movers, which own the connection and its time limits. The first tick
+of a gesture arms the control. It also renders the stop frame, so that a stop needs neither the
+engine nor the document.
+
+A control that stopped without a release stays closed until its page releases it. So a stick that is
+still held after the link reconnects moves nothing.
+
+A controller outlives the sessions of its robot, because the latch also holds while the robot is
+disconnected. `attach` adds the engine and the movers of a session, `detach` removes them.
+
+The module is synchronous, and callers pass the time. The movers report their stops by `stopped`.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from secrets import randbelow
+
+from urc.model.driver import Driver
+from urc.model.payload import CountedFrame, FrameVariants, Payload
+from urc.model.values import Reading
+from urc.motion.freshness import ControlInput, Freshness
+from urc.motion.hold_to_run import HoldTerms, Reason
+from urc.motion.lease import REQUEST_S, Lease, LeaseChanged, LeaseRefused, LeaseState, Operator
+from urc.problems import UrcError
+from urc.runtime.held_commands import HeldControl, MotionBackend, MotionFrames, control_of, is_lossy
+
+__all__ = ["MotionFrames", "MotionController", "MotionBackend", "Verb", "is_lossy"]
+
+Verb = str
+"""``take``, ``ask``, ``yes``, ``no``, ``force``, ``leave`` or ``reset``."""
+Moved = Callable[[Operator, int, str, Mapping[str, Reading], Payload, float], None]
+"""Arguments: operator, epoch of the lease, command, arguments, frame, and time."""
+MOST_SCREENS = 256
+_FIRST_TICKS = 2**31
+_NO_ROBOT = "the robot is not connected"
+LET_GO = "it was stopped: let go, then begin anew"
+_CUT = "the line to the robot was cut"
+_TAKE_ANEW = "it was stopped: take the controls anew"
+
+
+@dataclass(slots=True)
+class _Screen:
+    client: Operator
+    freshness: Freshness = field(default_factory=lambda: Freshness(randbelow(_FIRST_TICKS) + 1))
+
+
+class MotionController:
+    """The lease and the held commands of one robot."""
+
+    def __init__(
+        self, driver: Driver, *, kept: LeaseState | None = None, is_owed: bool = False
+    ) -> None:
+        """Start without an operator and without a connected robot.
+
+        Args:
+            driver: the driver; its commands with ``hold`` are the controls.
+            kept: the lease from before a restart: a latched stop stays latched.
+            is_owed: whether the last stop has not reached the robot and must be sent first.
+        """
+        self.lease = Lease(kept)
+        self._frames: MotionFrames | None = None
+        self._movers: MotionBackend | None = None
+        self._holds = {name: one for name, one in driver.commands.items() if one.hold is not None}
+        self._is_lossy = {
+            name: is_lossy(driver, one.transport) for name, one in self._holds.items()
+        }
+        self._controls = {name: control_of(driver, one) for name, one in self._holds.items()}
+        self._stops = tuple(name for name, one in driver.commands.items() if one.stops)
+        self._moves = any(one.moves for one in driver.commands.values())
+        self._is_making = False
+        self._screens: dict[str, _Screen] = {}
+        self._unconfirmed = {*self._holds, *self._stops} if is_owed else set[str]()
+        self.on_change: Callable[[LeaseState], None] = _ignore
+        """Called after each change of the lease, and after the confirmation of a stop."""
+        self.on_moved: Moved = _unseen
+        """Called for each tick whose frame went to the movers; must neither block nor raise."""
+        self.on_refused: Callable[[str, str], None] = _unrefused
+        """Called with the control and the message when the robot refuses to move."""
+
+    @property
+    def can_move(self) -> bool:
+        """Whether the robot has a held command, autonomous motion or a stop command."""
+        return bool(self._holds) or self._moves or bool(self._stops)
+
+    @property
+    def has_own_stop(self) -> bool:
+        """Whether STOP sends anything to the robot; else URC only blocks its own commands."""
+        return bool(self._holds) or bool(self._stops)
+
+    @property
+    def owed(self) -> list[str]:
+        """Return the stop commands that are still to be sent."""
+        return [name for name in self._stops if name in self._unconfirmed]
+
+    def given(self, command: str) -> None:
+        """Note that a stop command has reached the robot."""
+        if command in self._unconfirmed:
+            self._unconfirmed.discard(command)
+            if self.is_confirmed:
+                self.on_change(self.lease.state)
+
+    def holds(self, command: str) -> bool:
+        """Return whether `command` is a held command."""
+        return command in self._holds
+
+    def rests(self, command: str) -> bool:
+        """Return whether a held command is at rest and its last stop was reported."""
+        return self._controls[command].course == "rest"
+
+    @property
+    def is_confirmed(self) -> bool:
+        """Whether all stop frames of the last stop were written."""
+        return not self._unconfirmed
+
+    @property
+    def deadline(self) -> float | None:
+        """Time of the next call of `expire`, or None."""
+        return self.lease.deadline
+
+    # -- the robot
+
+    def attach(self, frames: MotionFrames, movers: MotionBackend | None) -> None:
+        """Connect a session's engine and its movers, if any; send an outstanding stop."""
+        self._frames, self._movers = frames, movers
+        frames.on_count, frames.on_ready = self._renew, self._ready
+        frames.on_refused = self._refused
+        if movers is not None and not self._unconfirmed.isdisjoint(self._holds):
+            movers.stop(self._stop_frames(self._holds))
+
+    def detach(self) -> None:
+        """End the session: its movers stop all motion, and no control stays armed."""
+        self._frames = self._movers = None
+        for control in self._controls.values():
+            control.is_owed_again = False
+            if control.is_armed:
+                self._close(control)
+
+    # -- pages
+
+    def join(self, client: Operator) -> None:
+        """Add a page; raise `UrcError` at the limit of pages."""
+        if len(self._screens) >= MOST_SCREENS:
+            raise UrcError(f"{MOST_SCREENS} pages already show this robot")
+        self._screens[client.id] = _Screen(client)
+
+    def part(self, client: str) -> None:
+        """Remove a page and stop the commands that it held."""
+        self._screens.pop(client, None)
+        self._settle(self.lease.leave(client))
+
+    def beat(self, client: str, now: float) -> int:
+        """Return the current tick number for this page, which the page echoes."""
+        return self._screens[client].freshness.issue(now)
+
+    # -- the lease
+
+    def drive(self, client: str, verb: Verb, now: float, for_s: float = REQUEST_S) -> str:
+        """Apply a page's request for the lease; return the reason of a refusal, or ""."""
+        who, lease = self._screens[client].client, self.lease
+        if verb == "take":
+            outcome: LeaseChanged | LeaseRefused | None = lease.take(who, now)
+        elif verb == "ask":
+            outcome = lease.ask(who, now, for_s)
+        elif verb in ("yes", "no"):
+            outcome = lease.answer(client, now, is_granted=verb == "yes")
+        elif verb == "force":
+            outcome = lease.force(who, now)
+        elif verb == "leave":
+            outcome = lease.leave(client)
+        elif verb == "reset":
+            outcome = lease.reset(who)
+        else:
+            return f"the controls know no {verb!r}"
+        if isinstance(outcome, LeaseRefused):
+            return outcome.message
+        self._settle(outcome)
+        return ""
+
+    def stop(self, by: str) -> None:
+        """Stop the robot and latch, regardless of the lease."""
+        self._unconfirmed = {*self._holds, *self._stops}
+        if self._movers is not None:
+            self._movers.stop(self._stop_frames(self._holds))
+        self._settle(self.lease.stop(by), is_stopped=True)
+
+    def halt(self) -> list[str]:
+        """Stop all motion; a new motion needs a new gesture and a new lease.
+
+        Controls that the movers have already stopped get no second stop.
+
+        Returns:
+            The commands that may have moved.
+        """
+        halted = self._moving()
+        for name in halted:
+            control = self._controls[name]
+            self._let_go(name, control)
+            self._close(control)
+        return halted
+
+    def _moving(self) -> list[str]:
+        """Return the commands with ticks since their last reported stop."""
+        controls = self._controls.items()
+        return [name for name, one in controls if one.is_armed and one.course != "rest"]
+
+    def expire(self, now: float) -> None:
+        """Handle the timeouts of the lease."""
+        self._settle(self.lease.expire(now))
+
+    # -- motion
+
+    def tick(
+        self,
+        client: str,
+        command: str,
+        arguments: Mapping[str, Reading],
+        given: ControlInput,
+        now: float,
+    ) -> str:
+        """Handle a tick of sampled input; return the reason of a refusal, or ""."""
+        control, screen = self._controls.get(command), self._screens.get(client)
+        if control is None or screen is None:
+            return f"{command!r} is not a held command of this robot"
+        epoch = self.lease.state.epoch
+        refusal = self.lease.refusal(client, given.epoch) or screen.freshness.refusal(
+            given, epoch, now, command
+        )
+        if refusal:
+            return refusal
+        if control.needs_release or epoch <= control.closed_epoch:
+            return control.why if control.needs_release else _TAKE_ANEW
+        frames, movers = self._frames, self._movers
+        if frames is None or movers is None:
+            return _NO_ROBOT
+        if control.slew is not None:
+            arguments = control.limited(arguments, now)
+        self._is_making = True  # its stop frame is rendered after it
+        try:
+            data = frames.motion_frame(command, arguments, now)
+            if not control.is_armed:
+                movers.arm(command, self._terms(command, frames))
+                control.is_armed, control.is_lasting = True, frames.is_lasting(command)
+            elif not control.is_lasting:
+                self._renew_stops(control.line)
+        except UrcError as error:
+            self._abandon(command, control, movers, str(error))
+            return str(error)
+        finally:
+            self._is_making = False
+        self.lease.touch(now)
+        control.course = "moving"
+        movers.tick(command, data)
+        if data == b"":
+            return ""  # it waits for a reply that the robot owes
+        shown = data.numbered.data if isinstance(data, CountedFrame) else data
+        self.on_moved(screen.client, epoch, command, arguments, shown, now)
+        return ""
+
+    def _abandon(self, command: str, control: HeldControl, movers: MotionBackend, why: str) -> None:
+        """End a motion for which no frame can be rendered."""
+        if control.is_armed:
+            movers.release(command)
+        self._close(control, why)
+
+    def release(self, client: str, command: str) -> None:
+        """Note the release of a control; only its holder may release it."""
+        holder = self.lease.state.holder
+        control = self._controls.get(command)
+        if control is None or holder is None or holder.id != client:
+            return
+        control.needs_release = False
+        if control.course == "moving":
+            control.course = "ending"
+        self._let_go(command, control)
+
+    def _let_go(self, command: str, control: HeldControl) -> None:
+        control.rest()
+        if control.is_armed and self._movers is not None:
+            self._movers.release(command)
+            self._renew(control.line)  # the counter of this stop frame is used up
+
+    def _refused(self, command: str, why: str) -> None:
+        """Stop a motion that the robot refuses, and report its message."""
+        control, movers = self._controls.get(command), self._movers
+        if control is None or movers is None or control.course != "moving":
+            return
+        self._abandon(command, control, movers, why)
+        self.on_refused(command, why)
+
+    def stopped(self, command: str, reason: Reason) -> None:
+        """Handle a report of the movers: the stop of a control was written."""
+        control = self._controls.get(command)
+        if control is None:
+            return
+        if control.course == "ending":  # else it already moves again
+            control.course = "rest"
+        if reason not in ("released", "stopped"):
+            self._close(control, _CUT if reason == "revoked" else LET_GO)
+        if self._is_too_early(command, control):
+            control.is_owed_again = True
+            return
+        if reason != "released":
+            self.given(command)
+
+    # -- renewed stops
+
+    def _is_too_early(self, command: str, control: HeldControl) -> bool:
+        """Return whether a written stop may not count, because the robot was not ready for it."""
+        frames, movers = self._frames, self._movers
+        if frames is None or movers is None:
+            return False
+        if not control.is_greeted and frames.is_lasting(command):
+            return False
+        return not (movers.is_open(command) and frames.is_ready(command))
+
+    def _ready(self, line: str) -> None:
+        """Repeat stops that were sent before the steps of connection `line` were done."""
+        owed = [
+            name
+            for name, control in self._controls.items()
+            if control.line == line and control.is_owed_again
+        ]
+        for name in owed:
+            self._controls[name].is_owed_again = False
+        if owed and self._movers is not None:
+            self._movers.stop(self._stop_frames(owed))
+
+    def _renew(self, line: str) -> None:
+        """Render the stops of `line` again, with counters after the last sent frame."""
+        if not self._is_making:
+            self._renew_stops(line)
+
+    def _renew_stops(self, line: str) -> None:
+        frames, movers = self._frames, self._movers
+        if frames is None or movers is None:
+            return
+        for name, control in self._controls.items():
+            if control.line != line or frames.is_lasting(name) or frames.has_stops(name):
+                continue
+            if not (control.is_armed or movers.is_stopping(name)):
+                continue
+            try:
+                stop = frames.stop_frame(name)
+            except UrcError:
+                continue  # the old stop is better than none
+            if stop != control.stop:
+                control.stop = stop
+                movers.renew(name, stop)
+
+    def _close(self, control: HeldControl, why: str = LET_GO) -> None:
+        control.close(why, self.lease.state.epoch)
+
+    def _terms(self, command: str, frames: MotionFrames) -> HoldTerms:
+        control = self._controls[command]
+        control.stop = stop = frames.stop_frame(command)
+        terms = HoldTerms(
+            b"",
+            period_s=control.period_s,
+            lease_s=control.hold.lease_s,
+            is_lossy=self._is_lossy[command],
+        )
+        return terms.stopped_by(stop)
+
+    def _settle(self, outcome: LeaseChanged | None, *, is_stopped: bool = False) -> None:
+        if outcome is None:
+            return
+        if outcome.must_stop:
+            if not is_stopped:
+                self._stop_what_moves()
+            for control in self._controls.values():
+                control.is_armed = control.needs_release = False
+                control.course = "rest"
+                control.rest()
+        self.on_change(outcome.state)
+
+    def _stop_what_moves(self) -> None:
+        moving = self._moving()
+        if moving and self._movers is not None:
+            self._movers.stop(self._stop_frames(moving))
+
+    def _stop_frames(
+        self, commands: Sequence[str] | Mapping[str, object]
+    ) -> dict[str, Payload | FrameVariants]:
+        """Return the stop frames; a failure of one must not prevent the others."""
+        made: dict[str, Payload | FrameVariants] = {}
+        for name in commands:
+            control = self._controls[name]
+            try:
+                if self._frames is not None:
+                    made[name] = self._frames.stop_frame(name)
+            except UrcError:  # reported by `urc validate`
+                if control.is_armed and control.stop is not None:
+                    made[name] = control.stop  # rendered when it was armed
+        return made
+
+
+def _unrefused(command: str, why: str) -> None:
+    """Ignore a refusal."""
+
+
+def _ignore(state: LeaseState) -> None:
+    """Ignore a change."""
+
+
+def _unseen(
+    client: Operator,
+    epoch: int,
+    command: str,
+    arguments: Mapping[str, Reading],
+    data: Payload,
+    now: float,
+) -> None:
+    """Ignore a tick."""

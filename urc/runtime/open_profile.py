@@ -1,0 +1,44 @@
+"""The document of a robot as users open it: with local widgets and installed interfaces.
+
+Layer 4. A driver's document names no interface; an installed driver gets the interfaces that were
+installed for it.
+"""
+
+from os import PathLike
+from pathlib import Path
+from typing import Final
+
+from urc.config.interface_fit import fit_interface
+from urc.config.load import load_profile
+from urc.model.profile import Profile
+from urc.packages.store import ecosystem_of
+from urc.runtime.registries import built_in_catalog
+from urc.runtime.widget_registry import shelf_of
+
+__all__ = ["open_document"]
+
+_DRIVER: Final = "driver.yaml"
+_MADE: Final = "default"
+"""Name of the generated interface of a document without one."""
+
+
+def open_document(path: str | PathLike[str]) -> Profile:
+    """Return the profile of a robot's or driver's document.
+
+    Raises:
+        ProblemsError: the document has errors, which the exception lists.
+    """
+    profile = load_profile(path, built_in_catalog(), shelf_of(path))
+    home = ecosystem_of(Path(path))
+    if home is None or Path(path).name != _DRIVER:
+        return profile
+    interfaces, widgets = dict(profile.interfaces), dict(profile.widgets)
+    for document in sorted(home.glob("interfaces/*/interface.yaml")):
+        found = fit_interface(str(document), profile, shelf_of(document))
+        name = document.parent.name
+        if found.interface is not None and name not in interfaces:
+            interfaces[name] = found.interface._replace(name=name)
+            widgets |= found.widgets
+    if len(interfaces) > 1 and _MADE in interfaces:
+        interfaces[_MADE] = interfaces.pop(_MADE)  # the generated one comes last
+    return profile._replace(interfaces=interfaces, widgets=widgets)

@@ -1,0 +1,255 @@
+"""A preview of a package from its documents, before it is installed or updated.
+
+Files, keys, agents, commands on other machines and hosts normally come from settings. A package may
+name them itself, but the person who installs it must know. So they are listed apart from the
+permissions.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from urc._translatable import joined, phrase
+from urc.config.load import CheckResult, check
+from urc.config.resolve import resolve
+from urc.expressions import Template
+from urc.model.driver import TransportSpec
+from urc.model.profile import Profile
+from urc.problems import ProblemsError, UrcError
+from urc.runtime.local_hosts import check_hosts
+from urc.runtime.registries import built_in_catalog
+from urc.runtime.widget_registry import shelf_of
+from urc.shipped import shipped
+from urc.source import parse_document
+
+__all__ = ["PackagePreview", "look", "permissions", "risks_of"]
+
+
+def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[str]:
+    """Return the permissions of a package, one line each.
+
+    Args:
+        document: the document of the package.
+        folder: folder with all files of the package; references outside are an error.
+        widgets: names of the included widgets.
+
+    Raises:
+        ProblemsError: the document has errors.
+        UrcError: it refers to a file outside.
+    """
+    checked = check(document, built_in_catalog(), shelf_of(document))
+    _check_inside(checked, folder)  # first, because a problem would show a line of an outside file
+    errors = [problem for problem in checked.problems if problem.severity == "error"]
+    if errors:
+        raise ProblemsError(errors)
+    if checked.profile:
+        check_hosts(checked.profile)
+    lines = _of_profile(checked.profile) if checked.profile else []
+    return [
+        *lines,
+        *(phrase("has the browser show the page {url}", url=url) for url in checked.pages),
+        *(
+            phrase(
+                "widget {name}: a program in a frame of its own; it sees and gives what its cell is"
+                " bound to, and nothing else",
+                name=name,
+            )
+            for name in widgets
+        ),
+    ] or [phrase("nothing: it is a layout, with no connection of its own")]
+
+
+def _check_inside(checked: CheckResult, folder: Path) -> None:
+    homes = (folder.resolve(), shipped("widgets").resolve())
+    for file in checked.files:
+        real = Path(file).resolve()
+        if not any(real.is_relative_to(home) for home in homes):
+            raise UrcError(f"{checked.files[0]}: it refers to {file}, which is not in the package")
+
+
+def _of_profile(profile: Profile) -> list[str]:
+    lines: list[str] = [_of_transport(spec, profile) for spec in profile.driver.transports.values()]
+    for setting in profile.settings.values():
+        if setting.type == "path":
+            lines.append(phrase("file: the one that the setting {name} names", name=setting.name))
+        if setting.is_secret:
+            lines.append(
+                phrase("secret: is given what the setting {name} holds", name=setting.name)
+            )
+    commands = profile.driver.commands
+    moving = sorted(name for name, command in commands.items() if command.hold or command.moves)
+    if commands:
+        lines.append(phrase("commands: {names}", names=", ".join(sorted(commands))))
+    if moving:
+        lines.append(phrase("moves the robot: {names}", names=", ".join(moving)))
+    return lines
+
+
+def _of_transport(spec: TransportSpec, profile: Profile) -> str:
+    """Return the line of a connection: its type, and the source of each option."""
+    options = [
+        joined(" ", (name, _told(value, profile))) for name, value in sorted(spec.options.items())
+    ]
+    names = {
+        "type": spec.type,
+        "name": spec.name,
+        "options": joined(", ", options) if options else phrase("no options"),
+    }
+    if spec.tunnel:
+        return phrase(
+            "connects by {type} ({name}) through {via}: {options}", via=spec.tunnel, **names
+        )
+    return phrase("connects by {type} ({name}): {options}", **names)
+
+
+def _told(value: Any, profile: Profile) -> str:
+    """Return an option as written, with the defaults of its settings."""
+    if isinstance(value, Template):
+        text = value.source
+        used = [
+            phrase("{name} is {value} by default", name=name, value=setting.default)
+            for name, setting in profile.settings.items()
+            if name in value.settings and setting.default is not None and not setting.is_secret
+        ]
+        if not used:
+            return phrase("from the settings: {text}", text=text)
+        return phrase("from the settings: {text} ({used})", text=text, used=joined(", ", used))
+    if isinstance(value, (list, tuple)):
+        return joined(", ", [_told(one, profile) for one in value]) or phrase("none")
+    if isinstance(value, dict):
+        some = [joined(" ", (str(name), _told(one, profile))) for name, one in value.items()]
+        return joined(", ", some) or phrase("none")
+    return phrase("always {value}", value=value)
+
+
+_FILES: Final = {
+    "key": phrase("a key file"),
+    "known_hosts": phrase("a file of known hosts"),
+    "ca": phrase("a file of certificates"),
+    "cert": phrase("a certificate file"),
+}
+_LOOPBACK: Final = re.compile(r"(localhost|127\.[0-9.]+|::1)$")
+_DEVICE: Final = re.compile(r"/dev/[A-Za-z0-9._:/-]+|COM[0-9]{1,3}|[a-z]+://.*", re.IGNORECASE)
+_URL_HOST: Final = re.compile(r"[a-z+]+://(?:[^/@]*@)?(?P<host>\[[^\]]*\]|[^/:?#]*)", re.IGNORECASE)
+
+
+def risks_of(profile: Profile) -> list[str]:
+    """Return the fixed names of a package, one line each; most packages have none."""
+    found = [
+        line
+        for spec in profile.driver.transports.values()
+        for line in _risks_of_transport(spec, profile)
+    ]
+    return list(dict.fromkeys(found))
+
+
+def _risks_of_transport(spec: TransportSpec, profile: Profile) -> Iterator[str]:
+    options = spec.options
+    tls = options.get("tls")
+    named = {**(tls if isinstance(tls, Mapping) else {}), **options}
+    for name, what in _FILES.items():
+        if name in named and (text := _own(named[name], profile)):
+            yield phrase(
+                "{line} uses {what} of this machine: {text}", line=spec.name, what=what, text=text
+            )
+    port = _own(options.get("port"), profile) if spec.type == "serial" else ""
+    if port and (not _DEVICE.fullmatch(port) or ".." in port):
+        yield phrase(
+            "{line} opens a file that is no serial port: {text}", line=spec.name, text=port
+        )
+    if options.get("agent") and _own(options["agent"], profile):
+        yield phrase("{line} logs in with the keys of your SSH agent", line=spec.name)
+    if text := _own(options.get("command"), profile):
+        yield phrase(
+            "{line} runs a program on the machine it logs in to: {text}", line=spec.name, text=text
+        )
+    if host := _fixed_host(options):
+        is_beyond = bool(spec.tunnel) and _LOOPBACK.match(host) is not None
+        if not is_beyond:
+            yield phrase("{line} connects to a fixed host: {host}", line=spec.name, host=host)
+
+
+def _own(value: Any, profile: Profile) -> str:
+    """Return the fixed text of an option, or "" if it comes from settings."""
+    if value is None or value is False:
+        return ""
+    if not isinstance(value, Template):
+        return str(value)
+    defaults = [
+        setting
+        for name in sorted(value.settings)
+        if (setting := profile.settings.get(name)) is not None and setting.default is not None
+    ]
+    if value.settings and not any(one.default not in ("", False) for one in defaults):
+        return ""
+    said = ", ".join(f"{one.name}: {one.default}" for one in defaults)
+    return f"{value.source} ({said})" if said else value.source
+
+
+def _fixed_host(options: Mapping[str, object]) -> str:
+    """Return the host that does not depend on a setting, or ""."""
+    host, url = options.get("host"), options.get("url")
+    text = host.source if isinstance(host, Template) and not host.settings else host
+    if isinstance(text, str):
+        return text
+    source = url.source if isinstance(url, Template) else url
+    if not isinstance(source, str):
+        return ""
+    found = _URL_HOST.match(source)
+    return found["host"] if found and "{{" not in found["host"] else ""
+
+
+_NOT_WIRE: Final = (
+    *("urc", "kind", "name", "title", "summary", "licence", "author"),
+    *("widgets", "interfaces", "tests", "simulator"),
+)
+
+
+class PackagePreview(NamedTuple):
+    """The preview of a package."""
+
+    permissions: list[str]
+    """Permissions, one line each."""
+    wire: Mapping[str, str]
+    """``commands.beep.send`` → its value: all keys that decide the sent bytes and the decoding of
+    the replies."""
+    risks: list[str]
+    """Local resources without a setting; see `risks_of`."""
+
+
+def look(document: Path, folder: Path, widgets: Sequence[str]) -> PackagePreview:
+    """Return the preview of a package.
+
+    Args:
+        document: the document of the package.
+        folder: folder with all files of the package; references outside are an error.
+        widgets: names of the included widgets.
+
+    Raises:
+        ProblemsError: the document has errors.
+        UrcError: it refers to a file outside.
+    """
+    allowed = permissions(document, folder, widgets)
+    shelf = shelf_of(document)
+    checked = check(document, built_in_catalog(), shelf)
+    if checked.profile is None:
+        return PackagePreview(allowed, {}, [])
+    risks = risks_of(checked.profile)
+    text = resolve(str(document), shelf, checked.profile).text
+    data = parse_document(text.encode(), "resolved").data
+    assert isinstance(data, dict)  # noqa: S101 (a document that was loaded is a mapping)
+    wire = {key: value for key, value in data.items() if key not in _NOT_WIRE}
+    return PackagePreview(allowed, dict(_flat(wire, "")), risks)
+
+
+def _flat(value: object, path: str) -> Iterator[tuple[str, str]]:
+    """Yield the path and text of every leaf value."""
+    if isinstance(value, dict) and value:
+        for key, inner in value.items():
+            yield from _flat(inner, f"{path}.{key}" if path else str(key))
+    elif isinstance(value, list) and value:
+        for place, inner in enumerate(value):
+            yield from _flat(inner, f"{path}.{place}")
+    else:
+        yield path, f'"{value}"' if isinstance(value, str) else str(value)

@@ -1,0 +1,189 @@
+"""Redaction: removal of the values of secret settings from all shown or stored data.
+
+Layer 4, pure. The engine marks secret frames, and the link redacts them. This module redacts other
+data for the hub, such as the echo of a password or a command with a token. A stream may bring an
+echo letter by letter. So the possible beginning of a secret is delayed until more data arrives, or
+none for a while.
+"""
+
+import base64
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from urc.model.payload import Envelope
+from urc.model.profile import Profile
+from urc.model.values import Value
+from urc.runtime.secret_forms import forms
+
+__all__ = ["REDACTED", "Redactor", "secret_texts", "stand_ins"]
+
+REDACTED = "‹secret›".encode()
+"""Replacement for secret bytes in shown data."""
+
+_SHORTEST = 3
+"""Shortest secret to cut out of a frame; shorter ones occur too often, so the frame is hidden."""
+_SHORTEST_CODED = 6
+_SHORTEST_PART = 4
+"""Shortest part of a cut secret to redact; shorter ones occur in many words."""
+_SHORTEST_NUMBER = 4
+"""Fewest digits of a secret number to redact; shorter ones equal too many readings."""
+_CUT = re.compile(rb"['\"]?\s*(?:\.\.\.|\xe2\x80\xa6|['\"]|$)")
+"""Text after a cut: dots, a quotation mark, or the end."""
+
+
+def stand_ins(profile: Profile, settings: Mapping[str, Value]) -> dict[str, Value]:
+    """Return the settings with placeholders for secrets, for tests of a document."""
+    return {
+        name: "SECRET" if profile.settings[name].is_secret and isinstance(value, str) else value
+        for name, value in settings.items()
+        if name in profile.settings
+    }
+
+
+def secret_texts(profile: Profile, settings: Mapping[str, Value]) -> list[str]:
+    """Return the values of a robot's secret settings."""
+    return [
+        str(settings[name])
+        for name, setting in profile.settings.items()
+        if setting.is_secret and settings.get(name) is not None
+    ]
+
+
+class Redactor:
+    """A remover of secrets from frames, texts and streams."""
+
+    def __init__(self, secrets: Iterable[str], encodings: Iterable[str] = ("utf-8",)) -> None:
+        """Prepare for these secrets, written in any of the encodings; empty ones do not count."""
+        names, texts = tuple(encodings), [text for text in secrets if text]
+        written = [text.encode(name, "replace") for text in texts for name in names]
+        self._plain = tuple(dict.fromkeys(written))
+        coded = [code for secret in self._plain for code in _base64(secret)]
+        coded += [form.encode("utf-8", "replace") for text in texts for form in forms(text)]
+        # The longest first, because one secret may be part of another.
+        found = dict.fromkeys((*self._plain, *coded))
+        self._all = tuple(sorted(found, key=len, reverse=True))
+        self._long = tuple(secret for secret in self._all if len(secret) >= _SHORTEST)
+        self._short = tuple(
+            re.compile(rf"(?<!\w){re.escape(text)}(?!\w)")
+            for text in texts
+            if len(text.encode("utf-8", "replace")) < _SHORTEST
+        )
+        """Short secrets, redacted in a text only as whole words; else most texts would vanish."""
+        self._numbers = frozenset(
+            int(text) for text in texts if text.isdecimal() and len(text) >= _SHORTEST_NUMBER
+        )
+        self._held: dict[tuple[str, str], bytes] = {}
+
+    @classmethod
+    def of(cls, profile: Profile, settings: Mapping[str, Value]) -> "Redactor":
+        """Return the redactor for a robot's secret settings."""
+        secrets = secret_texts(profile, settings)
+        encodings = (spec.encoding for spec in profile.driver.transports.values())
+        return cls(secrets, dict.fromkeys(("utf-8", *encodings)))
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether the robot has any secret."""
+        return bool(self._all)
+
+    def whole(self, data: bytes) -> bytes:
+        """Return the redacted form of one frame."""
+        for secret in self._all:
+            if secret in data:
+                if len(secret) < _SHORTEST:
+                    return REDACTED
+                data = data.replace(secret, REDACTED)
+        return data
+
+    def text(self, text: str) -> str:
+        """Return the redacted form of a text, which may end with the cut beginning of a secret."""
+        if not self._all:
+            return text
+        if any(word.search(text) for word in self._short):
+            return REDACTED.decode()
+        shown = text.encode("utf-8", "replace")
+        for secret in self._long:
+            shown = _without_cut(secret, shown.replace(secret, REDACTED))
+        return shown.decode("utf-8", "replace")
+
+    def value(self, value: Any) -> Any:
+        """Return the redacted form of a reading: None for a secret number."""
+        if isinstance(value, str):
+            return self.text(value)
+        if isinstance(value, bytes):
+            return self._in_bytes(value)
+        if isinstance(value, tuple | list):
+            return tuple(map(self.value, value))
+        if isinstance(value, Mapping):
+            return {self.value(name): self.value(one) for name, one in value.items()}
+        return None if value in self._numbers else value
+
+    def _in_bytes(self, data: bytes) -> bytes:
+        """Return the redacted form of a blob, in which short secrets occur by chance."""
+        for secret in self._long:
+            if len(secret) >= _SHORTEST_PART:
+                data = data.replace(secret, REDACTED)
+        return data
+
+    def envelope(self, envelope: Envelope) -> Envelope:
+        """Return the redacted form of a message."""
+        shown = self.value(envelope.attributes)
+        return envelope._replace(attributes=shown, body=self.value(envelope.body))
+
+    def stream(self, key: tuple[str, str], data: bytes) -> bytes:
+        """Return the redacted data of the stream `key` that can be shown after `data`."""
+        if not self._all:
+            return data
+        shown = self.whole(self._held.pop(key, b"") + data)
+        kept = self._beginning(shown)
+        if kept:
+            self._held[key] = shown[len(shown) - kept :]
+            shown = shown[: len(shown) - kept]
+        return shown
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether the possible beginning of a secret is delayed."""
+        return bool(self._held)
+
+    def rest(self) -> list[tuple[tuple[str, str], bytes]]:
+        """Return the delayed data of each stream, after a pause."""
+        held = list(self._held.items())
+        self._held.clear()
+        return [(key, REDACTED if len(data) >= _SHORTEST else data) for key, data in held]
+
+    def _beginning(self, data: bytes) -> int:
+        """Return the number of bytes at the end of `data` that may begin a secret."""
+        longest = 0
+        for secret in self._all:
+            for size in range(min(len(secret) - 1, len(data)), longest, -1):
+                if data.endswith(secret[:size]):
+                    longest = size
+                    break
+        return longest
+
+
+def _base64(secret: bytes) -> list[bytes]:
+    """Return the forms of a secret inside base64 text, one for each alignment."""
+    found = []
+    for shift in range(3):
+        code = base64.b64encode(bytes(shift) + secret).rstrip(b"=")
+        first = (shift * 8 + 5) // 6
+        whole = (shift + len(secret)) * 8 // 6
+        if whole - first >= _SHORTEST_CODED:
+            found.append(code[first:whole])
+    return found
+
+
+def _without_cut(secret: bytes, shown: bytes) -> bytes:
+    """Return a text without a cut beginning of `secret` at its end or before a quote."""
+    at = shown.find(secret[:_SHORTEST_PART])
+    while at >= 0 and len(secret) > _SHORTEST_PART:
+        size = _SHORTEST_PART
+        while shown[at + size : at + size + 1] == secret[size : size + 1] != b"":
+            size += 1
+        if _CUT.match(shown, at + size):
+            shown = shown[:at] + REDACTED + shown[at + size :]
+        at = shown.find(secret[:_SHORTEST_PART], at + 1)
+    return shown

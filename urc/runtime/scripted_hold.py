@@ -1,0 +1,133 @@
+"""A held command that a script sends for a limited time, under the rules of motion.
+
+The script samples no input, but it renews the lease as long as it ticks. If it hangs, is killed or
+loses its connection, the lease runs out, and the guard writes the stop.
+"""
+
+import asyncio
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from urc.model.values import Reading
+from urc.motion.freshness import ControlInput
+from urc.motion.hold_to_run import STOP_FOR_S
+from urc.motion.lease import Operator
+from urc.protocol.requests.bounds import queue_limit_s
+from urc.runtime.held_commands import MotionBackend, is_lossy
+from urc.runtime.motion_controller import MotionController
+from urc.runtime.session import CommandFailed, Session
+
+__all__ = ["LONGEST_HOLD_S", "hold"]
+
+LONGEST_HOLD_S: Final = 60.0
+"""Limit of a scripted hold, in seconds; longer motion needs an operator at a dashboard."""
+_TICK_S: Final = 0.05
+_LOOK_S: Final = 0.01
+_STOP_OUT_S: Final = 10.0
+"""Time for the connection to accept the stop, in seconds."""
+_WORKED_OFF_S: Final = 0.5
+"""Time for a broker or bridge to pass the stop on, in seconds, before the connection closes."""
+_US: Final = Operator("send", "a program")
+
+
+async def hold(
+    session: Session,
+    name: str,
+    arguments: Mapping[str, Reading],
+    for_s: float,
+    why_not: Callable[[], str],
+) -> None:
+    """Hold a command for a time, release it, and return once its stop is sent.
+
+    Args:
+        session: a session opened with ``motion``.
+        name: name of a command with ``hold``.
+        arguments: name → value.
+        for_s: duration, from 0 to `LONGEST_HOLD_S` seconds.
+        why_not: returns the reason to end early, or "".
+
+    Raises:
+        CommandFailed: it was refused, or ended early; the robot got a stop.
+    """
+    movers = session.movers
+    if movers is None:
+        raise CommandFailed("unknown-command", f"{name} is not a held command")
+    await _until_ready(session, movers, name)
+    desk = MotionController(session.profile.driver)
+    desk.join(_US)
+    desk.attach(session.frames, movers)
+    follower = asyncio.create_task(_follow(desk, movers))
+    try:
+        desk.drive(_US.id, "take", _now())
+        try:
+            has_moved, why = await _ticks(desk, name, arguments, for_s, why_not)
+        finally:
+            desk.release(_US.id, name)
+        if has_moved:
+            await _stop_is_out(session, desk, movers, name)
+        if why:
+            raise CommandFailed("stopped" if has_moved else "refused", why)
+    finally:
+        follower.cancel()
+        desk.detach()
+
+
+def _now() -> float:
+    return asyncio.get_running_loop().time()
+
+
+async def _until_ready(session: Session, movers: MotionBackend, name: str) -> None:
+    """Wait until the transport is connected and its steps are done or failed."""
+    line = session.profile.driver.commands[name].transport
+    until = _now() + queue_limit_s(session.profile.driver.transports[line], None)
+    while not (movers.is_open(name) and session.frames.is_ready(name)):
+        status = session.hub.links[line]
+        if status.attempts or _now() >= until:
+            why = f": {status.detail}" if status.detail else ""
+            raise CommandFailed("disconnected", f"the robot is not connected{why}")
+        await asyncio.sleep(_LOOK_S)
+
+
+async def _ticks(
+    desk: MotionController,
+    name: str,
+    arguments: Mapping[str, Reading],
+    for_s: float,
+    why_not: Callable[[], str],
+) -> tuple[bool, str]:
+    """Tick until the end of the time; return whether the robot moved, and why it ended early."""
+    number, next_s = 0, _now()
+    ends_s = next_s + for_s
+    while (now := _now()) < ends_s:
+        number += 1
+        given = ControlInput(desk.lease.state.epoch, number, desk.beat(_US.id, now))
+        why = why_not() or desk.tick(_US.id, name, arguments, given, now)
+        if why:
+            return number > 1, why
+        next_s = max(next_s + _TICK_S, now)
+        await asyncio.sleep(min(next_s, ends_s) - now)
+    return number > 0, ""
+
+
+async def _stop_is_out(
+    session: Session, desk: MotionController, movers: MotionBackend, name: str
+) -> None:
+    """Wait until the transport has accepted the stop, and its repetitions on a lossy transport.
+
+    The guard reopens a lost connection, and sends the stop first.
+    """
+    driver = session.profile.driver
+    until = _now() + _STOP_OUT_S
+    while not (desk.rests(name) and movers.is_open(name)):
+        if _now() >= until:
+            text = f"the stop has not reached the robot: its line took none for {_STOP_OUT_S:g} s"
+            raise CommandFailed("disconnected", text)
+        await asyncio.sleep(_LOOK_S)
+    if is_lossy(driver, driver.commands[name].transport):
+        await asyncio.sleep(STOP_FOR_S + _WORKED_OFF_S)
+
+
+async def _follow(desk: MotionController, movers: MotionBackend) -> None:
+    while True:
+        for command, reason in await movers.stops():
+            desk.stopped(command, reason)

@@ -1,0 +1,66 @@
+"""The transports of a driver, with tunnels before the transports that they carry."""
+
+from collections.abc import Mapping
+from typing import NamedTuple, cast
+
+from urc.model.driver import Driver, TransportSpec
+from urc.model.values import Value
+from urc.protocol.forms.topics import listened
+from urc.registry import Table
+from urc.runtime.settings import options_of
+from urc.transports.base import TopicSubscription, Transport, TransportSetup, Tunnel
+
+__all__ = ["BuiltTransport", "make_lines", "make_transports"]
+
+
+class BuiltTransport(NamedTuple):
+    """A transport, with the values it was built from."""
+
+    spec: TransportSpec
+    factory: str
+    """Factory, as ``module:attribute``."""
+    setup: TransportSetup
+    transport: Transport
+
+
+def make_lines(
+    driver: Driver, settings: Mapping[str, Value], table: Table
+) -> dict[str, BuiltTransport]:
+    """Return name → closed transport; tunnels come before the transports that they carry.
+
+    Args:
+        driver: the loaded driver, without circular tunnels.
+        settings: a value for every setting.
+        table: the kinds of transport.
+
+    Raises:
+        UrcError: a transport cannot be built with these settings.
+    """
+    made: dict[str, BuiltTransport] = {}
+
+    def make(name: str) -> Transport:
+        if name not in made:
+            spec = driver.transports[name]
+            # The loader has checked that `tunnel` names a tunnel.
+            tunnel = cast("Tunnel", make(spec.tunnel)) if spec.tunnel else None
+            topics = listened(driver, name, settings)
+            setup = TransportSetup(
+                name,
+                options_of(spec, settings),
+                tuple(TopicSubscription(*topic) for topic in topics.items()),
+                tunnel,
+            )
+            row = table[spec.type]
+            made[name] = BuiltTransport(spec, row.factory, setup, row.load()(setup))
+        return made[name].transport
+
+    for name in driver.transports:
+        make(name)
+    return made
+
+
+def make_transports(
+    driver: Driver, settings: Mapping[str, Value], table: Table
+) -> dict[str, Transport]:
+    """Return name → closed transport; see `make_lines`."""
+    return {name: made.transport for name, made in make_lines(driver, settings, table).items()}

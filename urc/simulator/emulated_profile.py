@@ -1,0 +1,41 @@
+"""A profile that connects to its own emulated robot, on free ports.
+
+Layer 4. `urc demo` and `urc serve --simulate` use it; `urc simulate` keeps the real ports instead.
+"""
+
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
+
+from urc.model.profile import Profile
+from urc.model.values import Value
+from urc.simulator.emulated_robot import EmulatedRobot
+from urc.simulator.server import serve
+
+__all__ = ["stand_in"]
+
+
+@asynccontextmanager
+async def stand_in(
+    profile: Profile, settings: Mapping[str, Value], twin: EmulatedRobot | None = None
+) -> AsyncIterator[Profile]:
+    """Emulate `profile` until the context ends; return the profile that connects to it.
+
+    Args:
+        profile: the profile of the robot.
+        settings: values for its templates.
+        twin: the emulated robot, for observers; made from the profile by default.
+
+    Raises:
+        UrcError: a transport cannot be emulated.
+    """
+    async with serve(profile, settings, is_anywhere=True, twin=twin) as listening:
+        places = {name: endpoint.options for name, endpoint in listening.items()}
+        yield _redirected(profile, places)
+
+
+def _redirected(profile: Profile, options: Mapping[str, Mapping[str, object]]) -> Profile:
+    transports = {
+        name: spec._replace(options={**spec.options, **options[name]})
+        for name, spec in profile.driver.transports.items()
+    }
+    return profile._replace(driver=profile.driver._replace(transports=transports))

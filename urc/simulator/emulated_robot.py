@@ -1,0 +1,416 @@
+"""The emulated robot: frames in, bytes out, by the simulator rules of a profile.
+
+The driver's own declarations reply to frames without a matching rule (`urc.simulator.auto`).
+
+Pure: no socket, no clock. The framing is the inverse of the driver's, so frames are split and built
+exactly as the real robot does it. Each client has a connection of its own; the robot's state is the
+same for all of them.
+"""
+
+import logging
+import math
+import weakref
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Final, Protocol
+
+from urc.model.driver import Driver, TransportSpec
+from urc.model.payload import Payload
+from urc.model.profile import Profile, SimulatorRule
+from urc.model.values import NOTHING, Reading, Value
+from urc.protocol.forms.topics import topic_of
+from urc.protocol.framing.base import FrameFault, Framing
+from urc.protocol.framing.table import build_framing
+from urc.protocol.values.payload import Frame
+from urc.simulator.auto import DefaultConnection, DefaultMessage, DefaultResponder, Unanswered
+from urc.simulator.fault_injection import inject, mend
+from urc.simulator.faults import DelayLine, parse_fault
+from urc.simulator.rules import ReadyRule, RuleSet, RunningRule, not_taken
+from urc.simulator.simulated_body import SimulatedBody
+from urc.simulator.values import Values
+
+__all__ = ["EmulatedRobot", "EmulatedConnection"]
+
+
+class _Line(Protocol):
+    is_over: bool
+
+
+class TimedSetters:
+    """Rule → the connection that performs its changes, while that connection lives."""
+
+    def __init__(self) -> None:
+        """Begin without connections."""
+        self._lines: dict[int, weakref.ref[_Line]] = {}
+
+    def sets(self, rule: SimulatorRule, line: _Line) -> bool:
+        """Return whether `line` performs the changes of `rule`; the first caller does."""
+        known = self._lines.get(id(rule))
+        before = known() if known is not None else None
+        if before is None or before.is_over:
+            self._lines[id(rule)] = weakref.ref(line)
+            return True
+        return before is line
+
+
+MOST_COURSES: Final = 256
+"""Most delayed replies of one connection."""
+
+log = logging.getLogger(__name__)
+"""Receives every fault, as ``(transport, text)``."""
+
+
+class EmulatedRobot:
+    """One emulated robot; `line` makes its side of a connection."""
+
+    def __init__(self, profile: Profile, settings: Mapping[str, Value]) -> None:
+        """Prepare the rules of `profile`, whose templates see `settings`."""
+        self._transports = profile.driver.transports
+        self._rules = profile.simulator
+        self._values = Values(profile.driver, settings, profile.emulated, profile.world)
+        self._pictures = _pictures(profile.driver, settings, self._values.senses)
+        self._robot = DefaultResponder(profile.driver, settings, self._values)
+        self._setters = TimedSetters()
+        self._framings = {
+            name: build_framing(spec.framing).reversed() for name, spec in self._transports.items()
+        }
+
+    def line(self, transport: str) -> "EmulatedConnection":
+        """Return the robot's side of a new connection on `transport`."""
+        rules = tuple(rule for rule in self._rules if rule.transport == transport)
+        spec, framing = self._transports[transport], self._framings[transport]
+        auto = self._robot.line(transport, framing, talks=not any(map(_speaks, rules)))
+        ruled = RuleSet(rules, spec, framing, auto, self._values)
+        return EmulatedConnection(spec, framing, ruled, auto, self._setters, self._values)
+
+    def picture(self, transport: str, topics: Iterable[str], now_s: float) -> bytes | None:
+        """Return the image of the robot's world for one of `topics`, or None.
+
+        It is b"" while the sensor has dropped out.
+
+        Args:
+            transport: name of the transport of the subscription.
+            topics: names of the image's topic there.
+            now_s: seconds since the epoch.
+        """
+        body = self._values.body
+        for topic in topics:
+            name = self._pictures.get((transport, topic))
+            if name is not None and body is not None:
+                faults = self._values.faults
+                return (
+                    b"" if faults.is_silent or faults.drops((name,)) else body.picture(name, now_s)
+                )
+        return None
+
+    @property
+    def body(self) -> SimulatedBody | None:
+        """The body in its world; None without a world."""
+        return self._values.body
+
+    def prepare(self) -> None:
+        """Load the modules for images, so that the first image is not late; may block."""
+        if self._values.body is not None:
+            self._values.body.prepare()
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """The injected faults, as they were written."""
+        return tuple(one.text for one in self._values.faults.active.values())
+
+    def inject(self, text: str, now_s: float) -> None:
+        """Inject a fault in the syntax of `FAULTS`.
+
+        Args:
+            text: such as ``loss=5%``.
+            now_s: seconds since the epoch.
+
+        Raises:
+            UrcError: the fault is unknown, or impossible for this robot; one line.
+        """
+        inject(parse_fault(text), self._values, now_s)
+
+    def mend(self) -> None:
+        """Remove all faults; a low battery stays low."""
+        mend(self._values)
+
+    def camera(self, now_s: float) -> bytes | None:
+        """Return the robot's camera image as JPEG; None without a camera in a world.
+
+        `now_s` is in seconds since the epoch.
+        """
+        body = self._values.body
+        name = next(iter(self._pictures.values()), None)
+        return None if body is None or name is None else body.picture(name, now_s)
+
+    def top_view(self, width: int, height: int, now_s: float) -> bytes | None:
+        """Return the robot in its world from above, as JPEG; None without a world.
+
+        Args:
+            width: pixels, 16 to 2000.
+            height: pixels, 16 to 2000.
+            now_s: seconds since the epoch.
+        """
+        body = self._values.body
+        if body is None:
+            return None
+        body.world.advance(now_s)
+        return body.world.top_view(width, height)
+
+    def readings(self, now_s: float) -> Mapping[str, Reading]:
+        """Return the values of the robot's signals, for an observer without a connection.
+
+        `now_s` is in seconds since the epoch.
+        """
+        return {name: self._values.of(name, now_s) for name in self._values.driver.signals}
+
+
+def _pictures(
+    driver: Driver, settings: Mapping[str, Value], senses: Iterable[str]
+) -> Mapping[tuple[str, str], str]:
+    """Return transport and topic → signal, for images from the world."""
+    return {
+        (message.transport, topic_of(message.read, settings)): name
+        for message in driver.messages.values()
+        for name in message.read.fields
+        if message.read.topic is not None
+        and name in senses
+        and driver.signals[name].type == "image"
+    }
+
+
+def _speaks(rule: SimulatorRule) -> bool:
+    """Return whether a rule defines messages of its own, in place of the declared ones."""
+    if rule.request:
+        return False
+    says = any(one.send or one.message for one in rule.reactions)
+    return says or not any(one.sets or one.answers for one in rule.reactions)
+
+
+@dataclass(slots=True)
+class _Periodic:
+    what: ReadyRule | DefaultMessage
+    every_s: float
+    left_s: float
+    """Time until it is due, in seconds."""
+
+
+class EmulatedConnection:
+    """The robot's side of one connection."""
+
+    def __init__(
+        self,
+        spec: TransportSpec,
+        framing: Framing,
+        rules: RuleSet,
+        auto: DefaultConnection,
+        setters: TimedSetters,
+        values: Values,
+    ) -> None:
+        """Prepare; `EmulatedRobot.line` calls this."""
+        self._body = values.body
+        self._flaws = values.faults
+        self._late = DelayLine()
+        self._name = spec.name
+        self._auto = auto
+        self._is_greeted = not auto.opening
+        self._encoding = spec.encoding
+        self._decoder = framing.decoder()
+        self._rules = rules
+        self._setters = setters
+        self._courses: list[RunningRule] = []
+        self._periodic = [
+            _Periodic(rule, rule.what.every_s, rule.what.every_s)
+            for rule in rules.periodic
+            if rule.what.every_s is not None
+        ]
+        self._periodic += [_Periodic(one, one.every_s, one.every_s) for one in auto.messages]
+        self._now_s = 0.0
+        self.is_over = False
+        """Whether the robot ends the connection, after all its data was taken."""
+        self.faults = 0
+        """Number of invalid frames, and of frames without a matching rule or a reply."""
+        self.last_fault = ""
+        """Text of the newest fault, one line."""
+
+    @property
+    def due_in_s(self) -> float | None:
+        """Time until `step` has data to send, in seconds; None if it never has."""
+        if not self._is_greeted:
+            return 0.0
+        left = [one.left_s for one in self._periodic]
+        left += [one.left_s for one in self._courses]
+        if self.has_late:
+            left.append(self._late.due_s - self._now_s)
+        silence = self._decoder.deadline
+        if silence is not None:
+            left.append(silence - self._now_s)
+        return max(0.0, min(left)) if left else None
+
+    def receive(self, data: Payload, now_s: float, limit: int | None = None) -> list[Payload]:
+        """Take data of the client and return the replies, each a whole frame.
+
+        Args:
+            data: any piece of the stream, or an envelope on a message transport.
+            now_s: seconds since the epoch, the templates' ``now``.
+            limit: most replies; requests beyond it are dropped. None: no limit.
+        """
+        return self._flawed(self._heard(data, now_s, limit, self._answer_or_lose), now_s)
+
+    def ask(self, data: Payload, now_s: float) -> list[Payload]:
+        """Return the replies at once, for servers that reply to each message separately."""
+        return self._heard(data, now_s, None, self._answer)
+
+    def _heard(
+        self,
+        data: Payload,
+        now_s: float,
+        limit: int | None,
+        answer: Callable[[Payload, float], list[Payload]],
+    ) -> list[Payload]:
+        answers: list[Payload] = []
+        self._pass(now_s)
+        if not isinstance(data, bytes):
+            return [] if self.is_over else answer(data, now_s)
+        for frame in self._decoder.feed(data, now_s):
+            if self.is_over or (limit is not None and len(answers) >= limit):
+                break
+            if isinstance(frame, FrameFault):
+                self._fault(frame.message)
+            else:
+                answers += answer(frame, now_s)
+        return answers
+
+    def step(self, dt_s: float, now_s: float) -> list[Payload]:
+        """Let `dt_s` seconds pass and return the robot's unsolicited frames.
+
+        A rule that was due several times sends once: a pause causes no burst.
+        """
+        said = self._flawed(self._due(dt_s, now_s), now_s)
+        return self._late.take(now_s) + said if self.has_late else said
+
+    def _flawed(self, said: list[Payload], now_s: float) -> list[Payload]:
+        """Return the frames to send now; injected faults delay or lose the others."""
+        if not self._flaws.active:
+            return said
+        said = self._flaws.said(said)
+        delay_s = self._flaws.delay_s
+        if not delay_s:
+            return said
+        self._late.put(said, now_s + delay_s)
+        return []
+
+    @property
+    def has_late(self) -> bool:
+        """Whether a delayed frame is due."""
+        return self._late.due_s < math.inf
+
+    @property
+    def loses(self) -> bool:
+        """Whether the next reply is lost."""
+        return self._flaws.is_silent or self._flaws.loses()
+
+    @property
+    def delay_s(self) -> float:
+        """Injected delay of every reply, in seconds."""
+        return self._flaws.delay_s
+
+    @property
+    def is_incomplete(self) -> bool:
+        """Whether an injected fault has made a signal drop out."""
+        return bool(self._flaws.dropped)
+
+    def _due(self, dt_s: float, now_s: float) -> list[Payload]:
+        said: list[Payload] = []
+        self._pass(now_s)
+        for frame in self._decoder.tick(now_s):
+            if not isinstance(frame, FrameFault):
+                said += self._answer_or_lose(frame, now_s)
+        if not self._is_greeted:
+            self._is_greeted = True
+            said += self._made(lambda: [*self._auto.greet(now_s)]) or []
+        for course in tuple(self._courses):
+            course.left_s -= dt_s
+            if course.left_s <= 0 and not self.is_over:
+                self._courses.remove(course)
+                said += self._go_on(course, now_s)
+        for periodic in self._periodic:
+            periodic.left_s -= dt_s
+            if periodic.left_s <= 0 and not self.is_over:
+                periodic.left_s = periodic.every_s - (-periodic.left_s) % periodic.every_s
+                said += self._by_itself(periodic.what, now_s)
+        return said
+
+    def _pass(self, now_s: float) -> None:
+        """Advance the world to the present, before its inputs change."""
+        self._now_s = now_s
+        if self._body is not None:
+            self._body.world.advance(now_s)
+
+    def _by_itself(self, what: ReadyRule | DefaultMessage, now_s: float) -> list[Payload]:
+        if isinstance(what, DefaultMessage):
+            answer = what.answer
+            return self._made(lambda: [*self._auto.say(answer, now_s)]) or []
+        rule = what.what
+
+        def go() -> list[Payload]:
+            if not self._rules.holds(rule.when, now_s):
+                return []
+            sets = self._setters.sets(rule, self)
+            return self._go_on(RunningRule(what.deeds, NOTHING, sets=sets), now_s)
+
+        return self._made(go) or []
+
+    def _answer_or_lose(self, frame: Payload, now_s: float) -> list[Payload]:
+        return [] if self._flaws.loses() else self._answer(frame, now_s)
+
+    def _answer(self, frame: Payload, now_s: float) -> list[Payload]:
+        asked = Frame(frame, self._encoding)
+        if self._body is not None and self._body.failsafe is not None:
+            self._body.hear(self._auto.labels(asked), now_s)
+
+        def answer() -> list[Payload] | None:
+            course = self._rules.find(asked, now_s)
+            if course is not None:
+                return self._go_on(course, now_s)
+            return self._auto.answer(asked, now_s)
+
+        said = self._made(answer)
+        if said is None:
+            self._fault(not_taken(asked))
+        return said or []
+
+    def _go_on(self, course: RunningRule, now_s: float) -> list[Payload]:
+        """Perform the due reactions, and keep the others for later."""
+        said: list[Payload] = []
+        while course.deeds and not self.is_over:
+            deed = course.deeds[0]
+            if deed.what.after_s > 0 and not course.has_waited:
+                self._keep(course, deed.what.after_s)
+                break
+            course.has_waited = False
+            course.deeds = course.deeds[1:]
+            said += self._made(partial(self._rules.do, deed, course, now_s)) or []
+            self.is_over |= deed.what.closes
+        return said
+
+    def _keep(self, course: RunningRule, left_s: float) -> None:
+        if len(self._courses) >= MOST_COURSES:
+            self._fault(f"{MOST_COURSES} delayed replies wait already; this one is dropped")
+            return
+        course.left_s, course.has_waited = left_s, True
+        self._courses.append(course)
+
+    def _made(self, make: Callable[[], list[Payload] | None]) -> list[Payload] | None:
+        """Return the result of `make`; count and log a frame without reply."""
+        try:
+            return make()
+        except Unanswered as problem:
+            self._fault(str(problem))
+            return []
+
+    def _fault(self, text: str) -> None:
+        self.faults += 1
+        self.last_fault = text
+        log.info("%s: %s", self._name, text)

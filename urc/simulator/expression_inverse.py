@@ -1,0 +1,145 @@
+"""Inversion of expressions: the field value for which an expression gives a wanted value.
+
+Pure. An expression of one field with a chain of filters is inverted from its end. Pieces of the
+same bytes (``unpack`` at several offsets) are merged. An expression without inverse gives None.
+"""
+
+import ast
+from collections.abc import Callable, Iterable
+from typing import Any, Final
+
+from urc._number_types import number_of
+from urc.expressions import Template, spelt
+from urc.filters.binary import written_number
+from urc.filters.parse import CUT_FILTERS
+from urc.model.payload import ReadSpec
+from urc.protocol.values.convert import BadValue
+
+__all__ = ["computed_fields", "field_of"]
+
+_MOST_BYTES: Final = 4096
+
+
+def computed_fields(spec: ReadSpec, raw: Callable[[str], object]) -> dict[str, object]:
+    """Return the fields from which expressions of one field compute signals.
+
+    Args:
+        spec: the frame.
+        raw: signal → its raw value; raises `BadValue` without one.
+    """
+    wanted: dict[str, list[tuple[Template, object]]] = {}
+    for name, template in spec.sets.items():
+        if len(template.names) == 1:
+            try:
+                pair = (template, raw(name))
+            except BadValue:
+                continue
+            wanted.setdefault(next(iter(template.names)), []).append(pair)
+    fields: dict[str, object] = {}
+    for field, pairs in wanted.items():
+        whole = field_of(pairs)
+        if whole is not None:
+            fields[field] = whole
+        elif not any(_takes_apart(template) for template, _ in pairs):
+            fields[field] = pairs[0][1]  # most others only convert text to a number
+    return fields
+
+
+def _takes_apart(template: Template) -> bool:
+    """Return whether the expression takes its field apart, so that it cannot be a plain value."""
+    return any(f"_filter_{name}(" in template.python for name in ("split", *CUT_FILTERS, *_TEXTS))
+
+
+def field_of(wanted: Iterable[tuple[Template, object]]) -> object | None:
+    """Return the value of the one field for which all expressions give their wanted values."""
+    whole: bytearray | None = None
+    last: Callable[[bytes], object] | None = None
+    found: object | None = None
+    for template, value in wanted:
+        try:
+            chain = _chain(template.python)
+            if not chain:
+                return None
+            found, at = _undone(chain, value)
+        except (ValueError, TypeError, KeyError, OverflowError):
+            return None
+        if isinstance(found, bytes) and at + len(found) <= _MOST_BYTES:
+            whole = bytearray() if whole is None else whole
+            whole.extend(bytes(max(0, at + len(found) - len(whole))))
+            whole[at : at + len(found)] = found
+            last = _TEXTS.get(chain[-1][0])
+    if whole is None:
+        return found
+    return bytes(whole) if last is None else last(bytes(whole))
+
+
+Step = tuple[str, tuple[Any, ...]]
+
+
+def _chain(python: str) -> list[Step]:
+    """Return the filters after the field, the last one first; [] for any other expression."""
+    node, steps = ast.parse(python, mode="eval").body, list[Step]()
+    while isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args:
+        subject, *rest = node.args
+        if not all(isinstance(one, ast.Constant) for one in rest):
+            return []
+        values = tuple(one.value for one in rest if isinstance(one, ast.Constant))
+        steps.append((node.func.id.removeprefix("_filter_"), values))
+        node = subject
+    return steps if isinstance(node, ast.Subscript) else []
+
+
+def _undone(chain: list[Step], value: Any) -> tuple[object, int]:
+    """Return the field, or bytes of it with their offset."""
+    at = 0
+    for name, arguments in chain:
+        if name in _TEXTS:
+            break  # several expressions may read bytes of one text
+        match name, arguments:
+            case "unpack", (type_name, *place):
+                value, at = _packed(type_name, value), int(place[0]) if place else 0
+            case "numbers", (type_name,):
+                value = b"".join(_packed(type_name, one) for one in value)
+            case "signed", (bits,):
+                value = round(value) & (1 << bits) - 1
+            case "digits", (width, base, *zero):
+                first = ord(zero[0]) if zero and isinstance(zero[0], str) else (*zero, 48)[0]
+                value = "".join(_digits(round(one), width, base, first) for one in value)
+            case "first", ():
+                value = [value]
+            case "int", (_, 16):
+                value = f"{round(value):X}"
+            case (("int" | "float"), _):
+                value = spelt(value)
+            case _:
+                raise ValueError(name)
+    return value, at
+
+
+def _packed(type_name: str, value: Any) -> bytes:
+    """Return a value as bytes, clamped to the range of the type."""
+    number = number_of(type_name)
+    if number is None:
+        raise ValueError(type_name)
+    if number.kind != "float":
+        value = min(max(round(value), number.least), number.most)
+    return written_number(type_name, value)
+
+
+def _digits(number: int, width: int, base: int, zero: int) -> str:
+    number = min(max(number, 0), base**width - 1)
+    places = (number // base**place % base for place in reversed(range(width)))
+    return "".join(chr(zero + digit) for digit in places)
+
+
+def _base64(data: bytes) -> str:
+    from binascii import b2a_base64
+
+    return b2a_base64(data, newline=False).decode("ascii")
+
+
+_TEXTS: Final[dict[str, Callable[[bytes], object]]] = {
+    "b64decode": _base64,
+    "hexbytes": lambda data: data.hex().upper(),
+}
+"""Filters from bytes to text → their inverse."""

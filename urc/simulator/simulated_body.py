@@ -1,0 +1,129 @@
+"""The body of an emulated robot: its state drives the body, and the body gives its signals.
+
+Pure: no socket, no clock. The robot's fail-safe behaviour runs here, with or without a connection:
+the one of the document (`failsafe`), else the one of its held commands (`watchdog`).
+"""
+
+import logging
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+
+from urc.expressions import ExpressionError, Template
+from urc.model.driver import Driver
+from urc.model.values import Reading
+from urc.model.world import Failsafe, WorldSpec
+from urc.simulator.world.world import SensorView, World
+
+__all__ = ["SimulatedBody", "failsafe_of"]
+
+log = logging.getLogger("urc.simulator.emulated_robot")
+_KEPT = ("flies", "cut")
+"""Inputs that are no motion: a robot without commands stays in the air."""
+
+_LOOKS = re.compile(r"_item\(ns\['world'\], '(laser|picture|panorama)'\)")
+"""Sensors that need numpy."""
+
+Evaluate = Callable[[Template, float], object]
+"""A template and the time → its value over the robot's signals and state."""
+
+
+class SimulatedBody:
+    """The body of one emulated robot.
+
+    Args:
+        spec: the declaration of its world.
+        driver: the driver of the robot.
+        evaluate: returns the value of a template.
+        put: sets a value in the robot's state.
+    """
+
+    def __init__(
+        self,
+        spec: WorldSpec,
+        driver: Driver,
+        evaluate: Evaluate,
+        put: Callable[[str, object], None],
+    ) -> None:
+        self.spec = spec
+        self.world = World(spec, self._inputs, self._holds)
+        self.failsafe = spec.failsafe or failsafe_of(driver)
+        self._evaluate = evaluate
+        self._put = put
+        self._heard_s = -math.inf
+        """Time of the last command that keeps the robot moving."""
+        self._is_safe = True
+        """Whether the fail-safe has acted since."""
+        self._last_fault = ""
+
+    def hear(self, labels: Iterable[str], now_s: float) -> None:
+        """Record the commands in a frame."""
+        if self.failsafe is not None and not {*labels}.isdisjoint(self.failsafe.without):
+            self._heard_s, self._is_safe = now_s, False
+
+    def prepare(self) -> None:
+        """Load the modules for lasers and cameras if a signal needs them; may block."""
+        if any(_LOOKS.search(one.python) for one in self.spec.senses.values()):
+            import urc.simulator.world.laser
+            import urc.simulator.world.picture  # noqa: F401  # loaded is all that is wanted
+
+    def view(self, now_s: float) -> SensorView:
+        """Return the sensor view of the world at `now_s`."""
+        return self.world.view(now_s)
+
+    def sense(self, name: str, now_s: float) -> object:
+        """Return the value of a signal from the world; raise `ExpressionError` without one."""
+        self.world.advance(now_s)
+        return self._evaluate(self.spec.senses[name], now_s)
+
+    def picture(self, name: str, now_s: float) -> bytes | None:
+        """Return the image that is the value of a signal, or None."""
+        value = self.sense(name, now_s)
+        return value if isinstance(value, bytes) else None
+
+    def _inputs(self, time_s: float) -> Mapping[str, float]:
+        failsafe = self.failsafe
+        is_lost = failsafe is not None and time_s - self._heard_s > failsafe.after_s
+        if is_lost and failsafe is not None and failsafe.sets and not self._is_safe:
+            self._is_safe = True
+            for name, value in failsafe.sets.items():
+                self._put(name, self._value(value, time_s))
+        stands = is_lost and failsafe is not None and not failsafe.sets
+        return {
+            name: self._number(name, value, time_s)
+            for name, value in self.spec.drive.items()
+            if not stands or name in _KEPT
+        }
+
+    def _holds(self, value: Template | bool) -> bool:
+        return bool(self._value(value, self.world.time_s or 0.0))
+
+    def _value(self, value: Template | Reading, time_s: float) -> object:
+        if not isinstance(value, Template):
+            return value
+        try:
+            return self._evaluate(value, time_s)
+        except ExpressionError as error:
+            self._tell(str(error))
+            return None
+
+    def _number(self, name: str, value: Template | float, time_s: float) -> float:
+        found = self._value(value, time_s)
+        if isinstance(found, (int, float)) and math.isfinite(found):
+            return float(found)
+        self._tell(f"world.drive.{name}: expected a number, found {found!r}")
+        return 0.0
+
+    def _tell(self, text: str) -> None:
+        if text != self._last_fault:
+            self._last_fault = text
+            log.info("%s", text)
+
+
+def failsafe_of(driver: Driver) -> Failsafe | None:
+    """Return the fail-safe of the held commands, from `watchdog` or `step`; None without one."""
+    held = {name: one.hold for name, one in driver.commands.items() if one.hold is not None}
+    times = [hold.step_s or hold.watchdog_s for hold in held.values()]
+    if not times or any(one is None or not math.isfinite(one) for one in times):
+        return None
+    return Failsafe(max(one for one in times if one is not None), tuple(held))

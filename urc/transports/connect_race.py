@@ -1,0 +1,78 @@
+"""Fast connecting to a robot that may come back at any moment.
+
+The system repeats a failed connection attempt only after a second, and then after longer delays.
+With `HURRY` set, further attempts start at short intervals, while earlier ones continue, because
+the robot may also just be far away.
+"""
+
+import asyncio
+import errno
+import socket
+from contextvars import ContextVar
+
+from urc.transports._stream import tune
+from urc.transports.own_listeners import OWN_DOORS
+
+__all__ = ["HURRY", "ConnectRace", "connected"]
+
+
+class ConnectRace:
+    """The interval between connection attempts."""
+
+    __slots__ = ("every_s", "is_used")
+
+    def __init__(self, every_s: float) -> None:
+        self.every_s = every_s
+        self.is_used = False
+        """Whether a connection was opened in this way; some transports use other ways."""
+
+
+HURRY: ContextVar[ConnectRace | None] = ContextVar("HURRY", default=None)
+"""Set by a caller that needs a fast connection."""
+
+
+async def connected(family: int, address: object) -> socket.socket:
+    """Return a connected non-blocking socket; the caller sets the timeout.
+
+    Raises:
+        OSError: the robot or this machine refuses the connection.
+    """
+    hurry = HURRY.get()
+    if hurry is None:
+        return await _once(family, address)
+    hurry.is_used = True
+    tries: set[asyncio.Task[socket.socket]] = set()
+    try:
+        while True:
+            tries.add(asyncio.create_task(_once(family, address)))
+            done, tries = await asyncio.wait(
+                tries, timeout=hurry.every_s, return_when=asyncio.FIRST_COMPLETED
+            )
+            if done:
+                first, *more = sorted(done, key=lambda one: one.exception() is not None)
+                tries.update(more)
+                return first.result()
+    finally:
+        for other in tries:
+            other.cancel()
+        for left in await asyncio.gather(*tries, return_exceptions=True):
+            if isinstance(left, socket.socket):
+                left.close()
+
+
+async def _once(family: int, address: object) -> socket.socket:
+    """Connect one socket; close it on failure or cancellation."""
+    loop = asyncio.get_running_loop()
+    line = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        line.setblocking(False)
+        tune(line)
+        await loop.sock_connect(line, address)  # type: ignore[arg-type] # a result of getaddrinfo
+        if line.getsockname() == line.getpeername():
+            # The kernel chose an unused port of this machine as both ends of the connection.
+            raise ConnectionRefusedError(errno.ECONNREFUSED, "connected to itself")
+        OWN_DOORS.check(line)
+    except BaseException:
+        line.close()
+        raise
+    return line

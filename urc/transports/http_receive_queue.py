@@ -1,0 +1,91 @@
+"""The bounded queue of received HTTP responses, pictures and events."""
+
+import asyncio
+from collections.abc import Mapping
+
+from urc.model.payload import Envelope
+from urc.transports.base import PeerClosed
+
+__all__ = ["HttpReceiveQueue"]
+
+EVENTS_BYTES = 1_048_576
+"""Limit of queued events and lines, in bytes; beyond it, the robot is not read."""
+EVENTS = 64
+
+
+class HttpReceiveQueue:
+    """A bounded queue in the order of arrival. A newer picture replaces the queued one."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[object, Envelope] = {}
+        """Place → envelope; the place of a picture is its topic, all others have a number."""
+        self._number = 0
+        self._events = 0
+        self._events_bytes = 0
+        self._arrived = asyncio.Event()
+        self._has_room = asyncio.Event()
+        self._has_room.set()
+        self._ended: str | None = None
+        self.dropped = 0
+        """Number of pictures that were replaced by newer ones."""
+
+    def answer(self, place: int, envelope: Envelope) -> None:
+        """Add the response to a request; the number of requests bounds the responses."""
+        self._waiting["answer", place] = envelope
+        self._arrived.set()
+
+    def give_up(self, place: int) -> None:
+        """Remove an unread response."""
+        self._waiting.pop(("answer", place), None)
+
+    def picture(self, topic: str, body: bytes) -> None:
+        """Add a picture, replacing the queued one of the same topic."""
+        self.dropped += topic in self._waiting
+        self._waiting[topic] = Envelope("message", {"topic": topic, "dropped": self.dropped}, body)
+        self._arrived.set()
+
+    async def event(self, attributes: Mapping[str, object], body: bytes) -> None:
+        """Add an event or a line, waiting while the queue is full."""
+        while self._events >= EVENTS or self._events_bytes >= EVENTS_BYTES:
+            self._has_room.clear()
+            await self._has_room.wait()
+        self._events += 1
+        self._events_bytes += len(body)
+        self._number += 1
+        self._waiting["event", self._number] = Envelope("message", attributes, body)
+        self._arrived.set()
+
+    def end(self, reason: str) -> None:
+        """End the queue; queued envelopes can still be read."""
+        if self._ended is None:
+            self._ended = reason
+        self._arrived.set()
+        self._has_room.set()
+
+    @property
+    def ended(self) -> str | None:
+        """Reason of the end; None while the connection is open."""
+        return self._ended
+
+    async def take(self) -> tuple[Envelope, int | None]:
+        """Return the next envelope, and the place of the request if it is a response.
+
+        Raises:
+            PeerClosed: the queue is empty and has ended.
+        """
+        while not self._waiting:
+            if self._ended is not None:
+                raise PeerClosed(self._ended)
+            self._arrived.clear()
+            await self._arrived.wait()
+        where = next(iter(self._waiting))
+        envelope = self._waiting.pop(where)
+        if not isinstance(where, tuple):
+            return envelope, None
+        kind, number = where
+        if kind == "answer":
+            return envelope, number
+        self._events -= 1
+        self._events_bytes -= len(envelope.body) if isinstance(envelope.body, bytes) else 0
+        self._has_room.set()
+        return envelope, None

@@ -1,0 +1,85 @@
+"""The listeners of URC's own dashboard, which no transport may connect to.
+
+A document that connects to the dashboard would act as a local program. Each new connection is
+checked, so host names, redirects and address notations make no difference. Forwarding by a router,
+a proxy or another machine is not detected.
+"""
+
+import ipaddress
+import socket
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+
+from urc._addresses import Address, is_of_this_machine, unmapped
+
+__all__ = ["OWN_DOORS", "OwnAddressError", "OwnListeners"]
+
+
+class OwnAddressError(OSError):
+    """A connection leads to URC's own dashboard."""
+
+    def __init__(self) -> None:
+        super().__init__(None, "this address is the dashboard itself; it cannot be a robot")
+
+
+class OwnListeners:
+    """The listening addresses of this program."""
+
+    def __init__(self) -> None:
+        """Initialise without listeners."""
+        self._doors: list[tuple[Address, int]] = []
+
+    @contextmanager
+    def kept(self, listener: socket.socket) -> Iterator[None]:
+        """Reject connections to `listener` during the context."""
+        place = listener.getsockname()
+        door = (_address(place[0]), int(place[1]))
+        self._doors.append(door)
+        try:
+            yield
+        finally:
+            self._doors.remove(door)
+
+    def words(self) -> list[str]:
+        """Return the addresses as words for `learn`, in another process of this program."""
+        return [f"{address}#{port}" for address, port in self._doors]
+
+    def learn(self, words: Iterable[str]) -> None:
+        """Add the listeners of another process of this program, until this process ends."""
+        for word in words:
+            address, _, port = word.partition("#")
+            self._doors.append((_address(address), int(port)))
+
+    def check(self, line: socket.socket) -> None:
+        """Raise `OwnAddressError` if a connected socket leads to an own listener."""
+        peer = line.getpeername()
+        if line.family in (socket.AF_INET, socket.AF_INET6):
+            self.check_place(_address(peer[0]), peer[1])
+
+    def check_place(self, address: Address, port: int, *, is_near: bool = True) -> None:
+        """Raise `OwnAddressError` if a connection to that address would lead to an own listener.
+
+        Args:
+            address: target address.
+            port: target port.
+            is_near: whether the connection starts on this machine; elsewhere, loopback means
+                another machine.
+        """
+        wanted = unmapped(address)
+        if not is_near and (wanted.is_loopback or wanted.is_unspecified):
+            return
+        for door, its_port in self._doors:
+            if port != its_port:
+                continue
+            if wanted == door or wanted.is_unspecified:
+                raise OwnAddressError
+            if door.is_unspecified and is_of_this_machine(wanted):
+                raise OwnAddressError
+
+
+def _address(text: str) -> Address:
+    return unmapped(ipaddress.ip_address(text.partition("%")[0]))
+
+
+OWN_DOORS = OwnListeners()
+"""Listeners of this process; they belong to the program as a whole."""

@@ -1,0 +1,380 @@
+"""ROS 1 and ROS 2 robots behind a rosbridge server: topics, services and actions.
+
+Theory of operation. Each connection is one WebSocket of URC's own transport, with pings. The
+protocol on it is that of roslibpy (`urc.transports.ros.rosbridge_client`). The state of roslibpy
+ends with the connection, so nothing can be sent late. A task always reads, however slowly the
+messages are consumed: one stalled reader freezes the topic for every client of the bridge.
+
+A bridge delivers a first message only after its publisher has connected to the subscribers, and
+drops it when its client leaves before that. `settle` is for leaving clients: it queries rosapi,
+whose reply also shows that the bridge has processed all earlier data, and waits for such
+connections.
+
+The bridge reports no errors: a topic without a publisher, a wrong type and an access list all cause
+silence. The transport therefore asks rosapi for the topics at the start, and for the subscribers of
+a topic at its first message. `urc.transports.ros.graph` reports mistakes. With ``version: auto``,
+subscriptions wait for that reply, which decides the form of type names.
+"""
+
+import asyncio
+import logging
+from collections.abc import Mapping
+from contextlib import suppress
+from importlib.util import find_spec
+from typing import Any, Final, Literal
+
+from urc.model.payload import Envelope, Payload
+from urc.model.values import NOTHING, Value
+from urc.transports.base import (
+    NOTICE,
+    ConnectFailed,
+    PeerClosed,
+    Transport,
+    TransportError,
+    TransportSetup,
+)
+from urc.transports.ros.graph import TopicGraph, version_of
+from urc.transports.ros.rosbridge_client import KNOWN_TOPICS, RosClient, RosSubscription
+from urc.transports.ros.rosbridge_operations import MAX_BYTES, BadOperation, OperationReader
+from urc.transports.topic_queue import TopicReceiveQueue
+from urc.transports.websocket import WebSocketTransport
+
+__all__ = ["RosbridgeTransport", "from_setup"]
+
+DEFAULT_PORT = 9090
+AUTO: Final = "auto"
+_WEBSOCKET = ("auth", "headers")
+"""Options of the WebSocket itself."""
+
+_ANSWER_S = 3.0
+"""Timeout for rosapi in seconds, after which it counts as missing."""
+_CONNECTS_S = 1.0
+"""Time for which a bridge keeps a message for new subscribers, in seconds."""
+_LOOK_S = 0.2
+
+_TURN_S = 0.005
+"""Time for reading frames per turn of the event loop, in seconds."""
+
+log = logging.getLogger(__name__)
+
+
+class RosbridgeTransport:
+    """One connection to a rosbridge server; it may be opened repeatedly."""
+
+    def __init__(
+        self,
+        wire: WebSocketTransport,
+        where: str,
+        subscriptions: tuple[RosSubscription, ...] = (),
+        ros: int | Literal["auto"] | None = None,
+    ) -> None:
+        """Initialise without connecting.
+
+        Args:
+            wire: WebSocket to the bridge, owned by this transport.
+            where: target as text for people: ``192.168.1.5:9090``.
+            subscriptions: subscriptions on each opening, one per topic.
+            ros: 1 or 2: form of type names; "auto": that of the bridge; None: as written.
+        """
+        self._wire = wire
+        self._where = where
+        self._subscriptions = subscriptions
+        self._ros = ros
+        self._session: _Session | None = None
+        self._graph = TopicGraph(self._tell, None if ros == AUTO else ros)
+
+    @property
+    def address(self) -> str:
+        """Target of the transport as text for people: ``rosbridge 192.168.1.5:9090``."""
+        return f"rosbridge {self._where}"
+
+    async def open(self, timeout_s: float) -> None:
+        """Connect and subscribe, or raise `ConnectFailed` within `timeout_s` seconds."""
+        await self.close()
+        await self._wire.open(timeout_s)
+        session = self._session = _Session(self._wire, self._ros, self._graph)
+        try:
+            async with asyncio.timeout(timeout_s):
+                await session.begin(self._subscriptions)
+        except BaseException as fault:
+            self._session = None
+            await session.end()
+            await self._wire.close()
+            if isinstance(fault, PeerClosed | TimeoutError):
+                told = str(fault) or "it takes nothing"
+                message = f"{self._where} refused the subscriptions ({told})"
+                raise ConnectFailed(message) from fault
+            raise
+
+    async def receive(self) -> Envelope:
+        """Return the next message, response or feedback; raise `PeerClosed` at the end."""
+        if self._session is None:
+            raise PeerClosed("the connection is closed")
+        return await self._session.inbox.take()
+
+    async def send(self, data: Payload) -> None:
+        """Publish, call a service, start or cancel a goal; return once the kernel has the data.
+
+        Raises:
+            PeerClosed: the connection broke.
+            TransportError: rosbridge cannot send `data`.
+        """
+        if self._session is None:
+            raise PeerClosed("the connection is closed")
+        if not isinstance(data, Envelope):
+            raise TransportError("rosbridge carries messages, not bytes; use publish or call")
+        await self._session.perform(data)
+
+    async def close(self) -> None:
+        """Close at once, discarding unsent data. Never raises, may be called twice."""
+        session, self._session = self._session, None
+        try:
+            if session is not None:
+                await session.end()
+        finally:
+            await self._wire.close()
+
+    async def settle(self) -> str:
+        """Wait until the first messages of all topics have reached their subscribers.
+
+        Returns:
+            The topics without subscribers in one line, or "".
+        """
+        return "" if self._session is None else await self._session.settle()
+
+    async def probe(self) -> None:
+        """Probe the bridge, and return when it has sent anything since."""
+        await self._wire.probe()
+
+    def unsent(self) -> int:
+        """Return the number of bytes that have not been acknowledged."""
+        return self._wire.unsent()
+
+    async def abort(self) -> None:
+        """Close at once and discard unsent data. Never raises."""
+        session, self._session = self._session, None
+        try:
+            if session is not None:
+                await session.end()
+        finally:
+            await self._wire.abort()
+
+    def _tell(self, fault: str) -> None:
+        if self._session is not None:
+            self._session.inbox.answer(Envelope(NOTICE, {}, fault))
+
+
+def from_setup(setup: TransportSetup) -> Transport:
+    """Return a transport for the options of a document; see docs/transports/rosbridge.md.
+
+    Raises:
+        TransportError: an option is missing or invalid.
+    """
+    options = setup.options
+    if (via := options.get("via", "rosbridge")) != "rosbridge":
+        raise TransportError(f"ros needs rosbridge as via, not {via!r}")
+    host, port = options.get("host"), options.get("port", DEFAULT_PORT)
+    if not isinstance(host, str) or not host.strip():
+        raise TransportError(f"rosbridge needs a host name or address, not {host!r}")
+    if isinstance(port, bool) or not isinstance(port, int) or not 1 <= port <= 65535:
+        raise TransportError(f"rosbridge needs a port from 1 to 65535, not {port!r}")
+    path, tls = options.get("path", "/"), options.get("tls") or None
+    if not isinstance(path, str) or not path.startswith("/"):
+        raise TransportError(f"rosbridge needs a path that starts with /, not {path!r}")
+    ros = options.get("version")
+    if ros is not None and (isinstance(ros, bool) or ros not in (1, 2, AUTO)):
+        raise TransportError(f"rosbridge needs 1, 2 or auto as version, not {ros!r}")
+    host = host.strip()
+    where = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    url = f"{'ws' if tls is None else 'wss'}://{where}{path}"
+    given = {name: options[name] for name in _WEBSOCKET if name in options}
+    wire = WebSocketTransport(
+        setup._replace(options={"url": url, "tls": tls, "max_message": MAX_BYTES, **given})
+    )
+    wanted = [_listening(one.topic, one.attributes) for one in setup.subscriptions]
+    return RosbridgeTransport(wire, where, _merged(wanted), ros)
+
+
+def _listening(topic: str, attributes: Mapping[str, Value]) -> RosSubscription:
+    def number(name: str, factor: float = 1) -> int:
+        value = attributes.get(name) or 0
+        if isinstance(value, bool) or not isinstance(value, int | float) or value < 0:
+            raise TransportError(f"rosbridge needs a number as {name} of {topic}, not {value!r}")
+        return round(value * factor)
+
+    compression = attributes.get("compression") or "none"
+    if compression not in ("none", "png", "cbor"):
+        raise TransportError(f"rosbridge: {compression!r} of {topic} is not none, png or cbor")
+    if compression == "cbor" and find_spec("cbor2") is None:
+        raise TransportError("cbor needs the package cbor2: pip install 'urc[cbor]'")
+    return RosSubscription(
+        topic,
+        str(attributes.get("type") or ""),
+        number("throttle", 1000),
+        number("queue_length"),
+        str(compression),
+    )
+
+
+def _merged(wanted: list[RosSubscription]) -> tuple[RosSubscription, ...]:
+    """Return one subscription per topic: a second one would cancel the throttle of the first."""
+    found: dict[str, RosSubscription] = {}
+    for one in wanted:
+        other = found.setdefault(one.topic, one)
+        if other is not one:
+            found[one.topic] = one._replace(
+                type=other.type or one.type,
+                throttle_ms=min(other.throttle_ms, one.throttle_ms),
+                queue_length=max(other.queue_length, one.queue_length),
+                compression="none" if "none" in (one.compression, other.compression) else other[4],
+            )
+    return tuple(found.values())
+
+
+class _Session:
+    """The state of one open connection."""
+
+    def __init__(
+        self, wire: WebSocketTransport, ros: int | Literal["auto"] | None, graph: TopicGraph
+    ) -> None:
+        self.inbox = TopicReceiveQueue()
+        self._wire = wire
+        self._client = RosClient(self.inbox, None if ros == AUTO else ros)
+        self._is_auto = ros == AUTO
+        self._frames = OperationReader()
+        self._graph = graph
+        self._learnt = asyncio.Event()
+        """Set after rosapi has listed the topics, or has failed."""
+        self._bad = 0
+        self._reader: asyncio.Task[None] | None = None
+        self._fresh: dict[str, None] = {}
+        """Topics with a first message that may not have arrived yet, in order."""
+
+    async def begin(self, subscriptions: tuple[RosSubscription, ...]) -> None:
+        """Query the topics, subscribe, and start reading."""
+        self._reader = asyncio.create_task(self._read())
+        # Query first: later, ROS 1 would include our own subscriptions.
+        asked = self._client.ask(
+            "/rosapi/topics", lambda said: self._learn(subscriptions, said), errback=self._unknown
+        )
+        await self._write(asked)
+        if self._is_auto:
+            with suppress(TimeoutError):  # without rosapi, type names are sent as written
+                async with asyncio.timeout(_ANSWER_S):
+                    await self._learnt.wait()
+        for one in subscriptions:
+            await self._write(self._client.listen(one))
+
+    async def perform(self, envelope: Envelope) -> None:
+        """Send the operation of an envelope."""
+        frames = self._client.perform(envelope)
+        if envelope.verb == "publish":
+            topic = str(envelope.attributes.get("topic"))
+            if len(self._fresh) < KNOWN_TOPICS:
+                self._fresh[topic] = None
+            if self._learnt.is_set():
+                frames += self._look_at(topic, str(envelope.attributes.get("type") or ""))
+        await self._write(frames)
+
+    def _look_at(self, topic: str, kind: str) -> list[bytes]:
+        """Return the query for the subscribers of a topic, at its first message."""
+        if not self._graph.publishes(topic, kind):
+            return []
+
+        def told(said: Mapping[str, Any]) -> None:
+            nodes = said.get("subscribers")
+            if isinstance(nodes, list):
+                self._graph.subscribers(topic, nodes)
+
+        return self._client.ask("/rosapi/subscribers", told, {"topic": topic})
+
+    async def settle(self) -> str:
+        """Wait until the published messages have arrived; return the undelivered topics."""
+        topics = list(self._fresh)
+        self._fresh.clear()
+        heard = await asyncio.gather(*map(self._is_heard, topics))
+        lost = [topic for topic, is_heard in zip(topics, heard, strict=True) if not is_heard]
+        return f"nothing subscribes to {', '.join(lost)}" if lost else ""
+
+    async def _is_heard(self, topic: str) -> bool:
+        """Wait until the publisher of a topic is connected; return False without subscribers."""
+        clock = asyncio.get_running_loop().time
+        subscribers = await self._subscribers(topic)
+        ends_s = clock() + _CONNECTS_S
+        while subscribers is not None and not subscribers:
+            if clock() >= ends_s:
+                return False
+            await asyncio.sleep(_LOOK_S)
+            subscribers = await self._subscribers(topic)
+        await asyncio.sleep(_CONNECTS_S)
+        return True
+
+    async def _subscribers(self, topic: str) -> list[object] | None:
+        """Return the subscribing nodes of a topic; None if rosapi does not reply."""
+        said: asyncio.Future[Mapping[str, Any]] = asyncio.get_running_loop().create_future()
+
+        def told(values: Mapping[str, Any]) -> None:
+            if not said.done():
+                said.set_result(values)
+
+        await self._write(
+            self._client.ask(
+                "/rosapi/subscribers", told, {"topic": topic}, lambda problem: told(NOTHING)
+            )
+        )
+        try:
+            async with asyncio.timeout(_ANSWER_S):
+                found = (await said).get("subscribers")
+        except TimeoutError:
+            return None
+        return found if isinstance(found, list) else None
+
+    async def end(self) -> None:
+        """Stop reading, and wake all waiting tasks."""
+        self.inbox.end("the connection is closed")
+        if self._reader is not None:
+            self._reader.cancel()
+            await asyncio.gather(self._reader, return_exceptions=True)
+
+    async def _write(self, frames: list[bytes]) -> None:
+        for frame in frames:
+            await self._wire.send(frame)
+
+    async def _read(self) -> None:
+        """Process every received frame until the connection ends."""
+        clock = asyncio.get_running_loop().time
+        began_s = clock()
+        try:
+            while True:
+                self._take(await self._wire.receive())
+                # Frames in the buffer need no wait, and some take long to parse.
+                if self.inbox.is_filling or clock() - began_s > _TURN_S:
+                    await asyncio.sleep(0)
+                    began_s = clock()
+        except TransportError as ended:
+            self.inbox.end(str(ended))
+
+    def _take(self, frame: bytes) -> None:
+        try:
+            operation = self._frames.read(frame)
+            if operation is not None:
+                self._client.arrived(operation, len(frame))
+        except BadOperation as problem:
+            self._bad += 1
+            if self._bad & (self._bad - 1) == 0:  # the 1st, 2nd, 4th, 8th …
+                log.warning("rosbridge: %s (%d such frames)", problem, self._bad)
+
+    def _learn(self, subscriptions: tuple[RosSubscription, ...], said: Mapping[str, Any]) -> None:
+        """Process the topics and types from rosapi."""
+        names, types = said.get("topics"), said.get("types")
+        if isinstance(names, list):
+            kinds = types if isinstance(types, list) and len(types) == len(names) else []
+            found = dict(zip(names, kinds or [""] * len(names), strict=True))
+            self._graph.learn({str(name): str(kind) for name, kind in found.items()})
+            self._graph.subscribed({one.topic: one.type for one in subscriptions})
+            if self._is_auto:
+                self._client.spell(version_of(map(str, kinds)))
+        self._learnt.set()
+
+    def _unknown(self, problem: object) -> None:
+        self._learnt.set()

@@ -1,0 +1,331 @@
+"""roslibpy's part of a rosbridge connection, without its network connection.
+
+roslibpy implements the operations, their ids and pending requests. The network connections of
+roslibpy are not used: they replay old messages after a reconnection, fail on binary frames, and
+never probe the other side. The figures are in docs/decisions. Here, roslibpy's protocol writes into
+a list, which the transport sends over its own socket. The transport passes received data to the
+protocol. One object serves one connection, so nothing remains for the next one.
+
+No I/O, no task, no thread.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, cast
+
+from roslibpy import ActionClient, Goal, Message, Ros, Service, Topic
+from roslibpy.comm.comm import RosBridgeProtocol
+from roslibpy.event_emitter import EventEmitterMixin
+
+from urc.model.payload import Envelope
+from urc.model.values import NOTHING
+from urc.transports._faults import one_line
+from urc.transports.base import TransportError
+from urc.transports.ros.rosbridge_operations import BadOperation, encode_operation
+from urc.transports.ros.types import spelled
+from urc.transports.topic_queue import TopicReceiveQueue
+
+__all__ = ["RosSubscription", "RosClient"]
+
+MAX_PENDING = 256
+"""Limit of pending calls and goals; beyond it, the oldest is dropped."""
+_NAME_SHOWN = 80
+KNOWN_TOPICS = 256
+"""Limit of remembered topics, services and actions."""
+
+
+class RosSubscription(NamedTuple):
+    """One subscription, as sent to the bridge."""
+
+    topic: str
+    type: str = ""
+    throttle_ms: int = 0
+    queue_length: int = 0
+    compression: str = "none"
+
+
+class RosClient:
+    """Converts envelopes to operations and back, for one connection."""
+
+    def __init__(self, inbox: TopicReceiveQueue, ros: int | None) -> None:
+        """Deliver to `inbox`; `ros` (1, 2 or None: as written) selects the form of type names."""
+        self._inbox = inbox
+        self._ros_version = ros
+        self._protocol = _Protocol()
+        self._ros = _Ros(self._protocol)
+        self._size_bytes = 0
+        self._topics: dict[str, Any] = {}
+        self._services: dict[str, Any] = {}
+        self._goals: dict[str, tuple[str, object]] = {}
+        """roslibpy's id of a running goal → its action and the id of the request."""
+
+    @property
+    def unanswered(self) -> int:
+        """Number of pending calls and goals."""
+        return self._protocol.unanswered
+
+    def spell(self, ros: int | None) -> None:
+        """Use the type names of that ROS version from now on; None: as written."""
+        self._ros_version = ros
+
+    # -- sending; each method returns the frames to write
+
+    def listen(self, wanted: RosSubscription) -> list[bytes]:
+        """Subscribe to one topic."""
+        topic = _Topic(
+            self._ros,
+            wanted.topic,
+            spelled(wanted.type, "msg", self._ros_version) or None,
+            compression=wanted.compression,
+            throttle_rate=wanted.throttle_ms,
+            queue_length=wanted.queue_length,
+            reconnect_on_close=False,
+        )
+        topic.subscribe(lambda body: self._message(wanted.topic, body))
+        return self._protocol.written()
+
+    def ask(
+        self,
+        service: str,
+        callback: Callable[[Mapping[str, Any]], None],
+        arguments: Mapping[str, object] = NOTHING,
+        errback: Callable[[object], None] | None = None,
+    ) -> list[bytes]:
+        """Call a service internally; on failure, only `errback` is called."""
+        call = Service(self._ros, service, "").call
+        call(dict(arguments), callback=callback, errback=errback or _ignore)
+        return self._protocol.written()
+
+    def perform(self, envelope: Envelope) -> list[bytes]:
+        """Execute the operation of an envelope.
+
+        Raises:
+            TransportError: rosbridge cannot send it.
+        """
+        work = {
+            "publish": self._publish,
+            "call": self._call,
+            "goal": self._goal,
+            "cancel": self._cancel,
+        }.get(envelope.verb)
+        if work is None:
+            raise TransportError(f"rosbridge cannot {envelope.verb}; it can publish, call and goal")
+        try:
+            work(envelope.attributes, envelope.body)
+        except BadOperation as problem:
+            self._protocol.written()
+            raise TransportError(str(problem)) from problem
+        return self._protocol.written()
+
+    def _publish(self, attributes: Mapping[str, object], body: object) -> None:
+        name, kind = _text(attributes, "topic"), str(attributes.get("type") or "")
+        if not kind:  # the bridge knows the type if any other client uses the topic
+            operation = {"op": "publish", "topic": name, "msg": _fields(body)}
+            self._protocol.send_ros_message(Message(operation))
+            return
+        topic = self._topics.get(name)
+        if topic is None:
+            topic = Topic(
+                self._ros,
+                name,
+                spelled(kind, "msg", self._ros_version),
+                latch=attributes.get("retain") is True,
+                reconnect_on_close=False,
+            )
+            while len(self._topics) >= KNOWN_TOPICS:
+                self._topics.pop(next(iter(self._topics))).unadvertise()
+            self._topics[name] = topic
+        topic.publish(_fields(body))
+
+    def _call(self, attributes: Mapping[str, object], body: object) -> None:
+        name, number = _text(attributes, "service"), attributes.get("id")
+        service = self._services.get(name)
+        if service is None:
+            if len(self._services) >= KNOWN_TOPICS:
+                self._services.clear()
+            kind = spelled(str(attributes.get("type") or ""), "srv", self._ros_version)
+            service = self._services[name] = Service(self._ros, name, kind)
+        service.call(
+            _fields(body),
+            callback=lambda values: self._answer(number, True, dict(values)),
+            errback=lambda values: self._answer(number, False, values),
+        )
+
+    def _goal(self, attributes: Mapping[str, object], body: object) -> None:
+        name, number = _text(attributes, "action"), attributes.get("id")
+        kind = spelled(str(attributes.get("type") or ""), "action", self._ros_version)
+        wants_feedback = attributes.get("feedback") is not False
+        self._protocol.wants_feedback = wants_feedback
+        goal: str = ActionClient(self._ros, name, kind, reconnect_on_close=False).send_goal(
+            Goal(_fields(body)),
+            resultback=lambda result: self._result(goal, True, result),
+            feedback=lambda values: self._feedback(name, number, values),
+            errback=lambda result: self._result(goal, False, result),
+        )
+        if len(self._goals) >= MAX_PENDING:
+            del self._goals[next(iter(self._goals))]
+        self._goals[goal] = name, number
+
+    def _cancel(self, attributes: Mapping[str, object], body: object) -> None:
+        """Cancel the goal with that id, or else the last running one of the action."""
+        name, number = _text(attributes, "action"), attributes.get("id")
+        running = [goal for goal, (action, _) in self._goals.items() if action == name]
+        named = [goal for goal in running if self._goals[goal][1] == number]
+        client = ActionClient(self._ros, name, "", reconnect_on_close=False)
+        for goal in named or running[-1:]:
+            client.cancel_goal(goal)
+
+    # -- receiving
+
+    def arrived(self, operation: dict[str, Any], size_bytes: int) -> None:
+        """Process one operation of the bridge.
+
+        Raises:
+            BadFrame: the operation is invalid.
+        """
+        self._size_bytes = size_bytes
+        self._protocol.arrived(operation)
+
+    def _message(self, topic: str, body: object) -> None:
+        envelope = Envelope("message", {"topic": topic}, body)
+        self._inbox.message(topic, envelope, self._size_bytes)
+
+    def _answer(self, number: object, is_ok: bool, values: object) -> None:
+        attributes = {"id": number, "ok": is_ok}
+        if not is_ok:
+            said = one_line(values) if isinstance(values, str) else ""
+            attributes["reason"] = said or "the service said no"
+        self._inbox.answer(Envelope("response", attributes, values), self._size_bytes)
+
+    def _feedback(self, action: str, number: object, values: Any) -> None:
+        attributes = {"action": action, "id": number}
+        self._inbox.answer(Envelope("feedback", attributes, dict(values)), self._size_bytes)
+
+    def _result(self, goal: str, is_ok: bool, result: Any) -> None:
+        _, number = self._goals.pop(goal, ("", None))
+        status, values = result["status"], result["values"]
+        attributes = {"id": number, "ok": is_ok, "status": status}
+        if not is_ok:
+            said = one_line(values) if isinstance(values, str) else _OUTCOMES.get(status, "failed")
+            attributes["reason"] = f"the action was {said}" if said in _ENDS else said
+        self._inbox.answer(Envelope("response", attributes, values), self._size_bytes)
+
+
+_OUTCOMES = {4: "succeeded", 5: "cancelled", 6: "aborted"}
+_ENDS = frozenset(_OUTCOMES.values())
+
+
+class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no types
+    """roslibpy's protocol, writing into a list."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.factory = _Factory(self)
+        self.wants_feedback = True
+        self._frames: list[bytes] = []
+        self._message_handlers["status"] = _ignore
+
+    @property
+    def unanswered(self) -> int:
+        return len(self._pending_service_requests) + len(self._pending_action_requests)
+
+    def written(self) -> list[bytes]:
+        """Remove and return the frames written since the last call."""
+        frames, self._frames = self._frames, []
+        return frames
+
+    def arrived(self, operation: dict[str, Any]) -> None:
+        """Let roslibpy process an operation; raise `BadOperation` for an unknown or invalid one."""
+        handler: Callable[[Any], None] | None = self._message_handlers.get(operation["op"])
+        if handler is None:
+            unknown = one_line(repr(operation["op"]), _NAME_SHOWN)
+            raise BadOperation(f"the bridge sent an operation {unknown} that is not known")
+        try:
+            handler(operation)
+        except Exception as problem:  # roslibpy does not validate its input
+            name = operation.get("id") or operation.get("topic")
+            shown = one_line(repr(name), _NAME_SHOWN) if isinstance(name, str) else "?"
+            raise BadOperation(f"{operation['op']} of {shown} is not understood") from problem
+
+    # -- overridden methods of roslibpy
+
+    def send_message(self, payload: bytes) -> None:
+        self._frames.append(payload)
+
+    def send_ros_message(self, message: Any) -> None:
+        """Write an operation; unlike roslibpy, report failures."""
+        self.send_message(encode_operation(dict(message)))
+
+    def send_ros_service_request(self, message: Any, callback: Any, errback: Any) -> None:
+        """Like roslibpy's method, with JSON for not-a-number and a bound."""
+        self.send_ros_message(message)
+        _keep(self._pending_service_requests, message["id"], (callback, errback))
+
+    def send_ros_action_goal(
+        self, message: Any, resultback: Any, feedback: Any, errback: Any
+    ) -> None:
+        """Like roslibpy's method, with JSON for not-a-number and a bound."""
+        self.send_ros_message({**message, "feedback": self.wants_feedback})
+        _keep(self._pending_action_requests, message["id"], (resultback, feedback, errback))
+
+    def _handle_action_result(self, message: Any) -> None:
+        """Like roslibpy's method, with any status number."""
+        resultback, _, errback = self._pending_action_requests.pop(message["id"])
+        values = message.get("values", {})
+        status = message.get("status")
+        if status is None and isinstance(values, dict):
+            status = values.get("status")
+        done = errback if message.get("result") is False else resultback
+        done({"status": status, "values": values})
+
+
+class _Factory(EventEmitterMixin):  # type: ignore[misc] # roslibpy ships no types
+    """roslibpy's connection factory, which is connected during its whole life."""
+
+    is_connected = True
+
+    def __init__(self, protocol: _Protocol) -> None:
+        super().__init__()
+        self._protocol = protocol
+
+    def on_ready(self, callback: Callable[[Any], object]) -> None:
+        callback(self._protocol)
+
+
+class _Ros(Ros):  # type: ignore[misc] # roslibpy ships no types
+    """roslibpy's client on a given protocol, instead of a connection of its own."""
+
+    def __init__(self, protocol: _Protocol) -> None:
+        self._id_counter = 0
+        self.factory = protocol.factory
+        self.is_connecting = False
+
+
+class _Topic(Topic):  # type: ignore[misc] # roslibpy ships no types
+    """A topic with optional CBOR messages, which are decoded before roslibpy gets them."""
+
+    SUPPORTED_COMPRESSION_TYPES = ("none", "png", "cbor")
+
+
+def _ignore(said: object) -> None:
+    """Ignore a status, or the failure of an internal query, since the bridge logs it."""
+
+
+def _keep(table: dict[str, object], name: str, waiting: object) -> None:
+    while len(table) >= MAX_PENDING:
+        del table[next(iter(table))]
+    table[name] = waiting
+
+
+def _text(attributes: Mapping[str, object], name: str) -> str:
+    value = attributes.get(name)
+    if not isinstance(value, str) or not value:
+        raise TransportError(f"rosbridge needs a {name}, not {value!r}")
+    return value
+
+
+def _fields(body: object) -> dict[str, object]:
+    if body is None:
+        return {}
+    if not isinstance(body, Mapping):
+        raise TransportError("a ROS message is an object of its fields; use json")
+    return dict(cast("Mapping[str, object]", body))

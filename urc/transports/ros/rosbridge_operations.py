@@ -1,0 +1,272 @@
+"""Conversion between WebSocket frames and rosbridge operations, with bounds.
+
+Pure. A frame is JSON text, or CBOR for subscriptions that request it. An operation may arrive in
+fragments, or as a PNG image whose pixels are its JSON. JSON has no not-a-number and no infinities:
+the bridge writes null for them, and CBOR values are converted in the same way.
+"""
+
+import base64
+import binascii
+import math
+import struct
+import zlib
+from collections.abc import Mapping
+from typing import Any
+
+import msgspec
+
+__all__ = ["BadOperation", "OperationReader", "encode_operation"]
+
+MAX_BYTES = 16 * 1024 * 1024
+"""Largest operation in bytes, in any encoding; the limit of the bridge itself is 10 MB."""
+MAX_FRAGMENTED = 8
+"""Limit of incomplete operations; beyond it, the oldest is dropped."""
+MAX_FRAGMENTS = 4096
+MAX_PNG_BYTES = 2 * 1024 * 1024
+"""Limit of the text in an image, in bytes; its decoding in Python takes a second at this size."""
+MAX_VALUES = 2_000_000
+"""Limit of commas and brackets: an empty list takes three bytes as text, but fifty in memory."""
+_MANY_VALUES = 100_000
+"""Limit of values in CBOR with shared references: they take a tenth of a second."""
+_CBOR_MAP = b"\xa0"
+"""First byte of a CBOR map, or a higher one; JSON never begins with these."""
+_LONGEST_ID = 256
+_PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
+_NUMBERS = {
+    # RFC 8746: tags of number arrays, little-endian.
+    69: "H", 70: "I", 71: "Q", 72: "b", 77: "h", 78: "i", 79: "q", 85: "f", 86: "d",
+}  # fmt: skip
+
+_decode_json = msgspec.json.Decoder().decode
+_encode_json = msgspec.json.Encoder().encode
+
+
+class BadOperation(ValueError):
+    """An invalid frame or operation, with a one-line text."""
+
+
+def encode_operation(operation: Mapping[str, object]) -> bytes:
+    """Return an operation as JSON; bytes become base64, not-a-number becomes null.
+
+    Raises:
+        BadFrame: a value cannot be written as JSON.
+    """
+    try:
+        return _encode_json(operation)
+    except (TypeError, ValueError, OverflowError) as problem:
+        raise BadOperation(f"this cannot be sent as JSON ({problem})") from problem
+
+
+class OperationReader:
+    """Decodes frames into operations, and joins the fragments of one connection."""
+
+    def __init__(self) -> None:
+        self._halves: dict[str, dict[int, str]] = {}
+        """Fragmented operation → its fragments by number."""
+        self._sizes: dict[str, int] = {}
+        """Fragmented operation → characters of its fragments."""
+
+    def read(self, frame: bytes) -> dict[str, Any] | None:
+        """Return the operation of a frame, or None if it is incomplete.
+
+        Raises:
+            BadFrame: the frame is invalid.
+        """
+        if frame[:1] >= _CBOR_MAP:
+            return _operation(_read_cbor(frame))
+        operation = _read_json(frame)
+        # At most two levels of nesting: fragments of a PNG.
+        for _ in range(2):
+            match operation.get("op"):
+                case "fragment":
+                    joined = self._join(operation)
+                    if joined is None:
+                        return None
+                    operation = _read_json(joined)
+                case "png":
+                    operation = _read_json(_png_text(operation))
+                case _:
+                    break
+        return operation
+
+    def _join(self, piece: Mapping[str, Any]) -> str | None:
+        name, number, total, data = (piece.get(key) for key in ("id", "num", "total", "data"))
+        if not (isinstance(number, int) and isinstance(total, int) and isinstance(data, str)):
+            raise BadOperation("a fragment without number, total or data")
+        if not 0 <= number < total <= MAX_FRAGMENTS:
+            raise BadOperation(f"fragment {number} of {total} is invalid")
+        key = str(name) if isinstance(name, str | int) else "?"
+        if len(key) > _LONGEST_ID:
+            raise BadOperation(f"the id of a fragment has {len(key)} characters")
+        pieces = self._halves.setdefault(key, {})
+        self._sizes[key] = self._sizes.get(key, 0) + len(data) - len(pieces.get(number, ""))
+        pieces[number] = data
+        if self._sizes[key] > MAX_BYTES:
+            self._forget(key)
+            raise BadOperation(
+                f"the fragments of an operation are more than {MAX_BYTES} characters"
+            )
+        if len(pieces) < total:
+            while len(self._halves) > MAX_FRAGMENTED or sum(self._sizes.values()) > MAX_BYTES:
+                self._forget(next(iter(self._halves)))
+            return None
+        self._forget(key)
+        return "".join(pieces[place] for place in sorted(pieces))
+
+    def _forget(self, key: str) -> None:
+        del self._halves[key], self._sizes[key]
+
+
+def _operation(found: object) -> dict[str, Any]:
+    if not isinstance(found, dict) or not isinstance(found.get("op"), str):
+        raise BadOperation("a frame without an operation")
+    return found
+
+
+def _read_json(text: bytes | str) -> dict[str, Any]:
+    if len(text) > MAX_VALUES:
+        flat = text.encode() if isinstance(text, str) else text
+        if sum(map(flat.count, (b",", b"[", b"{"))) > MAX_VALUES:
+            raise BadOperation(f"a frame has more than {MAX_VALUES} values")
+    try:
+        return _operation(_decode_json(text))
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as problem:
+        raise BadOperation(f"a frame is not JSON ({problem})") from problem
+
+
+def _read_cbor(data: bytes) -> object:
+    import cbor2  # only where a subscription asks for CBOR
+
+    try:
+        return _Plain(len(data)).of(cbor2.loads(data, tag_hook=_tagged))
+    except (cbor2.CBORError, ValueError, RecursionError, MemoryError) as problem:
+        raise BadOperation(f"a frame is not CBOR ({problem})") from problem
+
+
+def _tagged(first: Any, second: Any) -> object:
+    """Return the numbers of a tagged array; the tag comes first in cbor2 6, second before."""
+    tag = first if hasattr(first, "tag") else second
+    code, data = _NUMBERS.get(tag.tag), tag.value
+    if code is None or not isinstance(data, bytes) or len(data) % struct.calcsize(code):
+        raise ValueError(f"tag {tag.tag} is not known")
+    return list(struct.unpack(f"<{len(data) // struct.calcsize(code)}{code}", data))
+
+
+class _Plain:
+    """Converts CBOR values to JSON-like ones, with a bound on their expansion.
+
+    CBOR may refer to earlier values, which may refer to others: a few bytes could exceed any
+    memory.
+    """
+
+    def __init__(self, size: int) -> None:
+        """Initialise for a frame of `size` bytes: each of its values takes at least one."""
+        self._room = MAX_BYTES
+        """Remaining bytes of the result; a value counts at least one."""
+        self._values = max(size, _MANY_VALUES)
+        self._left = self._values
+        """Remaining number of values, since each takes time, however small it is."""
+
+    def of(self, value: Any) -> Any:
+        """Return `value` with null for every number that JSON lacks."""
+        self._room -= 1 + (len(value) if isinstance(value, str | bytes) else 0)
+        if self._room < 0:
+            raise ValueError(f"it expands to more than {MAX_BYTES} bytes")
+        self._left -= 1
+        if self._left < 0:
+            raise ValueError(f"it expands to more than {self._values} values")
+        if isinstance(value, float):
+            return value if math.isfinite(value) else None
+        if isinstance(value, dict):
+            return {_key(name): self.of(inner) for name, inner in value.items()}
+        if isinstance(value, list):
+            return [self.of(inner) for inner in value]
+        if value is None or isinstance(value, bool | str | bytes):
+            return value
+        if isinstance(value, int) and value.bit_length() <= 64:
+            return value
+        raise ValueError(f"{type(value).__name__} is not a value of a message")
+
+
+def _key(name: object) -> str:
+    if not isinstance(name, str):
+        raise ValueError(f"{type(name).__name__} is not a name of a field")
+    return name
+
+
+def _png_text(operation: Mapping[str, Any]) -> bytes:
+    """Return the JSON in the pixels of a PNG, without the padding by newlines."""
+    try:
+        image = base64.b64decode(operation.get("data", ""), validate=True)
+    except (binascii.Error, TypeError, ValueError) as problem:
+        raise BadOperation(f"the data of a png is not base64 ({problem})") from problem
+    return _pixels(image).rstrip(b"\n\x00")
+
+
+def _pixels(image: bytes) -> bytes:
+    """Return the pixel bytes of a non-interlaced 8-bit RGB image, as the bridge makes them."""
+    if not image.startswith(_PNG_MAGIC):
+        raise BadOperation("the data of a png is not a PNG image")
+    width = height = 0
+    packed = bytearray()
+    at = len(_PNG_MAGIC)
+    while at + 8 <= len(image):
+        length, kind = struct.unpack_from(">I4s", image, at)
+        chunk = image[at + 8 : at + 8 + length]
+        at += length + 12
+        if kind == b"IHDR" and len(chunk) == 13:
+            width, height, *form = struct.unpack(">IIBBBBB", chunk)
+            if form != [8, 2, 0, 0, 0]:
+                raise BadOperation("a png is not 8-bit RGB")
+        elif kind == b"IDAT":
+            packed += chunk
+    size = height * (width * 3 + 1)
+    if not 0 < size <= MAX_PNG_BYTES:
+        raise BadOperation(f"a png of {width} x {height} pixels is too large")
+    try:
+        rows = zlib.decompressobj().decompress(bytes(packed), size)
+    except zlib.error as problem:
+        raise BadOperation(f"a png cannot be unpacked ({problem})") from problem
+    if len(rows) != size:
+        raise BadOperation("a png ends too early")
+    return _unfiltered(rows, width * 3)
+
+
+def _unfiltered(rows: bytes, stride: int) -> bytes:
+    """Reverse the filters of a PNG; the first byte of each row selects its filter."""
+    out = bytearray()
+    above = bytes(stride)
+    for start in range(0, len(rows), stride + 1):
+        row = bytearray(rows[start + 1 : start + 1 + stride])
+        match rows[start]:
+            case 0:
+                pass
+            case 2:
+                row = bytearray((x + up) & 255 for x, up in zip(row, above, strict=True))
+            case 1 | 3 | 4 as kind:
+                _undo_left(kind, row, above)
+            case unknown:
+                raise BadOperation(f"a png has a filter {unknown}")
+        out += row
+        above = bytes(row)
+    return bytes(out)
+
+
+def _undo_left(kind: int, row: bytearray, above: bytes) -> None:
+    """Reverse a filter that uses the pixel to the left, in place."""
+    for place in range(len(row)):
+        left = row[place - 3] if place >= 3 else 0
+        up = above[place]
+        if kind == 1:
+            guess = left
+        elif kind == 3:
+            guess = (left + up) // 2
+        else:
+            corner = above[place - 3] if place >= 3 else 0
+            by_left, by_up = abs(up - corner), abs(left - corner)
+            by_corner = abs(left + up - 2 * corner)
+            if by_left <= by_up and by_left <= by_corner:
+                guess = left
+            else:
+                guess = up if by_up <= by_corner else corner
+        row[place] = (row[place] + guess) & 255

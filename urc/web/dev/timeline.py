@@ -1,0 +1,57 @@
+"""The audit log of one robot, as JSON for the developer page: why did it move?
+
+Layer 5. It contains traffic of the robot, so it needs the start key, like the developer page.
+``?last=`` is the number of entries, newest first; ``?since=`` is the earliest time (UTC, seconds).
+"""
+
+import asyncio
+
+from starlette.requests import Request
+from starlette.responses import JSONResponse
+
+from urc.runtime.audit import AuditEntry, AuditLog, read
+
+__all__ = ["timeline"]
+
+MOST = 1000
+USUAL = 200
+_HEADERS = {"cache-control": "no-store"}
+_SETTLE_S = 0.5
+
+
+async def timeline(
+    request: Request, log: AuditLog | None, robot: str, *, is_here: bool
+) -> JSONResponse:
+    """Return the entries about a robot, newest first.
+
+    Args:
+        request: its query limits the entries.
+        log: the audit log, or None.
+        robot: name of the robot.
+        is_here: whether the request has the start key.
+    """
+    if not is_here:
+        text = "the timeline needs the key in the address that URC printed"
+        return JSONResponse({"error": text}, 403, _HEADERS)
+    if log is None:
+        text = "there is no audit log: this server has no folder for its data"
+        return JSONResponse({"error": text}, 404, _HEADERS)
+    try:
+        last = int(request.query_params.get("last", USUAL))
+        since = float(request.query_params.get("since", 0))
+    except ValueError:
+        return JSONResponse({"error": "'last' and 'since' are numbers"}, 400, _HEADERS)
+    if not 1 <= last <= MOST or not 0 <= since < float("inf"):
+        text = f"'last' is 1 to {MOST}, 'since' a time in seconds since 1970"
+        return JSONResponse({"error": text}, 400, _HEADERS)
+    try:
+        found = await asyncio.to_thread(_settled, log, robot, since, last)
+    except OSError as error:
+        return JSONResponse({"error": str(error)}, 503, _HEADERS)
+    entries = [one._asdict() for one in reversed(found)]
+    return JSONResponse({"entries": entries, "fault": log.fault}, headers=_HEADERS)
+
+
+def _settled(log: AuditLog, robot: str, since: float, last: int) -> list[AuditEntry]:
+    log.settle(_SETTLE_S)  # the newest entries matter most
+    return read(log.file, robot=robot, since=since, last=last)

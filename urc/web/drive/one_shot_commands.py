@@ -1,0 +1,165 @@
+"""Commands without a held control: the check of permission, and the effect of STOP.
+
+Layer 5. Only held commands need the lease. A command without it needs the role of an operator; a
+watcher gives none. A command that starts autonomous motion (``moves``) also fails while a STOP is
+latched or another operator drives. The engine checks the latch a second time, because a command may
+have waited in a queue or for a confirmation.
+"""
+
+import asyncio
+from collections.abc import Callable, Mapping
+
+from urc.model.driver import Command, Driver
+from urc.model.payload import Payload
+from urc.model.values import NOTHING
+from urc.motion.lease import WATCHES, Operator
+from urc.protocol.requests.encode import BadArgument, check_arguments
+from urc.protocol.sequences.sequence_control import Pull
+from urc.runtime.audit_recorder import AuditRecorder
+from urc.runtime.clock import Clock
+from urc.runtime.motion_controller import MotionController
+from urc.runtime.session import CommandFailed
+from urc.web.drive.operator_session import Drivable
+
+__all__ = ["HELD", "CommandRefused", "OneShotCommands", "can_move", "needs_holding"]
+
+AGAIN_S = 1.0
+"""Delay before the next try while a STOP has not reached the robot, in seconds."""
+_STOP = Operator("", "STOP")
+HELD = "this command moves the robot only while a control is held; it cannot be sent once"
+
+
+class CommandRefused(CommandFailed):
+    """The refusal of a command before anything was sent to the robot."""
+
+
+def can_move(driver: Driver) -> bool:
+    """Return whether the robot can move, and so needs STOP and its latch."""
+    return any(one.hold is not None or one.moves or one.stops for one in driver.commands.values())
+
+
+def needs_holding(driver: Driver, command: str) -> bool:
+    """Return whether a command is continuous motion, which must not run without a held control."""
+    known = driver.commands.get(command)
+    return known is not None and known.hold is not None
+
+
+def _moves(command: Command, arguments: Mapping[str, object]) -> bool:
+    """Return whether a command with these arguments starts motion."""
+    if command.moves_if is None:
+        return command.moves
+    try:
+        return command.moves_with(check_arguments(command, arguments))
+    except BadArgument:
+        return False  # the engine reports the mistake; nothing is sent
+
+
+class OneShotCommands:
+    """Commands without a held control, for one robot."""
+
+    def __init__(
+        self,
+        driver: Driver,
+        desk: Callable[[], MotionController],
+        clock: Clock,
+        trail: AuditRecorder,
+    ) -> None:
+        """Prepare; `desk` returns the current motion desk."""
+        self.driver = driver
+        self._desk = desk
+        self._clock = clock
+        self._trail = trail
+        self._session: Drivable | None = None
+        self.on_stopped: Callable[[], None] = _nobody
+        """Callback for each press of STOP."""
+        self._pressed = asyncio.Event()
+
+    def admit(
+        self, client: Operator, command: str, arguments: Mapping[str, object], stops: int | None
+    ) -> None:
+        """Raise `CommandRefused` if this page may not run the command or sequence."""
+        is_held = needs_holding(self.driver, command)
+        reason = HELD if is_held else self.refusal(client, command, arguments, stops)
+        if reason:
+            raise CommandRefused("refused", reason)
+
+    def refusal(
+        self,
+        client: Operator,
+        command: str,
+        arguments: Mapping[str, object] = NOTHING,
+        stops: int | None = None,
+    ) -> str:
+        """Return why this page may not run a command or sequence now, or "".
+
+        `stops` is the page's count of STOPs at the operator's click; None means now.
+        """
+        known = self.driver.commands.get(command)
+        if known is not None and _moves(known, arguments):
+            return self._desk().lease.hindrance(client, stops)
+        return WATCHES if client.role == "viewer" else ""
+
+    def pull_refusal(self, client: Operator, sequence: str, what: Pull) -> str:
+        """Return why this page may not steer a sequence; any operator may pause or end one."""
+        if what in ("pause", "abort"):
+            return WATCHES if client.role == "viewer" else ""
+        return self.refusal(client, sequence)
+
+    # -- session
+
+    async def serve(self, session: Drivable) -> None:
+        """Let STOP reach a session, at once if it is latched or not yet acknowledged."""
+        self._session = session
+        self._pressed.clear()
+        if self._desk().lease.latched or self._desk().owed:
+            self.stopped()
+        try:
+            async with asyncio.TaskGroup() as group:
+                giving: asyncio.Task[None] | None = None
+                while True:
+                    await self._pressed.wait()
+                    self._pressed.clear()
+                    if giving is not None:
+                        giving.cancel()  # each press starts a new stop
+                    giving = group.create_task(self._give_stops(session))
+        finally:
+            self._session = None
+
+    def stopped(self) -> None:
+        """Start a stop: STOP was pressed."""
+        self.on_stopped()
+        if self._session is not None:
+            self._session.latch(self._desk().lease.latched)
+            self._pressed.set()
+
+    def reset(self) -> None:
+        """End the stop after a reset."""
+        if self._session is not None:
+            self._session.latch("")
+
+    async def _give_stops(self, session: Drivable) -> None:
+        """Repeat the stop commands until the robot has acknowledged each."""
+        while owed := self._desk().owed:
+            async with asyncio.TaskGroup() as group:
+                for command in owed:
+                    group.create_task(self._give_stop(session, command))
+            if self._desk().owed:
+                await self._clock.sleep(AGAIN_S)
+
+    async def _give_stop(self, session: Drivable, command: str) -> None:
+        sent: list[Payload] = []
+        outcome, is_heard = "done", True
+        try:
+            await session.command(command, {}, on_sent=sent.append)
+        except CommandFailed as failed:
+            outcome = f"{failed.code}: {failed.message}"
+            # A refusal proves that the robot received the command. A reset ends the retries.
+            is_heard = failed.code == "refused" or (bool(sent) and not self._desk().lease.latched)
+        if sent:
+            self._trail.ran(_STOP, command, {}, outcome, sent[-1])
+        if is_heard:
+            self._desk().given(command)
+
+
+def _nobody() -> None:
+    """Ignore a press of STOP."""

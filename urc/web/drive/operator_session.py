@@ -1,0 +1,128 @@
+"""The state of one page that may drive a robot: pending ticks, pending notices and its lease.
+
+Layer 5.
+"""
+
+import secrets
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from urc.model.payload import Payload
+from urc.model.values import Reading
+from urc.motion.freshness import DuplicateElimination
+from urc.motion.lease import LeaseState, Operator
+from urc.motion.rate_limiter import RateLimiter
+from urc.protocol.events import Replied
+from urc.runtime.clock import Timer
+from urc.runtime.hub import Hub
+from urc.runtime.motion_controller import MotionBackend, MotionFrames
+from urc.web.wire import drive as wire
+
+__all__ = ["FLOOD", "Drivable", "OperatorSession", "RedundantLine"]
+
+FLOOD = 4
+"""Ticks that may arrive while one is pending; further ones stay in the socket's buffer."""
+
+
+class RedundantLine(Protocol):
+    """A redundant socket of a page, see `urc.web.drive.redundant_socket`."""
+
+    def beat(self, number: int) -> None:
+        """Send a heartbeat number."""
+
+    def end(self) -> None:
+        """Stop reading from the socket."""
+
+
+class Drivable(Protocol):
+    """The part of a session that the controls need."""
+
+    @property
+    def frames(self) -> MotionFrames:
+        """The encoder of the engine."""
+
+    @property
+    def movers(self) -> MotionBackend | None:
+        """The sender of motion; None for a robot without a held command."""
+
+    @property
+    def hub(self) -> Hub:
+        """The hub, for values that all pages see."""
+
+    async def command(
+        self,
+        name: str,
+        arguments: Mapping[str, Reading],
+        *,
+        on_sent: Callable[[Payload], None] | None = None,
+    ) -> Replied:
+        """Run one command and return its reply; raise `CommandFailed` without one."""
+
+    def latch(self, reason: str) -> None:
+        """Latch, end sequences and block autonomous motion; "" as reason resets the latch."""
+
+
+class OperatorSession:
+    """The state of one page that may drive a robot."""
+
+    def __init__(self, client: Operator, wake: Callable[[], None]) -> None:
+        self.client = client
+        self.wake = wake
+        self.beat: int | None = None
+        self.notices: dict[str, str] = {}
+        """Control or verb → newest notice about it."""
+        self.seen = -1
+        """Number of the newest lease that was sent to the page."""
+        self.pending: dict[str, wire.Tick | bytes] = {}
+        """Control → newest pending tick, decoded or still as bytes."""
+        self.paces: dict[str, RateLimiter] = {}
+        self.alarms: dict[str, Timer] = {}
+        self.moved_s: dict[str, float] = {}
+        """Control → time of its last applied tick."""
+        self.moved_at_s = float("-inf")
+        """Time of the last applied tick of any control."""
+        self.key = secrets.token_urlsafe(16)
+        """Secret by which a redundant socket joins this page."""
+        self.spare: RedundantLine | None = None
+        self.doubled: DuplicateElimination | None = None
+        """Duplicate filter, once the page has a redundant socket."""
+        self.hold_back: Callable[[bool], None] = _nothing
+        """Pauses (True) or resumes (False) reading from the page's socket."""
+        self.crowd = 0
+        """Ticks since one became pending; more than a few pause the socket."""
+        self.dropped = 0
+        """Pending ticks that a newer one replaced."""
+
+    def notice(self, key: str, text: str) -> None:
+        """Queue a notice; it replaces an unsent one with the same key."""
+        self.notices[key] = text
+        self.wake()
+
+    def lease(self, state: LeaseState, now: float, *, is_confirmed: bool) -> str:
+        """Return the lease message for this page."""
+        left_s = max(0.0, state.asked_until - now) if state.asked_by is not None else 0.0
+        return wire.encode_lease(
+            state, self.client, left_s=left_s, is_confirmed=is_confirmed, spare=self.key
+        )
+
+    def is_first(self, about: str, number: int) -> bool:
+        """Return whether a message is the first with its number; the other is a duplicate."""
+        return self.doubled is None or not number or self.doubled.take(about, number)
+
+    def forget(self, command: str) -> None:
+        """Drop the pending tick of a control."""
+        self.pending.pop(command, None)
+        alarm = self.alarms.pop(command, None)
+        if alarm is not None:
+            alarm.cancel()
+            self.relax()
+
+    def relax(self) -> None:
+        """Resume reading from the page's socket."""
+        if self.crowd >= FLOOD:
+            self.hold_back(False)
+        self.crowd = 0
+
+
+def _nothing(is_held: bool) -> None:
+    """Do nothing: this socket cannot be paused."""

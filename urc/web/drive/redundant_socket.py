@@ -1,0 +1,101 @@
+"""The redundant socket of a page, for links that lose packets.
+
+Layer 5. A lost packet delays all later data of its TCP connection by a round trip or more. The
+delay doubles when the repeat is lost too, and is then longer than a lease. Two connections rarely
+lose packets at the same time. On such a link a page sends everything about held controls on both,
+and gets heartbeats on both. The first copy counts: each message carries the page's number.
+
+A redundant socket has no rights of its own. It joins the page by a key that only that page has, and
+closes with it.
+"""
+
+import msgspec
+from starlette.websockets import WebSocketDisconnect
+
+from urc.motion.freshness import DuplicateElimination
+from urc.runtime.clock import Clock, within
+from urc.web.drive.control_service import ControlService, OperatorSession
+from urc.web.feed.client_socket import ClientSocket, FlowControl, TokenBucket
+from urc.web.wire import drive as wire
+from urc.web.wire.picture import as_frame
+
+__all__ = ["CLOSE_NO_SEAT", "CLOSE_NOT_TAKEN", "KEY_WITHIN_S", "RedundantSocket"]
+
+CLOSE_NO_SEAT = 4404
+CLOSE_NOT_TAKEN = 4400
+KEY_WITHIN_S = 5.0
+"""Longest wait for the join message of a socket, in seconds."""
+MESSAGES_PER_S = 2000
+
+_hello = msgspec.json.Decoder(wire.JoinRedundant)
+_said: msgspec.json.Decoder[wire.Doubled] = msgspec.json.Decoder(wire.Doubled)
+_BAD = (msgspec.MsgspecError, UnicodeError, RecursionError)
+
+
+class RedundantSocket:
+    """One redundant socket."""
+
+    def __init__(
+        self, line: ClientSocket, controls: ControlService, clock: Clock, flow: FlowControl
+    ) -> None:
+        """Prepare; `line` is accepted, and `flow` is its flow control."""
+        self._line = line
+        self._controls = controls
+        self._clock = clock
+        self._flow = flow
+        self._is_over = False
+        self._allowance = TokenBucket(MESSAGES_PER_S, clock.now())
+
+    async def serve(self) -> None:
+        """Serve this socket until either side closes."""
+        try:
+            seat = await self._seat()
+            if seat is None:
+                await self._line.close(CLOSE_NO_SEAT, "no open page has this key")
+                return
+            if seat.spare is not None:
+                seat.spare.end()
+            seat.spare, seat.doubled = self, seat.doubled or DuplicateElimination()
+            try:
+                await self._listen(seat)
+            finally:
+                if seat.spare is self:
+                    seat.spare = None
+        except WebSocketDisconnect:
+            pass
+
+    def beat(self, number: int) -> None:
+        """Send a heartbeat number, unless an older one is still in the buffer."""
+        if self._flow.is_free():
+            self._flow.write(as_frame(wire.encode_beat(number).encode(), is_text=True))
+
+    def end(self) -> None:
+        """Stop: the page has closed, or has a newer redundant socket."""
+        self._is_over = True
+        self._flow.abort()
+
+    async def _seat(self) -> OperatorSession | None:
+        try:
+            async with within(self._clock, KEY_WITHIN_S):
+                message = await self._line.receive()
+            said = _hello.decode(message.get("text") or b"")
+        except (TimeoutError, *_BAD):
+            return None
+        return self._controls.seat_of(said.key)
+
+    async def _listen(self, seat: OperatorSession) -> None:
+        while (message := await self._line.receive())["type"] != "websocket.disconnect":
+            if not self._take(seat, message.get("text") or message.get("bytes") or b""):
+                await self._line.close(CLOSE_NOT_TAKEN, "only held controls may use this socket")
+                return
+
+    def _take(self, seat: OperatorSession, data: str | bytes) -> bool:
+        if self._is_over or not self._allowance.take(self._clock.now()):
+            return False
+        try:
+            said = _said.decode(data)
+        except _BAD:
+            return False
+        if said.number > 0:  # without a number, duplicates cannot be found
+            self._controls.hear(seat, said)
+        return said.number > 0

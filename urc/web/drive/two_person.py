@@ -1,0 +1,185 @@
+"""The two-person rule: a second page must approve the command, or it fails.
+
+Layer 5. Users do not sign in, so each page that may drive counts as a person. The asking page can
+never be the second one. The number of questions and their waiting time are bounded.
+
+A token of the server stands for a confirmation. It counts once, for a few seconds, on that page,
+and only for the same command with the same arguments. A recorded, changed or delayed confirmation
+is therefore void.
+"""
+
+import asyncio
+import secrets
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import count
+from typing import Final, NamedTuple
+
+import msgspec
+
+from urc.model.driver import STOPPED, Command
+from urc.model.exchange import Confirm
+from urc.model.values import Reading
+from urc.protocol.sequences.commands import questions
+from urc.runtime.clock import Clock, within
+from urc.runtime.session import CommandFailed
+from urc.web.drive.control_service import OperatorSession
+from urc.web.wire import ask as wire
+
+__all__ = ["TOKEN_S", "WAIT_S", "TwoPersonRule"]
+
+WAIT_S: Final = 30.0
+"""Longest wait for the second person, in seconds."""
+TOKEN_S: Final = 5.0
+"""Lifetime of a token, in seconds."""
+_MOST: Final = 8
+"""Most pending questions, and most tokens of one page."""
+
+
+@dataclass(slots=True)
+class _Question:
+    number: int
+    run: int
+    asker: OperatorSession
+    command: str
+    confirm: Confirm
+    until_s: float
+    answer: asyncio.Future[OperatorSession | None]
+
+
+class _Yes(NamedTuple):
+    """A confirmed command with its arguments."""
+
+    asker: OperatorSession
+    meant: bytes
+    until_s: float
+
+
+class TwoPersonRule:
+    """The questions of one robot."""
+
+    def __init__(self, seats: Callable[[], tuple[OperatorSession, ...]], clock: Clock) -> None:
+        """Begin without questions; `seats` returns the pages that watch the robot."""
+        self._seats = seats
+        self._clock = clock
+        self._numbers = count(1)
+        self._questions: dict[int, _Question] = {}
+        self._tokens: dict[str, _Yes] = {}
+
+    def prepare(self, asker: OperatorSession, said: wire.ApprovalRequest) -> str:
+        """Return a token for a confirmation on this page."""
+        now = self._clock.now()
+        self._tokens = {key: yes for key, yes in self._tokens.items() if yes.until_s > now}
+        mine = [key for key, yes in self._tokens.items() if yes.asker is asker]
+        for key in mine[: len(mine) + 1 - _MOST]:
+            del self._tokens[key]
+        token = secrets.token_urlsafe(16)
+        meant = _meant(said.command, said.arguments)
+        self._tokens[token] = _Yes(asker, meant, now + TOKEN_S)
+        return token
+
+    async def people(
+        self,
+        asker: OperatorSession,
+        run: int,
+        known: Command,
+        arguments: Mapping[str, Reading],
+        token: str,
+    ) -> tuple[str, ...]:
+        """Return the names of the people who confirmed a command; () if it needs no confirmation.
+
+        Args:
+            asker: the page that runs it.
+            run: number of the command on that page.
+            known: the command.
+            arguments: its arguments.
+            token: from `prepare`; valid once.
+
+        Raises:
+            CommandFailed: a confirmation is missing.
+        """
+        yes = self._tokens.pop(token, None)
+        asks = questions(known, arguments)
+        if not asks:
+            return ()
+        text = asks[0].text or known.title or known.name
+        if not token:
+            raise CommandFailed("not-confirmed", f"a confirmation is missing: {text}")
+        if yes is None or yes.asker is not asker or self._clock.now() >= yes.until_s:
+            raise CommandFailed("not-confirmed", f"the confirmation is no longer valid: {text}")
+        if yes.meant != _meant(known.name, arguments):
+            raise CommandFailed("not-confirmed", f"the confirmation does not match: {text}")
+        two = next((one for one in asks if one.is_two_person), None)
+        if two is None:
+            return (asker.client.name,)
+        return (asker.client.name, await self.second(asker, run, known.title or known.name, two))
+
+    async def second(self, asker: OperatorSession, run: int, command: str, confirm: Confirm) -> str:
+        """Ask all other pages that may drive; return the name of the second person.
+
+        `run` is the number of the command on the asking page.
+
+        Raises:
+            CommandFailed: approval was refused, withdrawn or too late, or STOP was pressed.
+        """
+        if len(self._questions) >= _MOST:
+            raise CommandFailed("busy", f"{_MOST} questions wait for a second person already")
+        answer: asyncio.Future[OperatorSession | None] = asyncio.get_running_loop().create_future()
+        until_s = self._clock.now() + WAIT_S
+        one = _Question(next(self._numbers), run, asker, command, confirm, until_s, answer)
+        self._questions[one.number] = one
+        for seat in self._seats():
+            self._tell(seat, one)
+        try:
+            async with within(self._clock, WAIT_S):
+                second = await answer
+        except TimeoutError:
+            text = f"{confirm.text}: no second person approved within {WAIT_S:g} s"
+            raise CommandFailed("not-confirmed", text) from None
+        finally:
+            del self._questions[one.number]
+            for each in self._seats():
+                each.notice(f"ask {one.number}", wire.encode_asked(one.number))
+        if second is None:
+            raise CommandFailed("not-confirmed", f"{confirm.text}: refused by another operator")
+        return second.client.name
+
+    def stop(self) -> None:
+        """End every question and revoke every token: STOP was pressed."""
+        self._tokens.clear()
+        for one in self._questions.values():
+            if not one.answer.done():
+                one.answer.set_exception(CommandFailed("not-confirmed", STOPPED))
+
+    def welcome(self, seat: OperatorSession) -> None:
+        """Send the pending questions to a new page."""
+        for one in self._questions.values():
+            self._tell(seat, one)
+
+    def hear(self, seat: OperatorSession, said: wire.Approval) -> None:
+        """Take the answer of a page; ignore it when the question is over."""
+        one = self._questions.get(said.n)
+        if one is None or one.answer.done() or seat.client.role == "viewer":
+            return
+        if not said.yes:
+            one.answer.set_result(None)
+        elif seat is not one.asker:
+            one.answer.set_result(seat)
+
+    def _tell(self, seat: OperatorSession, one: _Question) -> None:
+        if seat.client.role == "viewer" and seat is not one.asker:
+            return
+        text = wire.encode_ask(
+            one.number,
+            one.run if seat is one.asker else 0,
+            one.asker.client.name,
+            one.command,
+            one.confirm.text,
+            one.confirm.level,
+            max(0.0, one.until_s - self._clock.now()),
+        )
+        seat.notice(f"ask {one.number}", text)
+
+
+def _meant(command: str, arguments: Mapping[str, Reading]) -> bytes:
+    return msgspec.json.encode([command, dict(arguments)], order="deterministic")

@@ -1,0 +1,149 @@
+"""The socket of a browser client, and the rate limit of its messages.
+
+Layer 5.
+"""
+
+import asyncio
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+from starlette.types import Message
+
+from urc.motion.lease import Role
+
+__all__ = ["TokenBucket", "FlowControl", "SocketPeer", "ClientSocket", "SocketFlow"]
+
+
+class ClientSocket(Protocol):
+    """The part of an accepted WebSocket that a client needs."""
+
+    async def receive(self) -> Message:
+        """Return the next ASGI message."""
+
+    async def send_text(self, data: str) -> None:
+        """Send one text message."""
+
+    async def close(self, code: int = 1000, reason: str | None = None) -> None:
+        """Begin the closing handshake."""
+
+
+class FlowControl(Protocol):
+    """Flow control of a client's socket."""
+
+    def is_free(self) -> bool:
+        """Whether the kernel has taken everything written so far."""
+
+    async def drained(self) -> None:
+        """Return when the kernel has taken everything written so far."""
+
+    def write(self, frame: bytes) -> None:
+        """Write whole WebSocket frames."""
+
+    def listen(self, sink: Callable[[bytes], bool]) -> None:
+        """Hand each whole text to `sink` before `ClientSocket.receive` gets it.
+
+        It saves two task switches. A text for which `sink` returns False goes to `receive`.
+        """
+
+    def hold_back(self, is_held: bool) -> None:
+        """Pause or resume reading; unread data stays in the kernel's buffer."""
+
+    def abort(self) -> None:
+        """Close the connection at once, without a handshake."""
+
+
+class SocketFlow:
+    """Lets a client write whole frames, wait until the buffer is empty, or abort."""
+
+    def __init__(self) -> None:
+        self.sink: Callable[[bytes], bool] | None = None
+        """Callback for each whole text message."""
+        self._transport: asyncio.Transport | None = None
+        self._is_free = True
+        self._writable = asyncio.Event()
+        self._writable.set()
+
+    # Called by the protocol
+
+    def made(self, transport: asyncio.Transport) -> None:
+        """Take the transport, and make it report the first byte that the kernel does not take."""
+        self._transport = transport
+        transport.set_write_buffer_limits(high=0)
+
+    def lost(self) -> None:
+        """Wake a waiting writer, so that it notices the end of the connection."""
+        self.resume()
+
+    def pause(self) -> None:
+        """Record that the kernel's buffer is full."""
+        self._is_free = False
+        self._writable.clear()
+
+    def resume(self) -> None:
+        """Record that the kernel's buffer is empty."""
+        self._is_free = True
+        self._writable.set()
+
+    # Called by the client
+
+    def is_free(self) -> bool:
+        """Return whether the kernel has taken everything written so far."""
+        return self._is_free
+
+    def is_closing(self) -> bool:
+        """Return whether the transport is closing."""
+        return self._transport is None or self._transport.is_closing()
+
+    async def drained(self) -> None:
+        """Return when the kernel has taken everything written so far."""
+        await self._writable.wait()
+
+    def write(self, frame: bytes) -> None:
+        """Write whole WebSocket frames."""
+        if (transport := self._transport) and not transport.is_closing():
+            transport.write(frame)
+
+    def listen(self, sink: Callable[[bytes], bool]) -> None:
+        """Hand each whole text to `sink`."""
+        self.sink = sink
+
+    def hold_back(self, is_held: bool) -> None:
+        """Pause or resume reading."""
+        if self._transport and not self.is_closing():
+            (self._transport.pause_reading if is_held else self._transport.resume_reading)()
+
+    def abort(self) -> None:
+        """Close the connection at once, without a handshake."""
+        if self._transport:
+            self._transport.abort()
+
+
+class TokenBucket:
+    """A token bucket for messages, with a capacity of one second."""
+
+    def __init__(self, rate_hz: float, now_s: float) -> None:
+        self._rate_hz = rate_hz
+        self._left = rate_hz
+        self._time_s = now_s
+
+    def take(self, now_s: float) -> bool:
+        """Count one message; return False above the limit."""
+        earned = (now_s - self._time_s) * self._rate_hz
+        self._left = min(self._rate_hz, self._left + earned)
+        self._time_s = now_s
+        if self._left < 1:
+            return False
+        self._left -= 1
+        return True
+
+
+class SocketPeer(NamedTuple):
+    """The person or program at the other end."""
+
+    place: str = ""
+    """Address, shown to other pages; "" for this machine."""
+    role: Role = "driver"
+    who: str = ""
+    """Identity for the count of sockets: a browser, program or address; "" is not counted."""
+    is_known: bool = False
+    """Whether it has a key; else `who` is an address."""

@@ -1,0 +1,93 @@
+"""The newest image of each signal, encoded once for all pages that show it.
+
+Layer 5. Nothing is queued: a client takes the newest image when its socket is free, and skips the
+older ones.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from urc.model.values import Sample, Signal
+from urc.runtime.clock import Clock
+from urc.runtime.hub import Hub
+from urc.web.wire.picture import as_frame, encode_picture
+
+__all__ = ["EncodedImage", "ImageSubscription", "ImageCache", "is_picture"]
+
+SHARED_FOR_S = 0.05
+"""Reuse of an encoded image, in seconds. Its age counts from the encoding, and a few milliseconds
+are not worth another copy of some ten kilobytes."""
+
+
+class EncodedImage(NamedTuple):
+    """An image, ready for any client."""
+
+    frame: bytes
+    """The whole WebSocket frame."""
+    sample: Sample
+    number: int
+    """Counter of images; grows with each new image of any signal."""
+    made_s: float
+
+
+@dataclass(slots=True)
+class ImageSubscription:
+    """The images that one client shows, and the newest ones that it has."""
+
+    names: tuple[str, ...] = ()
+    seen: dict[str, int] = field(default_factory=dict)
+    """Signal → number of its last image at the client."""
+    turn: int = 0
+    """Round-robin position, so that one fast camera leaves room for another."""
+
+    def show(self, names: Iterable[str]) -> None:
+        """Set the shown images; a hidden one is sent again when it is shown again."""
+        self.names = tuple(dict.fromkeys(names))
+        self.seen = {name: number for name, number in self.seen.items() if name in self.names}
+
+
+def is_picture(signal: Signal | None) -> bool:
+    """Return whether a signal's values go as binary messages."""
+    return signal is not None and signal.type in ("image", "blob")
+
+
+class ImageCache:
+    """The encoded images of one session, for all its clients."""
+
+    def __init__(self, hub: Hub, clock: Clock) -> None:
+        self._hub = hub
+        self._clock = clock
+        self._encoded: dict[str, EncodedImage] = {}
+        self._count = 0
+
+    def take(self, looks: ImageSubscription) -> EncodedImage | None:
+        """Return a shown image that the client lacks, or None; it then counts as sent."""
+        count = len(looks.names)
+        for step in range(count):
+            name = looks.names[(looks.turn + step) % count]
+            made = self._newest(name)
+            if made is not None and looks.seen.get(name) != made.number:
+                looks.turn = (looks.turn + step + 1) % count
+                looks.seen[name] = made.number
+                return made
+        return None
+
+    def _newest(self, name: str) -> EncodedImage | None:
+        sample = self._hub.latest(name)
+        if sample is None or not isinstance(sample.value, bytes):
+            return None
+        known, now_s = self._encoded.get(name), self._clock.now()
+        if known is None or known.sample is not sample:
+            if known is None and not is_picture(self._hub.signals.get(name)):
+                return None
+            self._count += 1
+            number = self._count
+        elif now_s - known.made_s > SHARED_FOR_S:
+            number = known.number
+        else:
+            return known
+        age_s, index = now_s - sample.time_s, self._hub.index[name]
+        message = encode_picture(index, sample.value, round(age_s * 1000), round(now_s * 1000))
+        made = self._encoded[name] = EncodedImage(as_frame(message), sample, number, now_s)
+        return made

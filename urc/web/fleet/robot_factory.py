@@ -1,0 +1,253 @@
+"""Makes the robots of a dashboard: from documents, settings and installed packages.
+
+Layer 5. It reads files and stores settings; it has no session. Reading takes a while, so the event
+loop calls it in a thread.
+"""
+
+import logging
+from collections.abc import Callable, Mapping
+from contextlib import AbstractAsyncContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from urc.config.interface_fit import InterfaceFit, fit_interface
+from urc.model.profile import Profile
+from urc.model.values import Value
+from urc.packages.lock import Lock
+from urc.packages.manifest import Manifest
+from urc.packages.names import PackageError
+from urc.packages.package import open_package
+from urc.packages.store import Store
+from urc.problems import UrcError
+from urc.runtime.destination import destination_of
+from urc.runtime.local_hosts import check_hosts
+from urc.runtime.open_profile import open_document
+from urc.runtime.session import Session
+from urc.runtime.settings import parse_setting
+from urc.runtime.settings_store import DRIVEN, SettingsStore, StoredSettings, in_use
+from urc.runtime.widget_registry import shelf_of
+from urc.web.fleet.robots import Robot
+
+__all__ = ["InstalledInterface", "ResolvedSettings", "RobotFactory", "RobotOptions"]
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class RobotOptions:
+    """Options of the robot factory, chosen at the start of the dashboard."""
+
+    data: Path
+    """Folder of settings and packages."""
+    make: Callable[[Profile, Mapping[str, Value]], Robot]
+    """Return the robot of a profile with settings."""
+    tried: Callable[[Profile, Mapping[str, Value]], AbstractAsyncContextManager[Session]]
+    """Open a session that only tests the transports, without any control."""
+    given: Callable[[Profile], Mapping[str, Value]]
+    """Return the settings from the start of the server; stored settings never change them.
+    Raise `UrcError` for settings that no longer fit."""
+    shows_installed: bool = False
+    """Whether the menu shows the installed robots and drivers."""
+
+
+class ResolvedSettings(NamedTuple):
+    """The resolved settings of a robot."""
+
+    values: dict[str, Value]
+    """Values of all settings that may be used."""
+    given: dict[str, Value]
+    """Values from the start of the server."""
+    destination: str
+    """Hosts and ports of the robot's transports."""
+    withheld: frozenset[str]
+    """Secrets that were entered for another destination."""
+
+
+class InstalledInterface(NamedTuple):
+    """An installed interface."""
+
+    lock: Lock
+    document: str
+
+
+class RobotFactory:
+    """The documents of the robots."""
+
+    def __init__(self, workshop: RobotOptions) -> None:
+        """List the installed packages; no document is read yet."""
+        self.workshop = workshop
+        self.store = Store(workshop.data / "packages")
+        self._there = self._roots()
+        """Packages that were installed at the start."""
+        self._begun: dict[str, str] = {}
+        """Robot → its first destination, for which the settings from the start are valid."""
+        self._manifests: dict[tuple[str, int, int], Manifest] = {}
+        """Cache by digest and state of the archive, because pages need all manifests often."""
+
+    def _roots(self) -> frozenset[str]:
+        try:
+            return frozenset(lock.root for lock in self.store.installed())
+        except PackageError:  # the managers' pages report it
+            return frozenset()
+
+    def stamp(self) -> object:
+        """Return a value that changes with every install and removal."""
+        try:
+            found = (self.store.folder / "state.json").stat()
+        except OSError:
+            return None
+        return found.st_mtime_ns, found.st_size, found.st_ino
+
+    def kept(self, name: str) -> SettingsStore:
+        """Return the file with the settings of a robot."""
+        return SettingsStore(self.workshop.data / "robots", name)
+
+    def robot(self, name: str, profile: Profile, kept: StoredSettings | None = None) -> Robot:
+        """Return a robot with its settings and all interfaces that fit; raise `UrcError`.
+
+        Args:
+            name: its name in URLs.
+            profile: the profile from its document.
+            kept: its stored settings; None reads them from the file.
+        """
+        chosen = self.kept(name).load() if kept is None else kept
+        filled = self.filled(profile, chosen)
+        for secret in sorted(filled.withheld):
+            log.warning(
+                "%s: the setting %s was entered for another place, package or version of URC:"
+                " enter it again",
+                name,
+                secret,
+            )
+        return self.workshop.make(self.furnished(profile, chosen.interface), filled.values)
+
+    def filled(self, profile: Profile, kept: StoredSettings) -> ResolvedSettings:
+        """Return the resolved settings of a robot; raise `UrcError`.
+
+        A value from the start wins over a stored one, and a stored one over the default. A stored
+        value that no longer fits, for example after an update, counts as missing. A secret is only
+        used for the destination for which it was entered.
+        """
+        defaults: dict[str, Value] = {
+            name: setting.default
+            for name, setting in profile.settings.items()
+            if setting.default is not None
+        }
+        typed = dict(defaults)
+        for name, text in kept.settings.items():
+            if name in profile.settings:
+                try:
+                    typed[name] = parse_setting(profile.settings[name], text)
+                except UrcError:
+                    typed.pop(name, None)
+        given = dict(self.workshop.given(profile))
+        package = self.package_of(profile)
+        everything = typed | given
+        place = destination_of(profile, package, everything)
+        begun = self._begun_at(profile, package, defaults | given)
+        withheld: set[str] = set()
+        for name, setting in profile.settings.items():
+            if not setting.is_secret or name not in everything:
+                continue
+            if name in given and begun == place:
+                continue
+            given.pop(name, None)
+            if name in typed and kept.destination == place:
+                everything[name] = typed[name]
+            else:
+                del everything[name]
+                withheld.add(name)
+        for name, setting in profile.settings.items():
+            if not setting.is_required:
+                everything.setdefault(name, setting.empty)
+        return ResolvedSettings(everything, given, place, frozenset(withheld))
+
+    def _begun_at(self, profile: Profile, package: str, values: Mapping[str, Value]) -> str:
+        """Return the robot's destination at the start; "" if it was installed later."""
+        if package and package not in self._there:
+            return ""
+        place = destination_of(profile, package, values)
+        return self._begun.setdefault(package or profile.name, place)
+
+    def package_of(self, profile: Profile) -> str:
+        """Return the installed package of a robot, as ``drivers/puppet``; "" for a file."""
+        home = (self.store.folder / "ecosystems").resolve()
+        try:
+            parts = Path(profile.file).resolve().relative_to(home).parts
+        except ValueError:
+            return ""
+        return "/".join(parts[1:3])
+
+    def furnished(self, profile: Profile, first: str = "") -> Profile:
+        """Return a profile with the fitting installed interfaces; `first` comes first."""
+        interfaces, widgets = dict(profile.interfaces), dict(profile.widgets)
+        for added in self.interfaces():
+            found = self.fitted(added, profile)
+            if found.interface is not None and added.lock.key.name not in interfaces:
+                interfaces[added.lock.key.name] = found.interface._replace(name=added.lock.key.name)
+                widgets |= found.widgets
+        if first in interfaces:
+            interfaces = {first: interfaces[first], **interfaces}
+        return profile._replace(interfaces=interfaces, widgets=widgets)
+
+    def fitted(self, added: InstalledInterface, profile: Profile) -> InterfaceFit:
+        """Return an installed interface with its bindings on a robot."""
+        if added.lock.key.name in profile.interfaces:
+            return InterfaceFit(None, fault="this robot has an interface of that name already")
+        return fit_interface(added.document, profile, shelf_of(added.document))
+
+    def interfaces(self) -> list[InstalledInterface]:
+        """Return the newest version of each interface that a user installed directly."""
+        newest = {lock.root: lock for lock in _ascending(self.store.installed())}
+        found = []
+        for lock in newest.values():
+            if lock.key.kind == "interface":
+                try:
+                    found.append(InstalledInterface(lock, str(self.store.document(lock))))
+                except PackageError:
+                    continue  # damaged: the list of installed packages shows it
+        return found
+
+    def parked(self) -> dict[str, list[Lock]]:
+        """Return the installed packages with a robot: name → its versions, oldest first.
+
+        If a robot and a driver share a name, only the one in use is listed.
+        """
+        locks = self.store.installed()
+        found: dict[str, list[Lock]] = {}
+        for name in {lock.key.name for lock in locks if lock.key.kind in DRIVEN}:
+            used = in_use(self.workshop.data / "robots", name, locks)
+            found[name] = [one for one in _ascending(locks) if used and one.key == used.key]
+        return dict(sorted(found.items()))
+
+    def chosen(self, locks: list[Lock], version: str) -> Lock:
+        """Return the chosen version for a robot; the newest one if it is missing."""
+        return next((lock for lock in locks if lock.version == version), locks[-1])
+
+    def profile(self, lock: Lock) -> Profile:
+        """Return the profile of an installed package; raise `UrcError`."""
+        profile = open_document(self.store.document(lock))
+        check_hosts(profile)
+        return profile
+
+    def reread(self, profile: Profile) -> Profile:
+        """Return the present profile of a robot from the start; raise `UrcError`."""
+        return open_document(profile.file)
+
+    def manifest(self, lock: Lock) -> Manifest:
+        """Return the manifest of an installed package; raise `UrcError`."""
+        digest = lock.packages[lock.root].sha256
+        try:
+            found = self.store.blob_file(digest).stat()
+            key = digest, found.st_mtime_ns, found.st_size
+        except OSError:
+            key = digest, 0, 0
+        if key not in self._manifests:
+            said = open_package(self.store.blob(digest), str(lock)).manifest
+            self._manifests = {**self._manifests, key: said}
+        return self._manifests[key]
+
+
+def _ascending(locks: tuple[Lock, ...]) -> list[Lock]:
+    return sorted(locks, key=lambda lock: (lock.root, lock.number))

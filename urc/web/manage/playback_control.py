@@ -1,0 +1,46 @@
+"""Requests that read or change the playback of a recording.
+
+Layer 5. Its pages are those of a robot that is only watched. Any visitor may change the playback,
+because no real robot is connected.
+"""
+
+import math
+
+from starlette.requests import Request
+from starlette.responses import Response
+
+from urc.web.fleet.robots import Playback
+from urc.web.manage.routes import ApiError, answer, body_of, told
+from urc.web.manage.wire import PlaybackRequest, PlaybackState
+
+__all__ = ["move_tape", "tape_state"]
+
+
+def tape_state(tape: Playback | None) -> Response:
+    """Return the state of the playback as a response; 404 for None."""
+    if tape is None:
+        return told(404, "this robot is no recording")
+    return answer(
+        PlaybackState(
+            began_s=tape.began_s,
+            length_s=tape.length_s,
+            position_s=tape.position_s,
+            is_playing=tape.is_playing,
+            speed=tape.speed,
+        )
+    )
+
+
+async def move_tape(request: Request, tape: Playback | None) -> Response:
+    """Run, pause or move the playback, and return its state as a response."""
+    if tape is None:
+        return told(404, "this robot is no recording")
+    try:
+        asked = await body_of(request, PlaybackRequest)
+    except ApiError as refusal:
+        return told(refusal.status, refusal.line)
+    if asked.position_s is not None and math.isfinite(asked.position_s):
+        tape.seek(asked.position_s)
+    if asked.is_playing is not None and asked.is_playing != tape.is_playing:
+        (tape.play if asked.is_playing else tape.pause)()
+    return tape_state(tape)

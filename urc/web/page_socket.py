@@ -1,0 +1,375 @@
+"""The WebSocket of one page: its messages are checked, and no page waits for another.
+
+Layer 5. Reads and writes are two tasks of one group. The writer takes the newest state when the
+socket is free, so a slow page skips frames. A page that takes nothing for `STALL_S` is
+disconnected.
+"""
+
+import asyncio
+import logging
+import math
+from collections import deque
+from collections.abc import Mapping
+from time import time
+
+from starlette.types import Message
+from starlette.websockets import WebSocketDisconnect
+
+from urc.model.payload import Payload
+from urc.model.values import NOTHING, Reading
+from urc.runtime.session import CommandFailed
+from urc.web.drive.control_service import OperatorSession
+from urc.web.drive.one_shot_commands import CommandRefused
+from urc.web.feed.client_socket import ClientSocket, FlowControl, SocketPeer, TokenBucket
+from urc.web.feed.fanout import Place
+from urc.web.fleet.robots import LiveSession, RobotService, SessionFailed, missing_settings
+from urc.web.wire import messages as wire
+from urc.web.wire.ask import Approval, ApprovalRequest, SequenceAction, encode_token
+from urc.web.wire.drive import Drive, Driving, Release, Stop, Tick
+from urc.web.wire.picture import ImageSelection
+
+__all__ = ["TokenBucket", "BrowserClient", "FlowControl", "SocketPeer", "ClientSocket"]
+
+MESSAGES_PER_S = 100
+TICKS_PER_S = 2000
+"""Rate at which ticks of held controls close the socket. Slower ones are thinned, not refused."""
+TICK = b'{"t":"tick",'
+"""First bytes of a page's tick; a tick in another spelling takes the slower path."""
+BAD_MESSAGES = 10
+COMMANDS_AT_ONCE = 16
+COMMAND_TIMEOUT_S = 30.0
+STALL_S = 15.0
+GOODBYE_S = 2.0
+
+log = logging.getLogger(__name__)
+
+
+class BrowserClient:
+    """The server's side of one page, until either side closes."""
+
+    def __init__(
+        self,
+        line: ClientSocket,
+        station: RobotService,
+        flow: FlowControl,
+        guest: SocketPeer = SocketPeer(),  # noqa: B008 - it cannot be changed
+    ) -> None:
+        self._line = line
+        self._station = station
+        self._flow = flow
+        self._guest = guest
+        self._seat: OperatorSession | None = None
+        self._news = asyncio.Event()
+        self._answers: deque[str] = deque()
+        self._pong = ""
+        self._place = Place()
+        self._live: LiveSession | None = None
+        """Set once the page has the indices of its values."""
+        self._is_listening = False
+        self._closing: tuple[int, str] | None = None
+        self._commands: set[asyncio.Task[None]] = set()
+        self._allowance = TokenBucket(MESSAGES_PER_S, station.clock.now())
+        self._ticks = TokenBucket(TICKS_PER_S, station.clock.now())
+        self.bad_messages = 0
+
+    async def serve(self) -> None:
+        """Serve this page from the accepted socket to its end."""
+        missing = missing_settings(self._station.robot)
+        if missing:
+            names = ", ".join(setting.name for setting in missing)
+            await self._refuse(wire.CLOSE_NOT_READY, f"not set yet: {names}")
+        elif self._station.is_full:
+            await self._refuse(wire.CLOSE_FULL, "too many clients watch this robot")
+        elif not self._station.has_seat_for(self._guest):
+            await self._refuse(wire.CLOSE_FULL, "too many screens of yours watch this robot")
+        else:
+            with self._station.visit(self._guest.who):
+                await self._visit()
+
+    async def _visit(self) -> None:
+        opening = asyncio.ensure_future(self._station.live())
+        leaving = asyncio.ensure_future(self._line.receive())
+        # A page that leaves while the session is still opening must not count as a client.
+        try:
+            await asyncio.wait((opening, leaving), return_when=asyncio.FIRST_COMPLETED)
+            if leaving.done() and leaving.result()["type"] == "websocket.disconnect":
+                return
+            live = await opening
+        except SessionFailed as error:
+            await self._refuse(wire.CLOSE_FAILED, str(error))
+            return
+        finally:
+            opening.cancel()
+            if not leaving.done():
+                leaving.cancel()
+        first = leaving.result() if leaving.done() and not leaving.cancelled() else None
+        await self._converse(live, first)
+
+    async def _converse(self, live: LiveSession, first: Message | None) -> None:
+        self._place = live.fanout.join(self._flushed)
+        controls = self._station.controls
+        try:
+            self._seat = controls.sit(self._guest.place, self._guest.role, self._news.set)
+            self._station.consent.welcome(self._seat)
+            async with asyncio.TaskGroup() as group:
+                writing = group.create_task(self._write(live))
+                reading = group.create_task(self._read(live, group, first))
+                await asyncio.wait((writing, reading), return_when=asyncio.FIRST_COMPLETED)
+                if self._closing and not writing.done():
+                    await asyncio.wait((writing,), timeout=GOODBYE_S)
+                for task in (writing, reading, *self._commands):
+                    task.cancel()
+        except* WebSocketDisconnect:
+            pass
+        except* TimeoutError:
+            log.warning("a client took nothing for %g s and was disconnected", STALL_S)
+            self._flow.abort()
+        finally:
+            if self._seat is not None:
+                controls.rise(self._seat)
+            live.fanout.leave(self._flushed)
+
+    async def _refuse(self, code: int, reason: str) -> None:
+        try:
+            await self._line.send_text(wire.encode_error("refused", reason))
+            await self._line.close(code, reason[:100])
+        except WebSocketDisconnect:
+            pass
+
+    # Writing
+
+    async def _write(self, live: LiveSession) -> None:
+        profile = self._station.robot.profile
+        hello = wire.encode_hello(profile, live.number, self._station.clock.now())
+        await self._line.send_text(hello)
+        self._live = live
+        while True:
+            async with asyncio.timeout(STALL_S):
+                # Values taken before the socket is free would be old when they leave.
+                await self._flow.drained()
+                self._news.clear()
+                self._send_shared(live)
+                told = self._station.controls.take(self._seat) if self._seat else []
+                for text in (*told, *self._take_answers()):
+                    await self._line.send_text(text)
+            if live.ended.is_set() and not self._closing:
+                self._closing = (wire.CLOSE_FAILED, "the robot's session ended")
+            if self._closing:
+                await self._line.close(*self._closing)
+                return
+            await self._news.wait()
+
+    def _flushed(self) -> None:
+        """Send a flush of the fan-out at once if the socket is free; leave all else to the writer.
+
+        Waking the writer for every flush would cost three times as much as the send.
+        """
+        live = self._live
+        if live is not None and self._flow.is_free() and not self._closing:
+            self._send_shared(live)
+            if self._flow.is_free() and not live.ended.is_set():
+                return
+        self._news.set()
+
+    def _send_shared(self, live: LiveSession) -> None:
+        """Send the data that all pages share, and images until the kernel's buffer is full."""
+        if frames := live.fanout.take(self._place):
+            self._flow.write(frames)
+        while self._place.looks.names and self._flow.is_free():
+            picture = live.fanout.shelf.take(self._place.looks)
+            if picture is None:
+                break
+            self._flow.write(picture.frame)
+
+    def _take_answers(self) -> list[str]:
+        answers = list(self._answers)
+        self._answers.clear()
+        # Last, so that the page's round-trip time includes the wait in the buffer.
+        if self._pong:
+            answers.append(self._pong)
+            self._pong = ""
+        return answers
+
+    # Reading
+
+    async def _read(
+        self, live: LiveSession, group: asyncio.TaskGroup, first: Message | None
+    ) -> None:
+        self._flow.listen(self._offered)
+        if self._seat is not None:
+            self._seat.hold_back = self._flow.hold_back
+        message = first or await self._listen()
+        while message["type"] != "websocket.disconnect" and not self._closing:
+            self._take(message, live, group)
+            message = await self._listen()
+
+    async def _listen(self) -> Message:
+        self._is_listening = True
+        try:
+            return await self._line.receive()
+        finally:
+            self._is_listening = False
+
+    def _offered(self, data: bytes) -> bool:
+        """Take a tick that just arrived with nothing before it; `_take` handles all else."""
+        seat = self._seat
+        if seat is None or not (self._is_listening and data.startswith(TICK)) or self._closing:
+            return False
+        how = self._station.controls.offer(seat, data)
+        # Ticks within the rate are not counted: they are far fewer than the limit.
+        return how == "in time" or (
+            how == "one more" and self._ticks.take(self._station.clock.now())
+        )
+
+    def _take(self, message: Message, live: LiveSession, group: asyncio.TaskGroup) -> None:
+        now_s = self._station.clock.now()
+        if not self._ticks.take(now_s):
+            self._close(wire.CLOSE_TOO_FAST, f"more than {TICKS_PER_S} messages a second")
+            return
+        asked: wire.Inbound | None = None
+        fault = ""
+        try:
+            asked = wire.decode(message.get("text") or message.get("bytes") or "")
+        except wire.BadMessage as error:
+            fault = str(error)
+        if isinstance(asked, (Tick, Release, Stop)):
+            self._hear(asked)  # STOP is never counted, so no limit can refuse it
+        elif not self._allowance.take(now_s):
+            self._close(wire.CLOSE_TOO_FAST, f"more than {MESSAGES_PER_S} messages a second")
+        elif asked is None:
+            self._count_bad(fault)
+        elif isinstance(asked, Drive):
+            self._hear(asked)
+        elif isinstance(asked, ImageSelection):
+            self._news.set()
+            self._place.looks.show(asked.signals)
+        elif isinstance(asked, (Approval, ApprovalRequest, SequenceAction)):
+            self._advise(asked, live)
+        elif isinstance(asked, wire.Ping):
+            if math.isfinite(asked.c):
+                self._pong = wire.encode_pong(asked, now_s, time())
+                self._news.set()
+        else:
+            self._start(asked, live, group)
+
+    def _hear(self, said: Driving) -> None:
+        if isinstance(said, Stop) and self._station.robot.tape is not None:
+            return  # nothing moves in a recording, and no robot could acknowledge a stop
+        if self._seat is not None:
+            self._station.controls.hear(self._seat, said)
+
+    def _advise(self, said: Approval | ApprovalRequest | SequenceAction, live: LiveSession) -> None:
+        if self._seat is None:
+            return
+        controls, consent, who = self._station.controls, self._station.consent, self._seat.client
+        if isinstance(said, ApprovalRequest):
+            self._answer(encode_token(said.id, consent.prepare(self._seat, said)))
+        elif isinstance(said, Approval):
+            consent.hear(self._seat, said)
+        elif refused := controls.once.pull_refusal(who, said.command, said.verb):
+            controls.trail.refused(who, said.command, refused, self._station.clock.now())
+        else:
+            live.session.pull(said.command, said.verb)
+            controls.trail.ran(who, said.command, {}, f"told to {said.verb}")
+
+    def _count_bad(self, reason: str) -> None:
+        self.bad_messages += 1
+        if self.bad_messages >= BAD_MESSAGES:
+            self._close(wire.CLOSE_BAD_MESSAGES, f"{BAD_MESSAGES} messages were invalid")
+        else:
+            self._answer(wire.encode_error("bad-message", reason))
+
+    def _close(self, code: int, reason: str) -> None:
+        self._closing = (code, reason)
+        self._answer(wire.encode_error("closing", reason))
+
+    def _answer(self, text: str) -> None:
+        self._answers.append(text)
+        self._news.set()
+
+    def _start(
+        self, asked: wire.CommandRequest, live: LiveSession, group: asyncio.TaskGroup
+    ) -> None:
+        if len(self._commands) + len(self._answers) >= COMMANDS_AT_ONCE:
+            # The refusal closes and queues nothing: it is the page's only reply.
+            text = f"{COMMANDS_AT_ONCE} commands are still under way"
+            if len(self._answers) < 2 * COMMANDS_AT_ONCE:
+                self._reply(asked, code="busy", message=text)
+            else:
+                self._close(wire.CLOSE_TOO_FAST, text)
+            return
+        task = group.create_task(self._run(asked, live))
+        self._commands.add(task)
+        task.add_done_callback(self._commands.discard)
+
+    async def _run(self, asked: wire.CommandRequest, live: LiveSession) -> None:
+        sent: deque[Payload] = deque(maxlen=1)  # the last frame that was sent
+        try:
+            people = await self._confirmed(asked)
+            async with asyncio.timeout(self._limit_s(asked.command)):
+                replied = await live.session.command(
+                    asked.command, asked.arguments, confirmed_by=people, on_sent=sent.append
+                )
+        except asyncio.CancelledError:
+            if self._seat is not None:
+                text = "nobody waited for the answer"
+                trail = self._station.controls.trail
+                trail.ran(self._seat.client, asked.command, asked.arguments, text, _last(sent))
+            raise
+        except TimeoutError:
+            text = f"no answer within {COMMAND_TIMEOUT_S:g} s"
+            self._reply(asked, code="timed-out", message=text, sent=_last(sent))
+        except CommandRefused as refused:
+            self._reply(asked, code=refused.code, message=refused.message, is_ours=True)
+        except CommandFailed as failed:
+            self._reply(asked, code=failed.code, message=failed.message, sent=_last(sent))
+        else:
+            self._reply(asked, values=replied.values, people=people, sent=_last(sent))
+
+    def _limit_s(self, command: str) -> float | None:
+        """Return the time limit of a command; a sequence has its own end."""
+        known = self._station.robot.profile.driver.commands.get(command)
+        return None if known is not None and known.steps else COMMAND_TIMEOUT_S
+
+    async def _confirmed(self, asked: wire.CommandRequest) -> tuple[str, ...]:
+        """Return who confirmed a command; raise `CommandFailed` if it is not allowed."""
+        if self._seat is None:
+            return ()
+        known = self._station.robot.profile.driver.commands.get(asked.command)
+        who, admit = self._seat.client, self._station.controls.once.admit
+        admit(who, asked.command, asked.arguments, asked.stops)
+        if known is None:
+            return ()
+        people = await self._station.consent.people(
+            self._seat, asked.id, known, asked.arguments, asked.token
+        )
+        admit(who, asked.command, asked.arguments, asked.stops)  # again: a confirmation takes time
+        return people
+
+    def _reply(
+        self,
+        asked: wire.CommandRequest,
+        *,
+        values: Mapping[str, Reading] = NOTHING,
+        code: str = "",
+        message: str = "",
+        people: tuple[str, ...] = (),
+        sent: Payload = b"",
+        is_ours: bool = False,
+    ) -> None:
+        """Reply to a command, and write its outcome to the audit log."""
+        self._answer(wire.encode_reply(asked, values=values, code=code, message=message))
+        if self._seat is None:
+            return
+        trail, who = self._station.controls.trail, self._seat.client
+        if code == "busy" or is_ours:
+            trail.refused(who, asked.command, message, self._station.clock.now())
+        else:
+            outcome = f"{code}: {message}" if code else "done"
+            if people:
+                outcome += f"; confirmed by {', '.join(people)}"
+            trail.ran(who, asked.command, asked.arguments, outcome, sent, answer=values)
+
+
+def _last(sent: deque[Payload]) -> Payload:
+    return sent[-1] if sent else b""

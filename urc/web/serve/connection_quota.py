@@ -1,0 +1,54 @@
+"""Limits on the concurrent requests of one visitor, so that others still get through.
+
+Layer 5. Pure. Visitors with a key are counted one by one, unknown visitors by their address. STOP
+is not counted: it is always accepted.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from urc.web.serve.access import Visitor
+
+__all__ = ["KNOWN_PLACES", "PLACES", "ConnectionQuota", "is_stop"]
+
+PLACES = 32
+"""Most requests and sockets of one unknown address at a time. A page has up to two sockets and six
+requests: enough for several pages, and for a few people behind one address."""
+KNOWN_PLACES = 256
+"""The same limit for a known browser or program: it may watch many robots."""
+
+_STOP = re.compile(r"/api/v1/robots/[^/ ]+/stop")
+
+
+def is_stop(method: str, path: str) -> bool:
+    """Return whether a request stops a robot."""
+    return method == "POST" and _STOP.fullmatch(path) is not None
+
+
+class ConnectionQuota:
+    """Counters of concurrent requests by visitor."""
+
+    def __init__(self) -> None:
+        """Begin with zero."""
+        self._taken: Counter[str] = Counter()
+
+    @contextmanager
+    def taken(self, visitor: Visitor, address: str) -> Iterator[bool]:
+        """Take a place while the context lasts; yield whether one was free.
+
+        `address` counts for unknown visitors.
+        """
+        is_known = visitor.standing != "stranger"
+        who = f"{visitor.standing} {visitor.name}" if is_known else f"at {address}"
+        if self._taken[who] >= (KNOWN_PLACES if is_known else PLACES):
+            yield False
+            return
+        self._taken[who] += 1
+        try:
+            yield True
+        finally:
+            self._taken[who] -= 1
+            if not self._taken[who]:
+                del self._taken[who]

@@ -1,0 +1,49 @@
+"""Rights of a visitor: the start key gives more rights, and a page may choose to watch only.
+
+Layer 5. Pure.
+"""
+
+from ipaddress import ip_address
+
+from starlette.requests import HTTPConnection
+
+from urc.web.page_socket import SocketPeer
+from urc.web.serve.access import STRANGER, Visitor
+
+__all__ = ["guest_of", "is_here", "may_manage", "visitor_of"]
+
+
+def visitor_of(connection: HTTPConnection) -> Visitor:
+    """Return the visitor of a request, as the page policy identified it."""
+    found: Visitor = getattr(connection.state, "visitor", STRANGER)
+    return found
+
+
+def guest_of(connection: HTTPConnection) -> SocketPeer:
+    """Return the visitor's identity for the robot's other pages."""
+    host = connection.client.host if connection.client else ""
+    has_key = is_here(connection)
+    place = "" if has_key and _is_loopback(host) else host
+    visitor = visitor_of(connection)
+    is_known = visitor.standing != "stranger"
+    who = f"{visitor.standing} {visitor.name}" if is_known else f"at {host}"
+    if "watch" in connection.query_params:
+        return SocketPeer(place, "viewer", who, is_known)
+    return SocketPeer(place, "engineer" if has_key else "driver", who, is_known)
+
+
+def is_here(connection: HTTPConnection) -> bool:
+    """Return whether the visitor has the start key; the address does not matter."""
+    return visitor_of(connection).standing == "here"
+
+
+def may_manage(connection: HTTPConnection) -> bool:
+    """Return whether the visitor may install packages and change settings."""
+    return visitor_of(connection).standing in ("here", "manager")
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ip_address(host.partition("%")[0]).is_loopback
+    except ValueError:
+        return False

@@ -1,0 +1,112 @@
+"""Routes of files and third-party pages that a robot's documents name for their widgets.
+
+Layer 5. A document without scripts and with one frame shows a third-party page. The policy of the
+dashboard allows only frames of its own origin. So this document frames the other page, and its
+policy allows the one origin in the widget's option.
+"""
+
+import base64
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+from urllib.parse import urlsplit
+
+from markupsafe import Markup
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+from starlette.routing import Route
+
+from urc.model.profile import Profile
+from urc.web import words
+from urc.web.fleet.robots import Robot
+from urc.web.load.files import page_key, robot_file, uses_of
+from urc.web.serve.policy import is_origin_ours, parse_host
+from urc.web.show.pages import render
+
+__all__ = ["FramedPage", "ExternalPages", "framed_page"]
+
+# White, as pages without a background expect; a dark page paints its own.
+_STYLE: Final = Markup(
+    "html,body,iframe{display:block;width:100%;height:100%;margin:0;border:0;background:white}"
+)
+_DIGEST: Final = base64.b64encode(hashlib.sha256(_STYLE.encode()).digest()).decode()
+_POLICY: Final = (
+    f"default-src 'none'; frame-src {{frames}}; style-src 'sha256-{_DIGEST}'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'self'"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class FramedPage:
+    """``framed.html.j2``: the document around one third-party page."""
+
+    title: str
+    """Host of the page."""
+    url: str
+    """URL of the page; "" if it is refused."""
+    fault: str
+    """Why it is refused, in one line."""
+    style: Markup = _STYLE
+    """Style, character by character: the policy contains its digest."""
+
+
+class ExternalPages:
+    """The routes.
+
+    Args:
+        robots: the served robots, by the name in their URL.
+    """
+
+    def __init__(self, robots: Callable[[], Mapping[str, Robot]]) -> None:
+        self._robots = robots
+
+    def routes(self) -> list[Route]:
+        """Return the routes for the application."""
+        return [
+            Route("/robots/{name}/files/{file:path}", self._file),
+            Route("/robots/{name}/framed/{page}", self._page),
+        ]
+
+    async def _file(self, request: Request) -> Response:
+        return robot_file(self._profile(request), request.path_params["file"], request)
+
+    async def _page(self, request: Request) -> Response:
+        return framed_page(self._profile(request), request.path_params["page"], request)
+
+    def _profile(self, request: Request) -> Profile:
+        robot = self._robots().get(request.path_params["name"])
+        if robot is None:
+            raise HTTPException(404)
+        return robot.profile
+
+
+def framed_page(profile: Profile, key: str, request: Request) -> Response:
+    """Return the document around a page that an option names; raise 404 for any other.
+
+    A page of this server itself is refused: in a frame it could reach the dashboard.
+    """
+    pages = (many for use in uses_of(profile) for many in use.pages.values())
+    urls = {page_key(url): url for many in pages for url in many}
+    url = urls.get(key)
+    if url is None:
+        raise HTTPException(404)
+    parts = urlsplit(url)
+    origin = f"{parts.scheme}://{parts.netloc}".lower()
+    is_ours = _is_ours(origin, parts.netloc, request)
+    fault = words.t("this is a page of the dashboard itself, which is not shown here")
+    page = FramedPage(parts.netloc, "" if is_ours else url, fault if is_ours else "")
+    request.state.frame_policy = _POLICY.format(frames="'none'" if is_ours else origin)
+    html = render("framed.html.j2", page)
+    return HTMLResponse(html, 404 if is_ours else 200, headers={"cache-control": "no-store"})
+
+
+def _is_ours(origin: str, netloc: str, request: Request) -> bool:
+    ours = parse_host(request.headers.get("host", ""))
+    # Behind a proxy the scheme here may differ from the browser's; host and port are enough.
+    return (
+        ours is None
+        or parse_host(netloc) == ours
+        or is_origin_ours(origin, request.scope["scheme"], ours)
+    )

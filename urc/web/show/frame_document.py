@@ -1,0 +1,68 @@
+"""The document of a frame with a third-party widget: an empty cell and an import map.
+
+Layer 5. It holds no data of a robot: the page passes markup and values in (``warden.js``). Its
+policy allows code from a few paths; it has no other access to the network.
+"""
+
+import base64
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import cast
+
+from jinja2.utils import htmlsafe_json_dumps
+from markupsafe import Markup
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+
+from urc.web.serve.policy import frame_policy
+from urc.web.show.pages import render, with_words
+
+__all__ = ["FramePage", "FrameDocuments"]
+
+
+@dataclass(frozen=True, slots=True)
+class FramePage:
+    """``frame.html.j2``: the document around one third-party widget."""
+
+    title: str
+    import_map: Markup
+    """JSON, character by character: the policy contains its digest."""
+    style: str
+    """URL of the widget's style sheet."""
+    place: str
+    """Path prefix of its files."""
+
+
+class FrameDocuments:
+    """Makes the documents.
+
+    Args:
+        modules: the import map.
+        has: returns whether a widget of that name exists.
+        place: path below which frames load code.
+    """
+
+    def __init__(
+        self, modules: Mapping[str, object], has: Callable[[str], bool], place: str
+    ) -> None:
+        self._modules = modules
+        self._has = has
+        self._place = place
+
+    async def frame(self, request: Request) -> Response:
+        """Return the document for one widget; raise 404 for an unknown name."""
+        name, place = request.path_params["widget"], self._place
+        if not self._has(name):
+            raise HTTPException(404)
+        text = htmlsafe_json_dumps(self._below(with_words(self._modules)))
+        digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+        request.state.frame_policy = frame_policy(request.scope, name, f"sha256-{digest}", place)
+        page = FramePage(name, text, f"{place}/widgets/{name}/widget.css", place)
+        return HTMLResponse(render("frame.html.j2", page), headers={"cache-control": "no-store"})
+
+    def _below(self, modules: Mapping[str, object]) -> Mapping[str, object]:
+        """Return the import map with all its URLs below the frames' path."""
+        imports = cast("Mapping[str, str]", modules["imports"])
+        return {"imports": {name: f"{self._place}{url}" for name, url in imports.items()}}
