@@ -56,7 +56,7 @@ async def _urc(clients: int, ticks: int) -> tuple[float, int]:
     def tell(tick: int) -> None:
         now_s = robot.clock.now()
         readings = zip(signals, repeat(tick + 0.25), repeat(now_s), repeat(""))
-        robot.hub.put(tuple(map(_sample, readings)))
+        robot.hub.publish(tuple(map(_sample, readings)))
 
     async with speaking(ticks, RATE_HZ) as line:
         path = "/ws?robot=puppet"

@@ -128,7 +128,7 @@ async def _urc(seconds: float) -> Look:
 
     def tick(number: int) -> None:
         now_s = robot.clock.now()
-        robot.hub.put([Sample(name, number + 0.25, now_s) for name in signals])
+        robot.hub.publish([Sample(name, number + 0.25, now_s) for name in signals])
 
     return await _look(app, "/ws?robot=puppet", tick, seconds)
 

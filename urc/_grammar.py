@@ -104,9 +104,9 @@ class _Parser:
         if self._depth > MAX_DEPTH:
             raise ExpressionSyntaxError("the expression is nested too deeply", self._next.offset)
         value = self._or()
-        if self._take("if"):
+        if self._accept("if"):
             test = self._or()
-            if not self._take("else"):
+            if not self._accept("else"):
                 raise ExpressionSyntaxError("'… if …' needs an 'else'", self._next.offset)
             value = f"({value} if {test} else {self.expression()})"
         self._depth -= 1
@@ -126,7 +126,7 @@ class _Parser:
         self._place += 1
         return token
 
-    def _take(self, text: str) -> bool:
+    def _accept(self, text: str) -> bool:
         """Skip `text` if it is next; a string literal does not count."""
         if self._next.text == text and self._next.kind in ("operator", "name"):
             self._place += 1
@@ -134,7 +134,7 @@ class _Parser:
         return False
 
     def _expect(self, text: str) -> None:
-        if not self._take(text):
+        if not self._accept(text):
             raise self._surprise(f"; {text!r} is expected")
 
     def _surprise(self, expected: str = "") -> ExpressionSyntaxError:
@@ -145,19 +145,19 @@ class _Parser:
 
     def _or(self) -> str:
         value = self._and()
-        while self._take("or"):
+        while self._accept("or"):
             value = f"({value} or {self._and()})"
         return value
 
     def _and(self) -> str:
         value = self._not()
-        while self._take("and"):
+        while self._accept("and"):
             value = f"({value} and {self._not()})"
         return value
 
     def _not(self) -> str:
         count = 0
-        while self._take("not"):
+        while self._accept("not"):
             count += 1
         value = self._comparison()
         return f"({'not ' * min(count, MAX_DEPTH)}{value})" if count else value
@@ -168,7 +168,7 @@ class _Parser:
             token = self._next
             if token.kind == "operator" and token.text in _COMPARE:
                 parts += [self._advance().text, self._sum()]
-            elif self._take("in"):
+            elif self._accept("in"):
                 parts += ["in", self._sum()]
             elif token.text == "not" and self._tokens[self._place + 1].text == "in":
                 self._place += 2
@@ -181,7 +181,7 @@ class _Parser:
 
     def _concatenation(self) -> str:
         parts = [self._product()]
-        while self._take("~"):
+        while self._accept("~"):
             parts.append(self._product())
         return f"_join({', '.join(parts)})" if len(parts) > 1 else parts[0]
 
@@ -209,9 +209,9 @@ class _Parser:
         self._depth += 1
         if self._depth > MAX_DEPTH:
             raise ExpressionSyntaxError("the expression is nested too deeply", self._next.offset)
-        if self._take("-"):
+        if self._accept("-"):
             value = f"_sub(0, {self._signed()})"
-        elif self._take("+"):
+        elif self._accept("+"):
             value = f"_add(0, {self._signed()})"
         else:
             value = self._postfix()
@@ -222,9 +222,9 @@ class _Parser:
         is_settings = self._next == Token("name", "settings", self._next.offset)
         value = self._primary()
         while True:
-            if self._take("."):
+            if self._accept("."):
                 value = f"_item({value}, {self._key(is_settings)})"
-            elif self._take("["):
+            elif self._accept("["):
                 value = self._subscript(value, is_settings)
             elif self._next.text == "(" and self._next.kind == "operator":
                 text = "calls are not part of the language, only filters, seq() and nonce()"
@@ -247,7 +247,7 @@ class _Parser:
         """Parse ``[key]``, or a slice such as ``[1:3]``."""
         token = self._next
         key = "None" if token.text == ":" and token.kind == "operator" else self.expression()
-        if self._take(":"):
+        if self._accept(":"):
             stop = "None" if self._next.text == "]" else self.expression()
             if self._next.text == ":":
                 raise ExpressionSyntaxError(
@@ -271,9 +271,9 @@ class _Parser:
         if token.kind == "name" and token.text not in _KEYWORDS:
             if token.text in _CONSTANTS:
                 return _CONSTANTS[token.text]
-            if token.text == "seq" and self._take("("):
+            if token.text == "seq" and self._accept("("):
                 return self._counter(token)
-            if token.text == "nonce" and self._take("("):
+            if token.text == "nonce" and self._accept("("):
                 return self._nonce(token)
             self._names.add(token.text)
             return self._resolve(token.text)
@@ -294,11 +294,11 @@ class _Parser:
             raise ExpressionSyntaxError(
                 "'seq' takes a name in quotes first, such as 'id'", name.offset
             )
-        if self._take(","):
+        if self._accept(","):
             low = self._whole()
-        if low is not None and self._take(","):
+        if low is not None and self._accept(","):
             high = self._whole()
-        if low is None or high is None or not self._take(")"):
+        if low is None or high is None or not self._accept(")"):
             raise ExpressionSyntaxError(
                 "write seq('name', lowest, highest) with whole numbers", token.offset
             )
@@ -310,7 +310,7 @@ class _Parser:
     def _nonce(self, token: Token) -> str:
         """Parse ``nonce()`` or ``nonce(8)``: that many nonce bytes, 16 by default."""
         size = 16 if self._next.text == ")" else self._whole()
-        if size is None or not self._take(")"):
+        if size is None or not self._accept(")"):
             raise ExpressionSyntaxError(
                 "write nonce(), or nonce(8) with a number of bytes", token.offset
             )
@@ -330,19 +330,19 @@ class _Parser:
 
     def _items(self, closing: str) -> list[str]:
         items: list[str] = []
-        while not self._take(closing):
+        while not self._accept(closing):
             if items:
                 self._expect(",")
-                if self._take(closing):
+                if self._accept(closing):
                     break
             items.append(self.expression())
         return items
 
     def _filtered(self, value: str) -> str:
         while True:
-            if self._take("|"):
+            if self._accept("|"):
                 value = self._filter(value)
-            elif self._take("is"):
+            elif self._accept("is"):
                 value = self._test(value)
             else:
                 return value
@@ -368,7 +368,7 @@ class _Parser:
             raise ExpressionSyntaxError(
                 f"there is no filter {token.text!r}; there are: {known}", token.offset
             )
-        has_arguments = self._take("(")
+        has_arguments = self._accept("(")
         first = self._next
         arguments = self._items(")") if has_arguments else []
         self._check_word(token.text, first, arguments)
@@ -397,7 +397,7 @@ class _Parser:
             raise ExpressionSyntaxError(f"{name!r}: {wrong}", first.offset)
 
     def _test(self, subject: str) -> str:
-        is_negated = self._take("not")
+        is_negated = self._accept("not")
         token = self._advance()
         if token.kind != "name" or token.text not in _TESTS:
             known = ", ".join(_TESTS)

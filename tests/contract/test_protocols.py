@@ -125,7 +125,7 @@ class Conversation:
         while self.now < end:
             self.now += STEP_S
             for transport, line in tuple(self.lines.items()):
-                for said in line.step(STEP_S, self.now):
+                for said in line.advance(STEP_S, self.now):
                     if self.lines.get(transport) is line:
                         self.perform(self.engine.receive(transport, said, self.now))
             deadline = self.engine.deadline

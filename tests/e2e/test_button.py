@@ -240,7 +240,7 @@ async def test_a_button_is_large_enough_in_a_small_cell(new_page: PageMaker, con
         page = await new_page(size="phone")
         await page.goto(f"{address}robots/puppet/")
         await until_attribute(page, MAIN, "aria-disabled", "false")
-        robot.say("state", "idle")
+        robot.set_reading("state", "idle")
         await until_text(page, ".button-value", "idle")
         if confirm:
             await page.click(MAIN)

@@ -75,10 +75,10 @@ async def test_a_value_is_drawn_within_one_display_frame_of_its_arrival(
         page = await new_page()
         await page.add_init_script(PROBE)
         await open_robot(page, address, robot)
-        robot.say("battery", 0)
+        robot.set_reading("battery", 0)
         await until_text(page, DIGITS, "0")
         for level in range(1, 101):
-            robot.say("battery", level)
+            robot.set_reading("battery", level)
             await asyncio.sleep((0.001, 0.01, 0.02, 0.05)[level % 4])
             if level % 3 == 0:  # however slow this machine is, many are drawn
                 await until_text(page, DIGITS, str(level))
@@ -143,7 +143,7 @@ async def test_urc_is_lost_and_comes_back(new_page: PageMaker) -> None:
     port = free_port()
     async with running_dashboard(robot, port=port) as address:
         await open_robot(page, address, robot)
-        robot.say("battery", 55)
+        robot.set_reading("battery", 55)
         await until_text(page, DIGITS, "55")
         await until_attribute(page, ".battery", "data-state", "live")
     await until_attribute(page, ".battery", "data-state", "stale")
@@ -151,7 +151,7 @@ async def test_urc_is_lost_and_comes_back(new_page: PageMaker) -> None:
     async with running_dashboard(robot, port=port):
         await until(lambda: robot.is_open)
         await until_text(page, BADGE_TEXT, "Live")
-        robot.say("battery", 56)
+        robot.set_reading("battery", 56)
         await until_text(page, DIGITS, "56")
         await until_attribute(page, ".battery", "data-state", "live")
         assert robot.opened == 2
@@ -163,7 +163,7 @@ async def test_a_lost_line_greys_at_once_and_a_silent_one_with_time(new_page: Pa
     async with running_dashboard(robot) as address:
         page = await new_page()
         await open_robot(page, address, robot)
-        robot.say("battery", 15, alarm="low")
+        robot.set_reading("battery", 15, alarm="low")
         await until_text(page, ".battery-note", "◆ Low")
         robot.link("lost", "connection refused")
         await until_attribute(page, ".battery", "data-state", "stale")
@@ -171,9 +171,9 @@ async def test_a_lost_line_greys_at_once_and_a_silent_one_with_time(new_page: Pa
         assert "connection refused" in await page.inner_text("[data-links]")
         robot.link("live")
         await until_attribute(page, ".battery", "data-state", "live")
-        robot.say("battery", 15, age_s=70, alarm="low")
+        robot.set_reading("battery", 15, age_s=70, alarm="low")
         await until_attribute(page, ".battery", "data-state", "stale")
-        robot.say("battery", 15, age_s=610, alarm="low")
+        robot.set_reading("battery", 15, age_s=610, alarm="low")
         await until_attribute(page, ".battery", "data-state", "gone")
         await until_text(page, DIGITS, "—")
         assert "seen 10 min ago" in await page.inner_text(".battery-note")
@@ -196,7 +196,7 @@ async def test_a_value_is_not_shown_a_minute_after_its_line_was_lost(new_page: P
         page = await new_page()
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
-        robot.say("door", True, age_s=1800)
+        robot.set_reading("door", True, age_s=1800)
         await until_text(page, ".value-text", "open")
         await until_attribute(page, ".value", "data-state", "live")
         robot.link("lost", "connection refused", age_s=50)
@@ -278,7 +278,7 @@ async def test_the_battery_fits_every_screen(new_page: PageMaker, size: Size) ->
     async with running_dashboard(robot) as address:
         page = await new_page(size=size)
         await open_robot(page, address, robot)
-        robot.say("battery", 76)
+        robot.set_reading("battery", 76)
         await until_text(page, DIGITS, "76")
         view = page.viewport_size
         assert view is not None
@@ -361,13 +361,13 @@ async def test_lines_of_the_log_are_shown_once_in_order(new_page: PageMaker) -> 
         page = await new_page()
         await open_robot(page, address, robot)
         for number in range(3):
-            robot.tell(f"line {number} <b>not bold</b>")
+            robot.log(f"line {number} <b>not bold</b>")
         lines = page.locator("[data-log] > li")
         await lines.nth(2).wait_for()
         await page.evaluate("dispatchEvent(new Event('pagehide'))")
         await page.evaluate("dispatchEvent(new PageTransitionEvent('pageshow', {persisted: true}))")
         await until_text(page, BADGE_TEXT, "Live")
-        robot.tell("line 3")
+        robot.log("line 3")
         await lines.nth(3).wait_for()
         texts = await lines.all_inner_texts()
         assert [text.split("wire: ")[1] for text in texts] == [

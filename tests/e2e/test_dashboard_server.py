@@ -101,7 +101,7 @@ async def test_a_client_that_does_not_read_is_only_its_own_problem() -> None:
             slow.transport.pause_reading()
             seen = 0
             for number in range(frames):
-                robot.say("text", f"{number:06d}" + "x" * 4000)
+                robot.set_reading("text", f"{number:06d}" + "x" * 4000)
                 value = await next_value(quick)
                 assert str(value).startswith(f"{number:06d}")
                 seen += 1
@@ -140,7 +140,7 @@ async def test_a_flood_closes_the_socket_that_makes_it() -> None:
             for number in range(10_000):
                 await line.send(json.dumps({"t": "ping", "c": number}))
         assert await until_closed(line) == 4429
-        robot.say("battery", 5)
+        robot.set_reading("battery", 5)
         assert await next_value(other) == 5
 
 
@@ -321,7 +321,7 @@ async def test_an_open_socket_outlives_the_limit_of_a_request() -> None:
     ):
         await line.recv()
         await asyncio.sleep(0.6)
-        robot.say("battery", 7)
+        robot.set_reading("battery", 7)
         assert await next_value(line) == 7
 
 
@@ -336,7 +336,7 @@ async def test_one_connection_too_many_is_told_so() -> None:
             writer.write(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
             check_refusal(await answer_to(reader), 503, "Too many connections are open.")
             writer.close()
-            robot.say("battery", 8)
+            robot.set_reading("battery", 8)
             assert await next_value(first) == 8
         async with joined(address) as third:
             assert json.loads(await third.recv())["t"] == "hello"

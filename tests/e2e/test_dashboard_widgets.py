@@ -43,12 +43,12 @@ async def test_hostile_texts_are_shown_as_they_are(new_page: PageMaker) -> None:
         page.on("dialog", lambda dialog: pytest.fail(f"a script ran: {dialog.message}"))
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
-        robot.say("b", 50)
+        robot.set_reading("b", 50)
         elements = await page.locator("*").count()
         for text in HOSTILE:
-            robot.say("__proto__", text)
+            robot.set_reading("__proto__", text)
             robot.link("lost", text)
-            robot.tell(text)
+            robot.log(text)
             await until_text(page, ".value-text", text.strip())
             await page.locator("[data-log] > li", has_text=text).first.wait_for()
         assert await page.locator("main :is(img, script, svg[onload], h1)").count() == 0
@@ -96,7 +96,7 @@ async def test_a_widget_that_breaks_costs_its_own_cell(new_page: PageMaker, tmp_
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
         for level in (10, 11, 12):
-            robot.say("battery", level)
+            robot.set_reading("battery", level)
             await until_text(page, ".battery-digits", str(level))
         cards = page.locator(".urc-fault")
         assert await cards.count() == len(BROKEN)
@@ -132,7 +132,7 @@ async def test_a_cell_that_is_out_of_sight_is_sent_nothing(
         first, last = page.locator("[data-cell='0']"), page.locator("[data-cell='11']")
         await page.wait_for_selector("[data-cell='0'][data-count]")
         for level in range(20, 40):
-            robot.say("battery", level)
+            robot.set_reading("battery", level)
             await page.wait_for_selector(f"[data-cell='0'][data-level='{level}']")
         assert int(await first.get_attribute("data-count") or "0") >= 20
         assert int(await last.get_attribute("data-count") or "0") <= 1
@@ -250,7 +250,7 @@ async def test_limits_and_number_of_the_battery_are_seen_whatever_its_level(
         await page.get_by_label("Theme").select_option(theme)
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
-        robot.say("battery", level)
+        robot.set_reading("battery", level)
         await until_text(page, ".battery-digits", str(level))
         seen = await page.evaluate(MARKS)
         shades = {
@@ -303,7 +303,7 @@ async def test_the_line_of_a_value_has_a_scale_a_span_and_its_limits(new_page: P
         await until(lambda: robot.is_open)
         await page.wait_for_selector(".value-plot canvas")
         for age_s, volts in ((2.0, 12.0), (1.0, 12.5), (0.1, 12.25)):
-            robot.say("voltage", volts, age_s=age_s)
+            robot.set_reading("voltage", volts, age_s=age_s)
             await until_text(page, ".value-text", f"{volts:.2f}")
         await until_text(page, ".value-most", "13.00")
         await until_text(page, ".value-least", "11.00")
@@ -314,7 +314,7 @@ async def test_the_line_of_a_value_has_a_scale_a_span_and_its_limits(new_page: P
         assert last > first > 0.9
         colour = "getComputedStyle(document.querySelector('.value-plot')).color"
         live = await page.evaluate(colour)
-        robot.say("voltage", 12.25, age_s=40)
+        robot.set_reading("voltage", 12.25, age_s=40)
         await until_text(page, ".value-text", "—")
         assert await page.evaluate(colour) != live
         assert await page.evaluate(colour) == await page.evaluate(
@@ -330,6 +330,6 @@ async def test_a_text_has_no_line(new_page: PageMaker) -> None:
         page = await new_page()
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
-        robot.say("mode", "docked")
+        robot.set_reading("mode", "docked")
         await until_text(page, ".value-text", "docked")
         assert await page.locator(".value-history").count() == 0

@@ -48,7 +48,7 @@ def test_a_command_of_the_page_is_answered_as_it_says(
 def say(robot: FakeRobot, state: str, shown: Mapping[str, Any]) -> None:
     """Let the robot say what it says in a state of the demo."""
     for value in shown["values"].values():
-        robot.say(state, value, age_s=shown.get("age_s", 0.0))
+        robot.set_reading(state, value, age_s=shown.get("age_s", 0.0))
 
 
 async def until_it_says(inside: Locator, texts: list[str], again: Callable[[], None]) -> None:
@@ -108,7 +108,7 @@ async def test_the_button_of_the_page_gives_its_command(
         page = await new_page()
         await page.goto(f"{address}robots/desk-lamp/")
         await until(lambda: robot.is_open)
-        robot.say("lit", True)
+        robot.set_reading("lit", True)
         lamp = page.frame_locator(".urc-frame")
         word, answer = lamp.locator(".lamp-word"), lamp.locator(".lamp-answer")
         await expect(word).to_have_text("● on", timeout=FRAME_MS)

@@ -234,8 +234,8 @@ async def test_a_foreign_widget_gets_its_cell_and_nothing_else(
         assert await page.locator(".urc-fault").count() == 0
         assert robot.commands == []
 
-        robot.say("battery", 5, alarm="lolo")
-        robot.say("cam", colour_bars(8, 4))
+        robot.set_reading("battery", 5, alarm="lolo")
+        robot.set_reading("cam", colour_bars(8, 4))
         el = good.locator("[data-frame]")
         for name, value in {
             "heard": "5",
@@ -298,7 +298,7 @@ async def test_what_does_not_come_up_is_a_card_and_the_others_go_on(
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
         for level, (name, text) in enumerate(CARDS.items(), 30):
-            robot.say("battery", level)
+            robot.set_reading("battery", level)
             await until_text(page, ".battery-digits", str(level))
             card = page.locator(f"{cell(page, name, uses)} .urc-fault")
             await expect(card).to_contain_text(text, timeout=SLOW_MS)
@@ -327,12 +327,12 @@ async def test_one_that_spins_later_stops_neither_the_page_nor_who_drives(
         await until(lambda: robot.is_open)
         other = f"{cell(page, 'other', uses)} .urc-grip >> nth=0"
         heavy = inside(page, cell(page, "heavy", uses)).locator("[data-frame]")
-        robot.say("battery", 65)
+        robot.set_reading("battery", 65)
         last = str(200_000 + 65)
         await expect(heavy).to_have_attribute("data-last", last, timeout=SLOW_MS)
         await push(page, f"{cell(page, 'left', uses)} .joystick-pad")
         await robot.until_moving()
-        robot.say("battery", 66)  # one of them spins from here on
+        robot.set_reading("battery", 66)  # one of them spins from here on
         await until_text(page, ".battery-digits", "66")
         before = len(robot.line.texts)
         spun = page.locator(f"{cell(page, 'spinning', uses)} .urc-fault")

@@ -61,7 +61,7 @@ async def test_session_says_goodbye_and_shows_no_secret(tmp_path: Path) -> None:
             with session.hub.subscribe() as subscription:
                 while session.hub.latest("note") is None:
                     await asyncio.wait_for(subscription.changed(), 10)
-                    subscription.take()
+                    subscription.changes()
         await asyncio.wait_for(ended.wait(), 10)
     assert heard == [b"login s3cret\n", b"bye\n"]
     sent = b"".join(item.data for item in session.hub.traffic if item.direction == "sent")

@@ -135,7 +135,7 @@ async def test_a_robot_is_driven_in_another_language(new_page: PageMaker, tag: s
         assert await stop_box(page) == before
         await page.goto(f"{address}robots/still/")
         await until(lambda: still.is_open)
-        still.say("battery", 5, alarm="lolo")
+        still.set_reading("battery", 5, alarm="lolo")
         await expect(page.locator(".urc-grid")).to_contain_text(words["▲ Very low"][2:])
         await check(page, tag)
         await page.goto(address)

@@ -55,7 +55,7 @@ async def until(session: Session, is_so: Callable[[], bool]) -> None:
     with session.hub.subscribe() as subscription:
         async with asyncio.timeout(WAIT_S):
             while not is_so():
-                subscription.take()
+                subscription.changes()
                 await subscription.changed()
 
 

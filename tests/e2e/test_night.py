@@ -30,7 +30,7 @@ async def test_pictures_are_dim_at_night_and_full_for_a_moment(new_page: PageMak
         page = await new_page()
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
-        robot.say("front", plain(GREEN))
+        robot.set_reading("front", plain(GREEN))
         await page.wait_for_selector(".camera[data-state='live']")
         full = page.get_by_role("button", name="Full colour for 5 s")
         assert await filter_of(page) == "none"

@@ -85,7 +85,7 @@ async def test_no_log_moves_what_steers(new_page: PageMaker) -> None:
         await cell.wait_for()
         before = await cell.bounding_box()
         for number in range(60):
-            robot.tell(f"line {number} of a robot that is silent now and then")
+            robot.log(f"line {number} of a robot that is silent now and then")
         await page.locator("[data-log] > li").nth(59).wait_for()
         assert await cell.bounding_box() == before
         assert await page.evaluate("document.documentElement.scrollHeight <= innerHeight")

@@ -63,19 +63,19 @@ class MotionInterlock:
         self.why = ""
         """Reason why motion is refused, as of the last `look`; "" if it is allowed."""
 
-    async def look(self) -> str:
+    async def check(self) -> str:
         """Read the state now; return `why`."""
-        return await asyncio.to_thread(self._look)
+        return await asyncio.to_thread(self._check)
 
     async def follow(self, on_change: Callable[[str], None]) -> None:
         """Read the state repeatedly until cancelled; report every change of `why`."""
         while True:
             before = self.why
-            if await self.look() != before:
+            if await self.check() != before:
                 on_change(self.why)
             await asyncio.sleep(_LOOK_S)
 
-    def _look(self) -> str:
+    def _check(self) -> str:
         self._read_latch()
         if self._clock() >= self._ask_s:
             self._driven = self._asked()
@@ -314,7 +314,7 @@ async def _heeding(
     def tell(why: str) -> None:
         session.latch(f"{why}; --despite-stop overrides this" if why else "")
 
-    if await hindrance.look():
+    if await hindrance.check():
         tell(hindrance.why)
     following = asyncio.create_task(hindrance.follow(tell))
     try:
@@ -340,7 +340,7 @@ async def _known(session: "Session", command: "Command") -> None:
         async with asyncio.timeout(KNOWN_S):
             while not is_known():
                 await tap.filled()
-                tap.take()
+                tap.drain()
 
 
 def _why(session: "Session", command: "Command", failed: "CommandFailed") -> str:

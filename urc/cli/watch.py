@@ -90,7 +90,7 @@ async def _follow(tap: "EventTap", printer: "_Printer", seconds: float | None) -
         try:
             # The end of the time does not cut a line, but a blocked reader has a time limit.
             async with asyncio.timeout_at(ends + _LAST_WORDS_S):
-                await printer.tell(tap.take())
+                await printer.print_events(tap.drain())
                 await printer.tell_losses(tap.dropped, is_last=is_over)
         except TimeoutError:
             raise UrcError("the output is blocked; the last lines are lost") from None
@@ -115,7 +115,7 @@ class _Printer:
         # Offset from monotonic time to wall time.
         self._offset_s = time.time() - time.monotonic()
 
-    async def tell(self, events: "Iterable[Tapped]") -> None:
+    async def print_events(self, events: "Iterable[Tapped]") -> None:
         """Print the events."""
         from urc.model.values import Sample
         from urc.runtime.hub import LogEntry, Traffic

@@ -57,7 +57,7 @@ async def _guard(line: socket.socket, precedence: RealTimePriority) -> None:
         line,
         messages.encoder(),
         messages.decoder_of_guard(),
-        take=host.take,
+        take=host.handle,
         settle=host.settle,
         gone=over.set,
     )
@@ -65,7 +65,7 @@ async def _guard(line: socket.socket, precedence: RealTimePriority) -> None:
 
     def beat() -> None:
         nonlocal due_s
-        precedence.look()
+        precedence.retry()
         late_s = loop.time() - due_s
         if not pipe.is_backed_up:
             pipe.post(messages.Heartbeat(late_s))
@@ -102,7 +102,7 @@ def main() -> None:
     gc.collect()
     gc.freeze()  # what is loaded by now stays: no need to look through it again
     precedence = RealTimePriority()
-    precedence.ask()  # where it is refused, the guard is a process like others: see `urc doctor`
+    precedence.request()  # where it is refused, the guard is a process like others: see `urc doctor`
     run(_guard(line, precedence))
 
 

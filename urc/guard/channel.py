@@ -34,7 +34,7 @@ class ChannelListener(Protocol):
         Asked for once for each new guard: an owed stop counts as told from then on.
         """
 
-    def take(self, message: messages.FromGuard, size: int) -> None:
+    def handle(self, message: messages.FromGuard, size: int) -> None:
         """Handle a message of the guard; `size` is its size in bytes for flow control."""
 
     def lost(self, reason: str) -> None:

@@ -235,12 +235,12 @@ class GuardClient:
             elif control.is_armed:
                 yield messages.ArmControl(control.line, command, control.terms)
 
-    def take(self, message: messages.FromGuard, size: int) -> None:
+    def handle(self, message: messages.FromGuard, size: int) -> None:
         """Handle a message of the guard; `size` is its size in bytes for flow control."""
         if isinstance(message, messages.StopWritten):
-            self._note(message)
+            self._record_stop(message)
         elif not isinstance(message, messages.Heartbeat):
-            self.transports[message.line].take(message, size)
+            self.transports[message.line].handle(message, size)
             if isinstance(message, messages.CountersAdvanced):
                 self._tick_again(message)
 
@@ -262,7 +262,7 @@ class GuardClient:
             if numbered is not None:
                 self._post_tick(command, control, numbered)
 
-    def _note(self, stopped: messages.StopWritten) -> None:
+    def _record_stop(self, stopped: messages.StopWritten) -> None:
         control = self._controls.get(stopped.control)
         if control is not None:
             control.stopped_s = self.channel.now()

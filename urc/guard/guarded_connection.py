@@ -83,7 +83,7 @@ class GuardedConnection:
             clock,
             stalled_s=make.stalled_s,
             is_strict=make.is_strict,
-            told=lambda control, reason, number: self._told(control, reason, number),
+            told=lambda control, reason, number: self._report_stop(control, reason, number),
             failed=self._stall,
             tally=self._tally,
             counted=self._tell_counted,
@@ -148,8 +148,8 @@ class GuardedConnection:
             self._emit(messages.LineClosed(self.name, turn))
         else:
             self.reins.stop_all()
-            self.reins.step()
-            self.reins.look()
+            self.reins.write_due()
+            self.reins.check_arrivals()
             self._switch(self._shut(turn))
 
     def send(self, said: messages.SendBytes) -> None:
@@ -161,11 +161,11 @@ class GuardedConnection:
         if offer is not None and not self._tally.fits(said.count):
             self._refuse(number)
         elif offer is None or not offer(data):  # type: ignore[arg-type] # no envelope, see above
-            self._lane.put(partial(self._leave, said), number)
+            self._lane.push(partial(self._leave, said), number)
         else:
             self._count(said)
             if self._prompt is not None and self._prompt.is_clogged:
-                self._lane.put(lambda: b"", number)  # is handed over with the rest
+                self._lane.push(lambda: b"", number)  # is handed over with the rest
             else:
                 self._acked = number
 
@@ -213,7 +213,7 @@ class GuardedConnection:
     async def finish(self, within_s: float) -> None:
         """Stop what moves, wait until that has gone out, and close; takes `within_s` and little."""
         self.reins.stop_all()
-        self.reins.step()
+        self.reins.write_due()
         until_s = self._clock.now() + within_s
         while self._clock.now() < until_s and not self._is_quiet:
             await self._clock.sleep(_PAUSE_S)
@@ -313,7 +313,7 @@ class GuardedConnection:
             while self._credit <= 0:
                 self._credited.clear()
                 await self._credited.wait()
-                self._hearing.heard()  # it is the engine that was slow
+                self._hearing.note_arrival()  # it is the engine that was slow
             self._is_reading = True
             try:
                 data = await self.transport.receive()
@@ -330,7 +330,7 @@ class GuardedConnection:
         return True
 
     def _pass_on(self, data: Payload) -> None:
-        self._hearing.heard()
+        self._hearing.note_arrival()
         try:
             self._credit -= self._emit(messages.BytesReceived(self.name, self._turn, data))
         except UNFIT as fault:
@@ -436,7 +436,7 @@ class GuardedConnection:
 
     # -- what the lanes say
 
-    def _told(self, control: str, reason: str, number: int) -> None:
+    def _report_stop(self, control: str, reason: str, number: int) -> None:
         self._emit(messages.StopWritten(control, reason, number))  # type: ignore[arg-type]
 
     def _tell_counted(self, stale: list[tuple[str, int]]) -> None:

@@ -53,7 +53,7 @@ class LivenessWatch:
         """Take note that the line is open."""
         self._is_open = True
         self._hearing = Liveness(self._silent_s)
-        self.heard()
+        self.note_arrival()
 
     def end(self) -> None:
         """Take note that the line is closed."""
@@ -65,16 +65,16 @@ class LivenessWatch:
             self._asking.cancel()
             self._asking = None
 
-    def heard(self) -> None:
+    def note_arrival(self) -> None:
         """Take note that something came, or that nothing is read because of us."""
-        self._hearing.heard(self._clock.now())
+        self._hearing.note_arrival(self._clock.now())
 
     def start(self) -> None:
         """Watch, where something moves, until nothing does."""
         if self._alarm is None and self._is_open and self.is_able and self._is_moving():
-            self._look()
+            self._check()
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         self._alarm = None
         if not (self._is_open and self._is_moving()):
             return
@@ -86,14 +86,16 @@ class LivenessWatch:
         if self._transport is not None:
             self._hearing.asked(now)
             if self._asking is None:
-                self._asking = asyncio.get_running_loop().create_task(self._ask(self._transport))
+                self._asking = asyncio.get_running_loop().create_task(
+                    self._send_probe(self._transport)
+                )
         at_s = min(now + _LOOK_S, self._hearing.deadline)
-        self._alarm = self._clock.call_at(at_s, self._look)
+        self._alarm = self._clock.call_at(at_s, self._check)
 
-    async def _ask(self, transport: SupportsProbe) -> None:
+    async def _send_probe(self, transport: SupportsProbe) -> None:
         try:
             await transport.probe()
-            self.heard()
+            self.note_arrival()
         except TransportError:
             pass  # whoever reads the line is told
         except Exception as bug:  # supervisor: a foreign transport may raise what it likes

@@ -43,7 +43,7 @@ class LocalChannel:
 
     def post(self, message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
         """Send a message, which the guard handles at once: none is ever unsent."""
-        self._host.take(message)
+        self._host.handle(message)
         self._host.settle()
 
     def drop(self, slot: str) -> None:
@@ -62,5 +62,5 @@ class LocalChannel:
             if isinstance(message, messages.BytesReceived)
             else 0
         )
-        self._listener.take(message, size)
+        self._listener.handle(message, size)
         return size

@@ -170,7 +170,7 @@ class MotionScheduler:
             mover.renew(terms)
         return mover
 
-    def look(self) -> None:
+    def check_arrivals(self) -> None:
         """Take note of what has arrived by now; only of a line that works."""
         if self._unsent is not None and self.lane.is_idle and not self._unsent():
             self._all_arrived()
@@ -184,13 +184,13 @@ class MotionScheduler:
     def begin(self) -> None:
         """Take note that the line is open: what is owed is written first."""
         self._is_open = True
-        self._tally.begin()
+        self._tally.reset()
         self._stale.clear()
         self._watch.reset()
         now = self._clock.now()
         for mover in self._movers.values():
             mover.restored(now)
-        self.step()
+        self.write_due()
 
     def cut(self) -> None:
         """Take note that the line is closed: nothing that waits is kept."""
@@ -205,7 +205,7 @@ class MotionScheduler:
             self._alarm.cancel()
             self._alarm = None
 
-    def step(self) -> None:
+    def write_due(self) -> None:
         """Write what is due."""
         if not self._is_open:
             return
@@ -260,7 +260,7 @@ class MotionScheduler:
             self._forget()
             self._watch.gave_up()
         if data == b"":  # the step that moves the robot ends by itself
-            self._tell(control)
+            self._report_stop(control)
             return
         self._is_stop_under_way |= is_stop
         offer = self._offer
@@ -268,13 +268,13 @@ class MotionScheduler:
         if offer is None or type(data) is not bytes or not self.lane.is_idle or not offer(data):
             self._doubtful.add(control)
             if is_stop:
-                self.lane.put(partial(self._leave_stop, control, data), (control, is_stop))
+                self.lane.push(partial(self._leave_stop, control, data), (control, is_stop))
             else:
-                self.lane.put(partial(self._leave, control, data, count), (control, is_stop))
+                self.lane.push(partial(self._leave, control, data, count), (control, is_stop))
         else:
             self._tally.left(count)
             if is_stop:
-                self._tell(control)
+                self._report_stop(control)
         if self._unsent is not None:
             # What a message takes on the line is seen at the next look; a guess that is too high
             # would make it seem that something had left.
@@ -319,10 +319,10 @@ class MotionScheduler:
         if self._unsent is None:
             self._doubtful.discard(control)
         if is_stop:
-            self._tell(control)
-        self.step()
+            self._report_stop(control)
+        self.write_due()
 
-    def _tell(self, control: str) -> None:
+    def _report_stop(self, control: str) -> None:
         mover = self._movers[control]
         if mover.reason is not None and not mover.is_told:
             mover.is_told = True
@@ -357,7 +357,7 @@ class MotionScheduler:
             limit_ms = self._watch.limit_s * 1000
             self._failed(f"the robot has taken nothing for {limit_ms:.0f} ms while it moved")
             return
-        self.step()
+        self.write_due()
 
     def _is_stalled(self, now: float) -> bool:
         since = self.lane.busy_since_s

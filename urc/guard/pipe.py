@@ -202,7 +202,7 @@ class Pipe:
         """Let others have their turn where whole messages are left over."""
         is_behind = _is_whole(self._held) and self.is_open
         if is_behind:
-            self._loop.call_soon(self._go_on)
+            self._loop.call_soon(self._resume)
         if is_behind is not self._is_behind:
             self._is_behind = is_behind
             if is_behind:
@@ -210,7 +210,7 @@ class Pipe:
             elif self.is_open:
                 self._loop.add_reader(self._line, self._readable)
 
-    def _go_on(self) -> None:
+    def _resume(self) -> None:
         if self.is_open:
             self._read_held()
 

@@ -96,11 +96,11 @@ class PipeChannel:
         """Return this machine's monotonic time, which the guard's process reads, too."""
         return time.monotonic()
 
-    def _hear(self, message: messages.FromGuard) -> None:
+    def _handle(self, message: messages.FromGuard) -> None:
         self._silent_looks = self._kept_looks = 0
         self._was_heard = True
         self._has_served |= isinstance(message, messages.LineOpened)
-        self._listener.take(message, 0 if self._pipe is None else self._pipe.taken_bytes)
+        self._listener.handle(message, 0 if self._pipe is None else self._pipe.taken_bytes)
 
     # -- from start to end
 
@@ -139,7 +139,7 @@ class PipeChannel:
             line,
             self._encoder,
             self._decoder,
-            take=self._hear,
+            take=self._handle,
             settle=_nothing,
             gone=self._died,
         )

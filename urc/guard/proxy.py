@@ -138,7 +138,7 @@ class GuardedTransport:
         if not self._is_open:
             raise PeerClosed(self._ended)
         taken: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._put(data, taken)
+        self._enqueue(data, taken)
         await taken
 
     async def close(self) -> None:
@@ -159,7 +159,7 @@ class GuardedTransport:
         """Pass `data` on; return whether it was taken."""
         if not self._is_open or self._under_way_bytes + len(data) > _OFFERED_BYTES:
             return False
-        self._put(data, None)
+        self._enqueue(data, None)
         return True
 
     def offer_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> bool:
@@ -170,7 +170,7 @@ class GuardedTransport:
         """
         if not self._is_open or self._under_way_bytes > _OFFERED_BYTES:
             return False
-        self._put(counted.numbered.data, None, counted, left)
+        self._enqueue(counted.numbered.data, None, counted, left)
         return True
 
     async def send_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> None:
@@ -178,7 +178,7 @@ class GuardedTransport:
         if not self._is_open:
             raise PeerClosed(self._ended)
         taken: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._put(counted.numbered.data, taken, counted, left)
+        self._enqueue(counted.numbered.data, taken, counted, left)
         await taken
 
     @property
@@ -200,7 +200,7 @@ class GuardedTransport:
             self._opening.set_result(reason)
         self._closed()
 
-    def take(self, said: messages.FromGuard, size: int) -> None:
+    def handle(self, said: messages.FromGuard, size: int) -> None:
         """Take what is said of this line; it counts for `size` bytes, here and in the guard."""
         match said:
             case messages.BytesReceived(turn=turn, data=data) if (
@@ -260,7 +260,7 @@ class GuardedTransport:
             amount, self._taken_bytes = self._taken_bytes, 0
             self._post(messages.FlowCredit(self._name, self._turn, amount))
 
-    def _put(
+    def _enqueue(
         self,
         data: Payload,
         taken: asyncio.Future[None] | None,

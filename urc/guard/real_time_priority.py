@@ -64,7 +64,7 @@ class RealTimePriority:
         self._again_s: float | None = None
         """When it may be asked for again, after too long a run."""
 
-    def ask(self) -> str:
+    def request(self) -> str:
         """Ask for it; return why it was not given, or ""."""
         if os.environ.get(SWITCH, "").lower() == "no":
             return f"{SWITCH} is no"
@@ -74,7 +74,7 @@ class RealTimePriority:
             _bound(LONGEST_S, FATAL_S)
         return refusal
 
-    def look(self) -> None:
+    def retry(self) -> None:
         """Ask for it again when the pause after too long a run is over; called now and then."""
         if self._again_s is not None and time.monotonic() >= self._again_s:
             self._again_s = None

@@ -83,7 +83,7 @@ class SendQueue(Generic[_Tag]):
         """Return when everything was handed over."""
         await self._is_free.wait()
 
-    def put(self, make: Callable[[], Payload | None], tag: _Tag) -> None:
+    def push(self, make: Callable[[], Payload | None], tag: _Tag) -> None:
         """Send something after what waits.
 
         Args:

@@ -21,7 +21,7 @@ class SentCounters:
         self.is_changed = False
         """Whether numbers have left that the engine was not told of."""
 
-    def begin(self) -> None:
+    def reset(self) -> None:
         """Begin anew: no number has left."""
         self.stand = {}
         self.is_changed = False

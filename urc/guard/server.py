@@ -41,7 +41,7 @@ class GuardServer:
             messages.RecoverStop: self._owe,
         }
 
-    def take(self, said: messages.ToGuard) -> None:
+    def handle(self, said: messages.ToGuard) -> None:
         """Do what the engine's side says; `settle` follows."""
         if type(said) is messages.RenewLease and not self._is_finishing:
             line = self._controls.get(said.control)
@@ -55,7 +55,7 @@ class GuardServer:
         """Write what is due after all that was said together."""
         while self._stirred:
             line = self._stirred.pop()
-            line.reins.step()
+            line.reins.write_due()
             line.settle()
 
     async def finish(self) -> None:

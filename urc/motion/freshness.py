@@ -81,7 +81,7 @@ class DuplicateElimination:
     def __init__(self) -> None:
         self._newest: dict[str, int] = {}
 
-    def take(self, about: str, number: int) -> bool:
+    def accept(self, about: str, number: int) -> bool:
         """Return whether `number` is above all that came about the same, and remember it."""
         if number <= self._newest.get(about, 0):
             return False

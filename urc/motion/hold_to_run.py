@@ -159,7 +159,7 @@ class HoldToRun:
             self.stop("expired", now)
         if self.state == "stopping":
             return self._next_stop(now)
-        if self._waiting is None or not is_clear or not self._pace.take(now):
+        if self._waiting is None or not is_clear or not self._pace.allow(now):
             return None
         data, self._waiting = self._waiting, None
         return data

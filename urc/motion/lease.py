@@ -123,7 +123,7 @@ class Lease:
         """Take note that the holder is at work."""
         self._touched_at = now
 
-    def take(self, client: Operator, now: float) -> LeaseChanged | LeaseRefused:
+    def acquire(self, client: Operator, now: float) -> LeaseChanged | LeaseRefused:
         """Give a free lease to `client`."""
         state = self.state
         if _RANK[client.role] < _RANK["driver"]:
@@ -132,15 +132,15 @@ class Lease:
             return LeaseRefused(self.latched)
         if state.holder is not None and state.holder.id != client.id:
             return LeaseRefused(f"{_called(state.holder)} has the controls")
-        return self._give(client, now)
+        return self._grant(client, now)
 
-    def ask(
+    def request(
         self, client: Operator, now: float, for_s: float = REQUEST_S
     ) -> LeaseChanged | LeaseRefused:
         """Ask the holder for the lease; without an answer in time it is handed over."""
         state = self.state
         if state.holder is None or state.holder.id == client.id:
-            return self.take(client, now)
+            return self.acquire(client, now)
         if _RANK[client.role] < _RANK["driver"]:
             return LeaseRefused("viewers cannot drive")
         if state.asked_by is not None and state.asked_by.id != client.id:
@@ -155,7 +155,7 @@ class Lease:
         if state.holder is None or state.holder.id != client or state.asked_by is None:
             return LeaseRefused("nobody asks you for the controls")
         if is_granted:
-            return self._give(state.asked_by, now)
+            return self._grant(state.asked_by, now)
         self.state = state._replace(asked_by=None, asked_until=0.0)
         return LeaseChanged(self.state, must_stop=False)
 
@@ -165,7 +165,7 @@ class Lease:
             return LeaseRefused("taking the controls by force needs an engineer")
         if self.state.latched_by:
             return LeaseRefused(self.latched)
-        return self._give(client, now)
+        return self._grant(client, now)
 
     def leave(self, client: str) -> LeaseChanged | None:
         """Take note that a client gave the lease back, or is gone; None when it had no part."""
@@ -200,12 +200,12 @@ class Lease:
         if state.holder is None:
             return None
         if state.asked_by is not None and now >= state.asked_until:
-            return self._give(state.asked_by, now)
+            return self._grant(state.asked_by, now)
         if now >= self._touched_at + SILENT_S:
             return self.leave(state.holder.id)
         return None
 
-    def _give(self, client: Operator, now: float) -> LeaseChanged:
+    def _grant(self, client: Operator, now: float) -> LeaseChanged:
         self._touched_at = now
         self.state = self._next(holder=client)
         return LeaseChanged(self.state, must_stop=True)

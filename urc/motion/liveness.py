@@ -40,7 +40,7 @@ class Liveness:
         answer_s = SILENCE_S - ASKED_EVERY_S - _ON_THE_WAY_S
         return min(self._heard_s + self._silent_s, asked_s + answer_s)
 
-    def heard(self, now: float) -> None:
+    def note_arrival(self, now: float) -> None:
         """Take note that something came."""
         self._heard_s = now
         self._asked_s = None

@@ -31,7 +31,7 @@ class RateLimiter:
         """When the next one may go."""
         return self._due - self._early_s
 
-    def take(self, now: float) -> bool:
+    def allow(self, now: float) -> bool:
         """Count one that goes now, if it may."""
         due, period_s = self._due, self._period_s
         if now < due - self._early_s - _ROUNDING_S:

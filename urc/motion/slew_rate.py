@@ -39,7 +39,7 @@ class SlewRateLimiter:
         """Argument → how far each of its elements is from rest."""
         self._last_s: float | None = None
 
-    def begin(self) -> None:
+    def reset(self) -> None:
         """Take note that it stands: the next motion begins at rest."""
         self._reached.clear()
         self._last_s = None

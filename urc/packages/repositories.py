@@ -116,7 +116,7 @@ class Repository:
         if kept is not None and head is not None:
             index, tags = kept
             if (head.number, head.sha256) == (index.number, tags.sha256):  # only signed again
-                self._keep(_Tags(tags.sha256, tags.index, answer.etag, head))
+                self._store(_Tags(tags.sha256, tags.index, answer.etag, head))
                 return index
         return self._whole(kept, head, answer.etag)
 
@@ -140,7 +140,7 @@ class Repository:
         self._check_number(address, index, kept)
         if answer.status != 304:
             tags = _Tags(digest, answer.etag, etag if is_named else "", head if is_named else None)
-            self._keep(tags, answer.body)
+            self._store(tags, answer.body)
         return index
 
     def _check_number(self, address: str, index: Index, kept: tuple[Index, _Tags] | None) -> None:
@@ -163,11 +163,11 @@ class Repository:
         self._tags.unlink(missing_ok=True)
         self._trust.forget()
 
-    def _keep(self, tags: _Tags, data: bytes | None = None) -> None:
+    def _store(self, tags: _Tags, data: bytes | None = None) -> None:
         """Store the tags, and the index unless it is unchanged."""
         work = self._folder / "work"
         if tags.said is not None:
-            self._trust.keep(tags.said, work)
+            self._trust.pin(tags.said, work)
         if data is not None:
             atomic_files.put_file(self._index, data, work)
         atomic_files.put_file(self._tags, msgspec.json.encode(tags), work)

@@ -80,7 +80,7 @@ class PinnedKey:
                 " installed packages stay"
             )
 
-    def keep(self, head: IndexHead, work: Path) -> None:
+    def pin(self, head: IndexHead, work: Path) -> None:
         """Pin the key of a checked head."""
         signature = head.signed
         if signature is None:

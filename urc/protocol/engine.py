@@ -170,7 +170,7 @@ class Engine:
 
             def greeted(outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
                 if outcome.code:
-                    return line.give_up(outcome.message, now)
+                    return line.fail(outcome.message, now)
                 self._schedule.up(line, now)
                 return line.ready(now)
 
@@ -178,8 +178,8 @@ class Engine:
             ends_at = None if limit_s is None else now + limit_s
             runner = SequenceRunner(self, greeting, greeted, transport, ends_at=ends_at)
             runner.variables = line.learnt
-            self._begin(runner)
-        return self._settle(events, now) + self._ask(now)
+            self._start_sequence(runner)
+        return self._settle(events, now) + self._submit_polls(now)
 
     def closed(self, transport: str, reason: str, now: float) -> list[Event]:
         """Record that `transport` is not connected, or that connecting failed."""
@@ -202,7 +202,7 @@ class Engine:
         """Process all deadlines up to `now`."""
         if not self._is_begun:
             self._is_begun = True
-            self._schedule.begin(now)
+            self._schedule.start(now)
         events: list[LineEvent] = []
         for line in self._all_lines:
             events += line.tick(now)
@@ -214,7 +214,7 @@ class Engine:
         if self._verifications.deadline is not None:
             events += self._verifications.tick(now)
         told = self._settle(events, now) if events or self._runners else []
-        return told + self._ask(now)
+        return told + self._submit_polls(now)
 
     def latch(self, reason: str, now: float) -> list[Event]:
         """End every sequence, and refuse autonomous motion; "" allows it again.
@@ -277,7 +277,7 @@ class Engine:
             return sink(ExchangeOutcome("at-work", f"{command} is already running"), now)
         runner = SequenceRunner(self, program, sink, privileged_on, confirmed_by)
         runner.wait_for_logins(now)
-        self._begin(runner)
+        self._start_sequence(runner)
         return []
 
     def _send(
@@ -300,7 +300,7 @@ class Engine:
         exchange.unless = unless
         return self.lines[command.transport].submit(exchange, now)
 
-    def _begin(self, runner: SequenceRunner) -> None:
+    def _start_sequence(self, runner: SequenceRunner) -> None:
         self._runners.append(runner)
         for line in self._all_lines:
             line.is_scripted = True
@@ -314,7 +314,7 @@ class Engine:
         while True:
             for event in pending:
                 self._act(event, told, now)
-            pending = self._verifications.look(now) if self._verifications.has_news else []
+            pending = self._verifications.check(now) if self._verifications.has_news else []
             if self._runners:
                 pending += self._advance(now)
                 if any(runner.can_go_on for runner in self._runners):
@@ -323,7 +323,7 @@ class Engine:
                 continue
             for line in self._all_lines:
                 if line.is_behind:
-                    pending += line.go_on(now)
+                    pending += line.process_frames(now)
             if not pending:
                 return told
 
@@ -337,7 +337,7 @@ class Engine:
                 self._act(one, told, now)
         elif isinstance(event, Matched):
             if event.ear.owner is not None:
-                event.ear.owner.heard(event.ear, event.offer, now)
+                event.ear.owner.matched(event.ear, event.offer, now)
         elif isinstance(event, ConnectionClosing):
             self._say_good_bye(self.lines[event.transport], now)
         else:
@@ -349,10 +349,10 @@ class Engine:
 
     def _note_readings(self, samples: Sequence[Sample], now: float) -> None:
         if self._is_watched:
-            self.known.take(samples)
+            self.known.update(samples)
             self._verifications.has_news = True
             for runner in self._runners:
-                runner.look(now)
+                runner.check_conditions(now)
 
     def _advance(self, now: float) -> list[LineEvent]:
         """Advance the sequences until all of them wait."""
@@ -371,7 +371,7 @@ class Engine:
         def said(outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
             return line.shut(now) if line.is_open else []
 
-        self._begin(
+        self._start_sequence(
             SequenceRunner(self, self._good_byes[name], said, name, ends_at=now + GOOD_BYE_S)
         )
 
@@ -384,9 +384,9 @@ class Engine:
                 runner.stop("disconnected", reason)
         self._schedule.down(line)
 
-    def _ask(self, now: float) -> list[Event]:
+    def _submit_polls(self, now: float) -> list[Event]:
         """Submit the due polls and keepalives."""
         told: list[Event] = []
-        for events in self._schedule.ask(self.run, now):
+        for events in self._schedule.submit_due(self.run, now):
             told += self._settle(events, now)
         return told

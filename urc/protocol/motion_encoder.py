@@ -98,7 +98,7 @@ class MotionEncoder:
             self._lines[line].counters.is_shared = True
             self._lengths[line] = controls * (MOST_STOPS if line in repeating else 1) + _SPARE_STOPS
 
-    def told(self, line: str, stand: Mapping[str, int], is_settled: bool) -> None:
+    def set_counters(self, line: str, stand: Mapping[str, int], is_settled: bool) -> None:
         """Take how the shared counters of a line stand.
 
         Args:
@@ -107,7 +107,7 @@ class MotionEncoder:
             is_settled: whether no frame of the engine is still on its way.
         """
         if line in self._lengths:
-            self._lines[line].counters.told(stand, is_settled=is_settled)
+            self._lines[line].counters.set_counters(stand, is_settled=is_settled)
             self.on_count(line)
 
     def is_lasting(self, command: str) -> bool:

@@ -41,7 +41,7 @@ class PollState:
         self._misses = 0
         self._is_offline = False
 
-    def begin(self, now: float) -> None:
+    def start(self, now: float) -> None:
         """Start polling on a ready connection."""
         self._misses, self._is_offline = 0, False
         self.due = now + self.poll.phase_s
@@ -50,7 +50,7 @@ class PollState:
         """Stop polling on a lost connection."""
         self.due = None
 
-    def ask(self, now: float) -> list[LineEvent]:
+    def submit_if_due(self, now: float) -> list[LineEvent]:
         """Submit the request if it is due, unless the last one is still queued."""
         if self.due is None or self.due > now:
             return []
@@ -185,11 +185,11 @@ class PollSchedule:
         """Latest time of the next keepalive of each connection."""
         return [one.deadline for one in self._kept_alive.values()]
 
-    def begin(self, now: float) -> None:
+    def start(self, now: float) -> None:
         """Start the polls of per-request connections."""
         for poll in self._polls:
             if self._lines[poll.poll.transport].is_per_request:
-                poll.begin(now)
+                poll.start(now)
 
     def up(self, line: Conversation, now: float) -> None:
         """Start polls and keepalive of a ready connection."""
@@ -199,7 +199,7 @@ class PollSchedule:
         if not line.is_per_request:
             for poll in self._polls:
                 if poll.poll.transport == name:
-                    poll.begin(now)
+                    poll.start(now)
 
     def down(self, line: Conversation) -> None:
         """Stop the polls of a lost connection."""
@@ -213,11 +213,11 @@ class PollSchedule:
         for poll in self._polls:
             poll.stop()
 
-    def ask(self, run: Run, now: float) -> Iterator[list[LineEvent]]:
+    def submit_due(self, run: Run, now: float) -> Iterator[list[LineEvent]]:
         """Submit due requests one by one; each is settled before the next."""
         for poll in self._polls:
             if poll.due is not None and poll.due <= now:
-                yield poll.ask(now)
+                yield poll.submit_if_due(now)
         for one in self._kept_alive.values():
             if one.deadline is not None and one.deadline <= now:
                 yield one.speak(partial(_run_for, run, one, now), now)
@@ -243,7 +243,7 @@ def _submit(
     now: float,
 ) -> list[LineEvent]:
     try:
-        data = ask.made(names)
+        data = ask.render(names)
     except BadArgument as error:
         return [Violation(line.spec.name, "bad-argument", f"{ask.label}: {error}")]
     return line.submit(Exchange(ask, owner, names, data, expires_at(ask, now)), now)

@@ -122,7 +122,7 @@ class AuditLog:
         self._thread = threading.Thread(target=self._run, name="urc-audit", daemon=True)
         self._thread.start()
 
-    def note(self, entry: AuditEntry) -> None:
+    def add(self, entry: AuditEntry) -> None:
         """Queue an entry and return at once. Any thread may call it; it never raises."""
         with self._wakes:
             if len(self._waiting) >= self._most_waiting:

@@ -128,12 +128,12 @@ class AuditRecorder:
     ) -> None:
         """Note an accepted tick and its frame."""
         if self._hub is not None and self._hub.is_tapped:
-            self._hub.tell(MotionRecord(now, command, arguments))
+            self._hub.publish_record(MotionRecord(now, command, arguments))
         motion = self._motions.get(command)
         if motion is None or motion.client != client or motion.epoch != epoch:
             self.stopped(command, "taken over", now)
             motion = self._motions[command] = _Motion(client, epoch, now)
-            self._put(
+            self._record(
                 "moved",
                 client,
                 epoch=epoch,
@@ -151,7 +151,7 @@ class AuditRecorder:
         motion = self._motions.pop(command, None)
         if motion is None:
             return
-        self._put(
+        self._record(
             "stopped",
             motion.client,
             epoch=motion.epoch,
@@ -176,7 +176,7 @@ class AuditRecorder:
         known.count += 1
         if now - known.told_s >= _AGAIN_S and self._may_tell(now):
             outcome = self._hidden(message)
-            self._put("refused", client, command=about, outcome=outcome, times=known.count)
+            self._record("refused", client, command=about, outcome=outcome, times=known.count)
             known.told_s, known.count = now, 0
 
     @_harmless
@@ -184,15 +184,17 @@ class AuditRecorder:
         """Note a change of the lease: the holder, or the latch of STOP."""
         before, self._lease = self._lease, state
         if state.latched_by and not before.latched_by:
-            self._put("STOP", _NOBODY, epoch=state.epoch, outcome=f"by {state.latched_by}")
+            self._record("STOP", _NOBODY, epoch=state.epoch, outcome=f"by {state.latched_by}")
         elif before.latched_by and not state.latched_by:
-            self._put("reset", _NOBODY, epoch=state.epoch, outcome="may be driven again")
+            self._record("reset", _NOBODY, epoch=state.epoch, outcome="may be driven again")
         if state.holder != before.holder:
             who = state.holder or before.holder or _NOBODY
             outcome = "has the controls" if state.holder else "gave the controls back"
-            self._put("lease", who, epoch=state.epoch, outcome=outcome)
+            self._record("lease", who, epoch=state.epoch, outcome=outcome)
         if state.asked_by is not None and state.asked_by != before.asked_by:
-            self._put("lease", state.asked_by, epoch=state.epoch, outcome="asks for the controls")
+            self._record(
+                "lease", state.asked_by, epoch=state.epoch, outcome="asks for the controls"
+            )
 
     @_harmless
     def ran(
@@ -207,7 +209,7 @@ class AuditRecorder:
         """Note a command without hold, and its outcome: ``done`` or the reason of the failure."""
         if answer:
             outcome = f"{outcome}: {_json(answer)}"
-        self._put(
+        self._record(
             "ran",
             client,
             command=command,
@@ -222,7 +224,7 @@ class AuditRecorder:
         self._told += 1
         return self._told <= _MOST_TOLD
 
-    def _put(
+    def _record(
         self,
         what: str,
         who: Operator,
@@ -252,7 +254,7 @@ class AuditRecorder:
         )
         self._note(entry)
         if self._hub is not None:
-            self._hub.tell(AuditRecord(self._now(), entry))
+            self._hub.publish_record(AuditRecord(self._now(), entry))
 
     def _arguments(self, arguments: Mapping[str, Reading]) -> str:
         return self._hidden(_json(arguments))

@@ -165,7 +165,7 @@ class LinkPort(Protocol):
     def send(self, sent: Send) -> None:
         """Write bytes or a message; secret ones are not shown as traffic."""
 
-    def heard(self) -> None:
+    def frame_received(self) -> None:
         """Handle a good frame."""
 
     def ready(self) -> None:
@@ -333,18 +333,18 @@ class Dispatcher:
                 samples += event.samples
                 if event.transport not in ("", heard):
                     heard = event.transport
-                    ports[heard].heard()
+                    ports[heard].frame_received()
             elif isinstance(event, Send):
                 ports[event.transport].send(event)
             elif isinstance(event, (Replied, Failed)):
                 answers.append(event)
                 if isinstance(event, Replied) and heard_on is not None and not samples:
-                    ports[heard_on].heard()
+                    ports[heard_on].frame_received()
             else:
                 is_changed = True
                 self._change(event)
         if samples:
-            self._hub.put(samples)
+            self._hub.publish(samples)
         # After the hub: a caller that gets its reply must find the readings there.
         for answer in answers:
             self._waiting.settle(answer)
@@ -369,7 +369,7 @@ class Dispatcher:
         if self._alarm_s is None or self._alarm_s > now + self._calm_s:
             self._arm()
 
-    def _look(self) -> None:
+    def _show_sequences(self) -> None:
         """Publish the progress of the sequences."""
         for name, reins in self._reins.items():
             if reins.count != self._seen[name]:
@@ -383,7 +383,7 @@ class Dispatcher:
 
     def _arm(self, soonest_s: float = 0.0) -> None:
         if self._reins:
-            self._look()
+            self._show_sequences()
         due_s = self._engine.deadline
         if due_s is not None and soonest_s:
             due_s = max(due_s, self._clock.now() + soonest_s)
@@ -415,7 +415,7 @@ class Dispatcher:
         """Report a bug of URC, reopen all connections, and keep the timer running."""
         log.error("the engine failed", exc_info=bug)
         text = f"internal error ({type(bug).__name__}): please report it with the log"
-        self._hub.note(LogEntry(self._clock.now(), "error", "engine", text))
+        self._hub.log(LogEntry(self._clock.now(), "error", "engine", text))
         for port in self._ports.values():
             port.hang_up(text)
         self._arm(_AFTER_A_BUG_S)

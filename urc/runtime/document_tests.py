@@ -153,7 +153,7 @@ def _in_an_instant(trial: TestEngine, test: DocumentTest) -> list[str]:
     is_fed_only = bool(test.feed) and command is None and test.reply_to is None
     if not checks and not is_fed_only and (not test.feed or asked is None or asked.reply is None):
         return ["the test checks nothing; add 'expect', 'sent' or 'fails'"]
-    trial.begin()
+    trial.connect_lines()
     if command is not None:
         trial.run(command, test.arguments)
     for name, fed in test.feed.items():
@@ -193,7 +193,7 @@ def _in_steps(trial: TestEngine, test: DocumentTest) -> _Complaint:
     """Run the steps up to the first failure."""
     place = 0
     try:
-        trial.begin()
+        trial.connect_lines()
         trial.wait(0.0)
         for place, step in enumerate(test.steps):
             is_action = _is_action(step)

@@ -106,7 +106,7 @@ class HeldControl:
     def rest(self) -> None:
         """Set the control to rest."""
         if self.slew is not None:
-            self.slew.begin()
+            self.slew.reset()
 
     def close(self, why: str, epoch: int) -> None:
         """Accept no tick before a release and a new lease after `epoch`.

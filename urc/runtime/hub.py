@@ -54,13 +54,13 @@ class SampleHistory:
     def __bool__(self) -> bool:
         return bool(self._kept)
 
-    def keep(self, names: Iterable[str]) -> None:
+    def watch(self, names: Iterable[str]) -> None:
         """Store every reading of these signals from now on."""
         for name in names:
             self._kept.setdefault(name, deque(maxlen=STREAM_KEPT))
             self._counts.setdefault(name, 0)
 
-    def put(self, samples: Iterable[Sample], revision: int) -> None:
+    def append(self, samples: Iterable[Sample], revision: int) -> None:
         """Store the samples of a revision."""
         for sample in samples:
             name = sample[0]
@@ -154,7 +154,7 @@ class HubSubscription:
         """Let `changed` check again."""
         self._event.set()
 
-    def take(self) -> list[Sample]:
+    def changes(self) -> list[Sample]:
         """Return the newest sample of each signal that changed since `seen`; update `seen`."""
         samples = [*self._hub.changed_since(self.seen)]
         self.seen = self._hub.revision
@@ -205,7 +205,7 @@ class EventTap:
         self._kept: deque[Tapped] = deque()
         self._event = asyncio.Event()
 
-    def put(self, items: Iterable[Tapped]) -> None:
+    def push(self, items: Iterable[Tapped]) -> None:
         """Add items; beyond `TAP_KEPT`, drop the oldest ones."""
         for item in items:
             if len(self._kept) == TAP_KEPT:
@@ -220,7 +220,7 @@ class EventTap:
             self._event.clear()
             await self._event.wait()
 
-    def take(self) -> list[Tapped]:
+    def drain(self) -> list[Tapped]:
         """Return all items and empty the tap."""
         taken = list(self._kept)
         self._kept.clear()
@@ -272,7 +272,7 @@ class Hub:
         self._taps: set[EventTap] = set()
         self._traffic_taps: set[EventTap] = set()
 
-    def put(self, samples: Iterable[Sample]) -> None:
+    def publish(self, samples: Iterable[Sample]) -> None:
         """Store readings; a repeated value also counts as a change, because its age is new."""
         taken = samples if type(samples) is tuple else tuple(samples)
         if self._blanker is not None:
@@ -283,9 +283,9 @@ class Hub:
             self._latest[sample.signal] = sample
             self._changed[sample.signal] = revision
         if self.streams:
-            self.streams.put(taken, revision)
+            self.streams.append(taken, revision)
         for tap in self._taps:
-            tap.put(taken)
+            tap.push(taken)
         self._wake()
 
     def set_link(self, status: LinkStatus) -> None:
@@ -299,7 +299,7 @@ class Hub:
         self.links_count += 1
         self.revision += 1
         for tap in self._taps:
-            tap.put((status,))
+            tap.push((status,))
         self._wake()
 
     def set_progress(self, progress: SequenceProgress) -> None:
@@ -318,14 +318,14 @@ class Hub:
         """Whether a tap is open."""
         return bool(self._taps)
 
-    def tell(self, done: MotionRecord | AuditRecord) -> None:
+    def publish_record(self, done: MotionRecord | AuditRecord) -> None:
         """Report an operator's action; only taps receive it."""
         if self._blanker is not None and isinstance(done, MotionRecord):
             done = replace(done, arguments=self._blanker.value(done.arguments))
         for tap in self._taps:
-            tap.put((done,))
+            tap.push((done,))
 
-    def note(self, note: LogEntry) -> None:
+    def log(self, note: LogEntry) -> None:
         """Add a log entry."""
         if self._blanker is not None:
             note = replace(note, text=self._blanker.text(note.text))
@@ -333,7 +333,7 @@ class Hub:
         self.notes_count += 1
         self.revision += 1
         for tap in self._taps:
-            tap.put((note,))
+            tap.push((note,))
         self._wake()
 
     def saw(self, traffic: Traffic) -> None:
@@ -367,7 +367,7 @@ class Hub:
         self.traffic_count += 1
         self.revision += 1
         for tap in self._traffic_taps:
-            tap.put((traffic,))
+            tap.push((traffic,))
         self._wake()
 
     def latest(self, name: str) -> Sample | None:

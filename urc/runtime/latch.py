@@ -72,7 +72,7 @@ class LatchStore:
         log.warning("%s is not a record of a stop: the robot stays stopped", self._file)
         return _UNKNOWN
 
-    def keep(self, kept: Latch) -> None:
+    def save(self, kept: Latch) -> None:
         """Write `kept` soon and return at once; only the newest state counts.
 
         A failed write is retried every few seconds.
@@ -95,14 +95,14 @@ class LatchStore:
             try:
                 await asyncio.to_thread(self._replace, kept)
             except OSError as error:
-                self._tell(error.strerror or str(error))
+                self._report(error.strerror or str(error))
                 if self._newest is None:
                     loop = asyncio.get_running_loop()
-                    self._again = loop.call_later(RETRY_S, self.keep, kept)
+                    self._again = loop.call_later(RETRY_S, self.save, kept)
             else:
-                self._tell("")
+                self._report("")
 
-    def _tell(self, fault: str) -> None:
+    def _report(self, fault: str) -> None:
         if fault == self.fault:
             return
         self.fault = fault

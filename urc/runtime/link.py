@@ -153,9 +153,9 @@ class Link:
         """Write the bytes of the engine; secret bytes are not shown."""
         ended = self._ended
         if ended is not None and self._close_reason is None and not ended.done():
-            self._outgoing.put(sent.data, is_secret=sent.is_secret, counted=sent.counted)
+            self._outgoing.write(sent.data, is_secret=sent.is_secret, counted=sent.counted)
 
-    def heard(self) -> None:
+    def frame_received(self) -> None:
         """Handle a good frame: clear all failures, unless the login is still running."""
         self._has_heard = True
         if not self._is_ready:
@@ -171,7 +171,7 @@ class Link:
         """Handle the end of the connection's steps: earlier good frames count from now on."""
         self._is_ready = True
         if self._has_heard:
-            self.heard()
+            self.frame_received()
         elif self._has_stood:
             self._stand()
         else:
@@ -351,7 +351,7 @@ class Link:
             data = await self._transport.receive()
             self._is_reader_waiting = False
             if isinstance(data, Envelope) or not self._is_stream:
-                self._take(data)
+                self._receive(data)
                 await asyncio.sleep(0)
                 continue
             at = 0
@@ -359,7 +359,7 @@ class Link:
                 part = data[at : at + size]
                 at += len(part)
                 began_s = self._clock.now()
-                self._take(part)
+                self._receive(part)
                 took_s = self._clock.now() - began_s
                 spent += len(part) + _CHUNK_COST
                 if spent >= size or took_s > SLICE_S:
@@ -383,14 +383,14 @@ class Link:
             self._end(self._mistake(bug))
         return True
 
-    def _take(self, data: Payload) -> None:
+    def _receive(self, data: Payload) -> None:
         ended = self._ended
         if ended is not None and self._close_reason is None and not ended.done():
             self._pass_on(data)
 
     def _pass_on(self, data: Payload) -> None:
         if isinstance(data, Envelope) and data.verb == NOTICE:
-            self._report.note("warning", "notice", str(data.body))
+            self._report.log("warning", "notice", str(data.body))
             return
         now = self._heard_s = self._clock.now()
         if self._hub.traffic_watchers:

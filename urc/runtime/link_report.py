@@ -102,15 +102,15 @@ class LinkReport:
             self._detail = f"connected; {fault.message}"
         if fault.code == "no-data" and self.state != "silent":
             return  # the following change of state says the same
-        self.note("warning", f"fault {fault.code}", f"{fault.code}: {fault.message}")
+        self.log("warning", f"fault {fault.code}", f"{fault.code}: {fault.message}")
 
-    def note(self, level: Literal["info", "warning", "error"], kind: str, text: str) -> None:
+    def log(self, level: Literal["info", "warning", "error"], kind: str, text: str) -> None:
         """Log an entry, within the rate limit of its kind."""
         untold = self._limiter.admit(kind)
         if untold is None:
             return
         more = f" (and {untold} more like it)" if untold else ""
-        self._hub.note(LogEntry(self._clock.now(), level, self._transport, text + more))
+        self._hub.log(LogEntry(self._clock.now(), level, self._transport, text + more))
 
     def saw(self, direction: Literal["sent", "received"], data: Payload) -> None:
         """Record traffic while it has readers."""
@@ -150,4 +150,4 @@ class LinkReport:
             text = f"connecting to {self._address}"  # the only entry with the address
         else:
             text = f"{state}: {detail}" if detail else state
-        self.note(level, f"state {state}", text)
+        self.log(level, f"state {state}", text)

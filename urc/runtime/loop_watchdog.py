@@ -48,7 +48,7 @@ class LoopWatchdog:
         """Start the checks."""
         self.end()
         self._due_s = self._clock.now() + EVERY_S
-        self._alarm = self._clock.call_at(self._due_s, self._look)
+        self._alarm = self._clock.call_at(self._due_s, self._check)
 
     def end(self) -> None:
         """End the checks; may be called twice."""
@@ -56,7 +56,7 @@ class LoopWatchdog:
             self._alarm.cancel()
             self._alarm = None
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         now = self._clock.now()
         late_s = now - self._due_s
         if late_s > LATE_S:

@@ -162,9 +162,9 @@ class MotionController:
         """Apply a page's request for the lease; return the reason of a refusal, or ""."""
         who, lease = self._screens[client].client, self.lease
         if verb == "take":
-            outcome: LeaseChanged | LeaseRefused | None = lease.take(who, now)
+            outcome: LeaseChanged | LeaseRefused | None = lease.acquire(who, now)
         elif verb == "ask":
-            outcome = lease.ask(who, now, for_s)
+            outcome = lease.request(who, now, for_s)
         elif verb in ("yes", "no"):
             outcome = lease.answer(client, now, is_granted=verb == "yes")
         elif verb == "force":

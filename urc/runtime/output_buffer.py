@@ -100,7 +100,7 @@ class OutputBuffer:
         self._has_some.clear()
         self._is_idle = False
 
-    def put(
+    def write(
         self, data: Payload, *, is_secret: bool = False, counted: CountedFrame | None = None
     ) -> None:
         """Write `data` at once if possible, else as soon as the transport accepts it.

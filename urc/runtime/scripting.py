@@ -112,7 +112,7 @@ class ConnectedRobot:
             self._check(name)
         with self.session.hub.subscribe() as subscription:
             while True:
-                for sample in subscription.take():
+                for sample in subscription.changes():
                     if not names or sample.signal in names:
                         yield sample
                 await subscription.changed()

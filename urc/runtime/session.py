@@ -171,7 +171,7 @@ class Session:
             driver, self.settings, transports, self._clock, is_guarded=motion == "guarded"
         )
         engine.motions.share([name for name in driver.transports if is_lossy(driver, name)])
-        movers.on_stand = engine.motions.told
+        movers.on_stand = engine.motions.set_counters
         return movers
 
     def _made_links(

@@ -118,7 +118,7 @@ class TestEngine:
         """Commands, polls and messages that the test has used."""
         return self.engine.used
 
-    def begin(self) -> None:
+    def connect_lines(self) -> None:
         """Connect every persistent transport."""
         self.perform(self.engine.tick(self.now))
         for name, spec in self.driver.transports.items():
@@ -144,12 +144,12 @@ class TestEngine:
         self._requests += 1
         known = self.driver.commands.get(command)
         if known is not None and known.hold is not None:
-            self._give(known, arguments)
+            self._send(known, arguments)
             return
         request = Request(self._requests, command, arguments, confirmed_by=_TWO_PEOPLE)
         self.perform(self.engine.command(request, self.now))
 
-    def _give(self, command: Command, arguments: Mapping[str, Reading]) -> None:
+    def _send(self, command: Command, arguments: Mapping[str, Reading]) -> None:
         """Send a motion frame, which bypasses the queue, waits for no reply, and may be refused."""
         name, number = command.name, self._requests
         self.used.add(("command", name))

@@ -180,7 +180,7 @@ class DefaultConnection:
 
     def greet(self, now_s: float) -> list[Payload]:
         """Return the frames that the robot sends to a new client; raise `Unanswered`."""
-        return [data for one in self.opening for data in self.say(one, now_s)]
+        return [data for one in self.opening for data in self.render(one, now_s)]
 
     def answer(self, frame: Frame, now_s: float) -> list[Payload] | None:
         """Return the reply to a frame, or None for a frame that the driver never sends.
@@ -198,7 +198,9 @@ class DefaultConnection:
         """Return the declared replies to a request; raise `Unanswered`."""
         known, label = asked.arguments, asked.request.label
         try:
-            said = [data for one in asked.request.answers for data in self.say(one, now_s, known)]
+            said = [
+                data for one in asked.request.answers for data in self.render(one, now_s, known)
+            ]
         except Unanswered as problem:
             rule = rule_for(self._robot.driver, self._spec.name, label)
             raise Unanswered(f"{label}: {problem}; {rule}") from None
@@ -218,7 +220,7 @@ class DefaultConnection:
         needed = frozenset(one for one in message.read.fields if one.startswith("_")) & names
         return self._answer(message.read)._replace(needed=needed)
 
-    def say(
+    def render(
         self, answer: SimulatedReply, now_s: float, known: Mapping[str, object] = NOTHING
     ) -> list[Payload]:
         """Return the frames of one reply or message; raise `Unanswered`."""

@@ -256,13 +256,13 @@ class EmulatedConnection:
             now_s: seconds since the epoch, the templates' ``now``.
             limit: most replies; requests beyond it are dropped. None: no limit.
         """
-        return self._flawed(self._heard(data, now_s, limit, self._answer_or_lose), now_s)
+        return self._flawed(self._receive(data, now_s, limit, self._answer_or_lose), now_s)
 
-    def ask(self, data: Payload, now_s: float) -> list[Payload]:
+    def request(self, data: Payload, now_s: float) -> list[Payload]:
         """Return the replies at once, for servers that reply to each message separately."""
-        return self._heard(data, now_s, None, self._answer)
+        return self._receive(data, now_s, None, self._answer)
 
-    def _heard(
+    def _receive(
         self,
         data: Payload,
         now_s: float,
@@ -282,23 +282,23 @@ class EmulatedConnection:
                 answers += answer(frame, now_s)
         return answers
 
-    def step(self, dt_s: float, now_s: float) -> list[Payload]:
+    def advance(self, dt_s: float, now_s: float) -> list[Payload]:
         """Let `dt_s` seconds pass and return the robot's unsolicited frames.
 
         A rule that was due several times sends once: a pause causes no burst.
         """
         said = self._flawed(self._due(dt_s, now_s), now_s)
-        return self._late.take(now_s) + said if self.has_late else said
+        return self._late.pop_due(now_s) + said if self.has_late else said
 
     def _flawed(self, said: list[Payload], now_s: float) -> list[Payload]:
         """Return the frames to send now; injected faults delay or lose the others."""
         if not self._flaws.active:
             return said
-        said = self._flaws.said(said)
+        said = self._flaws.apply(said)
         delay_s = self._flaws.delay_s
         if not delay_s:
             return said
-        self._late.put(said, now_s + delay_s)
+        self._late.push(said, now_s + delay_s)
         return []
 
     @property
@@ -329,12 +329,12 @@ class EmulatedConnection:
                 said += self._answer_or_lose(frame, now_s)
         if not self._is_greeted:
             self._is_greeted = True
-            said += self._made(lambda: [*self._auto.greet(now_s)]) or []
+            said += self._try(lambda: [*self._auto.greet(now_s)]) or []
         for course in tuple(self._courses):
             course.left_s -= dt_s
             if course.left_s <= 0 and not self.is_over:
                 self._courses.remove(course)
-                said += self._go_on(course, now_s)
+                said += self._resume(course, now_s)
         for periodic in self._periodic:
             periodic.left_s -= dt_s
             if periodic.left_s <= 0 and not self.is_over:
@@ -351,16 +351,16 @@ class EmulatedConnection:
     def _by_itself(self, what: ReadyRule | DefaultMessage, now_s: float) -> list[Payload]:
         if isinstance(what, DefaultMessage):
             answer = what.answer
-            return self._made(lambda: [*self._auto.say(answer, now_s)]) or []
+            return self._try(lambda: [*self._auto.render(answer, now_s)]) or []
         rule = what.what
 
         def go() -> list[Payload]:
             if not self._rules.holds(rule.when, now_s):
                 return []
             sets = self._setters.sets(rule, self)
-            return self._go_on(RunningRule(what.deeds, NOTHING, sets=sets), now_s)
+            return self._resume(RunningRule(what.deeds, NOTHING, sets=sets), now_s)
 
-        return self._made(go) or []
+        return self._try(go) or []
 
     def _answer_or_lose(self, frame: Payload, now_s: float) -> list[Payload]:
         return [] if self._flaws.loses() else self._answer(frame, now_s)
@@ -368,41 +368,41 @@ class EmulatedConnection:
     def _answer(self, frame: Payload, now_s: float) -> list[Payload]:
         asked = Frame(frame, self._encoding)
         if self._body is not None and self._body.failsafe is not None:
-            self._body.hear(self._auto.labels(asked), now_s)
+            self._body.note_commands(self._auto.labels(asked), now_s)
 
         def answer() -> list[Payload] | None:
-            course = self._rules.find(asked, now_s)
+            course = self._rules.match(asked, now_s)
             if course is not None:
-                return self._go_on(course, now_s)
+                return self._resume(course, now_s)
             return self._auto.answer(asked, now_s)
 
-        said = self._made(answer)
+        said = self._try(answer)
         if said is None:
             self._fault(not_taken(asked))
         return said or []
 
-    def _go_on(self, course: RunningRule, now_s: float) -> list[Payload]:
+    def _resume(self, course: RunningRule, now_s: float) -> list[Payload]:
         """Perform the due reactions, and keep the others for later."""
         said: list[Payload] = []
         while course.deeds and not self.is_over:
             deed = course.deeds[0]
             if deed.what.after_s > 0 and not course.has_waited:
-                self._keep(course, deed.what.after_s)
+                self._defer(course, deed.what.after_s)
                 break
             course.has_waited = False
             course.deeds = course.deeds[1:]
-            said += self._made(partial(self._rules.do, deed, course, now_s)) or []
+            said += self._try(partial(self._rules.do, deed, course, now_s)) or []
             self.is_over |= deed.what.closes
         return said
 
-    def _keep(self, course: RunningRule, left_s: float) -> None:
+    def _defer(self, course: RunningRule, left_s: float) -> None:
         if len(self._courses) >= MOST_COURSES:
             self._fault(f"{MOST_COURSES} delayed replies wait already; this one is dropped")
             return
         course.left_s, course.has_waited = left_s, True
         self._courses.append(course)
 
-    def _made(self, make: Callable[[], list[Payload] | None]) -> list[Payload] | None:
+    def _try(self, make: Callable[[], list[Payload] | None]) -> list[Payload] | None:
         """Return the result of `make`; count and log a frame without reply."""
         try:
             return make()

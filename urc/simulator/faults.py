@@ -133,7 +133,7 @@ class Faults:
         self._frames += 1
         return uniform(1, self._frames, "loss") < fault.amount
 
-    def said(self, frames: Iterable[Payload]) -> list[Payload]:
+    def apply(self, frames: Iterable[Payload]) -> list[Payload]:
         """Return the frames to a client that are not lost."""
         return [] if self.is_silent else [one for one in frames if not self.loses()]
 
@@ -156,7 +156,7 @@ class DelayLine:
         """Due time of the first frame, by the clock of `put`; ``inf`` without frames."""
         return self._waiting[0][0] if self._waiting else math.inf
 
-    def put(self, frames: Sequence[Payload], due_s: float) -> None:
+    def push(self, frames: Sequence[Payload], due_s: float) -> None:
         """Keep frames until `due_s`."""
         for one in frames:
             if len(self._waiting) >= MOST_LATE:
@@ -164,7 +164,7 @@ class DelayLine:
             else:
                 self._waiting.append((due_s, one))
 
-    def take(self, now_s: float) -> list[Payload]:
+    def pop_due(self, now_s: float) -> list[Payload]:
         """Remove and return the due frames."""
         due: list[Payload] = []
         while self._waiting and self._waiting[0][0] <= now_s + 1e-9:

@@ -128,7 +128,7 @@ class RuleSet:
             self._auto.message(what.message) if what.message else None,
         )
 
-    def find(self, frame: Frame, now_s: float) -> RunningRule | None:
+    def match(self, frame: Frame, now_s: float) -> RunningRule | None:
         """Return the reactions of the first rule that matches a frame, or None.
 
         Raises:
@@ -198,7 +198,7 @@ class RuleSet:
                     raise Unanswered("the driver never sends this, so it declares no reply")
                 said += self._auto.answers(asked, now_s)
             if deed.message is not None:
-                said += self._auto.say(deed.message, now_s)
+                said += self._auto.render(deed.message, now_s)
             if deed.writer is not None and not self._is_dropped(what):
                 said.append(self._written(deed, deed.writer, course, now_s))
         except (ExpressionError, FramingError, NotWritable, Unsettable) as problem:
@@ -228,7 +228,7 @@ class RuleSet:
             for name, one in what.sets.items()
         }
         for name, value in values.items():  # all use the values from before
-            self._values.put(name, value)
+            self._values.set(name, value)
 
     def _written(
         self, deed: ReadyReaction, writer: PayloadWriter, course: RunningRule, now_s: float

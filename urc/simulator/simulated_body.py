@@ -56,7 +56,7 @@ class SimulatedBody:
         """Whether the fail-safe has acted since."""
         self._last_fault = ""
 
-    def hear(self, labels: Iterable[str], now_s: float) -> None:
+    def note_commands(self, labels: Iterable[str], now_s: float) -> None:
         """Record the commands in a frame."""
         if self.failsafe is not None and not {*labels}.isdisjoint(self.failsafe.without):
             self._heard_s, self._is_safe = now_s, False
@@ -104,17 +104,17 @@ class SimulatedBody:
         try:
             return self._evaluate(value, time_s)
         except ExpressionError as error:
-            self._tell(str(error))
+            self._log(str(error))
             return None
 
     def _number(self, name: str, value: Template | float, time_s: float) -> float:
         found = self._value(value, time_s)
         if isinstance(found, (int, float)) and math.isfinite(found):
             return float(found)
-        self._tell(f"world.drive.{name}: expected a number, found {found!r}")
+        self._log(f"world.drive.{name}: expected a number, found {found!r}")
         return 0.0
 
-    def _tell(self, text: str) -> None:
+    def _log(self, text: str) -> None:
         if text != self._last_fault:
             self._last_fault = text
             log.info("%s", text)

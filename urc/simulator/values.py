@@ -119,10 +119,10 @@ class Values:
         self.faults = Faults()
         """Injected faults of the robot."""
         for name, value in initial.items():
-            self.put(name, value)
+            self.set(name, value)
         if world is not None:
             self.body, self.senses = (
-                SimulatedBody(world, driver, self.evaluate, self.put),
+                SimulatedBody(world, driver, self.evaluate, self.set),
                 world.senses,
             )
 
@@ -138,7 +138,7 @@ class Values:
                 except BadValue:
                     continue  # the command uses the name with another meaning
 
-    def put(self, name: str, value: object) -> None:
+    def set(self, name: str, value: object) -> None:
         """Set a signal, within its range, or a value of the robot's own state.
 
         Raises:

@@ -178,15 +178,17 @@ class FakeRobot:
         """Record the reason of a latch."""
         self.latched.append(reason)
 
-    def say(self, signal: str, value: Reading, *, alarm: Alarm = "", age_s: float = 0.0) -> None:
+    def set_reading(
+        self, signal: str, value: Reading, *, alarm: Alarm = "", age_s: float = 0.0
+    ) -> None:
         """Deliver a reading that was measured `age_s` ago."""
-        self.hub.put([Sample(signal, value, self.clock.now() - age_s, alarm)])
+        self.hub.publish([Sample(signal, value, self.clock.now() - age_s, alarm)])
 
     def link(self, state: LinkState, detail: str = "", *, age_s: float = 0.0) -> None:
         """Set the state of the one transport, as of `age_s` ago."""
         since_s = self.clock.now() - age_s
         self.hub.set_link(LinkStatus("wire", state, "tcp 127.0.0.1:6789", since_s, detail))
 
-    def tell(self, text: str) -> None:
+    def log(self, text: str) -> None:
         """Add a log entry."""
-        self.hub.note(LogEntry(self.clock.now(), "info", "wire", text))
+        self.hub.log(LogEntry(self.clock.now(), "info", "wire", text))

@@ -107,7 +107,7 @@ class FakeMotionBackend:
         assert not isinstance(data, CountedFrame)  # noqa: S101 - the fake has no shared counters
         if self._movers[command].tick(data or None, self._clock.now()):
             self.ticked_s = self._clock.now()
-        self.step()
+        self.write_due()
 
     def renew(self, command: str, stop: Payload | FrameVariants) -> None:
         """Replace the stop frame."""
@@ -126,7 +126,7 @@ class FakeMotionBackend:
         """Release the control."""
         if command in self._movers:
             self._movers[command].stop("released", self._clock.now())
-        self.step()
+        self.write_due()
 
     def stop(self, stops: Mapping[str, Payload | FrameVariants]) -> None:
         """Stop all motion."""
@@ -134,27 +134,29 @@ class FakeMotionBackend:
             terms = HoldTerms(b"", period_s=0.05).stopped_by(frame)
             mover = self._movers.setdefault(command, HoldToRun(terms))
             mover.stop("stopped", self._clock.now())
-        self.step()
+        self.write_due()
 
     async def stops(self) -> Sequence[tuple[str, Reason]]:
         """Wait for written stops."""
         return [await self._stops.get()]
 
-    def step(self) -> None:
+    def write_due(self) -> None:
         """Write the due frames, also after the transport is up again."""
         now = self._clock.now()
         for command, mover in self._movers.items():
             while self.is_up and (data := mover.due(now, is_clear=True)) is not None:
-                self._put(data, now)
+                self._send_now(data, now)
                 if data == mover.terms.stop and mover.reason is not None:
                     self.reasons.append(mover.reason)
                     self._stops.put_nowait((command, mover.reason))
         if self._alarm is not None:
             self._alarm.cancel()
         dues = [mover.deadline for mover in self._movers.values() if mover.deadline is not None]
-        self._alarm = self._clock.call_at(min(dues), self.step) if dues and self.is_up else None
+        self._alarm = (
+            self._clock.call_at(min(dues), self.write_due) if dues and self.is_up else None
+        )
 
-    def _put(self, data: Payload, now: float) -> None:
+    def _send_now(self, data: Payload, now: float) -> None:
         if isinstance(data, bytes):
             self.written.append((now, data.decode()))
             if self._write is not None:

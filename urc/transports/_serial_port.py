@@ -81,15 +81,15 @@ class _Rfc2217(RFC2217SerialTransport):
             try:
                 super()._data_received(data[start : start + _AT_ONCE])
             except Exception as fault:  # the library checks little of its input
-                self._give_up(f"the server does not speak RFC 2217 ({reason(fault)})")
+                self._fail(f"the server does not speak RFC 2217 ({reason(fault)})")
                 return
             # Discard old unsolicited options: the library would keep them and search them each
             # time.
             del serial._engine._pending_telnet[:-_KEPT_OPTIONS]  # noqa: SLF001 - no public way
             if line.get_write_buffer_size() > UNTAKEN_BYTES:
-                self._give_up("the server does not read the replies")
+                self._fail("the server does not read the replies")
 
-    def _give_up(self, why: str) -> None:
+    def _fail(self, why: str) -> None:
         if self._tcp_transport is not None:
             self._tcp_transport.abort()
         self._tcp_connection_lost(OSError(why))
@@ -150,7 +150,7 @@ class SerialStream(asyncio.Protocol):
 
     # -- a `ByteStream`
 
-    async def take(self) -> bytes:
+    async def read(self) -> bytes:
         """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
         while not self._arrived_bytes:
             if self._ended is not None:
@@ -164,7 +164,7 @@ class SerialStream(asyncio.Protocol):
             self._transport.resume_reading()
         return data
 
-    async def put(self, data: bytes) -> None:
+    async def write(self, data: bytes) -> None:
         """Pass `data` to the system, waiting for buffer space; raise `PeerClosed` on an error."""
         await self._until_writable()
         try:

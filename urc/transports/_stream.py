@@ -125,7 +125,7 @@ class TcpStream(asyncio.BufferedProtocol):
 
     # -- a `ByteStream`
 
-    async def take(self) -> bytes:
+    async def read(self) -> bytes:
         """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
         while not self._filled:
             if self._ended is not None:
@@ -138,7 +138,7 @@ class TcpStream(asyncio.BufferedProtocol):
         self._filled = 0
         return data
 
-    async def put(self, data: bytes) -> None:
+    async def write(self, data: bytes) -> None:
         """Pass `data` to the kernel, waiting for buffer space; raise `PeerClosed` on an error."""
         await self._until_writable()
         self._transport.write(data)
@@ -216,13 +216,13 @@ class StreamTransport:
         """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
         if self._stream is None:
             raise PeerClosed(CLOSED)
-        return await self._stream.take()
+        return await self._stream.read()
 
     async def send(self, data: Payload) -> None:
         """Pass `data` to the kernel, waiting for buffer space; raise `PeerClosed` on an error."""
         if self._stream is None:
             raise PeerClosed(CLOSED)
-        await self._stream.put(as_bytes(data))
+        await self._stream.write(as_bytes(data))
 
     async def close(self) -> None:
         """Close at once, discarding unsent data. Never raises, may be called twice."""

@@ -109,7 +109,7 @@ class _TlsStream:
                 self._tls.do_handshake()
             except ssl.SSLWantReadError:
                 await self._flush()
-                self._arrived.write(await self._stream.take())
+                self._arrived.write(await self._stream.read())
             except ssl.SSLError:
                 await self._flush()  # the alert, which tells the other side the reason
                 raise
@@ -117,16 +117,16 @@ class _TlsStream:
                 await self._flush()
                 return
 
-    async def take(self) -> bytes:
+    async def read(self) -> bytes:
         while True:
             data = self._decrypted()
             if self._leaving.pending:
                 await self._flush()  # the reply to a key update
             if data:
                 return data
-            self._arrived.write(await self._stream.take())
+            self._arrived.write(await self._stream.read())
 
-    async def put(self, data: bytes) -> None:
+    async def write(self, data: bytes) -> None:
         _guarded(lambda: self._tls.write(data))
         await self._flush()
 
@@ -146,7 +146,7 @@ class _TlsStream:
     async def _flush(self) -> None:
         async with self._turn:
             if data := self._leaving.read():
-                await self._stream.put(data)
+                await self._stream.write(data)
 
     def _decrypted(self) -> bytes:
         """Return the decrypted data so far, possibly b""."""

@@ -98,10 +98,10 @@ def bytes_of(data: Payload) -> bytes:
 class ByteStream(Protocol):
     """One open connection inside a tunnel."""
 
-    async def take(self) -> bytes:
+    async def read(self) -> bytes:
         """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
 
-    async def put(self, data: bytes) -> None:
+    async def write(self, data: bytes) -> None:
         """Send `data`, waiting for buffer space; raise `PeerClosed` if the connection broke."""
 
     async def abort(self) -> None:

@@ -175,7 +175,7 @@ class _Talk:
             raise ConnectFailed(f"the probe of {path} failed: {reason}")
 
     async def receive(self) -> Envelope:
-        envelope, place = await self.inbox.take()
+        envelope, place = await self.inbox.pop()
         if place is not None:
             self._requests.pop(place, None)
             self._has_place.set()
@@ -214,7 +214,7 @@ class _Talk:
             while len(self._requests) >= self._most:
                 place = next(iter(self._requests))
                 self._requests.pop(place).cancel()
-                self.inbox.give_up(place)
+                self.inbox.forget(place)
 
     async def _request(self, place: int, data: Envelope, handed: asyncio.Event) -> None:
         """Send one request, and put its response into the queue."""
@@ -223,7 +223,7 @@ class _Talk:
         await asyncio.sleep(0)
         try:
             async with asyncio.timeout(self._answer_s):
-                answer = await self._ask(data, handed)
+                answer = await self._exchange(data, handed)
         except TimeoutError:
             fault = HttpFault(f"no answer within {self._answer_s:g} s", is_unanswered=True)
         except HttpFault as found:
@@ -250,7 +250,7 @@ class _Talk:
             finally:
                 self._is_looking = False
 
-    async def _ask(self, data: Envelope, handed: asyncio.Event) -> Envelope:
+    async def _exchange(self, data: Envelope, handed: asyncio.Event) -> Envelope:
         request = _request_of(self._client, data)
         body = await request.aread()
         request.stream = _Handed(body, handed)

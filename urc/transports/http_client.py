@@ -323,7 +323,7 @@ class _Connection(httpcore2.AsyncNetworkStream):
             return early
         try:
             async with asyncio.timeout(timeout):
-                return await self._stream.take()
+                return await self._stream.read()
         except TimeoutError as fault:
             raise httpcore2.ReadTimeout from fault
         except PeerClosed as ended:
@@ -336,7 +336,7 @@ class _Connection(httpcore2.AsyncNetworkStream):
             return
         try:
             async with asyncio.timeout(timeout):
-                await self._stream.put(buffer)
+                await self._stream.write(buffer)
         except TimeoutError as fault:
             raise httpcore2.WriteTimeout from fault
         except PeerClosed as ended:
@@ -383,7 +383,7 @@ class _Connection(httpcore2.AsyncNetworkStream):
         """
         if self._early:
             return True
-        taking = self._stream.take()
+        taking = self._stream.read()
         try:
             taking.send(None)
         except StopIteration as taken:

@@ -34,7 +34,7 @@ class HttpReceiveQueue:
         self._waiting["answer", place] = envelope
         self._arrived.set()
 
-    def give_up(self, place: int) -> None:
+    def forget(self, place: int) -> None:
         """Remove an unread response."""
         self._waiting.pop(("answer", place), None)
 
@@ -67,7 +67,7 @@ class HttpReceiveQueue:
         """Reason of the end; None while the connection is open."""
         return self._ended
 
-    async def take(self) -> tuple[Envelope, int | None]:
+    async def pop(self) -> tuple[Envelope, int | None]:
         """Return the next envelope, and the place of the request if it is a response.
 
         Raises:

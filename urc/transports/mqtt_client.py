@@ -82,7 +82,7 @@ class MqttTransport:
         """Return the next message; raise `PeerClosed` at the end of the connection."""
         if self._session is None:
             raise PeerClosed(CLOSED)
-        return await self._session.inbox.take()
+        return await self._session.inbox.pop()
 
     async def send(self, data: Payload) -> None:
         """Publish a message; return once the kernel has it.
@@ -126,7 +126,7 @@ class MqttTransport:
             line.close()
             raise
         try:
-            await session.begin()
+            await session.start()
         except BaseException:
             session.end()
             raise
@@ -167,7 +167,7 @@ class _Session:
         client.on_socket_close = lambda _client, _data, line: self._forget(line)
         return client
 
-    async def begin(self) -> None:
+    async def start(self) -> None:
         """Log in and subscribe; raise `ConnectFailed` with the broker's own reason."""
         options = self._options
         self._client.start()

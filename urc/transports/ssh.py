@@ -175,7 +175,7 @@ class SshTransport:
     async def receive(self) -> bytes:
         """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
         if self._channel is not None:
-            return await self._channel.take()
+            return await self._channel.read()
         if self._connection is None:
             raise PeerClosed(CLOSED)
         return await self._connection.ended()
@@ -186,7 +186,7 @@ class SshTransport:
             raise PeerClosed(CLOSED)
         if self._channel is None:
             raise PeerClosed("this connection only tunnels others ('mode: forward')")
-        await self._channel.put(bytes_of(data))
+        await self._channel.write(bytes_of(data))
 
     async def close(self) -> None:
         """Close at once, without affecting tunnelled transports.
@@ -290,11 +290,11 @@ class _Carried:
         self._shared = shared
         self._is_user = True
 
-    async def take(self) -> bytes:
-        return await self._channel.take()
+    async def read(self) -> bytes:
+        return await self._channel.read()
 
-    async def put(self, data: bytes) -> None:
-        await self._channel.put(data)
+    async def write(self, data: bytes) -> None:
+        await self._channel.write(data)
 
     def unsent(self) -> int:
         return self._channel.unsent()

@@ -104,7 +104,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
 
     # -- a `ByteStream`
 
-    async def take(self) -> bytes:
+    async def read(self) -> bytes:
         """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
         while not self._parts:
             if self._ended is not None:
@@ -119,7 +119,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
             self._channel.resume_reading()
         return data
 
-    async def put(self, data: bytes) -> None:
+    async def write(self, data: bytes) -> None:
         """Send `data`, waiting for buffer space; raise `PeerClosed` on an error."""
         await self._until_writable()
         try:

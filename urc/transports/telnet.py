@@ -76,7 +76,7 @@ class TelnetTransport(StreamTransport):
                 inner, line = await self._connect(timeout_s)
                 talk, first = _begin(self._wishes)
                 if first:
-                    await inner.put(first)
+                    await inner.write(first)
             self._stream, inner = _TelnetStream(inner, talk, line), None
         except TimeoutError as fault:
             raise ConnectFailed(late(place, timeout_s)) from fault
@@ -112,12 +112,12 @@ class _TelnetStream:
         self._inner = inner
         self._talk = talk
         self._line = line
-        self._put = inner.put  # the path of every message, looked up once
+        self._put = inner.write  # the path of every message, looked up once
         self._encode = talk.encode
 
-    async def take(self) -> bytes:
+    async def read(self) -> bytes:
         while True:
-            data = await self._inner.take()
+            data = await self._inner.read()
             if self._line is not None and len(data) < _SMALL_BYTES:
                 _acknowledge(self._line)
             text, answers = self._talk.receive(data)
@@ -126,7 +126,7 @@ class _TelnetStream:
             if text:
                 return text
 
-    def put(self, data: bytes) -> Coroutine[Any, Any, None]:
+    def write(self, data: bytes) -> Coroutine[Any, Any, None]:
         return self._put(self._encode(data))
 
     async def abort(self) -> None:
@@ -185,4 +185,4 @@ def _begin(wishes: TelnetOptions) -> tuple[TelnetNegotiation, bytes]:
     )
     if not wishes.is_first:
         return talk, b""
-    return talk, talk.ask(ours=(SGA, *binary), theirs=(SGA, *binary, *echo))
+    return talk, talk.requests(ours=(SGA, *binary), theirs=(SGA, *binary, *echo))

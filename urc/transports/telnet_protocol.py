@@ -42,7 +42,7 @@ class _Side:
         self.active: set[int] = set()
         self._asked: set[int] = set()
 
-    def ask(self, option: int) -> bytes:
+    def request(self, option: int) -> bytes:
         """Return the request to enable `option`."""
         if option in self.active or option in self._asked:
             return b""
@@ -112,10 +112,10 @@ class TelnetNegotiation:
         """Enabled options of the other end."""
         return frozenset(self._theirs.active)
 
-    def ask(self, *, ours: tuple[int, ...] = (), theirs: tuple[int, ...] = ()) -> bytes:
+    def requests(self, *, ours: tuple[int, ...] = (), theirs: tuple[int, ...] = ()) -> bytes:
         """Return the bytes that request these options."""
-        wishes = [self._ours.ask(option) for option in ours]
-        return b"".join(wishes + [self._theirs.ask(option) for option in theirs])
+        wishes = [self._ours.request(option) for option in ours]
+        return b"".join(wishes + [self._theirs.request(option) for option in theirs])
 
     def receive(self, data: bytes) -> tuple[bytes, bytes]:
         """Return the text in `data`, and the bytes of the replies to the rest.

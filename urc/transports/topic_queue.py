@@ -91,7 +91,7 @@ class TopicReceiveQueue:
         """Whether the reader should yield to the consumer."""
         return len(self._waiting) >= A_TURN
 
-    async def take(self) -> Envelope:
+    async def pop(self) -> Envelope:
         """Return the next envelope; raise `PeerClosed` at the end."""
         while not self._waiting:
             if self._ended is not None:

@@ -183,7 +183,7 @@ class UdpTransport:
             loop.add_reader(line, self._read)
         except NotImplementedError:  # the default event loop of Windows
             self._endpoint, _ = await loop.create_datagram_endpoint(
-                lambda: _Endpoint(self._heard, self._note), sock=line
+                lambda: _Endpoint(self._receive, self._record_error), sock=line
             )
 
     def _bound(self, family: socket.AddressFamily) -> socket.socket:
@@ -216,11 +216,11 @@ class UdpTransport:
                 return
             except OSError as fault:
                 _forget_faults(line)
-                self._note(fault)
+                self._record_error(fault)
                 return
-            self._heard(bytes(self._buffer[:count]), sender)
+            self._receive(bytes(self._buffer[:count]), sender)
 
-    def _heard(self, datagram: bytes, sender: _Address) -> None:
+    def _receive(self, datagram: bytes, sender: _Address) -> None:
         """Queue a datagram of the robot."""
         host = str(sender[0]).partition("%")[0]
         if not datagram or not (self._accepts_any or host in self._allowed):
@@ -234,7 +234,7 @@ class UdpTransport:
             self.dropped += 1
         self._changed.set()
 
-    def _note(self, fault: OSError) -> None:
+    def _record_error(self, fault: OSError) -> None:
         with suppress(TransportError):
             self._take_fault(fault, 0)
 

@@ -97,11 +97,11 @@ async def _pump(stream: ByteStream, end: socket.socket) -> None:
 
     async def out() -> None:
         while data := await loop.sock_recv(end, _PIECE_BYTES):
-            await stream.put(data)
+            await stream.write(data)
 
     async def back() -> None:
         while True:
-            await loop.sock_sendall(end, await stream.take())
+            await loop.sock_sendall(end, await stream.read())
 
     try:
         async with asyncio.TaskGroup() as ways:

@@ -132,7 +132,7 @@ def _trail(audit: AuditLog | None, name: str, robot: Robot) -> AuditRecorder | N
     if audit is None:
         return None
     secrets = secret_texts(robot.profile, robot.settings)
-    return AuditRecorder(name, audit.note, utc=time.time, secrets=secrets)
+    return AuditRecorder(name, audit.add, utc=time.time, secrets=secrets)
 
 
 class _Dashboard(Starlette):
@@ -265,7 +265,7 @@ class _Routes:
         head = PageHead(request.state.nonce, "URC")
         drivers: Mapping[str, str] = {}
         if self.manager is not None:
-            await self.manager.look()
+            await self.manager.refresh()
             drivers = self.manager.drivers()
         html = menu_page(
             head, self.robots, ways=self.ways, drivers=drivers, broken=self.fleet.broken

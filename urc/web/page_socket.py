@@ -149,7 +149,7 @@ class BrowserClient:
                 await self._flow.drained()
                 self._news.clear()
                 self._send_shared(live)
-                told = self._station.controls.take(self._seat) if self._seat else []
+                told = self._station.controls.changes(self._seat) if self._seat else []
                 for text in (*told, *self._take_answers()):
                     await self._line.send_text(text)
             if live.ended.is_set() and not self._closing:
@@ -173,10 +173,10 @@ class BrowserClient:
 
     def _send_shared(self, live: LiveSession) -> None:
         """Send the data that all pages share, and images until the kernel's buffer is full."""
-        if frames := live.fanout.take(self._place):
+        if frames := live.fanout.frames_for(self._place):
             self._flow.write(frames)
         while self._place.looks.names and self._flow.is_free():
-            picture = live.fanout.shelf.take(self._place.looks)
+            picture = live.fanout.shelf.next_image(self._place.looks)
             if picture is None:
                 break
             self._flow.write(picture.frame)
@@ -200,7 +200,7 @@ class BrowserClient:
             self._seat.hold_back = self._flow.hold_back
         message = first or await self._listen()
         while message["type"] != "websocket.disconnect" and not self._closing:
-            self._take(message, live, group)
+            self._handle(message, live, group)
             message = await self._listen()
 
     async def _listen(self) -> Message:
@@ -218,12 +218,12 @@ class BrowserClient:
         how = self._station.controls.offer(seat, data)
         # Ticks within the rate are not counted: they are far fewer than the limit.
         return how == "in time" or (
-            how == "one more" and self._ticks.take(self._station.clock.now())
+            how == "one more" and self._ticks.allow(self._station.clock.now())
         )
 
-    def _take(self, message: Message, live: LiveSession, group: asyncio.TaskGroup) -> None:
+    def _handle(self, message: Message, live: LiveSession, group: asyncio.TaskGroup) -> None:
         now_s = self._station.clock.now()
-        if not self._ticks.take(now_s):
+        if not self._ticks.allow(now_s):
             self._close(wire.CLOSE_TOO_FAST, f"more than {TICKS_PER_S} messages a second")
             return
         asked: wire.Inbound | None = None
@@ -233,13 +233,13 @@ class BrowserClient:
         except wire.BadMessage as error:
             fault = str(error)
         if isinstance(asked, (Tick, Release, Stop)):
-            self._hear(asked)  # STOP is never counted, so no limit can refuse it
-        elif not self._allowance.take(now_s):
+            self._drive(asked)  # STOP is never counted, so no limit can refuse it
+        elif not self._allowance.allow(now_s):
             self._close(wire.CLOSE_TOO_FAST, f"more than {MESSAGES_PER_S} messages a second")
         elif asked is None:
             self._count_bad(fault)
         elif isinstance(asked, Drive):
-            self._hear(asked)
+            self._drive(asked)
         elif isinstance(asked, ImageSelection):
             self._news.set()
             self._place.looks.show(asked.signals)
@@ -252,11 +252,11 @@ class BrowserClient:
         else:
             self._start(asked, live, group)
 
-    def _hear(self, said: Driving) -> None:
+    def _drive(self, said: Driving) -> None:
         if isinstance(said, Stop) and self._station.robot.tape is not None:
             return  # nothing moves in a recording, and no robot could acknowledge a stop
         if self._seat is not None:
-            self._station.controls.hear(self._seat, said)
+            self._station.controls.handle(self._seat, said)
 
     def _advise(self, said: Approval | ApprovalRequest | SequenceAction, live: LiveSession) -> None:
         if self._seat is None:
@@ -265,7 +265,7 @@ class BrowserClient:
         if isinstance(said, ApprovalRequest):
             self._answer(encode_token(said.id, consent.prepare(self._seat, said)))
         elif isinstance(said, Approval):
-            consent.hear(self._seat, said)
+            consent.handle(self._seat, said)
         elif refused := controls.once.pull_refusal(who, said.command, said.verb):
             controls.trail.refused(who, said.command, refused, self._station.clock.now())
         else:

@@ -162,7 +162,7 @@ def test_the_right_message_has_the_frame(lines: list[str | bytes]) -> None:
         frame = Frame(payload, "utf-8")
         takes = (one.take(frame, float(now)) for one in plainly)
         expected = next((taken for taken in takes if taken is not None), None)
-        found = messages.take(Frame(payload, "utf-8"), float(now))
+        found = messages.decode(Frame(payload, "utf-8"), float(now))
         assert plain(found) == plain(expected), line
 
 

@@ -176,7 +176,7 @@ async def test_a_robot_that_is_lost_is_told_as_no_link_and_stopped_when_it_is_ba
         await touch(page)
         await until_text(page, NOTE, "▲ NO LINK, latched")
         robot.line.is_up = True
-        robot.line.step()
+        robot.line.write_due()
         robot.link("live")
         await until_text(page, NOTE, DONE)
         assert robot.line.texts == ["drive stop", "lift stop"]

@@ -72,7 +72,7 @@ class _Overheard(EmulatedRobot):
 
     def line(self, transport: str) -> EmulatedConnection:
         line = super().line(transport)
-        receive, ask, notes = line.receive, line.ask, self._notes.setdefault(transport, [])
+        receive, ask, notes = line.receive, line.request, self._notes.setdefault(transport, [])
 
         def received(data: Payload, now_s: float, limit: int | None = None) -> list[Payload]:
             notes.append(data)

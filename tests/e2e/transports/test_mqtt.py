@@ -275,7 +275,7 @@ async def test_profile_drives_the_emulated_robot_through_the_broker(tmp_path: Pa
                     async with asyncio.timeout(WAIT_S):
                         while session.hub.latest("volts") is None:
                             await news.changed()
-                            news.take()
+                            news.changes()
                 async with asyncio.timeout(WAIT_S):
                     await session.command("light", {"level": 40})
                 assert await reader.next() == "lamp/set 40"

@@ -36,5 +36,5 @@ async def test_robot_of_a_page_drives_its_emulated_self(page: str, tmp_path: Pat
                 while not all(
                     session.hub.links[name].state == "live" for name in profile.driver.transports
                 ) or not all(session.hub.latest(name) for name in profile.driver.signals):
-                    subscription.take()
+                    subscription.changes()
                     await subscription.changed()

@@ -306,7 +306,7 @@ async def test_profile_drives_the_emulated_robot(rover: Profile) -> None:
                 async with asyncio.timeout(WAIT_S):
                     while session.hub.latest("x") is None:
                         await news.changed()
-                        news.take()
+                        news.changes()
             for name, values in (("drive", {"speed": 0.5}), ("reset", {}), ("dock", {})):
                 async with asyncio.timeout(WAIT_S):
                     await session.command(name, values)
@@ -323,7 +323,7 @@ async def test_a_fault_of_a_topic_is_in_the_robots_log(rover: Profile) -> None:
                 async with asyncio.timeout(WAIT_S):
                     while "nobody publishes /odom" not in [note.text for note in session.hub.notes]:
                         await news.changed()
-                        news.take()
+                        news.changes()
             assert session.hub.links["ros"].state != "live", "it is no sign of life"
 
 

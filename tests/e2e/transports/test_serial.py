@@ -318,7 +318,7 @@ async def until(session: Session, state: str, detail: str = "") -> None:
                 link = session.hub.links["wire"]
                 if link.state == state and detail in ("", link.detail):
                     return
-                subscription.take()
+                subscription.changes()
                 await subscription.changed()
 
 

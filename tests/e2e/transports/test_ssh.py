@@ -112,7 +112,7 @@ async def test_killed_server_is_told_and_reached_again_when_it_is_back(sshd: Ssh
     async with nothing_left():
         await line.open(OPEN_S)
         through = await line.connect("127.0.0.1", sshd.port, OPEN_S)
-        assert (await through.take()).startswith(b"SSH-2.0")
+        assert (await through.read()).startswith(b"SSH-2.0")
         sshd.kill()
         assert await end_of(line) in (
             "the robot closed the connection",
@@ -120,9 +120,9 @@ async def test_killed_server_is_told_and_reached_again_when_it_is_back(sshd: Ssh
             "the connection broke (broken pipe)",  # Linux reports a late reset so
         )
         with pytest.raises(PeerClosed):
-            await through.take()
+            await through.read()
         with pytest.raises(PeerClosed):
-            await through.put(b"?")
+            await through.write(b"?")
         await through.abort()
         await line.close()
         said = await refusal(line)
@@ -161,7 +161,7 @@ async def test_one_connection_carries_everything(sshd: Sshd) -> None:
             *(line.connect("127.0.0.1", sshd.port, OPEN_S) for _ in range(10))
         )
         for stream in streams:
-            assert (await stream.take()).startswith(b"SSH-2.0")
+            assert (await stream.read()).startswith(b"SSH-2.0")
         assert sshd.said.count("Accepted password") == 1
         for stream in streams[:9]:
             await stream.abort()
@@ -185,7 +185,7 @@ async def test_who_gives_up_waiting_does_not_hold_up_the_others(sshd: Sshd) -> N
             await asyncio.sleep(pause_s)
             one.cancel()
             stream = await other
-            assert (await stream.take()).startswith(b"SSH-2.0")
+            assert (await stream.read()).startswith(b"SSH-2.0")
             await stream.abort()
             if not one.cancelled() and one.done() and one.exception() is None:
                 await one.result().abort()

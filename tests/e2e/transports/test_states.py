@@ -68,7 +68,7 @@ async def until(session: Session, state: str, attempts: int = 0) -> LinkStatus:
                 link = session.hub.links["wire"]
                 if link.state == state and link.attempts >= attempts:
                     return link
-                subscription.take()
+                subscription.changes()
                 await subscription.changed()
 
 

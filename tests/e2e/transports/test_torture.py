@@ -159,7 +159,7 @@ class Ear:
         """Each with how many had been said by then."""
         self.said = 0
         self.greetings = 0
-        hear = EmulatedConnection._heard
+        hear = EmulatedConnection._receive
 
         def heard(line: EmulatedConnection, data: Payload, *more: Any) -> list[Payload]:
             said = str(data.body if isinstance(data, Envelope) else data)

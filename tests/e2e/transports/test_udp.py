@@ -285,7 +285,7 @@ async def test_refused_robot_comes_back_to_the_same_session() -> None:
             with session.hub.subscribe() as subscription:
                 async with asyncio.timeout(WAIT_S):
                     while session.hub.links["wire"].state != state:
-                        subscription.take()
+                        subscription.changes()
                         await subscription.changed()
 
         for _ in range(2):

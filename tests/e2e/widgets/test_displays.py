@@ -101,17 +101,17 @@ async def test_needles_bars_and_tapes_stand_where_the_value_is(new_page: PageMak
         use("battery", {"cells": "cells"}, imbalance=0.2),
     )
     async with shown(new_page, *uses) as (robot, page):
-        robot.say("amps", 20.0)
+        robot.set_reading("amps", 20.0)
         await until_text(page, ".gauge-text", "20.0")
-        robot.say("amps", 15.0)
-        robot.say("goal", 30)
-        robot.say("pace", -1.0)
-        robot.say("height", 31.25)
-        robot.say("yaw", 0.0)  # east
-        robot.say("way", 1.5707963)  # north
-        robot.say("turned", (0.17364818, 0.0, 0.0, 0.98480775))  # 20 degrees about x
-        robot.say("mode", "leak")
-        robot.say("cells", (3.9, 3.5, None))
+        robot.set_reading("amps", 15.0)
+        robot.set_reading("goal", 30)
+        robot.set_reading("pace", -1.0)
+        robot.set_reading("height", 31.25)
+        robot.set_reading("yaw", 0.0)  # east
+        robot.set_reading("way", 1.5707963)  # north
+        robot.set_reading("turned", (0.17364818, 0.0, 0.0, 0.98480775))  # 20 degrees about x
+        robot.set_reading("mode", "leak")
+        robot.set_reading("cells", (3.9, 3.5, None))
         await until_text(page, ".gauge-text", "15.0")
         assert await corners(page, ".gauge-needle polygon") == [[-4, 0], [-1.5, -74]]
         await until_attribute(page, ".gauge-target", "visibility", "visible")
@@ -142,9 +142,9 @@ async def test_needles_bars_and_tapes_stand_where_the_value_is(new_page: PageMak
         moved = (".gauge-needle", ".bar-fill", ".altitude-tape", ".compass-needle")
         assert await page.evaluate(NO_EASING, list(moved)) == ["0s none"] * len(moved)
 
-        robot.say("turned", (0.5, 0.0, 0.0, 0.8660254))  # 60 degrees
+        robot.set_reading("turned", (0.5, 0.0, 0.0, 0.8660254))  # 60 degrees
         await until_text(page, ".attitude-note", "▲ Leans too far")
-        robot.say("turned", (0.0, 0.0, 0.0, 0.0))  # no orientation at all
+        robot.set_reading("turned", (0.0, 0.0, 0.0, 0.0))  # no orientation at all
         await until_text(page, ".attitude-words", "—")
         await until_attribute(page, ".attitude", "data-missing", "bank nose")
 
@@ -159,10 +159,10 @@ async def test_an_attitude_without_one_of_its_angles_is_not_level(new_page: Page
         use("attitude", {"roll": "roll"}, "alone", view="horizon"),
     )
     async with shown(new_page, *uses) as (robot, page):
-        robot.say("roll", 0.2)
-        robot.say("pitch", 20.0)
+        robot.set_reading("roll", 0.2)
+        robot.set_reading("pitch", 20.0)
         await until_text(page, "[data-cell='0'] .attitude-words", "nose down 20°")
-        robot.say("pitch", 20.0, age_s=700)
+        robot.set_reading("pitch", 20.0, age_s=700)
         for cell, hidden, seen in (
             (0, "world", "symbol"),
             (1, "world", "symbol"),
@@ -176,7 +176,7 @@ async def test_an_attitude_without_one_of_its_angles_is_not_level(new_page: Page
         await until_text(page, "[data-cell='3'] .attitude-words", "level")
         assert await page.is_visible("[data-cell='3'] .attitude-world")
         # What is known is told, and in colour.
-        robot.say("roll", 40.0)
+        robot.set_reading("roll", 40.0)
         await until_text(page, "[data-cell='2'] .attitude-words", "right side down 40°")
         await until_attribute(page, "[data-cell='2'] .attitude", "data-state", "live")
         await until_attribute(page, "[data-cell='2'] .attitude", "data-alarm", "hihi")
@@ -186,9 +186,9 @@ async def test_a_table_puts_the_gravest_first_and_filters(new_page: PageMaker) -
     """Diagnostics of the robot and signals of any kind stand in one list."""
     uses = (WidgetUse("table", "table", {"report": "report"}, lists={"values": ("amps", "mode")}),)
     async with shown(new_page, *uses) as (robot, page):
-        robot.say("amps", 22.0, alarm="high")
-        robot.say("mode", "docked")
-        robot.say("report", {"lid": {"level": 2, "message": "open"}, "radio": "ok"})
+        robot.set_reading("amps", 22.0, alarm="high")
+        robot.set_reading("mode", "docked")
+        robot.set_reading("report", {"lid": {"level": 2, "message": "open"}, "radio": "ok"})
         await until_text(page, ".table-count", "2 not OK")
         names = "(rows) => rows.map((row) => row.children[1].textContent)"
         rows = page.locator(".table-body tr")
@@ -209,7 +209,7 @@ async def test_a_heading_is_chosen_and_then_sent(new_page: PageMaker) -> None:
     command = Command("turn_to", "wire", WriteSpec("text"), {"value": Argument("value")})
     async with shown(new_page, compass, columns=1, turn_to=command) as (robot, page):
         robot.on_command = lambda name, arguments: {}
-        robot.say("yaw", 0.0)
+        robot.set_reading("yaw", 0.0)
         await until_text(page, ".compass-text", "000")
         assert await page.is_disabled(".compass-set")
         box = await page.locator(".compass-body").bounding_box()
@@ -261,7 +261,7 @@ async def test_a_plot_draws_each_signal_and_can_be_looked_at(
         await until(lambda: robot.is_open)
         for step in range(6):
             for place, name in enumerate(names):
-                robot.say(name, place + step % 2 / 2, age_s=(6 - step) / 5)
+                robot.set_reading(name, place + step % 2 / 2, age_s=(6 - step) / 5)
             value = f"{9 + step % 2 / 2:.1f} A"
             await page.wait_for_function(
                 LAST_VALUE_IS,
@@ -293,7 +293,7 @@ async def test_a_plot_draws_each_signal_and_can_be_looked_at(
         await page.click(".plot-pause")
         await page.wait_for_selector(".plot-picture", state="visible")
         assert await page.locator(".plot-history .u-over").count() == 0
-        robot.say("m0", 40.0)  # far above the scale, which grows at once
+        robot.set_reading("m0", 40.0)  # far above the scale, which grows at once
         await page.wait_for_function(
             "() => Number([...document.querySelectorAll('.plot-figure')].at(-1).textContent) >= 40"
         )
@@ -309,13 +309,13 @@ async def test_a_line_that_was_hidden_stays_hidden_after_a_cut(new_page: PageMak
     async with running_dashboard(robot, port=port) as address:
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
-        robot.say("goal", 3)
+        robot.set_reading("goal", 3)
         await page.wait_for_function(LAST_VALUE_IS, arg="3 A")
         await page.click(".plot-entry >> nth=0")
         await until_attribute(page, ".plot-entry", "aria-pressed", "false")
     async with running_dashboard(robot, port=port):
         await until(lambda: robot.is_open)
-        robot.say("goal", 4)
+        robot.set_reading("goal", 4)
         await page.wait_for_function(LAST_VALUE_IS, arg="4 A")
         pressed = "(all) => all.map((el) => el.ariaPressed)"
         assert await page.eval_on_selector_all(".plot-entry", pressed) == ["false", "true"]
@@ -340,7 +340,7 @@ async def test_the_newest_picture_is_shown(new_page: PageMaker) -> None:
     source = "data:image/svg+xml,%3Csvg xmlns='http://www.w3.org/2000/svg' width='9' height='9'/%3E"
     async with shown(new_page, use("image", {"picture": "seen"}, source=source)) as (robot, page):
         await page.wait_for_selector(".image-place img")
-        robot.say("seen", made_picture(40, 30))
+        robot.set_reading("seen", made_picture(40, 30))
         await page.wait_for_selector(".image-place canvas")
         await page.wait_for_function(
             "() => document.querySelector('.image-place canvas').width === 40"
@@ -367,15 +367,15 @@ async def test_a_recording_is_saved_as_a_table(new_page: PageMaker, tmp_path: Pa
     """From one press to the next, each value once; what was there before is not in it."""
     bound = use("recorder", {})._replace(lists={"values": ("amps", "mode")})
     async with shown(new_page, bound) as (robot, page):
-        robot.say("amps", 1.0)
+        robot.set_reading("amps", 1.0)
         await until_attribute(page, ".recorder", "data-state", "live")
         assert await page.is_disabled(".recorder-save")
         await page.click(".recorder-main")
         for count, (name, value) in enumerate((("amps", 2.5), ("mode", "=go,1"), ("amps", 3.5)), 1):
-            robot.say(name, value)
+            robot.set_reading(name, value)
             await until_text(page, ".recorder-note", f"● recording: {count} rows")
         await page.click(".recorder-main")
-        robot.say("amps", 4.5)
+        robot.set_reading("amps", 4.5)
         async with page.expect_download() as download:
             await page.click(".recorder-save")
         file = tmp_path / "recording.csv"

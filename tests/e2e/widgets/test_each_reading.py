@@ -38,7 +38,7 @@ async def cut_off(page: Page, robot: FakeRobot, signal: str, *values: float | st
     await page.evaluate("lines.forEach((line) => line.close())")
     await expect(page.locator("[data-badge-text]")).to_have_text("No connection to URC")
     for value in values:
-        robot.say(signal, value)
+        robot.set_reading(signal, value)
     await page.context.set_offline(False)
     await expect(page.locator("[data-badge-text]")).to_have_text("Live")
 
@@ -55,19 +55,19 @@ async def test_a_recording_goes_on_out_of_sight_and_after_a_cut(new_page: PageMa
         await page.goto(f"{address}robots/puppet/")
         await other.goto(f"{address}robots/puppet/")  # so that the robot stays connected
         await until(lambda: robot.is_open)
-        robot.say("speed", 1)
+        robot.set_reading("speed", 1)
         await until_text(page, NOTE, "nothing recorded")
         await page.get_by_role("button", name="Record", exact=True).click()
         await until_text(page, NOTE, "● recording: 0 rows")
         await page.locator("[data-cell='12']").scroll_into_view_if_needed()
         await expect(page.locator(".recorder")).not_to_be_in_viewport()
         for value in range(2, 12):
-            robot.say("speed", value)
-            robot.say("battery", value)
+            robot.set_reading("speed", value)
+            robot.set_reading("battery", value)
             await until_text(page, "[data-cell='12'] .battery-digits", str(value))
         await until_text(page, NOTE, "● recording: 10 rows")
         await cut_off(page, robot, "speed")
-        robot.hub.put([Sample("speed", value, robot.clock.now()) for value in (12, 13, 14)])
+        robot.hub.publish([Sample("speed", value, robot.clock.now()) for value in (12, 13, 14)])
         await until_text(page, NOTE, "● recording: 13 rows")
         await cut_off(page, robot, "speed", 15, 16, 17)
         await until_text(page, NOTE, "● recording: 14 rows · ▲ 2 lost on the way")
@@ -89,14 +89,14 @@ async def test_a_terminal_shows_each_line_once(new_page: PageMaker) -> None:
         await other.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
         lines = page.locator(".terminal-list > li")
-        robot.say("said", "hello")
+        robot.set_reading("said", "hello")
         await expect(lines).to_have_text(["< hello"])
         burst = [f"burst {number}" for number in range(20)]
-        robot.hub.put([Sample("said", text, robot.clock.now()) for text in burst])
+        robot.hub.publish([Sample("said", text, robot.clock.now()) for text in burst])
         shown = ["< hello", *(f"< {text}" for text in burst)]
         await expect(lines).to_have_text(shown)
         await cut_off(page, robot, "said")
-        robot.say("said", "burst 19")
+        robot.set_reading("said", "burst 19")
         shown += ["< burst 19"]
         await expect(lines).to_have_text(shown)
         await cut_off(page, robot, "said", "one", "two", "three")

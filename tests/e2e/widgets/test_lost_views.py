@@ -24,9 +24,9 @@ async def test_a_sensor_that_says_nothing_looks_dead(new_page: PageMaker) -> Non
     page = await new_page(size="tablet")
     async with shown(page, {**METRES, "around": around}, *uses) as robot:
         first, second = (f"[data-cell='{place}'] .range" for place in (0, 1))
-        robot.say("front", 2.0)
-        robot.say("around", (3.0, 2.0, 4.0))  # type: ignore[arg-type]
-        robot.say("rear", 0.5, age_s=90)
+        robot.set_reading("front", 2.0)
+        robot.set_reading("around", (3.0, 2.0, 4.0))  # type: ignore[arg-type]
+        robot.set_reading("rear", 0.5, age_s=90)
         await until_text(page, f"{first}-text", "0.50")
         await until_attribute(page, first, "data-state", "stale")
         assert (await page.inner_text(f"{first}-note")).startswith("behind · ")
@@ -35,15 +35,15 @@ async def test_a_sensor_that_says_nothing_looks_dead(new_page: PageMaker) -> Non
             "live",
             "stale",
         ]
-        robot.say("rear", 3.0, age_s=90)
+        robot.set_reading("rear", 3.0, age_s=90)
         await page.locator(f"{first}-note", has_text="ahead · behind: ").wait_for()
         await until_attribute(page, first, "data-state", "live")
-        robot.say("rear", 3.0, age_s=700)
+        robot.set_reading("rear", 3.0, age_s=700)
         await page.locator(f"{first}-note", has_text="ahead · behind: seen").wait_for()
         await until_text(page, f"{first}-text", "2.00")
         # Its three places stay theirs, so what stands to the right is still there.
-        robot.say("rear", 1.0)
-        robot.say("around", (3.0, 2.0, 4.0), age_s=700)  # type: ignore[arg-type]
+        robot.set_reading("rear", 1.0)
+        robot.set_reading("around", (3.0, 2.0, 4.0), age_s=700)  # type: ignore[arg-type]
         lost = page.locator(f"{second}-note", has_text="ahead, left, behind: seen")
         await lost.wait_for()
         assert (await lost.inner_text()).startswith("right · ")
@@ -74,7 +74,7 @@ async def test_points_that_have_gone_are_not_drawn(new_page: PageMaker) -> None:
     page = await new_page(size="desktop")
     async with shown(page, signals, use) as robot:
         before = await look(page)
-        robot.say("seen", plane)  # type: ignore[arg-type]
+        robot.set_reading("seen", plane)  # type: ignore[arg-type]
         await until_attribute(page, ".scene3d", "data-state", "live")
         full = await look(page)
         assert apart(before, full) > 20
@@ -92,16 +92,16 @@ async def test_a_pose_that_is_not_known_stays_as_it_was_last(new_page: PageMaker
     use = WidgetUse("s", "scene3d", {"roll": "r", "pitch": "p"})
     page = await new_page(size="desktop")
     async with shown(page, tilt, use) as robot:
-        robot.say("r", 0.0)
-        robot.say("p", 0.0)
+        robot.set_reading("r", 0.0)
+        robot.set_reading("p", 0.0)
         await until_text(page, ".scene3d-text", "level")
         level = await look(page)
-        robot.say("r", 0.7)
-        robot.say("p", -0.4)
+        robot.set_reading("r", 0.7)
+        robot.set_reading("p", -0.4)
         await until_text(page, ".scene3d-text", "right side down 40° · nose up 23°")
         tilted = await look(page)
         assert apart(level, tilted) > 20
-        robot.say("p", -0.4, age_s=700)
+        robot.set_reading("p", -0.4, age_s=700)
         await until_text(page, ".scene3d-text", "—")
         await until_attribute(page, ".scene3d", "data-pose", "unknown")
         assert apart(tilted, await look(page)) < 10  # its note has a line more

@@ -80,10 +80,10 @@ async def test_images_go_to_cells_that_can_be_seen(new_page: PageMaker, tmp_path
         )
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
-        robot.say("cam", colour_bars(8, 4))
-        robot.say("battery", 42)
+        robot.set_reading("cam", colour_bars(8, 4))
+        robot.set_reading("battery", 42)
         await until_text(page, "[data-cell='0'] .battery-digits", "42")
-        robot.say("battery", 43)
+        robot.set_reading("battery", 43)
         await until_text(page, "[data-cell='0'] .battery-digits", "43")
         assert came == []
         cell = page.locator("[data-cell='12']")
@@ -91,8 +91,8 @@ async def test_images_go_to_cells_that_can_be_seen(new_page: PageMaker, tmp_path
         await until_attribute(page, "[data-cell='12']", "data-size", "8x4")
         await until_attribute(page, "[data-cell='12']", "data-type", "image/png")
         await until_attribute(page, "[data-cell='12']", "data-links", "true live")
-        robot.say("cam", b"this is no image")
-        robot.say("cam", colour_bars(6, 3))
+        robot.set_reading("cam", b"this is no image")
+        robot.set_reading("cam", colour_bars(6, 3))
         await until_attribute(page, "[data-cell='12']", "data-size", "6x3")
 
 
@@ -115,9 +115,9 @@ async def test_lists_arrays_and_units_reach_a_widget(new_page: PageMaker, tmp_pa
         page = await new_page()
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
-        robot.say("a", 1)
-        robot.say("b", 2)
-        robot.say("turned", (3.14159265, None, -1.57079633))
+        robot.set_reading("a", 1)
+        robot.set_reading("b", 2)
+        robot.set_reading("turned", (3.14159265, None, -1.57079633))
         await until_attribute(page, "[data-cell='0']", "data-series", "2 1")
         await until_attribute(page, "[data-cell='0']", "data-turned", "[180,null,-90]")
         await until_attribute(page, "[data-cell='0']", "data-unit", "deg ° 2 lines")
@@ -132,7 +132,7 @@ async def test_people_choose_in_which_units_they_read(new_page: PageMaker) -> No
         page = await new_page()
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
-        robot.say("speed", 10)
+        robot.set_reading("speed", 10)
         cell = page.locator("[data-cell='0']")
         await expect(cell).to_contain_text("10.0 m/s")
         await page.get_by_role("button", name="This device").click()
@@ -145,7 +145,7 @@ async def test_people_choose_in_which_units_they_read(new_page: PageMaker) -> No
             await expect(cell).to_contain_text(shown)
         await page.reload()
         await until(lambda: robot.is_open)
-        robot.say("speed", 10)
+        robot.set_reading("speed", 10)
         await expect(cell).to_contain_text("19.4 kn")
         assert robot.commands == []
 
@@ -167,7 +167,7 @@ async def test_a_slow_widget_says_so_and_leaves_the_page_to_the_others(
         await until(lambda: robot.is_open)
         remark = page.locator("[data-cell='0'] .urc-remark")
         for level in range(60):
-            robot.say("battery", level)
+            robot.set_reading("battery", level)
             await until_text(page, "[data-cell='1'] .battery-digits", str(level))
             if await remark.count():
                 break

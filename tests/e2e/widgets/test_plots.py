@@ -42,7 +42,7 @@ async def test_a_line_that_is_hidden_leaves_the_picture_and_comes_back_whole(
         await until(lambda: robot.is_open)
         for step in range(6):
             for level, name in enumerate(names):
-                robot.say(name, level * 5 + step % 2, age_s=(6 - step) / 5)
+                robot.set_reading(name, level * 5 + step % 2, age_s=(6 - step) / 5)
             value = f"{10 + step % 2} A"
             await page.locator("li:last-child .plot-value", has_text=value).wait_for()
         await page.wait_for_function(IS_DRAWN, arg=[1, True])

@@ -82,6 +82,6 @@ async def test_the_legend_of_a_plot_shows_every_signal(
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
         for name in names:
-            robot.say(name, -90.25)
+            robot.set_reading(name, -90.25)
         await page.locator(".plot-value", has_text="-90.25 °").nth(5).wait_for(state="attached")
         assert await page.evaluate(ENTRIES) == len(names)

@@ -95,9 +95,9 @@ async def test_figures_keep_what_means_something_in_every_unit(new_page: PageMak
     gauge = WidgetUse("gauge", "gauge", {"value": "ticks"})
     uses = (value("gap"), value("pace", precision=0), gauge)
     async with shown(new_page, *uses) as (robot, page):
-        robot.say("gap", 12.0)
-        robot.say("pace", 9.0)
-        robot.say("ticks", 12345)
+        robot.set_reading("gap", 12.0)
+        robot.set_reading("pace", 9.0)
+        robot.set_reading("ticks", 12345)
         await until_text(page, ".gauge-text", "12345")
         await choose(page, "imperial")
         await until_text(page, "[data-cell='0'] .value-figure", "0.47 in")
@@ -107,22 +107,22 @@ async def test_figures_keep_what_means_something_in_every_unit(new_page: PageMak
 async def test_an_alarm_is_read_out_in_the_unit_that_is_shown(new_page: PageMaker) -> None:
     """A screen reader hears the number with its own unit."""
     async with shown(new_page, value("pace")) as (robot, page):
-        robot.say("pace", 3.0)
+        robot.set_reading("pace", 3.0)
         await choose(page, "imperial")
         await until_text(page, ".value-text", "6.711")
-        robot.say("pace", 9.0, alarm="hihi")
+        robot.set_reading("pace", 9.0, alarm="hihi")
         await until_text(page, "[data-alarms]", "pace very high: 20.13 mph")
 
 
 async def test_the_history_of_a_value_is_the_same_line_in_other_units(new_page: PageMaker) -> None:
     """Its ends change with the unit, and nothing jumps."""
     async with shown(new_page, value("pace", history="60s")) as (robot, page):
-        robot.say("pace", 10.0)
+        robot.set_reading("pace", 10.0)
         await until_text(page, ".value-most", "11")
         await choose(page, "imperial")
         await until_text(page, ".value-most", "24.61")
         await until_text(page, ".value-least", "20.13")
-        robot.say("pace", 11.0)
+        robot.set_reading("pace", 11.0)
         await until_text(page, ".value-most", "24.61")
         await until_text(page, ".value-least", "22.37")
 
@@ -130,11 +130,11 @@ async def test_the_history_of_a_value_is_the_same_line_in_other_units(new_page: 
 async def test_a_plot_is_the_same_line_in_other_units(new_page: PageMaker, tmp_path: Path) -> None:
     """What stands still is level, its scale is in the unit of the legend, the file as declared."""
     async with shown(new_page, plot("pace")) as (robot, page):
-        robot.say("pace", 10.0, age_s=1.0)
+        robot.set_reading("pace", 10.0, age_s=1.0)
         await until_text(page, ".plot-value", "10 m/s")
         await choose(page, "imperial")
         await until_text(page, ".plot-value", "22.37 mph")
-        robot.say("pace", 10.0)
+        robot.set_reading("pace", 10.0)
         await page.wait_for_function(f"() => ({LINE_TOPS})() !== null")
         assert await page.evaluate(LINE_TOPS) < 6
         figures = await said(page, ".plot-figure")

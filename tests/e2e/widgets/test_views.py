@@ -42,17 +42,17 @@ async def test_distances_around_the_robot(new_page: PageMaker) -> None:
     )
     page = await new_page(size="tablet")
     async with shown(page, signals, *uses) as robot:
-        robot.say("front", 2.0)
-        robot.say("rear", 0.4)
+        robot.set_reading("front", 2.0)
+        robot.set_reading("rear", 0.4)
         await until_text(page, ".range-text", "0.40")
         assert await page.inner_text(".range-note") == "▲ very near · behind"
         assert await page.locator(".range-wall[data-zone='stop']").count() == 1
-        robot.say("rear", 4.0)
-        robot.say("front", float("nan"))
+        robot.set_reading("rear", 4.0)
+        robot.set_reading("front", float("nan"))
         await until_text(page, ".range-text", "clear")
         assert await page.locator(".range-free").count() == 1, "what is not known is not drawn"
         # Behind 8, right 5, ahead 2, left not known.
-        robot.say("sweep", (8.0, 5.0, 2.0, None))  # type: ignore[arg-type]
+        robot.set_reading("sweep", (8.0, 5.0, 2.0, None))  # type: ignore[arg-type]
         await until_text(page, ".scan-text", "▲ 2.00 m · ahead")
         await until_pixel(page, ".scan-data", 0.5, 0.4, "r > 120 && r > b + 40 && a === 255")
         await until_pixel(page, ".scan-data", 0.75, 0.5, "a === 255 && Math.abs(r - b) < 40")
@@ -80,10 +80,10 @@ async def test_rays_at_uneven_angles_are_drawn_where_they_look(new_page: PageMak
     page = await new_page(size="tablet")
     async with shown(page, signals, use) as robot:
         ahead, right, behind_left = (0.5, 0.4), (0.75, 0.5), (0.5 + 0.2 * -0.866, 0.5 + 0.2 * 0.5)
-        robot.say("sweep", (2.0, 5.0, 4.0))  # type: ignore[arg-type]
+        robot.set_reading("sweep", (2.0, 5.0, 4.0))  # type: ignore[arg-type]
         await until_text(page, ".scan-note", "no angles yet")
         assert await page.inner_text(".scan-text") == "—"
-        robot.say("ways", (0.0, -90.0, 120.0))  # type: ignore[arg-type]
+        robot.set_reading("ways", (0.0, -90.0, 120.0))  # type: ignore[arg-type]
         await until_text(page, ".scan-text", "▲ 2.00 m · ahead")
         await until_pixel(page, ".scan-data", *ahead, "r > 120 && r > b + 40 && a === 255")
         for x, y in (right, behind_left):
@@ -91,23 +91,23 @@ async def test_rays_at_uneven_angles_are_drawn_where_they_look(new_page: PageMak
         # Where even steps would have put the second and the third.
         await until_pixel(page, ".scan-data", 0.5 + 0.25 * 0.866, 0.5 - 0.25 * 0.5, "a === 0")
         await until_pixel(page, ".scan-data", 0.5 - 0.2 * 0.866, 0.5 - 0.2 * 0.5, "a === 0")
-        robot.say("ways", (0.0, -90.0))  # type: ignore[arg-type]
+        robot.set_reading("ways", (0.0, -90.0))  # type: ignore[arg-type]
         await until_text(page, ".scan-note", "▲ 2 angles for 3 distances")
         for x, y in (ahead, right, behind_left):
             await until_pixel(page, ".scan-data", x, y, "a === 0")
         assert await page.inner_text(".scan-text") == "—"
         assert await page.get_attribute(".scan", "data-zone") == ""
-        robot.say("ways", (0.0, None, 120.0))  # type: ignore[arg-type]
+        robot.set_reading("ways", (0.0, None, 120.0))  # type: ignore[arg-type]
         await until_text(page, ".scan-note", "▲ angle 2 of 3 is not a number")
         await until_pixel(page, ".scan-data", *ahead, "a === 0")
-        robot.say("ways", (0.0, -90.0, 90.0))  # type: ignore[arg-type]
+        robot.set_reading("ways", (0.0, -90.0, 90.0))  # type: ignore[arg-type]
         await until_text(page, ".scan-text", "▲ 2.00 m · ahead")
         assert await page.inner_text(".scan-note") == ""
         await page.get_by_role("button", name="View: Dots").click()
         await until_attribute(page, ".scan", "data-view", "map")
         await until_pixel(page, ".scan-data", 0.4, 0.5, "a > 0")  # free, up to the wall on the left
         await until_pixel(page, ".scan-data", 0.5, 0.6, "a === 0")  # no ray looks behind
-        robot.say("ways", (0.0, 180.0, 90.0))  # type: ignore[arg-type]
+        robot.set_reading("ways", (0.0, 180.0, 90.0))  # type: ignore[arg-type]
         await until_pixel(page, ".scan-data", 0.5, 0.6, "a > 0")
         await until_pixel(page, ".scan-data", 0.6, 0.5, "a === 0")
 
@@ -122,7 +122,7 @@ async def test_depth_is_coloured_and_probed(new_page: PageMaker) -> None:
     page = await new_page(size="tablet")
     async with shown(page, signals, use, commands=commands) as robot:
         rows = [[400] * 8 + [3600] * 8 for _ in range(8)]
-        robot.say("depth", png(rows))
+        robot.set_reading("depth", png(rows))
         await until_text(page, ".depth-text", "3.60 m · 8, 4")
         await until_pixel(page, ".depth-data", 0.2, 0.5, "r > 200 && b < 100")
         await until_pixel(page, ".depth-data", 0.8, 0.5, "r < 60 && b > 80")
@@ -147,7 +147,7 @@ async def test_depth_is_coloured_and_probed(new_page: PageMaker) -> None:
         assert robot.commands[1:] == [("look", {"x": 4, "y": 4, "distance": 0.4})], (
             "a press that began elsewhere, or with another button, chose nothing"
         )
-        robot.say("depth", b"not a picture")
+        robot.set_reading("depth", b"not a picture")
         await page.wait_for_selector(".depth[data-fault='yes']")
         assert "set the options width and height" in await page.inner_text(".depth-note")
 
@@ -168,8 +168,8 @@ async def test_a_camera_shows_the_newest_picture_and_its_age(new_page: PageMaker
     async with shown(page, signals, use) as robot:
         await until_text(page, ".camera-note", "no picture yet")
         halves = png([[RED] * 4 + [BLUE] * 4] * 6)
-        robot.say("front", halves)
-        robot.say("arm", plain(GREEN))
+        robot.set_reading("front", halves)
+        robot.set_reading("arm", plain(GREEN))
         # Mirrored: what is left in the picture is right on the screen.
         await until_pixel(page, ".camera-picture", 0.8, 0.5, "r > 150 && b < 50")
         await until_pixel(page, ".camera-picture", 0.2, 0.5, "b > 150 && r < 50")
@@ -180,11 +180,11 @@ async def test_a_camera_shows_the_newest_picture_and_its_age(new_page: PageMaker
         assert Path(await download.path()).read_bytes().startswith(b"\x89PNG")
         await page.get_by_role("button", name="Arm").click()
         await until_pixel(page, ".camera-picture", 0.2, 0.5, "g > 150 && r < 50")
-        robot.say("arm", plain(GREY), age_s=5.0)
+        robot.set_reading("arm", plain(GREY), age_s=5.0)
         await until_pixel(page, ".camera-picture", 0.2, 0.5, "g === 90 && r === 90")
         await page.wait_for_selector(".camera[data-frozen='yes']")
         assert "s old" in await page.inner_text(".camera-age")
-        robot.say("arm", b"GIF89a broken")
+        robot.set_reading("arm", b"GIF89a broken")
         await until_text(page, ".camera-note", "▲ this picture cannot be shown")
 
 
@@ -242,7 +242,7 @@ async def test_a_place_on_the_map_is_asked_for_before_it_is_sent(new_page: PageM
     page = await new_page(size="desktop")
     async with shown(page, DEGREES, use, commands=commands) as robot:
         for name, value in (("lat", 46.52), ("lon", 6.57), ("head", 90.0)):
-            robot.say(name, value)
+            robot.set_reading(name, value)
         await until_text(page, ".map-text", "46°31′12.0″ N, 6°34′12.0″ E")
         turn = "document.querySelector('.map-arrow').style.transform"
         await page.wait_for_function(f"() => {turn} === 'rotate(90deg)'")
@@ -274,7 +274,7 @@ async def test_a_place_on_the_map_is_asked_for_before_it_is_sent(new_page: PageM
         west, east = way["longitudes"]  # type: ignore[misc]
         assert west < 6.57 < east
         assert len(way["latitudes"]) == 2  # type: ignore[arg-type]
-        robot.say("lat", 46.6)
+        robot.set_reading("lat", 46.6)
         await page.wait_for_selector(".map[data-fence='out']")
         await area.focus()
         await page.keyboard.press("Enter")
@@ -290,8 +290,8 @@ async def test_a_map_of_a_floor_has_metres(new_page: PageMaker) -> None:
     use = WidgetUse("m", "map", {"x": "px", "y": "py"}, {"goto": "go"})
     page = await new_page(size="desktop")
     async with shown(page, signals, use, commands={"go": told("go", "x", "y")}) as robot:
-        robot.say("px", 1.5)
-        robot.say("py", -2.0)
+        robot.set_reading("px", 1.5)
+        robot.set_reading("py", -2.0)
         await until_text(page, ".map-text", "x 1.50 m, y -2.00 m")
         x, y = await centre(page, ".map-area")
         await page.mouse.click(x + 64, y - 32)
@@ -308,9 +308,9 @@ async def test_a_robot_leaves_a_trail_on_the_map(new_page: PageMaker) -> None:
     use = WidgetUse("m", "map", {"x": "px", "y": "py"}, options={"trail_step": 0.2})
     page = await new_page(size="desktop")
     async with shown(page, signals, use) as robot:
-        robot.say("py", 0.1)  # off the axes of the grid
+        robot.set_reading("py", 0.1)  # off the axes of the grid
         for step in (*range(11), *range(9, 4, -1)):
-            robot.say("px", step / 5)
+            robot.set_reading("px", step / 5)
             await until_text(page, ".map-text", f"x {step / 5:.2f} m, y 0.10 m")
         x, y = await centre(page, ".map-area")
         for left in (-25, 20):  # behind the robot, and where it came back from
@@ -330,7 +330,7 @@ async def test_a_panorama_is_looked_around_in(new_page: PageMaker) -> None:
     page = await new_page(size="desktop")
     commands = {"take": Command("take", "wire", None)}  # type: ignore[arg-type]
     async with shown(page, signals, *uses, commands=commands) as robot:
-        robot.say("around", png([quarters] * 32))
+        robot.set_reading("around", png([quarters] * 32))
         faces = [f"[data-cell='{cell}'] .pano360-face" for cell in (0, 1)]
         for cell, face in enumerate(faces):
             where = f"[data-cell='{cell}'] .pano360-where"
@@ -380,14 +380,14 @@ async def test_a_model_bends_as_the_robot_does(new_page: PageMaker, tmp_path: Pa
     page = await new_page(size="desktop")
     async with shown(page, signals, use) as robot:
         await page.wait_for_selector(".scene3d[data-model='urdf']")
-        robot.say("elbow", 0.0)
+        robot.set_reading("elbow", 0.0)
         await until_text(page, ".scene3d-text", "joints: 1")
         drawn = "document.querySelector('.scene3d-picture').dataset.frames"
         # It comes to rest: twenty frames of the page without one of the scene.
         before = await page.evaluate(RESTED)
         assert before == await page.evaluate(drawn)
         straight = (await coarse(page, [".scene3d-face"]))[0]
-        robot.say("elbow", 1.57)
+        robot.set_reading("elbow", 1.57)
         await page.wait_for_function(f"(before) => {drawn} !== before", arg=before)
         await page.evaluate(RESTED)
         bent = (await coarse(page, [".scene3d-face"]))[0]

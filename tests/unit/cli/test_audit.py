@@ -15,7 +15,7 @@ from urc.runtime.audit import AuditEntry, AuditLog
 def folder(tmp_path: Path) -> Path:
     with AuditLog(tmp_path / "audit.sqlite") as log:
         for number in range(6):
-            log.note(
+            log.add(
                 AuditEntry(1000.0 + number, "rover" if number % 2 else "puppet", "moved", "Ann")
             )
         assert log.settle()

@@ -175,7 +175,7 @@ class PipedChannel(LocalChannel):
 
     def _to(self) -> None:
         if self._to_guard:
-            self._host.take(self._of_guard.decode(self._to_guard.popleft()))
+            self._host.handle(self._of_guard.decode(self._to_guard.popleft()))
             self._host.settle()
 
     def _emit(self, message: messages.FromGuard) -> int:
@@ -187,7 +187,7 @@ class PipedChannel(LocalChannel):
     def _from(self) -> None:
         if self._to_engine:
             data = self._to_engine.popleft()
-            self._listener.take(self._of_server.decode(data), len(data))
+            self._listener.handle(self._of_server.decode(data), len(data))
 
     async def finish(self) -> None:
         while self._to_guard:

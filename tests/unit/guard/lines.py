@@ -177,7 +177,7 @@ class Bench:
     def tell(self, *messages: messages.ToGuard) -> None:
         """Tell it what comes together."""
         for message in messages:
-            self.host.take(message)
+            self.host.handle(message)
         self.host.settle()
 
     async def open(self, turn: int = 1) -> None:

@@ -203,7 +203,7 @@ def test_counters_change_only_when_numbers_have_left() -> None:
     assert not tally.is_changed
     tally.left(Count({}, {"n": 7}))
     assert tally.is_changed
-    tally.begin()
+    tally.reset()
     assert not tally.is_changed
 
 

@@ -399,7 +399,7 @@ async def test_only_frames_with_counters_are_passed_on_with_what_they_count(rig:
 async def test_unread_stops_are_bounded(rig: Rig) -> None:
     """The newest are kept."""
     for number in range(1000):
-        rig.guard.take(messages.StopWritten(f"control {number}", "expired", 1), 0)
+        rig.guard.handle(messages.StopWritten(f"control {number}", "expired", 1), 0)
     stops = await rig.stops()
     assert len(stops) < 500
     assert stops[-1] == ("control 999", "expired")
@@ -424,15 +424,15 @@ async def test_tick_whose_number_was_used_up_is_made_again_whatever_else_was(rig
     again = Numbered(b"8 left", Count({"n": 7}, {"n": 8}))
     rig.guard.tick("turn", CountedFrame(first, lambda: again))
     caught = rig.caught()
-    rig.guard.take(
+    rig.guard.handle(
         messages.CountersAdvanced("wire", 1, 0, {}, [("drive", 1), ("lift", 1), ("turn", 1)]), 0
     )
     ((slot, tick),) = caught
     assert isinstance(tick, messages.RenewLease)
     assert (slot, tick.data) == ("turn", b"8 left")
-    rig.guard.take(messages.CountersAdvanced("wire", 1, 0, {}, [("turn", 9)]), 0)
+    rig.guard.handle(messages.CountersAdvanced("wire", 1, 0, {}, [("turn", 9)]), 0)
     rig.guard.release("turn")
-    rig.guard.take(messages.CountersAdvanced("wire", 1, 0, {}, [("turn", 1)]), 0)
+    rig.guard.handle(messages.CountersAdvanced("wire", 1, 0, {}, [("turn", 1)]), 0)
     assert len(caught) == 1
 
 
@@ -443,6 +443,6 @@ async def test_tick_whose_number_was_used_up_is_not_made_again_after_the_guards_
     first = Numbered(b"7 go", Count({}, {"n": 7}))
     rig.guard.tick("drive", CountedFrame(first, lambda: first))
     caught = rig.caught()
-    rig.guard.take(messages.StopWritten("drive", "expired", 2), 0)
-    rig.guard.take(messages.CountersAdvanced("wire", 1, 0, {}, [("drive", 2)]), 0)
+    rig.guard.handle(messages.StopWritten("drive", "expired", 2), 0)
+    rig.guard.handle(messages.CountersAdvanced("wire", 1, 0, {}, [("drive", 2)]), 0)
     assert caught == []

@@ -35,7 +35,7 @@ class Guard:
             self.tell(messages.LineClosed("wire", said.turn))
 
     def tell(self, said: messages.FromGuard, size: int = 0) -> None:
-        self.line.take(said, size)
+        self.line.handle(said, size)
 
     async def ready(self) -> None:
         if not self.is_there:

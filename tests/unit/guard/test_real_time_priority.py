@@ -58,7 +58,7 @@ def system(monkeypatch: pytest.MonkeyPatch) -> System:
 
 def test_it_is_asked_for_with_the_lowest_priority_and_bounds(system: System) -> None:
     """What it starts is ordinary; a run that does not end is ended by the kernel."""
-    assert RealTimePriority().ask() == ""
+    assert RealTimePriority().request() == ""
     assert system.asked == [RR]
     assert system.bounds == (100_000, 2_000_000)
     assert callable(system.handlers[signal.SIGXCPU])
@@ -68,9 +68,9 @@ def test_where_it_is_refused_nothing_else_happens(system: System) -> None:
     """The reason is the system's own, for people."""
     system.refusal = PermissionError(1, "Operation not permitted")
     asking = RealTimePriority()
-    assert asking.ask() == why_not() == "Operation not permitted"
+    assert asking.request() == why_not() == "Operation not permitted"
     system.refusal = None
-    asking.look()
+    asking.retry()
     assert (system.asked, system.bounds) == ([], None)
 
 
@@ -79,20 +79,20 @@ def test_it_is_not_asked_for_where_nobody_wants_it(
 ) -> None:
     """One word in the environment."""
     monkeypatch.setenv(SWITCH, "no")
-    assert RealTimePriority().ask() == why_not() == "URC_REAL_TIME is no"
+    assert RealTimePriority().request() == why_not() == "URC_REAL_TIME is no"
     assert system.asked == []
 
 
 def test_who_runs_too_long_is_ordinary_for_a_while(system: System) -> None:
     """A guard that is flooded must not keep everybody else from running."""
     asking = RealTimePriority()
-    asking.ask()
+    asking.request()
     asking._is_too_long(signal.SIGXCPU, None)
-    asking.look()
+    asking.retry()
     assert system.asked == [RR, ORDINARY]
     system.now += PAUSE_S
-    asking.look()
-    asking.look()
+    asking.retry()
+    asking.retry()
     assert system.asked == [RR, ORDINARY, RR]
 
 

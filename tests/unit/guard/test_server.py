@@ -56,8 +56,8 @@ def test_line_is_made_by_name_and_carried_by_another(
     robots: list[tuple[TransportSetup, CountedWire]],
 ) -> None:
     host = GuardServer(lambda said: 0, FakeClock())
-    host.take(MAKE)
-    host.take(INNER)
+    host.handle(MAKE)
+    host.handle(INNER)
     (outer, carrier), (setup, _) = robots
     assert outer == TransportSetup("wire", {"port": 1}, (), None)
     assert setup == TransportSetup(
@@ -69,13 +69,13 @@ async def test_what_nobody_armed_is_nobodys() -> None:
     """Of a guard before this one; nothing is written, and nothing breaks."""
     said: list[messages.FromGuard] = []
     host = GuardServer(lambda one: said.append(one) or 0, FakeClock())  # type: ignore[func-returns-value]
-    host.take(MAKE)
+    host.handle(MAKE)
     for one in (
         messages.RenewLease("drive", 1, b"go", 1000.0),
         messages.ReleaseControl("drive"),
         messages.ReplaceStop("drive", b"stop 2"),
     ):
-        host.take(one)
+        host.handle(one)
     host.settle()
     assert Robots.made[0][1].written == []
     assert said == []
@@ -85,17 +85,17 @@ async def test_nothing_is_taken_at_the_end() -> None:
     """A tick that comes after the last stop would move the robot for ever."""
     clock = FakeClock()
     host = GuardServer(lambda said: 0, clock)
-    host.take(MAKE)
+    host.handle(MAKE)
     robot = Robots.made[0][1]
-    host.take(messages.OpenLine("wire", 1, 1.0))
+    host.handle(messages.OpenLine("wire", 1, 1.0))
     await clock.advance(0)
-    host.take(messages.ArmControl("wire", "drive", TERMS))
-    host.take(messages.RenewLease("drive", 1, b"go", clock.now()))
+    host.handle(messages.ArmControl("wire", "drive", TERMS))
+    host.handle(messages.RenewLease("drive", 1, b"go", clock.now()))
     host.settle()
     finishing = asyncio.ensure_future(host.finish())
     await clock.advance(0)
-    host.take(messages.ArmControl("wire", "drive", TERMS))
-    host.take(messages.RenewLease("drive", 2, b"go on", clock.now()))
+    host.handle(messages.ArmControl("wire", "drive", TERMS))
+    host.handle(messages.RenewLease("drive", 2, b"go on", clock.now()))
     host.settle()
     await clock.advance(3.0)
     await finishing

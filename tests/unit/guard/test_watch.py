@@ -102,7 +102,7 @@ async def test_one_that_speaks_now_and_then_is_alive(stands: list[ProcessState])
     guard = Watched()
     for _ in range(4):
         guard.looks(5)
-        guard._hear(messages.Heartbeat(0.0))
+        guard._handle(messages.Heartbeat(0.0))
     assert guard.deaths == 0
 
 

@@ -70,7 +70,7 @@ def test_of_two_lines_in_order_each_number_counts_once_and_none_goes_back(
     order, taken = DuplicateElimination(), []
     while any(lines):
         number = dice.choice([one for one in lines if one]).pop(0)  # type: ignore[attr-defined]
-        if order.take("drive", number):
+        if order.accept("drive", number):
             taken.append(number)
     assert taken == sorted(set(taken))
     assert taken[-1:] == [last] * bool(last), "the newest always counts"
@@ -78,9 +78,9 @@ def test_of_two_lines_in_order_each_number_counts_once_and_none_goes_back(
 
 def test_what_is_said_of_one_control_is_nothing_to_another() -> None:
     order = DuplicateElimination()
-    assert order.take("drive", 5)
-    assert order.take("lift", 4)
-    assert not order.take("drive", 4)
+    assert order.accept("drive", 5)
+    assert order.accept("lift", 4)
+    assert not order.accept("drive", 4)
 
 
 def test_ticks_are_numbered_from_the_first_on() -> None:

@@ -15,33 +15,33 @@ EVE = Operator("e", "Eve", role="viewer")
 
 def test_whoever_comes_first_drives_and_the_others_are_told_who() -> None:
     lease = Lease()
-    taken = lease.take(ANNA, 0.0)
+    taken = lease.acquire(ANNA, 0.0)
     assert isinstance(taken, LeaseChanged)
     assert taken.must_stop
-    assert lease.take(BERT, 0.0) == LeaseRefused("Anna has the controls")
+    assert lease.acquire(BERT, 0.0) == LeaseRefused("Anna has the controls")
     assert lease.refusal("a", taken.state.epoch) == ""
     assert lease.refusal("b", taken.state.epoch) == "Anna has the controls"
 
 
 def test_a_driver_without_a_name_is_somebody() -> None:
     lease = Lease()
-    lease.take(Operator("a"), 0.0)
-    assert lease.take(BERT, 1.0) == LeaseRefused("somebody else has the controls")
+    lease.acquire(Operator("a"), 0.0)
+    assert lease.acquire(BERT, 1.0) == LeaseRefused("somebody else has the controls")
 
 
 def test_an_input_of_an_earlier_lease_is_refused() -> None:
     lease = Lease()
-    lease.take(ANNA, 0.0)
+    lease.acquire(ANNA, 0.0)
     before = lease.state.epoch
     lease.leave("a")
-    lease.take(ANNA, 1.0)
+    lease.acquire(ANNA, 1.0)
     assert lease.refusal("a", before) == "the controls were taken anew meanwhile"
 
 
 def test_a_request_without_an_answer_is_granted_when_its_time_is_over() -> None:
     lease = Lease()
-    lease.take(ANNA, 0.0)
-    lease.ask(BERT, 1.0)
+    lease.acquire(ANNA, 0.0)
+    lease.request(BERT, 1.0)
     assert lease.deadline == 11.0
     assert lease.expire(10.9) is None
     given = lease.expire(11.0)
@@ -52,8 +52,8 @@ def test_a_request_without_an_answer_is_granted_when_its_time_is_over() -> None:
 
 def test_the_holder_may_keep_the_controls() -> None:
     lease = Lease()
-    lease.take(ANNA, 0.0)
-    lease.ask(BERT, 1.0)
+    lease.acquire(ANNA, 0.0)
+    lease.request(BERT, 1.0)
     lease.touch(1.0)
     kept = lease.answer("a", 2.0, is_granted=False)
     assert isinstance(kept, LeaseChanged)
@@ -64,18 +64,18 @@ def test_the_holder_may_keep_the_controls() -> None:
 
 def test_a_request_that_was_declined_leaves_no_trace() -> None:
     lease = Lease()
-    lease.take(ANNA, 0.0)
+    lease.acquire(ANNA, 0.0)
     before = lease.state
     asked = before._replace(asked_by=BERT, asked_until=11.0)
-    assert lease.ask(BERT, 1.0) == LeaseChanged(asked, must_stop=False)
+    assert lease.request(BERT, 1.0) == LeaseChanged(asked, must_stop=False)
     assert lease.answer("a", 2.0, is_granted=False) == LeaseChanged(before, must_stop=False)
 
 
 def test_only_the_holder_answers_a_request() -> None:
     """Nobody gives the controls to themselves."""
     lease = Lease()
-    lease.take(ANNA, 0.0)
-    lease.ask(BERT, 1.0)
+    lease.acquire(ANNA, 0.0)
+    lease.request(BERT, 1.0)
     for who in ("b", "c"):
         for is_granted in (True, False):
             answered = lease.answer(who, 2.0, is_granted=is_granted)
@@ -88,11 +88,11 @@ def test_only_the_holder_answers_a_request() -> None:
 
 def test_one_asks_at_a_time_and_may_ask_again() -> None:
     lease = Lease()
-    lease.take(ANNA, 0.0)
-    lease.ask(BERT, 1.0)
-    assert lease.ask(CARL, 2.0) == LeaseRefused("Bert asks for the controls already")
-    assert lease.ask(EVE, 2.0) == LeaseRefused("viewers cannot drive")
-    again = lease.ask(BERT, 3.0)
+    lease.acquire(ANNA, 0.0)
+    lease.request(BERT, 1.0)
+    assert lease.request(CARL, 2.0) == LeaseRefused("Bert asks for the controls already")
+    assert lease.request(EVE, 2.0) == LeaseRefused("viewers cannot drive")
+    again = lease.request(BERT, 3.0)
     assert isinstance(again, LeaseChanged)
     assert (again.state.asked_by, again.state.asked_until) == (BERT, 13.0)
 
@@ -100,14 +100,14 @@ def test_one_asks_at_a_time_and_may_ask_again() -> None:
 def test_a_request_lasts_3_to_60_seconds() -> None:
     for asked_s, waits_s in ((0.1, 3.0), (20.0, 20.0), (1e9, 60.0)):
         lease = Lease()
-        lease.take(ANNA, 0.0)
-        lease.ask(BERT, 0.0, asked_s)
+        lease.acquire(ANNA, 0.0)
+        lease.request(BERT, 0.0, asked_s)
         assert lease.state.asked_until == waits_s
 
 
 def test_only_an_engineer_takes_the_controls_by_force() -> None:
     lease = Lease()
-    lease.take(ANNA, 0.0)
+    lease.acquire(ANNA, 0.0)
     assert isinstance(lease.force(BERT, 1.0), LeaseRefused)
     taken = lease.force(CARL, 1.0)
     assert isinstance(taken, LeaseChanged)
@@ -117,21 +117,21 @@ def test_only_an_engineer_takes_the_controls_by_force() -> None:
 
 def test_a_viewer_stops_the_robot_and_cannot_drive_or_reset_it() -> None:
     lease = Lease()
-    assert isinstance(lease.take(EVE, 0.0), LeaseRefused)
+    assert isinstance(lease.acquire(EVE, 0.0), LeaseRefused)
     assert lease.stop(EVE.name).must_stop
     assert isinstance(lease.reset(EVE), LeaseRefused)
 
 
 def test_stop_latches_until_somebody_resets_it_on_purpose() -> None:
     lease = Lease()
-    lease.take(ANNA, 0.0)
+    lease.acquire(ANNA, 0.0)
     lease.stop("Eve")
-    assert lease.take(ANNA, 1.0) == LeaseRefused("stopped by Eve: reset it first")
+    assert lease.acquire(ANNA, 1.0) == LeaseRefused("stopped by Eve: reset it first")
     assert lease.force(CARL, 1.0) == LeaseRefused("stopped by Eve: reset it first")
     reset = lease.reset(ANNA)
     assert isinstance(reset, LeaseChanged)
     assert reset.state.holder is None
-    assert isinstance(lease.take(ANNA, 2.0), LeaseChanged)
+    assert isinstance(lease.acquire(ANNA, 2.0), LeaseChanged)
 
 
 def test_a_stop_stays_that_of_the_first_who_pressed_it() -> None:
@@ -153,7 +153,7 @@ def test_what_was_wished_before_a_stop_is_refused_also_when_it_was_reset() -> No
     assert lease.hindrance(ANNA, before) == ""
     lease.stop("ben")
     lease.reset(ANNA)
-    lease.take(ANNA, 1.0)
+    lease.acquire(ANNA, 1.0)
     assert lease.hindrance(ANNA, before) == "STOP was pressed meanwhile: give it anew"
     assert lease.hindrance(ANNA, lease.state.stops) == ""
     assert lease.hindrance(ANNA) == ""
@@ -161,7 +161,7 @@ def test_what_was_wished_before_a_stop_is_refused_also_when_it_was_reset() -> No
 
 def test_a_latch_survives_a_restart_and_a_holder_does_not() -> None:
     lease = Lease()
-    lease.take(ANNA, 0.0)
+    lease.acquire(ANNA, 0.0)
     again = Lease(lease.state)
     assert again.state.holder is None
     assert again.state.epoch > lease.state.epoch
@@ -171,7 +171,7 @@ def test_a_latch_survives_a_restart_and_a_holder_does_not() -> None:
 
 def test_a_holder_who_goes_silent_gives_the_controls_back() -> None:
     lease = Lease()
-    lease.take(ANNA, 0.0)
+    lease.acquire(ANNA, 0.0)
     lease.touch(30.0)
     assert lease.expire(89.9) is None
     left = lease.expire(90.0)
@@ -183,9 +183,9 @@ def test_a_holder_who_goes_silent_gives_the_controls_back() -> None:
 def test_a_request_goes_with_the_client_that_made_it() -> None:
     """Other clients change nothing when they go."""
     lease = Lease()
-    lease.take(ANNA, 0.0)
+    lease.acquire(ANNA, 0.0)
     before = lease.state
-    lease.ask(BERT, 1.0)
+    lease.request(BERT, 1.0)
     assert lease.leave("c") is None
     assert lease.state.asked_by == BERT
     assert lease.leave("b") == LeaseChanged(before, must_stop=False)
@@ -194,13 +194,13 @@ def test_a_request_goes_with_the_client_that_made_it() -> None:
 
 def test_a_holder_without_a_request_has_a_minute() -> None:
     lease = Lease()
-    lease.take(ANNA, 0.0)
+    lease.acquire(ANNA, 0.0)
     assert lease.deadline == 60.0
 
 
 def test_returned_controls_are_free() -> None:
     lease = Lease()
-    lease.take(ANNA, 0.0)
+    lease.acquire(ANNA, 0.0)
     left = lease.leave("a")
     assert left == LeaseChanged(LeaseState(lease.state.epoch), must_stop=True)
 
@@ -249,9 +249,9 @@ class ThreeClients(RuleBasedStateMachine):
         self.now += wait
         match verb:
             case "take":
-                self.note(lease.take(client, self.now))
+                self.note(lease.acquire(client, self.now))
             case "ask":
-                self.note(lease.ask(client, self.now, wait))
+                self.note(lease.request(client, self.now, wait))
             case "force":
                 self.note(lease.force(client, self.now))
             case "leave":

@@ -57,7 +57,7 @@ def test_a_new_motion_begins_at_rest() -> None:
     slew = rover()
     slew.limit({"speed": 1.0}, 1.0)
     slew.limit({"speed": 1.0}, 2.0)
-    slew.begin()
+    slew.reset()
     assert slew.limit({"speed": 1.0}, 2.05) == {"speed": 0.1}
 
 

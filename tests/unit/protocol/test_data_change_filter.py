@@ -14,7 +14,7 @@ def told(signal: Signal, *values_at: tuple[float, object]) -> list[tuple[object,
     readings = Readings({signal.name: signal})
     found = []
     for time, value in values_at:
-        for sample in readings.put({signal.name: value}, time)[0]:
+        for sample in readings.set_values({signal.name: value}, time)[0]:
             found.append((sample.value, sample.time_s, sample.alarm))
     return found
 

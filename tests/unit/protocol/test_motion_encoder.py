@@ -116,7 +116,7 @@ def test_stops_are_made_for_each_repeat_and_for_a_new_connection() -> None:
     """Whoever stops alone has one for each number that may be next."""
     motions = Dialogue(DRIVER.replace("0, 9", "0, 999")).connect().engine.motions
     motions.share(["wire"])
-    motions.told("wire", {"n": 499}, True)
+    motions.set_counters("wire", {"n": 499}, True)
     made = [one for one in stops(motions) if isinstance(one, bytes)]
     length = len(made) // 2
     assert length >= MOST_STOPS
@@ -132,14 +132,14 @@ def test_numbers_of_a_shared_line_count_when_their_frames_have_left() -> None:
     first = motions.motion_frame("turn", {"v": 1}, 0.1)
     assert numbered(first) == Numbered(b"0 TURN 1\n", Count({}, {"n": 0}))
     assert numbered(motions.motion_frame("turn", {"v": -1}, 0.2)).data == b"0 TURN -1\n"
-    motions.told("wire", {"n": 0}, True)
+    motions.set_counters("wire", {"n": 0}, True)
     next_one = numbered(motions.motion_frame("turn", {"v": 1}, 0.3))
     assert next_one == Numbered(b"1 TURN 1\n", Count({"n": 0}, {"n": 1}))
     (sent,) = talk.engine.command(Request(1, "ping"), 0.4)[:1]
     assert isinstance(sent, Send)
     assert sent.counted is not None
     assert sent.counted.numbered == Numbered(b"1 PING\n", Count({"n": 0}, {"n": 1}))
-    motions.told("wire", {"n": 7}, True)
+    motions.set_counters("wire", {"n": 7}, True)
     assert sent.counted.again() == Numbered(b"8 PING\n", Count({"n": 7}, {"n": 8}))
     assert isinstance(first, CountedFrame)
     assert first.again() == Numbered(b"8 TURN 1\n", Count({"n": 7}, {"n": 8})), "it overtakes"

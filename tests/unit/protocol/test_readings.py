@@ -31,7 +31,7 @@ def values(samples: list[Sample]) -> dict[str, object]:
 def alarms(limits: AlarmLimits, *readings_at: tuple[float, object]) -> list[str]:
     """Return the alarm of each of some readings in turn."""
     made = readings(Signal("v", "array" if limits.for_s < 0 else "number", limits=limits))
-    return [made.put({"v": value}, time)[0][0].alarm for time, value in readings_at]
+    return [made.set_values({"v": value}, time)[0][0].alarm for time, value in readings_at]
 
 
 def test_a_limit_is_passed_at_its_very_value_and_left_past_the_hysteresis() -> None:
@@ -58,7 +58,7 @@ def test_an_alarm_begins_only_when_the_value_has_stayed() -> None:
 def test_an_alarm_begins_without_a_further_reading() -> None:
     """A robot that tells only what changes would never be told of otherwise."""
     made = readings(VOLTS)
-    made.put({"volts": 11}, 5.0)
+    made.set_values({"volts": 11}, 5.0)
     assert made.deadline == 8.0
     assert made.tick(7.9) == []
     assert made.tick(8.0) == [Sample("volts", 11, 5.0, "low")]
@@ -68,17 +68,17 @@ def test_an_alarm_begins_without_a_further_reading() -> None:
 def test_an_array_is_judged_by_its_worst_element() -> None:
     """One cell that is flat is a flat battery."""
     made = readings(Signal("cells", "array", limits=AlarmLimits(low=3.2, high=4.3)))
-    assert made.put({"cells": [3.9, 3.1, None]}, 0.0)[0][0].alarm == "low"
-    assert made.put({"cells": [3.9, 4.4]}, 1.0)[0][0].alarm == "high"
-    assert made.put({"cells": [None]}, 2.0)[0][0].alarm == ""
+    assert made.set_values({"cells": [3.9, 3.1, None]}, 0.0)[0][0].alarm == "low"
+    assert made.set_values({"cells": [3.9, 4.4]}, 1.0)[0][0].alarm == "high"
+    assert made.set_values({"cells": [None]}, 2.0)[0][0].alarm == ""
 
 
 def test_a_computed_signal_follows_each_of_its_inputs() -> None:
     """It waits until each has been read once."""
     made = readings(signal("power", "volts * amps"), signal("volts"), signal("amps"))
-    assert values(made.put({"volts": 12}, 0.0)[0]) == {"volts": 12}
-    assert values(made.put({"amps": 2}, 1.0)[0]) == {"amps": 2, "power": 24}
-    assert values(made.put({"volts": 11}, 2.0)[0]) == {"volts": 11, "power": 22}
+    assert values(made.set_values({"volts": 12}, 0.0)[0]) == {"volts": 12}
+    assert values(made.set_values({"amps": 2}, 1.0)[0]) == {"amps": 2, "power": 24}
+    assert values(made.set_values({"volts": 11}, 2.0)[0]) == {"volts": 11, "power": 22}
 
 
 def test_computed_signals_may_rest_on_computed_ones_in_any_order() -> None:
@@ -86,7 +86,7 @@ def test_computed_signals_may_rest_on_computed_ones_in_any_order() -> None:
     made = readings(
         signal("left", "energy / settings.cells"), signal("energy", "volts * 2"), signal("volts")
     )
-    assert values(made.put({"volts": 10}, 0.0)[0]) == {"volts": 10, "energy": 20, "left": 5}
+    assert values(made.set_values({"volts": 10}, 0.0)[0]) == {"volts": 10, "energy": 20, "left": 5}
 
 
 def test_what_is_computed_from_nothing_available_is_not_available() -> None:
@@ -94,7 +94,7 @@ def test_what_is_computed_from_nothing_available_is_not_available() -> None:
     made = readings(
         signal("double", "volts * 2"), signal("safe", "(volts | default(0)) + 1"), signal("volts")
     )
-    samples, refused = made.put({"volts": None}, 0.0)
+    samples, refused = made.set_values({"volts": None}, 0.0)
     assert values(samples) == {"volts": None, "double": None, "safe": 1}
     assert refused == []
 
@@ -102,10 +102,10 @@ def test_what_is_computed_from_nothing_available_is_not_available() -> None:
 def test_a_formula_that_fails_is_told() -> None:
     """Counted like any value that is none; the input itself is taken."""
     made = readings(signal("inverse", "1 / volts", max=5), signal("volts"))
-    samples, refused = made.put({"volts": 0}, 0.0)
+    samples, refused = made.set_values({"volts": 0}, 0.0)
     assert values(samples) == {"volts": 0}
     assert refused == ["inverse: in '1 / volts': division by zero"]
-    assert made.put({"volts": 0.1}, 1.0)[1] == ["inverse: 10 is above its maximum 5"]
+    assert made.set_values({"volts": 0.1}, 1.0)[1] == ["inverse: 10 is above its maximum 5"]
 
 
 def test_a_computed_signal_is_as_old_as_the_first_of_its_inputs_to_grow_old() -> None:
@@ -115,20 +115,20 @@ def test_a_computed_signal_is_as_old_as_the_first_of_its_inputs_to_grow_old() ->
         signal("volts", stale_after_s=3.0),
         signal("amps", stale_after_s=60.0),
     )
-    made.put({"volts": 12}, 0.0)
-    made.put({"amps": 1}, 1.0)
-    power = made.put({"amps": 2}, 50.0)[0][1]
+    made.set_values({"volts": 12}, 0.0)
+    made.set_values({"amps": 1}, 1.0)
+    power = made.set_values({"amps": 2}, 50.0)[0][1]
     assert power.time_s == 0.0  # old at 3.0, when volts is
-    power = made.put({"volts": 12}, 100.0)[0][1]
+    power = made.set_values({"volts": 12}, 100.0)[0][1]
     assert power.time_s == 100.0  # fresh: amps is good until 110
-    power = made.put({"volts": 12}, 109.0)[0][1]
+    power = made.set_values({"volts": 12}, 109.0)[0][1]
     assert power.time_s == 107.0  # old at 110, when amps is
 
 
 def test_a_computed_signal_has_its_own_limits() -> None:
     """With the newest values of its inputs."""
     made = readings(signal("power", "volts * 2", limits=AlarmLimits(high=10)), signal("volts"))
-    assert made.put({"volts": 6}, 0.0)[0][1] == Sample("power", 12, 0.0, "high")
+    assert made.set_values({"volts": 6}, 0.0)[0][1] == Sample("power", 12, 0.0, "high")
 
 
 def test_orientation_to_angles() -> None:
@@ -137,9 +137,9 @@ def test_orientation_to_angles() -> None:
         Signal("turn", "array", size=4, stale_after_s=1),
         signal("heading", "(turn | yaw) * 180 / 3.141592653589793"),
     )
-    samples = made.put({"turn": [0, 0, 1, 1]}, 0.0)[0]
+    samples = made.set_values({"turn": [0, 0, 1, 1]}, 0.0)[0]
     assert round(samples[1].value, 6) == 90.0  # type: ignore[arg-type]
-    assert values(made.put({"turn": [0, 0, 0, 0]}, 1.0)[0])["heading"] is None
+    assert values(made.set_values({"turn": [0, 0, 0, 0]}, 1.0)[0])["heading"] is None
 
 
 def test_a_frame_that_two_kinds_set_shares_the_alarm() -> None:
@@ -153,7 +153,7 @@ def test_a_frame_that_two_kinds_set_shares_the_alarm() -> None:
 def test_conversions_and_refusals_of_a_frame() -> None:
     """One bad value does not spoil the others."""
     made = readings(Signal("a", conversion=Conversion(polynomial=(0, 0.1))), Signal("b", max=1))
-    samples, refused = made.put({"a": "3", "b": 2}, 0.0)
+    samples, refused = made.set_values({"a": "3", "b": 2}, 0.0)
     assert (values(samples), refused) == ({"a": 0.3}, ["b: 2 is above its maximum 1"])
 
 

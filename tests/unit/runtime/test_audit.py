@@ -35,7 +35,7 @@ def kept(file: Path) -> Iterator[AuditLog]:
 def test_entries_are_read_in_the_order_in_which_they_were_noted(kept: AuditLog) -> None:
     wanted = [entry(number) for number in range(10)]
     for one in wanted:
-        kept.note(one)
+        kept.add(one)
     assert kept.settle()
     assert read(kept.file) == wanted
     assert read(kept.file, last=2) == wanted[-2:]
@@ -43,8 +43,8 @@ def test_entries_are_read_in_the_order_in_which_they_were_noted(kept: AuditLog) 
 
 
 def test_one_robot_is_not_shown_what_belongs_to_another(kept: AuditLog) -> None:
-    kept.note(entry(1, "puppet"))
-    kept.note(entry(2, "rover"))
+    kept.add(entry(1, "puppet"))
+    kept.add(entry(2, "rover"))
     assert kept.settle()
     assert [one.robot for one in read(kept.file, robot="rover")] == ["rover"]
 
@@ -52,14 +52,14 @@ def test_one_robot_is_not_shown_what_belongs_to_another(kept: AuditLog) -> None:
 def test_it_goes_on_after_a_restart(file: Path) -> None:
     for number in range(3):
         with AuditLog(file) as log:
-            log.note(entry(number))
+            log.add(entry(number))
     assert [one.at for one in read(file)] == [1000.0, 1001.0, 1002.0]
     assert check(file) == ""
 
 
 def test_a_changed_row_shows(kept: AuditLog) -> None:
     for number in range(6):
-        kept.note(entry(number))
+        kept.add(entry(number))
     assert kept.settle()
     assert check(kept.file) == ""
     with sqlite3.connect(kept.file) as base:
@@ -69,7 +69,7 @@ def test_a_changed_row_shows(kept: AuditLog) -> None:
 
 def test_a_removed_row_shows(kept: AuditLog) -> None:
     for number in range(6):
-        kept.note(entry(number))
+        kept.add(entry(number))
     assert kept.settle()
     with sqlite3.connect(kept.file) as base:
         base.execute("DELETE FROM entries WHERE id = 3")
@@ -80,7 +80,7 @@ def test_a_full_file_loses_its_oldest_entries(file: Path) -> None:
     most_bytes = 400_000
     with AuditLog(file, most_bytes=most_bytes) as log:
         for number in range(4000):
-            log.note(entry(number, text="x" * 200))
+            log.add(entry(number, text="x" * 200))
             if number % 500 == 0:
                 assert log.settle()
         assert log.settle(20)
@@ -94,9 +94,9 @@ def test_a_full_file_loses_its_oldest_entries(file: Path) -> None:
 def test_a_queue_that_is_full_loses_entries_and_says_how_many(file: Path) -> None:
     with AuditLog(file, most_waiting=10, now=lambda: 5000.0) as log:
         for number in range(2000):
-            log.note(entry(number))
+            log.add(entry(number))
         assert log.settle()
-        log.note(entry(9999))
+        log.add(entry(9999))
         assert log.settle()
         found = read(file, last=5000)
     lost = sum(one.times for one in found if one.what == "lost")
@@ -111,7 +111,7 @@ def test_a_folder_that_cannot_be_written_is_told_once_and_holds_nobody_up(
     log = AuditLog(tmp_path / "file" / "audit.sqlite")
     began_s = time.monotonic()
     for number in range(5000):
-        log.note(entry(number))
+        log.add(entry(number))
     assert time.monotonic() - began_s < 1.0
     with log._wakes:
         assert log._wakes.wait_for(lambda: log._lost > 0, 5)
@@ -128,7 +128,7 @@ def test_a_file_that_is_no_database_is_put_aside(
     file.parent.mkdir()
     file.write_bytes(b"this is no database " * 100)
     with AuditLog(file) as log:
-        log.note(entry(1))
+        log.add(entry(1))
         assert log.settle()
         assert [one.at for one in read(file)] == [1001.0]
     assert file.with_suffix(".broken").read_bytes().startswith(b"this is no database")
@@ -147,7 +147,7 @@ def test_reading_what_is_no_database_is_one_line(file: Path) -> None:
 
 
 def test_texts_have_an_end_and_any_character(kept: AuditLog) -> None:
-    kept.note(entry(1, text="é\ud800" + "x" * 5000))
+    kept.add(entry(1, text="é\ud800" + "x" * 5000))
     assert kept.settle()
     (found,) = read(kept.file)
     assert found.arguments == "é?" + "x" * 998
@@ -162,7 +162,7 @@ def test_two_servers_with_one_folder_keep_one_chain(file: Path) -> None:
     with AuditLog(file) as one, AuditLog(file) as other:
         for number in range(6):
             log = other if number % 2 else one
-            log.note(entry(number))
+            log.add(entry(number))
             assert log.settle()
     assert [each.at for each in read(file)] == [1000.0 + number for number in range(6)]
     assert check(file) == ""
@@ -173,9 +173,9 @@ def test_an_entry_that_no_file_takes_is_counted_and_the_next_one_is_kept(
 ) -> None:
     monkeypatch.setattr("urc.runtime.audit._RETRY_S", 0.0)
     with AuditLog(file) as log:
-        log.note(entry(1)._replace(epoch=2**70))
+        log.add(entry(1)._replace(epoch=2**70))
         assert log.settle()
-        log.note(entry(2))
+        log.add(entry(2))
         assert log.settle()
     assert [(each.what, each.times) for each in read(file)] == [("moved", 1), ("lost", 1)]
 
@@ -186,19 +186,19 @@ def test_a_file_that_somebody_locks_holds_nobody_up_and_is_told_once(
     monkeypatch.setattr("urc.runtime.audit._RETRY_S", 0.0)
     monkeypatch.setattr("urc.runtime.audit._LOCKED_S", 0.05)
     with AuditLog(file) as log:
-        log.note(entry(1))
+        log.add(entry(1))
         assert log.settle()
         base = sqlite3.connect(file, isolation_level=None)
         base.execute("BEGIN IMMEDIATE")
         for number in (2, 3):
             began_s = time.monotonic()
-            log.note(entry(number))
+            log.add(entry(number))
             assert time.monotonic() - began_s < 0.5, "the lock is waited for elsewhere"
             assert log.settle(10)
         assert log.fault == "database is locked"
         base.execute("ROLLBACK")
         base.close()
-        log.note(entry(4))
+        log.add(entry(4))
         assert log.settle()
     assert [(each.what, each.times) for each in read(file)][1:] == [("moved", 1), ("lost", 2)]
     told = [one.getMessage() for one in caplog.records]
@@ -215,7 +215,7 @@ def test_only_its_owner_reads_it(file: Path) -> None:
     sqlite3.connect(file).close()
     file.chmod(0o644)
     with AuditLog(file) as log:
-        log.note(entry(1))
+        log.add(entry(1))
         assert log.settle()
         found = [one for one in file.parent.iterdir() if one.name.startswith(file.name)]
         assert {one.stat().st_mode & 0o777 for one in found} == {0o600}

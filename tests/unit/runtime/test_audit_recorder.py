@@ -49,10 +49,10 @@ def test_who_keeps_all_that_happens_hears_of_each_tick_while_it_is_connected() -
         for number in (1, 2):
             book.trail.moved(ANN, 7, "go", {"v": number}, b"", number)
         book.trail.stopped("go", "expired", 3.0)
-        *ticks, end = tap.take()
+        *ticks, end = tap.drain()
         book.trail.attend(None, lambda: 8.0)
         book.trail.moved(ANN, 7, "go", {"v": 3}, b"", 9.0)
-        assert tap.take() == []
+        assert tap.drain() == []
     assert ticks == [MotionRecord(1, "go", {"v": 1}), MotionRecord(2, "go", {"v": 2})]
     assert end == AuditRecord(7.0, book.entries[1])
 

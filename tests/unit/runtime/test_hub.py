@@ -60,12 +60,12 @@ def test_link_that_did_not_change_is_no_new_revision(hub: Hub) -> None:
 def test_reader_gets_the_newest_of_each_changed_signal_once(hub: Hub) -> None:
     """Newest wins: what was overwritten before it looked is not repeated."""
     with hub.subscribe() as subscription:
-        hub.put([sample("a", 1), sample("b", 1)])
-        hub.put([sample("a", 2)])
-        assert subscription.take() == [sample("a", 2), sample("b", 1)]
-        assert subscription.take() == []
-        hub.put([sample("b", 1)])
-        assert subscription.take() == [sample("b", 1)], "a repeated value has a new age"
+        hub.publish([sample("a", 1), sample("b", 1)])
+        hub.publish([sample("a", 2)])
+        assert subscription.changes() == [sample("a", 2), sample("b", 1)]
+        assert subscription.changes() == []
+        hub.publish([sample("b", 1)])
+        assert subscription.changes() == [sample("b", 1)], "a repeated value has a new age"
     assert hub.latest("a") == sample("a", 2)
     assert hub.latest("c") is None
 
@@ -76,7 +76,7 @@ def test_a_signal_that_came_twice_at_once_counts_once(count: int) -> None:
     names = [f"s{place}" for place in range(count - 1)]
     hub = Hub({name: Signal(name) for name in names})
     newest = [sample(name, 2) for name in names]
-    hub.put([sample("s0", 1), *newest])
+    hub.publish([sample("s0", 1), *newest])
     assert hub.readings_since(0) == hub.changed_since(0) == newest
     assert hub.readings_since(1) == []
     assert hub.latest("s0") == sample("s0", 2)
@@ -87,11 +87,11 @@ def test_much_that_came_is_found_by_signal_whatever_comes_next() -> None:
     names = [f"s{place}" for place in range(60)]
     hub = Hub({name: Signal(name) for name in names})
     for value in (1, 2):
-        hub.put([sample(name, value) for name in names[:30]])
-    hub.put([sample(name, 3) for name in names[20:]])
+        hub.publish([sample(name, value) for name in names[:30]])
+    hub.publish([sample(name, 3) for name in names[20:]])
     assert (hub.latest("s0"), hub.latest("s25")) == (sample("s0", 2), sample("s25", 3))
-    hub.put([sample(name, 4) for name in names[20:]])
-    hub.put([sample("s1", 5)])
+    hub.publish([sample(name, 4) for name in names[20:]])
+    hub.publish([sample("s1", 5)])
     found = {each.signal: each.value for each in hub.changed_since(2)}
     assert found == {"s1": 5, **dict.fromkeys(names[20:], 4)}
 
@@ -99,13 +99,13 @@ def test_much_that_came_is_found_by_signal_whatever_comes_next() -> None:
 async def test_reader_is_woken_by_a_change_and_waits_without_one(hub: Hub) -> None:
     """`changed` returns at once when there is news, else with the next news."""
     with hub.subscribe() as subscription:
-        hub.put([sample("a")])
+        hub.publish([sample("a")])
         await subscription.changed()
-        subscription.take()
+        subscription.changes()
         waiting = asyncio.create_task(subscription.changed())
         await asyncio.sleep(0)
         assert not waiting.done()
-        hub.note(NOTE)
+        hub.log(NOTE)
         async with asyncio.timeout(5):
             await waiting
 
@@ -114,9 +114,9 @@ async def test_reader_that_has_left_is_not_kept(hub: Hub) -> None:
     """Neither subscriptions nor taps outlive their context."""
     with hub.subscribe() as subscription, hub.tap(with_traffic=True) as tap:
         pass
-    hub.put([sample("a")])
+    hub.publish([sample("a")])
     hub.saw(TRAFFIC)
-    assert tap.take() == []
+    assert tap.drain() == []
     waiting = asyncio.create_task(subscription.changed())
     await asyncio.sleep(0)
     assert waiting.done(), "what happened can still be asked for"
@@ -125,16 +125,16 @@ async def test_reader_that_has_left_is_not_kept(hub: Hub) -> None:
 
 def test_tap_gives_everything_in_order(hub: Hub) -> None:
     """Samples that repeat a signal, notes, and the traffic around them."""
-    hub.put([sample("c")])
+    hub.publish([sample("c")])
     with hub.tap(with_traffic=True) as tap:
         assert hub.traffic_watchers == 1
         hub.saw(TRAFFIC)
-        hub.put([sample("a", 1), sample("a", 2)])
-        hub.note(NOTE)
-        hub.put([sample("a", 3)])
+        hub.publish([sample("a", 1), sample("a", 2)])
+        hub.log(NOTE)
+        hub.publish([sample("a", 3)])
         expected: list[Tapped] = [TRAFFIC, sample("a", 1), sample("a", 2), NOTE, sample("a", 3)]
-        assert tap.take() == expected
-        assert tap.take() == []
+        assert tap.drain() == expected
+        assert tap.drain() == []
         assert tap.dropped == 0
 
 
@@ -149,9 +149,9 @@ def test_tap_hears_of_lines_and_of_what_people_did(hub: Hub) -> None:
         assert hub.is_tapped
         hub.set_link(live)
         hub.set_link(live)
-        subscription.take()
-        hub.tell(moved)
-        assert tap.take() == [live, moved]
+        subscription.changes()
+        hub.publish_record(moved)
+        assert tap.drain() == [live, moved]
         assert hub.revision == subscription.seen
 
 
@@ -159,7 +159,7 @@ def test_tap_without_traffic_asks_for_none(hub: Hub) -> None:
     """Recording costs, so it is done for those only who look at it."""
     with hub.tap() as tap, hub.tap(with_traffic=True):
         hub.saw(TRAFFIC)
-        assert tap.take() == []
+        assert tap.drain() == []
 
 
 def test_full_tap_drops_the_oldest_and_counts_them(
@@ -168,36 +168,36 @@ def test_full_tap_drops_the_oldest_and_counts_them(
     """A reader that stands still costs bounded memory, and knows what it missed."""
     monkeypatch.setattr(hub_module, "TAP_KEPT", 3)
     with hub.tap() as tap:
-        hub.put([sample("a", number) for number in range(5)])
-        hub.note(NOTE)
-        assert tap.take() == [sample("a", 3), sample("a", 4), NOTE]
+        hub.publish([sample("a", number) for number in range(5)])
+        hub.log(NOTE)
+        assert tap.drain() == [sample("a", 3), sample("a", 4), NOTE]
         assert tap.dropped == 3
-        hub.put([sample("b")])
-        assert tap.take() == [sample("b")]
+        hub.publish([sample("b")])
+        assert tap.drain() == [sample("b")]
         assert tap.dropped == 3
 
 
 async def test_tap_waits_for_the_next(hub: Hub) -> None:
     """`filled` returns at once when something is there, else when something comes."""
     with hub.tap() as tap:
-        hub.put([sample("a")])
+        hub.publish([sample("a")])
         await tap.filled()
-        tap.take()
+        tap.drain()
         waiting = asyncio.create_task(tap.filled())
         await asyncio.sleep(0)
-        hub.put([])
+        hub.publish([])
         await asyncio.sleep(0)
         assert not waiting.done(), "an empty batch is nothing to take"
-        hub.put([sample("b")])
+        hub.publish([sample("b")])
         async with asyncio.timeout(5):
             await waiting
-        assert tap.take() == [sample("b")]
+        assert tap.drain() == [sample("b")]
 
 
 def test_notes_and_traffic_are_bounded_and_counted(hub: Hub) -> None:
     """The log keeps the last of them; the count says how many there were."""
     for number in range(hub_module.NOTES_KEPT + 1):
-        hub.note(replace(NOTE, text=str(number)))
+        hub.log(replace(NOTE, text=str(number)))
     for _ in range(hub_module.TRAFFIC_KEPT + 1):
         hub.saw(TRAFFIC)
     assert (len(hub.notes), hub.notes_count) == (500, 501)

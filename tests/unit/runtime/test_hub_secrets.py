@@ -34,17 +34,17 @@ def shown(hub: Hub, *events: Tapped) -> str:
         for event in events:
             match event:
                 case Sample():
-                    hub.put([event])
+                    hub.publish([event])
                 case LogEntry():
-                    hub.note(event)
+                    hub.log(event)
                 case Traffic():
                     hub.saw(event)
                 case LinkStatus():
                     hub.set_link(event)
                 case MotionRecord():
-                    hub.tell(event)
+                    hub.publish_record(event)
         hub.tell_rest(9.0)
-        told = tap.take()
+        told = tap.drain()
     wire = b"".join(one.data for one in told if isinstance(one, Traffic)).decode("utf-8", "replace")
     kept = (*hub.notes, *hub.traffic, *hub.links.values(), *hub.changed_since(0))
     texts = [_text(one) for one in (*told, *kept)]
@@ -122,7 +122,7 @@ def test_a_word_that_only_begins_like_a_secret_is_shown() -> None:
 def test_a_secret_number_is_not_available() -> None:
     """Only the number itself, and only where it has enough digits to be told from others."""
     hub = hub_of("4711", "42")
-    hub.put([Sample("pin", 4711, 1.0), Sample("pose", (42, 4711.0, 14711), 1.0)])
+    hub.publish([Sample("pin", 4711, 1.0), Sample("pose", (42, 4711.0, 14711), 1.0)])
     assert [one.value for one in hub.changed_since(0)] == [None, (42, None, 14711)]
 
 
@@ -133,7 +133,7 @@ def test_traffic_that_may_begin_a_secret_is_shown_when_nothing_follows() -> None
         hub.saw(Traffic(1.0, "wire", "received", b"battery low h"))
         assert hub.holds_back
         hub.tell_rest(2.0)
-        told = [one.data for one in tap.take() if isinstance(one, Traffic)]
+        told = [one.data for one in tap.drain() if isinstance(one, Traffic)]
     assert told == [b"battery low ", b"h"]
     assert not hub.holds_back
 
@@ -142,7 +142,7 @@ def test_a_secret_of_two_letters_blanks_what_it_stands_in_alone() -> None:
     """Nearly every text and picture holds them by chance."""
     hub = hub_of("42")
     picture = bytes(range(256)) * 4 + b"42"
-    hub.put([Sample("dump", picture, 1.0), Sample("word", "PIN 42", 1.0)])
-    hub.note(LogEntry(1.0, "info", "wire", "connecting to tcp 10.0.0.1:4242"))
+    hub.publish([Sample("dump", picture, 1.0), Sample("word", "PIN 42", 1.0)])
+    hub.log(LogEntry(1.0, "info", "wire", "connecting to tcp 10.0.0.1:4242"))
     assert [one.value for one in hub.changed_since(0)] == [picture, "‹secret›"]
     assert hub.notes[0].text == "connecting to tcp 10.0.0.1:4242"

@@ -20,7 +20,7 @@ async def test_what_was_kept_is_found_again(tmp_path: Path) -> None:
     """The latch and the epoch; nobody keeps the controls over a restart."""
     file = LatchStore(tmp_path / "new" / "folder", "puppet")
     assert file.load() == Latch(LeaseState())
-    file.keep(Latch(LeaseState(7, Operator("a"), None, 0.0, "ann")))
+    file.save(Latch(LeaseState(7, Operator("a"), None, 0.0, "ann")))
     await file.settle()
     found = LatchStore(tmp_path / "new" / "folder", "puppet").load()
     assert found == Latch(LeaseState(7, latched_by=f"ann{BEFORE}"))
@@ -32,7 +32,7 @@ async def test_who_stopped_it_in_another_run_is_none_of_this_ones_screens(tmp_pa
     file = LatchStore(tmp_path, "puppet")
     kept = Latch(LeaseState(7, latched_by="screen 1"))
     for _ in range(3):
-        file.keep(kept)
+        file.save(kept)
         await file.settle()
         kept = file.load()
         assert kept.state.latched_by == f"screen 1{BEFORE}"
@@ -43,7 +43,7 @@ async def test_whether_the_robot_heard_of_the_stop_is_kept(tmp_path: Path, is_ow
     """Whether it is latched or was reset since."""
     file = LatchStore(tmp_path, "puppet")
     for by in ("ann", ""):
-        file.keep(Latch(LeaseState(7, latched_by=by), is_owed))
+        file.save(Latch(LeaseState(7, latched_by=by), is_owed))
         await file.settle()
         assert file.load().is_owed is is_owed
 
@@ -59,7 +59,7 @@ async def test_of_many_states_the_newest_is_kept(tmp_path: Path) -> None:
     """A slow disk writes fewer of them, and the last one."""
     file = LatchStore(tmp_path, "puppet")
     for epoch in range(200):
-        file.keep(Latch(LeaseState(epoch)))
+        file.save(Latch(LeaseState(epoch)))
     await file.settle()
     assert file.load().state.epoch == 199
 
@@ -93,7 +93,7 @@ async def test_a_full_disk_is_told_and_harms_nothing(
     """The old file stays whole, and the next write that can be made is made."""
     file, told = LatchStore(tmp_path, "puppet"), list[str]()
     file.on_fault = told.append
-    file.keep(Latch(LeaseState(1, latched_by="ann")))
+    file.save(Latch(LeaseState(1, latched_by="ann")))
     await file.settle()
 
     def full(descriptor: int) -> None:
@@ -102,13 +102,13 @@ async def test_a_full_disk_is_told_and_harms_nothing(
     with monkeypatch.context() as patched:
         patched.setattr("os.fsync", full)
         for epoch in (2, 2, 2):
-            file.keep(Latch(LeaseState(epoch)))
+            file.save(Latch(LeaseState(epoch)))
             await file.settle()
         assert told == ["No space left on device"], "once, however often it fails"
         assert file.fault == "No space left on device"
     assert json.loads((tmp_path / "puppet.latch.json").read_text())["epoch"] == 1
     assert len(list(tmp_path.iterdir())) == 1
-    file.keep(Latch(LeaseState(3)))
+    file.save(Latch(LeaseState(3)))
     await file.settle()
     assert (file.fault, file.load().state.epoch) == ("", 3)
     assert told == ["No space left on device", ""]
@@ -124,7 +124,7 @@ async def test_a_fault_without_a_number_is_told_in_its_own_words(
         raise OSError("the card was pulled out")
 
     monkeypatch.setattr("os.fsync", broken)
-    file.keep(Latch(LeaseState(1)))
+    file.save(Latch(LeaseState(1)))
     await file.settle()
     assert file.fault == "the card was pulled out"
 
@@ -145,7 +145,7 @@ async def test_what_could_not_be_written_is_tried_again(
             raise faults.pop()
 
     monkeypatch.setattr("os.fsync", full)
-    file.keep(Latch(LeaseState(2, latched_by="ann")))
+    file.save(Latch(LeaseState(2, latched_by="ann")))
     async with asyncio.timeout(10):
         await well.wait()
     assert file.load().state.latched_by == f"ann{BEFORE}"

@@ -68,7 +68,7 @@ class Dialogue:
         """Let time pass on both sides."""
         for _ in range(round(seconds / step_s)):
             self.now += step_s
-            for said in self.line.step(step_s, self.now):
+            for said in self.line.advance(step_s, self.now):
                 self.perform(self.engine.receive("wire", said, self.now))
             deadline = self.engine.deadline
             if deadline is not None and deadline <= self.now:

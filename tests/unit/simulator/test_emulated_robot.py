@@ -88,10 +88,10 @@ def test_periodic_rules_speak_at_their_times() -> None:
     """Time comes in steps of any size; a long pause is not made up for."""
     line = line_with(rule(None, "tick {{ now | int }}", every_s=0.5))
     assert line.due_in_s == 0.5
-    assert line.step(0.3, 1.0) == []
+    assert line.advance(0.3, 1.0) == []
     assert line.due_in_s == pytest.approx(0.2)
-    assert line.step(0.2, 2.0) == [b"tick 2\n"]
-    assert line.step(10.1, 3.0) == [b"tick 3\n"]
+    assert line.advance(0.2, 2.0) == [b"tick 2\n"]
+    assert line.advance(10.1, 3.0) == [b"tick 3\n"]
     assert line.due_in_s == pytest.approx(0.4)
     assert line_with().due_in_s is None
 

@@ -60,12 +60,12 @@ def rover(tmp_path: Path) -> EmulatedRobot:
 def test_late_is_whole_and_in_order(rover: EmulatedRobot) -> None:
     """Nothing before its time, and then everything."""
     line = rover.line("wire")
-    assert line.step(0.1, 0.1) == []
+    assert line.advance(0.1, 0.1) == []
     rover.inject("delay=200ms", 0.1)
     assert line.receive(b"GO 0.5\nL?\n", 0.2) == []
     assert line.due_in_s == pytest.approx(0.2)
-    assert line.step(0.1, 0.3) == []
-    assert [one[:5] for one in line.step(0.1, 0.4)] == [b"OK\n", b"L 89."]
+    assert line.advance(0.1, 0.3) == []
+    assert [one[:5] for one in line.advance(0.1, 0.4)] == [b"OK\n", b"L 89."]
     rover.mend()
     assert line.receive(b"GO 0\n", 0.5) == [b"OK\n"]
 
@@ -73,10 +73,10 @@ def test_late_is_whole_and_in_order(rover: EmulatedRobot) -> None:
 def test_what_is_late_is_bounded() -> None:
     """Beyond it the newest are lost, and counted."""
     late = DelayLine()
-    late.put([b"x"] * (MOST_LATE + 3), 1.0)
+    late.push([b"x"] * (MOST_LATE + 3), 1.0)
     assert late.lost == 3
-    assert late.take(0.9) == []
-    assert len(late.take(1.0)) == MOST_LATE
+    assert late.pop_due(0.9) == []
+    assert len(late.pop_due(1.0)) == MOST_LATE
     assert late.due_s == math.inf
 
 
@@ -106,9 +106,9 @@ def test_a_silent_robot_hears(rover: EmulatedRobot) -> None:
     line = rover.line("wire")
     rover.inject("silent", 0.0)
     assert line.receive(b"GO 0.5\n", 0.0) == []
-    assert line.step(1.0, 1.0) == []
+    assert line.advance(1.0, 1.0) == []
     rover.mend()
-    assert line.step(1.0, 2.0)[0] == b"AT 1\n"
+    assert line.advance(1.0, 2.0)[0] == b"AT 1\n"
 
 
 def test_noise_is_so_many_times_as_loud(rover: EmulatedRobot) -> None:
@@ -116,7 +116,7 @@ def test_noise_is_so_many_times_as_loud(rover: EmulatedRobot) -> None:
     line = rover.line("wire")
 
     def errors() -> list[float]:
-        said = [line.step(1.0, float(second))[1] for second in range(1, 30)]
+        said = [line.advance(1.0, float(second))[1] for second in range(1, 30)]
         return [abs(float(one[2:]) - 3.0) for one in said if one != b"R \n"]
 
     before = max(errors())
@@ -133,12 +133,12 @@ def test_a_signal_that_drops_out_is_not_told(rover: EmulatedRobot) -> None:
     rover.inject("dropout=level", 0.0)
     assert line.receive(b"L?\nM?\n", 0.0) == [b"M 2\n"]
     rover.inject("dropout=x", 0.0)
-    assert [one[:1] for one in line.step(1.0, 1.0)] == [b"R"]
+    assert [one[:1] for one in line.advance(1.0, 1.0)] == [b"R"]
     rover.inject("dropout=laser", 0.0)  # a sensor takes all signals with it that it tells
-    assert line.step(1.0, 2.0) == []
+    assert line.advance(1.0, 2.0) == []
     assert line.faults == 0
     rover.mend()
-    assert len(line.step(1.0, 3.0)) == 2
+    assert len(line.advance(1.0, 3.0)) == 2
 
 
 def test_what_a_rule_reads_of_a_sensor_that_failed_is_not_told(tmp_path: Path) -> None:
@@ -147,23 +147,23 @@ def test_what_a_rule_reads_of_a_sensor_that_failed_is_not_told(tmp_path: Path) -
     file.write_text(ROVER.replace('"R {{ range }}"', '"G {{ world.gps.fix }}"'))
     robot = EmulatedRobot(load_profile(file, built_in_catalog()), {})
     line = robot.line("wire")
-    assert line.step(1.0, 1.0)[1] == b"G 3\n"
+    assert line.advance(1.0, 1.0)[1] == b"G 3\n"
     robot.inject("dropout=gps", 1.0)
-    assert len(line.step(1.0, 2.0)) == 1
+    assert len(line.advance(1.0, 2.0)) == 1
     assert line.faults == 0
     robot.mend()
-    assert len(line.step(1.0, 3.0)) == 2
+    assert len(line.advance(1.0, 3.0)) == 2
 
 
 def test_a_signal_that_is_stuck_stays(rover: EmulatedRobot) -> None:
     """As it was when it began, whatever becomes of the robot."""
     line = rover.line("wire")
     line.receive(b"GO 0.5\n", 0.0)
-    first = line.step(1.0, 1.0)[0]
+    first = line.advance(1.0, 1.0)[0]
     rover.inject("stuck=x", 1.0)
-    assert line.step(1.0, 2.0)[0] == first
+    assert line.advance(1.0, 2.0)[0] == first
     rover.mend()
-    assert line.step(1.0, 3.0)[0] != first
+    assert line.advance(1.0, 3.0)[0] != first
 
 
 def test_a_low_battery_is_low_at_once(rover: EmulatedRobot) -> None:

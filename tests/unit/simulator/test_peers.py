@@ -65,7 +65,7 @@ def test_a_document_is_in_the_order_of_the_driver_and_knows_the_robots_state(
 ) -> None:
     """Clients of gpsd look at the first key; `_major` is what the state calls `major`."""
     line = EmulatedRobot(profile_of(tmp_path, GREETING), {}).line("wire")
-    said = [one for one in line.step(1.0, 1.0) if isinstance(one, bytes)]
+    said = [one for one in line.advance(1.0, 1.0) if isinstance(one, bytes)]
     assert said == [b'{"class":"VERSION","release":"3.25","major":7}\n'] or said == [
         b'{"class":"VERSION","release":"3.25","major":7}\r'
     ]

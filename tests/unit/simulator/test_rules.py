@@ -73,7 +73,7 @@ def talk(line: EmulatedConnection, dialogue: list[tuple[object, list[bytes]]]) -
         else:
             assert isinstance(what, float)
             now_s += what
-            said = line.step(what, now_s)
+            said = line.advance(what, now_s)
         assert (what, said) == (what, expected)
 
 
@@ -228,7 +228,7 @@ def test_a_closing_rule_ends_the_connection(tmp_path: Path) -> None:
     assert line.receive(b"QUIT\nB?\n", 0.0) == [b"BYE\n"]
     assert line.is_over
     assert line.receive(b"B?\n", 0.0) == []
-    assert line.step(9.0, 9.0) == []
+    assert line.advance(9.0, 9.0) == []
 
 
 def test_time_changes_the_robot_once_however_many_look(tmp_path: Path) -> None:
@@ -239,10 +239,10 @@ def test_time_changes_the_robot_once_however_many_look(tmp_path: Path) -> None:
     first, second = robot.line("wire"), robot.line("wire")
     for now_s in (1.0, 2.0):
         for line in (first, second):
-            assert len(line.step(1.0, now_s)) == 2
+            assert len(line.advance(1.0, now_s)) == 2
     assert second.receive(b"B?\n", 2.0) == [b"B 48\n"]
     del first, line
-    second.step(1.0, 3.0)
+    second.advance(1.0, 3.0)
     assert second.receive(b"B?\n", 3.0) == [b"B 47\n"]
 
 
@@ -253,7 +253,7 @@ def test_answers_that_wait_are_bounded(tmp_path: Path) -> None:
     assert line.faults == 3
     assert "delayed replies wait already" in line.last_fault
     assert line.due_in_s == 1.0
-    assert line.step(1.0, 1.0) == [b"w\n"] * MOST_COURSES
+    assert line.advance(1.0, 1.0) == [b"w\n"] * MOST_COURSES
 
 
 ALL_FORMS = """
@@ -302,7 +302,7 @@ def test_nothing_that_a_client_says_breaks_the_robot(
     for name in ("wire", "pad"):
         line = robot_of_all_forms.line(name)
         for now_s, piece in enumerate(pieces):
-            said = [*line.receive(piece, float(now_s)), *line.step(0.5, float(now_s))]
+            said = [*line.receive(piece, float(now_s)), *line.advance(0.5, float(now_s))]
             assert all(isinstance(one, bytes) for one in said)
 
 
@@ -322,7 +322,7 @@ def test_messages_are_taken_and_answered_by_rules(tmp_path: Path) -> None:
     drive = Envelope("publish", {"topic": "/cmd_vel", "type": "t"}, {"linear": {"x": 0.25}})
     assert ros.receive(drive, 0.0) == []
     assert (web.faults, ros.faults) == (0, 0)
-    assert ros.step(1.0, 1.0) == [Envelope("message", {"topic": "/x"}, b'{"data":0.5}')]
+    assert ros.advance(1.0, 1.0) == [Envelope("message", {"topic": "/x"}, b'{"data":0.5}')]
     assert ros.receive(Envelope("publish", {"topic": "/other"}, {}), 0.0) == []
     assert ros.last_fault.startswith("no rule matches 'publish topic=/other")
 

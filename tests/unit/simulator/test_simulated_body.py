@@ -67,9 +67,9 @@ def test_a_command_moves_the_body_and_the_signals_follow(tmp_path: Path) -> None
     """An argument that is called like a signal of the world does not change that signal."""
     line = EmulatedRobot(profile_of(tmp_path, CART), {}).line("wire")
     assert line.receive(b"D 0.5\n", 0.0) == []
-    assert line.step(0.1, 0.2) == [b"X 0.1 0.5\n"]
+    assert line.advance(0.1, 0.2) == [b"X 0.1 0.5\n"]
     assert line.receive(b"D 0\n", 0.2) == []
-    assert line.step(0.1, 0.4) == [b"X 0.1 0\n"]
+    assert line.advance(0.1, 0.4) == [b"X 0.1 0\n"]
 
 
 def test_a_release_that_is_also_the_good_bye_stops_it(tmp_path: Path) -> None:
@@ -178,7 +178,7 @@ simulator:
       send: { publish: { topic: /x, type: std_msgs/Float32, json: { data: 0.5 } } }
 """
     line = EmulatedRobot(profile_of(tmp_path, text), {}).line("ros")
-    said = line.step(1.0, 1.0)
+    said = line.advance(1.0, 1.0)
     assert [(one.verb, one.attributes) for one in said if isinstance(one, Envelope)] == [
         ("message", {"topic": "/x"})
     ]

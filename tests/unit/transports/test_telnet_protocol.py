@@ -61,8 +61,8 @@ def test_what_is_agreed_is_not_answered_again() -> None:
 def test_answer_to_our_own_wish_is_not_answered() -> None:
     """We asked, they agree, that is all."""
     talk = client()
-    assert talk.ask(ours=(SGA,), theirs=(ECHO,)) == said(IAC, WILL, SGA, IAC, DO, ECHO)
-    assert talk.ask(ours=(SGA,)) == b""
+    assert talk.requests(ours=(SGA,), theirs=(ECHO,)) == said(IAC, WILL, SGA, IAC, DO, ECHO)
+    assert talk.requests(ours=(SGA,)) == b""
     assert talk.receive(said(IAC, DO, SGA, IAC, WONT, ECHO)) == (b"", b"")
     assert (talk.ours, talk.theirs) == (frozenset({SGA}), frozenset())
 
@@ -159,7 +159,7 @@ def test_two_ends_always_come_to_an_end(
 ) -> None:  # fmt: skip
     """Whatever both want at once: they fall silent, and agree about what is on."""
     a, b = client(ours=a_ours, theirs=a_theirs), client(ours=b_ours, theirs=b_theirs)
-    to_b, to_a = a.ask(ours=a1, theirs=a2), b.ask(ours=b1, theirs=b2)
+    to_b, to_a = a.requests(ours=a1, theirs=a2), b.requests(ours=b1, theirs=b2)
     for _ in range(10):
         (_, from_b), (_, from_a) = b.receive(to_b), a.receive(to_a)
         to_a, to_b = from_b, from_a

@@ -19,7 +19,7 @@ def message(topic: str, number: int) -> Envelope:
 
 def taken(inbox: TopicReceiveQueue, count: int) -> list[object]:
     async def take() -> list[object]:
-        return [(await inbox.take()).body for _ in range(count)]
+        return [(await inbox.pop()).body for _ in range(count)]
 
     return asyncio.run(take())
 

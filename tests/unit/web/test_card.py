@@ -55,7 +55,7 @@ def test_a_real_robot_is_shown_while_somebody_is_connected() -> None:
     ):
         assert line.receive_json()["t"] == "hello"
         assert client.portal is not None
-        client.portal.call(robot.say, "battery", 77)
+        client.portal.call(robot.set_reading, "battery", 77)
         assert client.get("/robots/puppet/card").json() == [["Battery", "77 %"]]
 
 

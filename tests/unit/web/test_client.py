@@ -151,7 +151,7 @@ async def scene(
 async def test_a_client_gets_hello_then_links_then_values() -> None:
     """What an index means comes before any index."""
     async with scene() as it:
-        it.robot.say("battery", 42)
+        it.robot.set_reading("battery", 42)
         await settle()
         assert [message["t"] for message in it.line.sent] == ["hello", "links", "v"]
         assert it.line.of_type("v")[0]["v"] == [42]
@@ -161,11 +161,11 @@ async def test_a_blocked_line_gets_only_the_newest_value() -> None:
     """While the kernel takes nothing, nothing is taken from the hub either."""
     async with scene() as it:
         it.line.free.clear()
-        it.robot.say("battery", 0)
+        it.robot.set_reading("battery", 0)
         await settle()
         before = len(it.line.of_type("v"))
         for level in range(1, 50):
-            it.robot.say("battery", level)
+            it.robot.set_reading("battery", level)
             await it.clock.advance(0.02)
         it.line.free.set()
         await settle()
@@ -257,9 +257,9 @@ async def test_too_many_messages_close_the_line() -> None:
 def test_the_allowance_comes_back_with_time() -> None:
     """A second's worth at once, then the rate."""
     allowance = TokenBucket(100, 0.0)
-    assert [allowance.take(0.0) for _ in range(101)] == [True] * 100 + [False]
-    assert [allowance.take(0.011) for _ in range(2)] == [True, False]
-    assert sum(allowance.take(100.0) for _ in range(500)) == 100
+    assert [allowance.allow(0.0) for _ in range(101)] == [True] * 100 + [False]
+    assert [allowance.allow(0.011) for _ in range(2)] == [True, False]
+    assert sum(allowance.allow(100.0) for _ in range(500)) == 100
 
 
 async def test_a_robot_that_is_not_ready_refuses_with_the_settings_names() -> None:

@@ -50,7 +50,7 @@ class Scene:
 
     def read(self, seat: OperatorSession) -> list[dict[str, Any]]:
         """Return what a screen is told now, beats apart."""
-        messages = [json.loads(text) for text in self.controls.take(seat)]
+        messages = [json.loads(text) for text in self.controls.changes(seat)]
         for message in messages:
             if message["t"] == "beat":
                 self.beats[seat.client.id] = message["n"]
@@ -58,7 +58,7 @@ class Scene:
 
     def say(self, seat: OperatorSession, verb: wire.Verb) -> None:
         """Want something of the controls."""
-        self.controls.hear(seat, wire.Drive(verb))
+        self.controls.handle(seat, wire.Drive(verb))
         self.read(seat)
 
     def tick(self, seat: OperatorSession, speed: Any = 0.5, command: str = "drive") -> None:
@@ -67,7 +67,7 @@ class Scene:
         self._numbers += 1
         epoch, echo = self.controls.desk.lease.state.epoch, self.beats.get(seat.client.id, 0)
         said = wire.Tick(command, epoch, self._numbers, echo, {"speed": speed})
-        self.controls.hear(seat, said)
+        self.controls.handle(seat, said)
 
 
 @asynccontextmanager
@@ -182,9 +182,9 @@ async def test_what_waits_is_forgotten_by_a_release_a_stop_and_a_page_that_goes(
             it.tick(ann, 0.2)
             it.tick(ann, 0.3)
             if end == "release":
-                it.controls.hear(ann, wire.Release("drive"))
+                it.controls.handle(ann, wire.Release("drive"))
             elif end == "stop":
-                it.controls.hear(ann, wire.Stop())
+                it.controls.handle(ann, wire.Stop())
             else:
                 it.controls.rise(ann)
             count = len(it.movers.texts)
@@ -215,13 +215,13 @@ async def test_a_refused_tick_is_told_unless_the_control_moves_all_the_same() ->
         await it.clock.advance(0.02)
         epoch = it.controls.desk.lease.state.epoch
         old = wire.Tick("drive", epoch, 0, it.beats["s1"])
-        it.controls.hear(ann, old)
+        it.controls.handle(ann, old)
         assert [message for message in it.read(ann) if message["t"] == "refused"] == []
         await it.clock.advance(1)
-        it.controls.hear(ann, old)
+        it.controls.handle(ann, old)
         (told,) = [message for message in it.read(ann) if message["t"] == "refused"]
         assert told["message"] == "it is not newer than the last one"
-        it.controls.hear(ann, wire.Tick("beep", epoch, 9, 9))
+        it.controls.handle(ann, wire.Tick("beep", epoch, 9, 9))
         (told,) = it.read(ann)
         assert told["message"] == "'beep' is not a held command of this robot"
 
@@ -231,10 +231,10 @@ async def test_a_hostile_page_makes_nothing_grow() -> None:
     async with scene() as it:
         ann = it.sit()
         for step in range(5000):
-            it.controls.hear(ann, wire.Tick(f"drive{step}", 1, step, 1))
-            it.controls.hear(ann, wire.Drive("ask"))
-            it.controls.hear(ann, wire.Drive("yes"))
-            it.controls.hear(ann, wire.Release(f"drive{step}"))
+            it.controls.handle(ann, wire.Tick(f"drive{step}", 1, step, 1))
+            it.controls.handle(ann, wire.Drive("ask"))
+            it.controls.handle(ann, wire.Drive("yes"))
+            it.controls.handle(ann, wire.Release(f"drive{step}"))
         assert len(ann.notices) <= 8
         assert len(ann.pending) + len(ann.paces) + len(ann.alarms) <= 6
 
@@ -244,7 +244,7 @@ async def test_a_silent_holder_loses_the_controls_and_a_request_is_granted() -> 
     async with scene() as it:
         ann, bob = it.sit(), it.sit()
         it.say(ann, "take")
-        it.controls.hear(bob, wire.Drive("ask", 3))
+        it.controls.handle(bob, wire.Drive("ask", 3))
         await it.clock.advance(3.1)
         assert it.controls.desk.lease.state.holder == bob.client
         await it.clock.advance(61)
@@ -264,7 +264,7 @@ async def test_the_audit_says_who_moved_what_and_why_it_stopped() -> None:
         it.tick(ann, 0.5)
         await it.clock.advance(0.05)
         it.tick(ann, 0.25)
-        it.controls.hear(ann, wire.Release("drive"))
+        it.controls.handle(ann, wire.Release("drive"))
         await settle()
         assert audited(it) == [
             "lease screen 1 has the controls",
@@ -287,7 +287,7 @@ async def test_the_audit_names_whoever_was_refused_and_why() -> None:
         it.say(ann, "take")
         it.tick(bob)
         it.say(bob, "force")
-        it.controls.hear(bob, wire.Tick("beep", 0, 1, 0, {}))
+        it.controls.handle(bob, wire.Tick("beep", 0, 1, 0, {}))
         it.controls.stop("vic")
         refused = [one for one in audited(it) if one.startswith("refused")]
         assert refused[0] == "refused screen 2 at 192.168.1.7 drive screen 1 has the controls"

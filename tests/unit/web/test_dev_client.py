@@ -85,7 +85,7 @@ async def test_traffic_and_notes_come_in_their_order() -> None:
     """With the line, the direction, and the bytes."""
     async with scene() as it:
         it.goes(b"ask\n", "sent")
-        it.robot.tell("no-match: nothing declared matches 'x'")
+        it.robot.log("no-match: nothing declared matches 'x'")
         it.goes(b"42\n")
         rows = await it.rows()
         assert [(row["kind"], row["line"], row["data"]) for row in rows] == [
@@ -127,10 +127,10 @@ def test_a_backlog_is_bounded_in_bytes_as_well() -> None:
     """A thousand pictures would be too much."""
     backlog = Backlog()
     for number in range(100):
-        backlog.put(TrafficRow(0, float(number), "received", "cam", data=bytes(40_000)))
+        backlog.push(TrafficRow(0, float(number), "received", "cam", data=bytes(40_000)))
     assert len(backlog) < 30
     assert backlog.first == 100 - len(backlog)
-    assert backlog.take()[-1].n == 99
+    assert backlog.pop()[-1].n == 99
 
 
 async def test_a_question_is_answered_with_its_number() -> None:
@@ -227,10 +227,10 @@ async def test_a_version_waits_while_somebody_drives(tmp_path: Path) -> None:
         assert desk.drive("s9", "take", it.clock.now()) == ""
         await settle()
         watch._next = with_commands("new")
-        assert not watch._go_on()
+        assert not watch._try_switch()
         desk.drive("s9", "leave", it.clock.now())
         await settle()
-        assert watch._go_on()
+        assert watch._try_switch()
         await settle()
         assert list(it.station.robot.profile.driver.commands) == ["new"]
         assert (watch.state, watch.told) == ("running", "was saved and is running now")
@@ -245,7 +245,7 @@ async def test_a_version_that_cannot_be_made_changes_nothing() -> None:
 
         watch = ProfileWatch(it.station, refuse, it.station.replace)
         watch._next = with_commands("new")
-        assert watch._go_on()
+        assert watch._try_switch()
         assert watch.state == "broken"
         assert "'x' is no number" in watch.told
         assert list(it.station.robot.profile.driver.commands) == ["old"]

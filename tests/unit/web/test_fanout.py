@@ -41,7 +41,7 @@ class Watcher:
             self.take()
 
     def take(self) -> None:
-        if frames := self.fanout.take(self.place):
+        if frames := self.fanout.frames_for(self.place):
             self.frames.append(frames)
 
     @property
@@ -63,7 +63,7 @@ def robot(clock: FakeClock) -> tuple[Hub, Fanout]:
 
 def put(hub: Hub, clock: FakeClock, **values: float) -> None:
     """Let readings arrive now."""
-    hub.put([Sample(name, value, clock.now()) for name, value in values.items()])
+    hub.publish([Sample(name, value, clock.now()) for name, value in values.items()])
 
 
 def test_a_frame_is_encoded_once_for_all_at_the_same_place() -> None:
@@ -143,8 +143,8 @@ def test_of_some_signals_every_reading_is_told(at_once: int) -> None:
     first = Watcher(fanout)
     fanout.flush()
     for begin in range(0, 40, at_once):
-        hub.put([Sample("a", value, clock.now()) for value in range(begin, begin + at_once)])
-        hub.put([Sample("b", begin, clock.now())])
+        hub.publish([Sample("a", value, clock.now()) for value in range(begin, begin + at_once)])
+        hub.publish([Sample("b", begin, clock.now())])
     fanout.flush()
     assert readings(first) == [([-1], {"0": 1}), ([*range(40)], {"0": 2})]
     assert first.values[-1]["b"] == 40 - at_once
@@ -181,12 +181,12 @@ def test_lines_of_the_log_are_never_lost_silently() -> None:
     hub, fanout = robot(clock)
     place = Place()
     for number in range(700):
-        hub.note(LogEntry(clock.now(), "info", "wire", f"line {number}"))
+        hub.log(LogEntry(clock.now(), "info", "wire", f"line {number}"))
     fanout.flush()
-    log = messages_in(fanout.take(place))[0]
+    log = messages_in(fanout.frames_for(place))[0]
     assert (log["first"], len(log["lines"])) == (200, 500)
     assert log["lines"][-1]["text"] == "line 699"
-    assert not fanout.take(place)
+    assert not fanout.frames_for(place)
 
 
 def test_lines_of_the_log_come_while_values_stream() -> None:
@@ -197,7 +197,7 @@ def test_lines_of_the_log_come_while_values_stream() -> None:
     put(hub, clock, a=1)
     fanout.flush()
     for value in (2, 3):
-        hub.note(LogEntry(clock.now(), "warning", "wire", f"line {value}"))
+        hub.log(LogEntry(clock.now(), "warning", "wire", f"line {value}"))
         put(hub, clock, a=value)
         fanout.flush()
     said = [[message["t"] for message in messages_in(frames)] for frames in client.frames]
@@ -219,8 +219,8 @@ def test_a_newcomer_gets_the_last_lines_of_the_log() -> None:
     clock = FakeClock()
     hub, fanout = robot(clock)
     for number in range(80):
-        hub.note(LogEntry(clock.now(), "info", "wire", f"line {number}"))
-    log = messages_in(fanout.take(Watcher(fanout).place))[0]
+        hub.log(LogEntry(clock.now(), "info", "wire", f"line {number}"))
+    log = messages_in(fanout.frames_for(Watcher(fanout).place))[0]
     assert (log["first"], len(log["lines"])) == (30, 50)
 
 

@@ -25,7 +25,7 @@ class Line:
 def made(line: Line) -> SocketFlow:
     """Return the flow of a line."""
     flow = SocketFlow()
-    flow.made(cast(Any, line))
+    flow.connected(cast(Any, line))
     return flow
 
 

@@ -37,10 +37,10 @@ async def test_a_server_that_was_held_up_says_no_stop_twice() -> None:
         it.tick(ann)
         await it.clock.hold_up(0.9)
         assert it.movers.texts == ["drive speed=0.5", "drive stop"]
-        it.controls.hear(ann, wire.Release("drive"))
+        it.controls.handle(ann, wire.Release("drive"))
         it.say(ann, "take")
         it.tick(ann)
-        it.controls.hear(ann, wire.Release("drive"))
+        it.controls.handle(ann, wire.Release("drive"))
         await settle()
         for _ in range(3):
             await it.clock.hold_up(0.9)

@@ -25,12 +25,12 @@ async def test_one_job_at_a_time_and_it_can_be_given_up(tmp_path: Path) -> None:
     job = jobs.begin(FileSource("dial.zip", [dial], [dial.manifest.key]))
     with pytest.raises(Busy, match="is under way"):
         jobs.begin(FileSource("dial.zip", [dial], [dial.manifest.key]))
-    jobs.give_up(job.number)
+    jobs.cancel(job.number)
     assert job.news().state == "cancelled"
     with pytest.raises(Busy, match="no job waits for approval"):
         await jobs.agree(job.number)
     with pytest.raises(Busy, match="another page"):
-        jobs.give_up(job.number + 1)
+        jobs.cancel(job.number + 1)
     await jobs.close()
     assert store.installed() == ()
 
@@ -64,7 +64,7 @@ async def test_a_stalled_repository_holds_up_nobody(tmp_path: Path) -> None:
     try:
         assert await to_thread.run_sync(stalled.asked.wait, 10)
         assert job.news().line.startswith("fetching widgets/dial 1.0.0")
-        jobs.give_up(job.number)
+        jobs.cancel(job.number)
         assert job.news().state == "cancelled"
         other = package("widget", "lamp")
         second = jobs.begin(FileSource("lamp.zip", [other], [other.manifest.key]))

@@ -70,13 +70,13 @@ async def test_what_moves_by_itself_is_refused_while_somebody_else_drives() -> N
     """Whoever has the controls may give it."""
     async with scene(commands=FOLD) as it:
         other = it.station.controls.sit("10.0.0.7", "driver", lambda: None)
-        it.station.controls.hear(other, Drive("take"))
+        it.station.controls.handle(other, Drive("take"))
         it.line.say({"t": "run", "id": 1, "command": "fold"})
         it.line.say({"t": "run", "id": 2, "command": "ask"})
         await settle()
         assert refusals(it.line) == ["screen 2 at 10.0.0.7 has the controls"]
         assert [name for name, _ in it.robot.commands] == ["ask"]
-        it.station.controls.hear(other, Drive("leave"))
+        it.station.controls.handle(other, Drive("leave"))
         it.line.say({"t": "drive", "verb": "take"})
         it.line.say({"t": "run", "id": 3, "command": "fold"})
         await settle()
@@ -108,7 +108,7 @@ async def test_what_moves_for_some_values_is_refused_for_those_while_somebody_el
     command = Command("steer", "wire", text, {"mode": mode}, moves=True, moves_if=moves_if)
     async with scene(commands={"steer": command}) as it:
         other = it.station.controls.sit("10.0.0.7", "driver", lambda: None)
-        it.station.controls.hear(other, Drive("take"))
+        it.station.controls.handle(other, Drive("take"))
         for number, given in enumerate((4, 10, 10.0, "fast")):
             it.line.say(
                 {"t": "run", "id": number, "command": "steer", "arguments": {"mode": given}}

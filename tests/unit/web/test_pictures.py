@@ -96,24 +96,26 @@ def test_who_was_away_gets_the_newest_and_no_other() -> None:
     hub, shelf, clock = robot()
     looks = looking_at("left")
     for data in (b"one", b"two", b"three"):
-        hub.put([Sample("left", data, clock.now())])
-    made = shelf.take(looks)
+        hub.publish([Sample("left", data, clock.now())])
+    made = shelf.next_image(looks)
     assert made is not None
     assert made.frame.endswith(b"three")
-    assert shelf.take(looks) is None
-    hub.put([Sample("left", b"three", clock.now())])  # the same bytes are news: they are younger
-    assert shelf.take(looks) is not None
+    assert shelf.next_image(looks) is None
+    hub.publish(
+        [Sample("left", b"three", clock.now())]
+    )  # the same bytes are news: they are younger
+    assert shelf.next_image(looks) is not None
 
 
 async def test_an_image_is_encoded_once_for_all_who_take_it_soon() -> None:
     """Later ones get its age of then."""
     hub, shelf, clock = robot()
-    hub.put([Sample("left", JPEG, clock.now())])
-    one, two = shelf.take(looking_at("left")), shelf.take(looking_at("left"))
+    hub.publish([Sample("left", JPEG, clock.now())])
+    one, two = shelf.next_image(looking_at("left")), shelf.next_image(looking_at("left"))
     assert one is not None
     assert one is two
     await clock.advance(SHARED_FOR_S + 0.01)
-    three = shelf.take(looking_at("left"))
+    three = shelf.next_image(looking_at("left"))
     assert three is not None
     assert three.number == one.number
     assert three.frame != one.frame
@@ -125,8 +127,8 @@ def test_two_cameras_take_turns_however_fast_one_is() -> None:
     looks = looking_at("left", "right")
     order = []
     for _ in range(4):
-        hub.put([Sample("left", b"L", clock.now()), Sample("right", b"R", clock.now())])
-        made = shelf.take(looks)
+        hub.publish([Sample("left", b"L", clock.now()), Sample("right", b"R", clock.now())])
+        made = shelf.next_image(looks)
         assert made is not None
         order.append(made.sample.signal)
     assert order == ["left", "right", "left", "right"]
@@ -135,20 +137,20 @@ def test_two_cameras_take_turns_however_fast_one_is() -> None:
 def test_nobody_gets_what_is_no_image_or_is_not_there() -> None:
     """Names come from a page: any text may be among them."""
     hub, shelf, clock = robot()
-    hub.put([Sample("a", 1.0, clock.now()), Sample("right", None, clock.now())])
-    assert shelf.take(looking_at("a", "left", "right", "__proto__", "")) is None
+    hub.publish([Sample("a", 1.0, clock.now()), Sample("right", None, clock.now())])
+    assert shelf.next_image(looking_at("a", "left", "right", "__proto__", "")) is None
 
 
 def test_a_camera_that_is_shown_again_is_sent_again() -> None:
     """The page may have thrown its image away meanwhile."""
     hub, shelf, clock = robot()
-    hub.put([Sample("left", JPEG, clock.now())])
+    hub.publish([Sample("left", JPEG, clock.now())])
     looks = looking_at("left")
-    assert shelf.take(looks) is not None
+    assert shelf.next_image(looks) is not None
     looks.show(())
-    assert shelf.take(looks) is None
+    assert shelf.next_image(looks) is None
     looks.show(("left",))
-    assert shelf.take(looks) is not None
+    assert shelf.next_image(looks) is not None
 
 
 def test_images_are_no_part_of_the_frames_of_values() -> None:
@@ -157,13 +159,13 @@ def test_images_are_no_part_of_the_frames_of_values() -> None:
     hub = Hub({"a": Signal("a"), "left": Signal("left", "image")})
     fanout = Fanout(hub, clock=clock)
     place = Place()
-    hub.put([Sample("a", 1.0, clock.now()), Sample("left", JPEG, clock.now())])
+    hub.publish([Sample("a", 1.0, clock.now()), Sample("left", JPEG, clock.now())])
     fanout.flush()
-    (frame,) = values_in(fanout.take(place))
+    (frame,) = values_in(fanout.frames_for(place))
     assert frame["i"] == [0]
-    hub.put([Sample("left", None, clock.now())])
+    hub.publish([Sample("left", None, clock.now())])
     fanout.flush()
-    (frame,) = values_in(fanout.take(place))
+    (frame,) = values_in(fanout.frames_for(place))
     assert (frame["i"], frame["v"]) == ([1], [None])
 
 
@@ -185,7 +187,7 @@ async def test_a_slow_line_drops_images_and_costs_nobody_else_any() -> None:
         await settle()
         slow.free.clear()
         for number in range(20):
-            robot.say("cam", b"image %d." % number)
+            robot.set_reading("cam", b"image %d." % number)
             await clock.advance(0.05)
         got = [frame[frame.rindex(b"image ") :] for frame in quick.frames]
         assert got == [b"image %d." % number for number in range(20)]
@@ -197,7 +199,7 @@ async def test_a_slow_line_drops_images_and_costs_nobody_else_any() -> None:
         # Shown no more: nothing comes, and the values go on.
         quick.say({"t": "show", "signals": []})
         await settle()
-        robot.say("cam", b"image 20.")
+        robot.set_reading("cam", b"image 20.")
         await clock.advance(0.05)
         assert len(quick.frames) == 20
     finally:

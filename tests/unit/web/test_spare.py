@@ -51,7 +51,7 @@ class Doubled(Scene):
         """Let it come on the first one."""
         words = {name: value for name, value in message.items() if name != "t"}
         kinds = {"tick": wire.Tick, "release": wire.Release, "stop": wire.Stop}
-        self.controls.hear(self.ann, kinds[message["t"]](**words))
+        self.controls.handle(self.ann, kinds[message["t"]](**words))
         await settle()
 
 

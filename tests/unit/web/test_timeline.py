@@ -22,7 +22,7 @@ from urc.web.fleet.robots import Robot
 def client(tmp_path: Path) -> Iterator[TestClient]:
     with AuditLog(tmp_path / "audit.sqlite") as log:
         for number in range(5):
-            log.note(
+            log.add(
                 AuditEntry(1000.0 + number, "rover" if number % 2 else "puppet", "moved", "Ann")
             )
         yield asking(log)

@@ -68,7 +68,7 @@ class Expander:
                 order[name] = None
                 continue
             for copy in self._copies(inner, (*path, name), name, names):
-                self._take(made, copy, (*path, name))
+                self._expand_copy(made, copy, (*path, name))
                 order[str(copy.name)] = None
         result: dict[str | int, Tree] = {}
         for name in order:
@@ -92,7 +92,7 @@ class Expander:
                 continue
             for copy in self._copies(inner, (*path, place), item_name(inner.value), names):
                 if copy.name is not None:
-                    self._take(made, copy, (*path, place))
+                    self._expand_copy(made, copy, (*path, place))
                 items.append(copy)
         given = [copy for copy in items if copy.name is None and item_name(copy.tree.value) in made]
         for _, inner in given:
@@ -104,7 +104,7 @@ class Expander:
         }
         return Tree([copy.tree.value for copy in items], tree.mark.copy(marks), tree.home)
 
-    def _take(self, made: dict[str, Tree], copy: _Copy, path: Path) -> None:
+    def _expand_copy(self, made: dict[str, Tree], copy: _Copy, path: Path) -> None:
         name = str(copy.name)
         if name in made:
             self.findings.error(

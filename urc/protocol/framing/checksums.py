@@ -39,7 +39,7 @@ class Checksum:
         if right is not None:
             self.compare(frame[place : place + self.size], right)
 
-    def put(self, frame: bytearray) -> None:
+    def write(self, frame: bytearray) -> None:
         """Write the checksum into its place; raise `BadFrame` if the frame has no such place."""
         place = self._place(frame)
         right = self.right(frame, self._window(frame, place))

@@ -217,7 +217,7 @@ class _LengthDecoder(StreamDecoder):
                 return fault
             if len(stream) < len(self._start):
                 return None
-            verdict = self._take()
+            verdict = self._read()
             if verdict is None:
                 return None
             if verdict:
@@ -228,7 +228,7 @@ class _LengthDecoder(StreamDecoder):
                 return found
         return None
 
-    def _take(self) -> tuple[str, ...] | None:
+    def _read(self) -> tuple[str, ...] | None:
         """Process bytes until the frame is complete; return (), None if incomplete, or an error."""
         stream, plain, start = self._stream, self._plain, self._start
         inner = len(start)
@@ -245,7 +245,7 @@ class _LengthDecoder(StreamDecoder):
             byte = stream.data[stream.at + self._taken]
             self._taken += 1
             is_mark = start[:1] == bytes((byte,)) and byte in self._stuffing.spec.table
-            if is_mark or not plain.take(byte):
+            if is_mark or not plain.feed(byte):
                 return "bad-stuffing", "a frame has invalid byte stuffing; skipped"
 
     def _ending(self) -> tuple[str, ...] | None:

@@ -133,9 +133,9 @@ class FrameCodec:
         if end:
             frame[len(frame) - len(end) :] = end
         if isinstance(self.length, LengthField):
-            self.length.put(frame, len(frame) - layout.tail)
+            self.length.write(frame, len(frame) - layout.tail)
         for checksum in self._checksums:
-            checksum.put(frame)
+            checksum.write(frame)
         return self._spelt(bytes(frame)) if self._is_text else bytes(frame)
 
     def _read(self, frame: bytes) -> bytes:
@@ -211,7 +211,7 @@ class LengthField:
                 return -1
         return number * spec.unit + spec.adjust
 
-    def put(self, frame: bytearray, stop: int) -> None:
+    def write(self, frame: bytearray, stop: int) -> None:
         """Write the size of `frame` into it, before the place `stop`.
 
         Raises:

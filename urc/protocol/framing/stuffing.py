@@ -83,7 +83,7 @@ class Unstuffer:
         self._tail = b""
         """Newest bytes, as many as the sequence before an inserted byte."""
 
-    def take(self, byte: int) -> bool:
+    def feed(self, byte: int) -> bool:
         """Process one byte; return False when it is invalid here."""
         spec = self._stuffing.spec
         if spec.after:

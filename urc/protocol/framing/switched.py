@@ -122,20 +122,20 @@ class _SwitchDecoder(StreamDecoder):
             found = self._active.next(now)
             if found is None:
                 return None
-            told = self._told(found)
+            told = self._end_case(found)
             if told is not None:
                 return told
 
     def tick(self, now: float) -> list[bytes | FrameFault]:
         if self._active is None:
             return []
-        told = [self._told(found) for found in self._active.tick(now)]
+        told = [self._end_case(found) for found in self._active.tick(now)]
         frames = [one for one in told if one is not None]
         while (frame := self.next(now)) is not None:
             frames.append(frame)
         return frames
 
-    def _told(self, found: bytes | FrameFault) -> bytes | FrameFault | None:
+    def _end_case(self, found: bytes | FrameFault) -> bytes | FrameFault | None:
         """Leave the case after `found`; return None for a violation that was already reported."""
         self._active = None
         if isinstance(found, bytes):

@@ -86,7 +86,7 @@ class _PatientDecoder:
 
     def push(self, data: bytes, now: float = 0.0) -> None:
         """Append bytes for `next`."""
-        self._give_up(now)
+        self._discard(now)
         if self._framing.strips_ansi:
             data = self._stripped(data)
         self._decoder.push(data, now)
@@ -103,11 +103,11 @@ class _PatientDecoder:
     def tick(self, now: float) -> list[bytes | FrameFault]:
         """Return the frames that the silence until `now` has completed or released."""
         frames = self._decoder.tick(now)
-        self._give_up(now)
+        self._discard(now)
         told, self._told = self._told, []
         return told + frames
 
-    def _give_up(self, now: float) -> None:
+    def _discard(self, now: float) -> None:
         """Drop the beginning of a stalled frame; record the frames after it."""
         timeout, stream = self._framing.timeout_s, self._stream
         if timeout is None or self._newest is None or now < self._newest + timeout:

@@ -26,7 +26,7 @@ class DataChangeFilter:
         """Time at which `tick` has a sample to report."""
         return None if self._pending is None else self._since + self._settle_s
 
-    def take(self, sample: Sample, now: float) -> Sample | None:
+    def filter(self, sample: Sample, now: float) -> Sample | None:
         """Return the sample to report: the new one, an update of the last one, or None."""
         told = self._told
         if told is not None and sample.alarm == told.alarm and self._is_same(sample, told):
@@ -34,7 +34,7 @@ class DataChangeFilter:
             self._told = sample._replace(value=told.value)
             return self._told
         if told is None or not self._settle_s:
-            return self._tell(sample)
+            return self._report(sample)
         if self._pending is None or not self._is_same(sample, self._pending):
             self._since = now
         self._pending = sample
@@ -45,9 +45,9 @@ class DataChangeFilter:
         due = self.deadline
         if self._pending is None or due is None or now < due:
             return None
-        return self._tell(self._pending)
+        return self._report(self._pending)
 
-    def _tell(self, sample: Sample) -> Sample:
+    def _report(self, sample: Sample) -> Sample:
         self._pending = None
         self._told = sample
         return sample

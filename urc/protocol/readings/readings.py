@@ -83,7 +83,7 @@ class Readings:
                     refused.append(f"{name}: {error}")
                 else:
                     sample = Sample(name, value, now, self.alarm(name, value, now))
-                    told = self._told(sample, now) if self._steady else sample
+                    told = self._report(sample, now) if self._steady else sample
                     if told is not None:
                         samples.append(told)
             if self._kept:
@@ -92,7 +92,9 @@ class Readings:
 
         return decode
 
-    def put(self, values: Mapping[str, object], now: float) -> tuple[list[Sample], list[str]]:
+    def set_values(
+        self, values: Mapping[str, object], now: float
+    ) -> tuple[list[Sample], list[str]]:
         """Convert values from another source than a frame, as a decoder converts fields."""
         return self.decoder(values)(values, now)
 
@@ -146,7 +148,7 @@ class Readings:
         changed = set()
         for taken in samples:
             if taken.signal in self._kept:
-                self._keep(taken)
+                self._store(taken)
                 changed.add(taken.signal)
         for computed in self._computed:
             if changed.isdisjoint(computed.inputs):
@@ -157,18 +159,18 @@ class Readings:
                 refused.append(f"{computed.name}: {error}")
                 continue
             if sample is not None and self._steady:
-                sample = self._told(sample, now)
+                sample = self._report(sample, now)
             if sample is not None:
                 samples.append(sample)
-                self._keep(sample)
+                self._store(sample)
                 changed.add(computed.name)
 
-    def _told(self, sample: Sample, now: float) -> Sample | None:
+    def _report(self, sample: Sample, now: float) -> Sample | None:
         """Return the sample to report; None while dead band or debounce suppress it."""
         steady = self._steady.get(sample.signal)
-        return sample if steady is None else steady.take(sample, now)
+        return sample if steady is None else steady.filter(sample, now)
 
-    def _keep(self, sample: Sample) -> None:
+    def _store(self, sample: Sample) -> None:
         if sample.signal in self._kept:
             self._last[sample.signal] = sample
             self._namespace[sample.signal] = sample.value

@@ -29,7 +29,7 @@ class SignalState:
         self.latched = reason
         self.stops += reason != ""
 
-    def take(self, samples: Iterable[Sample]) -> None:
+    def update(self, samples: Iterable[Sample]) -> None:
         """Keep new readings."""
         for sample in samples:
             self._last[sample.signal] = sample

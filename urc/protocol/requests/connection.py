@@ -82,7 +82,7 @@ class Connection:
         )
         self._reset("open")
         self.last_sent = now
-        self._hear(now)
+        self._read_frames(now)
         if not self.spec.on_connect:
             self._get_ready()
         return events + self._pump(now)
@@ -109,7 +109,7 @@ class Connection:
         events += self._lose(reason or "the robot closed the connection")
         return events + self._pump(now)
 
-    def give_up(self, reason: str, now: float) -> list[LineEvent]:
+    def fail(self, reason: str, now: float) -> list[LineEvent]:
         """Close the connection for a reason; its requests fail."""
         if self.state == "closed":
             return []
@@ -168,9 +168,9 @@ class Connection:
         self.learnt = {}
         self._askers.clear()
         if state == "open":
-            self.counters.begin()
+            self.counters.reset()
 
-    def _hear(self, now: float) -> None:
+    def _read_frames(self, now: float) -> None:
         if self.spec.stale_after_s is not None:
             self._silent_at = now + self.spec.stale_after_s
 

@@ -133,7 +133,7 @@ class Conversation(Connection):
             return [
                 ExchangeEnded(exchange, ExchangeOutcome("bad-argument", f"{text} (queue.bytes)"))
             ]
-        gone = self._outbox.take(exchange)
+        gone = self._outbox.submit(exchange)
         events: list[LineEvent] = [] if gone is None else [ExchangeEnded(*gone)]
         return events + self._pump(now)
 
@@ -260,14 +260,14 @@ class Conversation(Connection):
         if ear.answer.framing is None:
             return []
         self._may_recut = True
-        return self.go_on(now) if self.inbox.has_more else []
+        return self.process_frames(now) if self.inbox.has_more else []
 
     def receive(self, data: Payload, now: float) -> list[LineEvent]:
         """Process bytes or an envelope from the transport."""
         if self.state != "open":
             return []
         if self.spec.stale_after_s is not None:
-            self._hear(now)
+            self._read_frames(now)
         if isinstance(data, Envelope):
             told = self._envelope(data, now)
             self.is_behind = self.is_open and bool(told)
@@ -275,9 +275,9 @@ class Conversation(Connection):
         if self._may_recut:
             self._recut()
         self.inbox.decoder.push(data, now)
-        return self.go_on(now)
+        return self.process_frames(now)
 
-    def go_on(self, now: float) -> list[LineEvent]:
+    def process_frames(self, now: float) -> list[LineEvent]:
         """Process received frames, up to the first that a sequence may have waited for.
 
         Later frames may belong to the next step, which has to register its expectation first.
@@ -302,7 +302,7 @@ class Conversation(Connection):
         # Queued requests may depend on the new samples, so process these first.
         self.is_behind = bool(events) and bool(self._outbox)
         if inbox.is_prompted:
-            events += inbox.look()
+            events += inbox.find_prompt()
         return events + self._pump(now) if self._outbox or self.is_per_request else events
 
     def _ahead(self, now: float) -> list[LineEvent]:
@@ -326,7 +326,7 @@ class Conversation(Connection):
         for payload in decoder.ahead():
             frame = Frame(payload, self.spec.encoding)
             answer = None if reply is None else reply.take(frame, now)
-            taken = answer or inbox.messages.take(frame, now)
+            taken = answer or inbox.messages.decode(frame, now)
             if taken is None:
                 break
             count, size = count + 1, size + len(payload)
@@ -337,7 +337,7 @@ class Conversation(Connection):
             if refused:
                 break
         decoder.skip(count, size)
-        events = inbox.told(samples, refused) if count > (answer is not None) else []
+        events = inbox.events_of(samples, refused) if count > (answer is not None) else []
         if flight is not None and answer is not None:
             events += self._answered(flight, answer, now)
         return events
@@ -374,7 +374,7 @@ class Conversation(Connection):
     def _frame(self, cut: bytes | FrameFault, now: float) -> list[LineEvent]:
         if isinstance(cut, FrameFault):
             fault = Violation(self.spec.name, cut.code, cut.message)
-            return [fault, *self.give_up(cut.message, now)] if cut.closes else [fault]
+            return [fault, *self.fail(cut.message, now)] if cut.closes else [fault]
         frame = Frame(cut, self.spec.encoding)
         is_motion = self.held.is_listening(now)
         plain = self._flights.plain() if self._flights and not is_motion else None
@@ -390,7 +390,7 @@ class Conversation(Connection):
             if message is not None:
                 return message
         of_motion = self._of_motion(frame, now) if is_motion else None
-        return self.inbox.tell(frame, now) if of_motion is None else of_motion
+        return self.inbox.publish(frame, now) if of_motion is None else of_motion
 
     def _plain(self, flight: PendingReply, frame: Frame, now: float) -> list[LineEvent]:
         """Process a frame while the only pending reply consists of samples.
@@ -400,14 +400,14 @@ class Conversation(Connection):
         matcher = flight.exchange.ask.plain
         taken = None if matcher is None else matcher.take(frame, now)
         if taken is None:
-            return self.inbox.tell(frame, now)
+            return self.inbox.publish(frame, now)
         return self._answered(flight, taken, now)
 
     def _answered(self, flight: PendingReply, taken: Taken, now: float) -> list[LineEvent]:
         self._misses = 0
         self._flights.clear()
         samples, refused = taken
-        events = self.inbox.told(samples, refused)
+        events = self.inbox.events_of(samples, refused)
         values = {sample.signal: sample.value for sample in samples}
         events.append(new(ExchangeEnded, (flight.exchange, new(ExchangeOutcome, ("", "", values)))))
         return events + self.leave(now) if self.is_per_request and self.is_ready else events
@@ -422,7 +422,7 @@ class Conversation(Connection):
         if answered:
             return self._answer(*answered, frame, now)
         told = self._of_motion(frame, now) if self.held.is_listening(now) else None
-        return self.inbox.tell(frame, now) if told is None else told
+        return self.inbox.publish(frame, now) if told is None else told
 
     def _response(self, envelope: Envelope, frame: Frame, now: float) -> list[LineEvent]:
         attributes = envelope.attributes
@@ -538,7 +538,7 @@ class Conversation(Connection):
         else:
             told, samples = self.inbox.samples(flight.ear.answer.matcher, offer.fields, now)
             events += told
-            flight.take(offer.fields, samples)
+            flight.add(offer.fields, samples)
             if flight.next_stage(now):
                 return events
             outcome = ExchangeOutcome(values=flight.values)
@@ -587,9 +587,9 @@ class Conversation(Connection):
             if self.is_per_request and exchange.ask.learnt:
                 exchange.data = None  # the next connection has a login of its own
             self._outbox.put_back(exchange)
-            return events + self.give_up(text, now) if self.is_per_request else events
+            return events + self.fail(text, now) if self.is_per_request else events
         events.append(ExchangeEnded(exchange, ExchangeOutcome("timed-out", text)))
         self._misses += not exchange.ask.is_miss_harmless
         if self.is_per_request or self._misses >= MISSES_UNTIL_CLOSED:
-            events += self.give_up(text, now)
+            events += self.fail(text, now)
         return events

@@ -96,7 +96,7 @@ class CompiledRequest(NamedTuple):
     is_numbered: bool = False
     """Whether it is an envelope with a number, which its reply repeats."""
 
-    def made(self, names: Mapping[str, object]) -> Payload | None:
+    def render(self, names: Mapping[str, object]) -> Payload | None:
         """Return the payload, or None if it is rendered when it is sent.
 
         Raises:

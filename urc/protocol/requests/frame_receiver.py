@@ -120,7 +120,7 @@ class FrameReceiver:
         self.is_timed = getattr(type(self.decoder), "deadline", None) is not StreamDecoder.deadline
         """Whether a timeout alone may complete a frame."""
 
-    def tell(self, frame: Frame, now: float) -> list[LineEvent]:
+    def publish(self, frame: Frame, now: float) -> list[LineEvent]:
         """Return the events of a frame that is no reply."""
         heard = self._listeners(frame, now) if self._ears else None
         told = self.message(frame, now)
@@ -157,7 +157,7 @@ class FrameReceiver:
         """Look for `pattern` in the text after the last whole frame, for `ear`."""
         self._prompt = (pattern, ear)
         self.is_listening = True
-        return self.look()
+        return self.find_prompt()
 
     def unlisten(self, ear: Expectation) -> None:
         """Remove an expectation."""
@@ -171,7 +171,7 @@ class FrameReceiver:
         """Whether an expectation waits for a prompt."""
         return self._prompt is not None
 
-    def look(self) -> list[LineEvent]:
+    def find_prompt(self) -> list[LineEvent]:
         """Look for the expected prompt."""
         if self._prompt is None:
             return []
@@ -188,17 +188,17 @@ class FrameReceiver:
 
     def message(self, frame: Frame, now: float) -> list[LineEvent] | None:
         """Return the events of a declared message, or None for other frames."""
-        taken = self.messages.take(frame, now)
-        return None if taken is None else self.told(*taken)
+        taken = self.messages.decode(frame, now)
+        return None if taken is None else self.events_of(*taken)
 
     def _listeners(self, frame: Frame, now: float) -> list[LineEvent] | None:
         for ear in self._ears:
             offer = ear.offer(frame)
             if offer is not None:
-                return self._said(ear, offer, now)
+                return self._match(ear, offer, now)
         return None
 
-    def _said(self, ear: Expectation, offer: MatchResult, now: float) -> list[LineEvent]:
+    def _match(self, ear: Expectation, offer: MatchResult, now: float) -> list[LineEvent]:
         """Return the events of a frame that matches an expectation."""
         events: list[LineEvent] = self.dropped(offer)
         if offer.fields is not None:
@@ -228,7 +228,7 @@ class FrameReceiver:
             offer = MatchResult(refusal=refusal)
         if offer is None:
             offer = MatchResult(refusal=f"its reply does not match the declaration: {shown(frame)}")
-        return self._said(ear, offer, now)
+        return self._match(ear, offer, now)
 
     def dropped(self, offer: MatchResult) -> list[LineEvent]:
         """Return the events for collected lines that were no reply."""
@@ -256,9 +256,9 @@ class FrameReceiver:
     ) -> tuple[list[LineEvent], list[Sample]]:
         """Return the events for the fields of a frame, and their samples."""
         samples, refused = matcher.decode(found, now)
-        return self.told(samples, refused), samples
+        return self.events_of(samples, refused), samples
 
-    def told(self, samples: list[Sample], refused: Sequence[str]) -> list[LineEvent]:
+    def events_of(self, samples: list[Sample], refused: Sequence[str]) -> list[LineEvent]:
         """Return the events for samples and refused values.
 
         A valid frame without values gives an event, too: it shows that the robot is alive.

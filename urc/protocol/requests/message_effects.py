@@ -40,7 +40,7 @@ class Collector:
         self._parts = [] if self._spec.begin is None else None
         self._size = 0
 
-    def take(self, names: Mapping[str, object]) -> object:
+    def add(self, names: Mapping[str, object]) -> object:
         """Process the fields of a frame; return the complete value, or None."""
         spec, whole = self._spec, None
         if spec.begin is not None and _holds(spec.begin, names):
@@ -93,7 +93,7 @@ def collecting(
         names = {"settings": settings, **found}
         fields = dict(found)
         for name, collector in collectors.items():
-            whole = collector.take(names)
+            whole = collector.add(names)
             if whole is not None:
                 fields[name] = whole
         return decode(fields, now)

@@ -18,7 +18,7 @@ class Messages:
     def __init__(self, declared: Sequence[Matcher]) -> None:
         self.declared = tuple(declared)
 
-    def take(self, frame: Frame, now: float) -> Taken | None:
+    def decode(self, frame: Frame, now: float) -> Taken | None:
         """Return the samples and refused values of a frame, or None when it is no message.
 
         `Frame.fault` is set when a message recognised the frame but rejected its content.

@@ -109,7 +109,7 @@ class PendingReply:
         self.due = now + answers[self.stage].timeout_s
         return True
 
-    def take(self, fields: Fields, samples: list[Sample]) -> None:
+    def add(self, fields: Fields, samples: list[Sample]) -> None:
         """Keep the samples and private fields of a reply."""
         for name, raw in fields.items():
             if name.startswith("_"):

@@ -36,7 +36,7 @@ class GcraLimiter:
         """Earliest time of the next call."""
         return self._next_s - self._period_s
 
-    def take(self, now: float) -> None:
+    def count(self, now: float) -> None:
         """Count one call."""
         self._next_s = max(self._next_s, now) + self._period_s
 
@@ -111,7 +111,7 @@ class Counters:
         if self.counted is not None:
             self.counted()
 
-    def told(self, stand: Mapping[str, int], *, is_settled: bool) -> None:
+    def set_counters(self, stand: Mapping[str, int], *, is_settled: bool) -> None:
         """Update shared counters with confirmed values.
 
         Args:
@@ -153,7 +153,7 @@ class Counters:
         place = next((at for at, one in enumerate(made) if one == key), most)
         return place + self.ahead < most
 
-    def begin(self) -> None:
+    def reset(self) -> None:
         """Reset the counters for a new connection. Shared counters wait for their confirmation."""
         if not self.is_shared:
             self._last = self._known = {}
@@ -183,7 +183,7 @@ class PriorityQueue(list[Item]):
         super().__init__()
         self._depth = depth
 
-    def put(self, item: Item) -> Item | None:
+    def push(self, item: Item) -> Item | None:
         """Add `item`; return the item that was displaced, possibly `item` itself."""
         if item.latest_key:
             for place, other in enumerate(self):

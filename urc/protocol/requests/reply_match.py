@@ -198,7 +198,7 @@ class Expectation:
 class ExpectationOwner(Protocol):
     """The owner of an expectation."""
 
-    def heard(self, ear: Expectation, offer: MatchResult, now: float) -> None:
+    def matched(self, ear: Expectation, offer: MatchResult, now: float) -> None:
         """Process the match result."""
 
 

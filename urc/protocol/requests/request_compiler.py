@@ -92,7 +92,7 @@ class RequestCompiler:
 
     def command(self, command: Command) -> CompiledRequest:
         """Return the compiled request of a command."""
-        ask = self._ask(
+        ask = self._compile(
             command.name, command.transport, command.send, command.reply, command.arguments
         )
         return ask._replace(
@@ -107,14 +107,14 @@ class RequestCompiler:
 
     def poll(self, poll: Poll, label: str) -> CompiledRequest:
         """Return the compiled request of a poll."""
-        ask = self._ask(label, poll.transport, poll.send, poll.reply)
+        ask = self._compile(label, poll.transport, poll.send, poll.reply)
         return ask._replace(rank=RANKS[poll.priority], is_miss_harmless=poll.offline is not None)
 
     def plain(self, label: str, transport: str, send: WriteSpec) -> CompiledRequest:
         """Return a request that expects no reply."""
-        return self._ask(label, transport, send, None)
+        return self._compile(label, transport, send, None)
 
-    def step(self, label: str, step: SendStep) -> CompiledRequest:
+    def compile_step(self, label: str, step: SendStep) -> CompiledRequest:
         """Return the request of a step.
 
         The normal rank keeps the order of the steps.
@@ -131,7 +131,7 @@ class RequestCompiler:
         """Return the default reply timeout of a transport, in seconds."""
         return self.lines[transport].spec.timeouts.reply_s
 
-    def _ask(
+    def _compile(
         self,
         label: str,
         transport: str,

@@ -32,9 +32,9 @@ class RequestQueue(PriorityQueue[Exchange]):
         self.next_send = float("-inf")
         """End of the shortest gap after the last request."""
 
-    def take(self, exchange: Exchange) -> tuple[Exchange, ExchangeOutcome] | None:
+    def submit(self, exchange: Exchange) -> tuple[Exchange, ExchangeOutcome] | None:
         """Queue a request; return the displaced one with its outcome, or None."""
-        gone = self.put(exchange)
+        gone = self.push(exchange)
         if gone is None:
             return None
         if gone is not exchange and gone.latest_key and gone.latest_key == exchange.latest_key:
@@ -52,7 +52,7 @@ class RequestQueue(PriorityQueue[Exchange]):
         """Record that a request is sent now."""
         self.next_send = now + self._spec.min_gap_s
         if exchange.ask.bucket is not None:
-            exchange.ask.bucket.take(now)
+            exchange.ask.bucket.count(now)
 
     def next(self, now: float, *, is_ready: bool) -> Exchange | None:
         """Return the next request to send, without removing it.

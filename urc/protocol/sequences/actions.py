@@ -53,7 +53,7 @@ def _actions(
 def _action(label: str, step: sequence.Step, builder: RequestCompiler) -> Action:
     match step:
         case sequence.SendStep():
-            return _sending(builder.step(label, step), step)
+            return _sending(builder.compile_step(label, step), step)
         case sequence.ExpectStep() | sequence.PromptStep():
             return _expecting(label, step, builder)
         case sequence.WaitStep(seconds):
@@ -99,7 +99,7 @@ def _awaiting(label: str, step: sequence.UntilStep, builder: RequestCompiler) ->
 
     def wait(runner: SequenceRunner, now: float) -> list[LineEvent]:
         runner.wait_for(step.condition, now + step.timeout_s, otherwise, text)
-        runner.look(now)
+        runner.check_conditions(now)
         return []
 
     return wait
@@ -161,7 +161,7 @@ def _sending(ask: CompiledRequest, step: sequence.SendStep) -> Action:
         view = runner.names(now)
         namespace = {name: view[name] for name in names if name in view}
         try:
-            data = ask.made(namespace)
+            data = ask.render(namespace)
         except BadArgument as error:
             why = untold(error) if step.is_secret else str(error)
             runner.stop("bad-argument", f"{ask.label}: {why}")
@@ -177,7 +177,7 @@ def _sending(ask: CompiledRequest, step: sequence.SendStep) -> Action:
             is_secret=step.is_secret,
             unless=runner.why_over,
         )
-        runner.begin()
+        runner.wait()
         return line.submit(exchange, now)
 
     return send
@@ -231,7 +231,7 @@ def _running(step: sequence.RunStep) -> Action:
         except ExpressionError as error:
             runner.stop("bad-argument", str(error))
             return []
-        runner.begin()
+        runner.wait()
         return runner.host.run(
             step.command,
             arguments,
@@ -253,7 +253,7 @@ def _setting(step: sequence.SetStep) -> Action:
         except ExpressionError as error:
             runner.stop("failed", str(error))
             return []
-        samples, refused = runner.host.readings.put(values, now)
+        samples, refused = runner.host.readings.set_values(values, now)
         if refused:
             runner.stop("failed", refused[0])
         return [Samples("", tuple(samples))] if samples else []

@@ -139,7 +139,7 @@ def exchange_of(
         if command.verify is None
         else VerifiedRun(command.verify, values, sink, verifications),
         names,
-        ask.made(names),
+        ask.render(names),
         expires_at(ask, now),
     )
     if isinstance(sink, ReplySink):
@@ -194,7 +194,7 @@ class Verifications:
             self._waiting.append(_Waiting(run, since, due, outcome))
             self.has_news = True
 
-    def look(self, now: float) -> list[LineEvent]:
+    def check(self, now: float) -> list[LineEvent]:
         """Return the events of the verified commands."""
         events: list[LineEvent] = []
         if not self.has_news:
@@ -211,7 +211,7 @@ class Verifications:
 
     def tick(self, now: float) -> list[LineEvent]:
         """Return the events of the verifications that have timed out."""
-        events = self.look(now)
+        events = self.check(now)
         for one in tuple(self._waiting):
             if one.due <= now and one.run.verify is not None:
                 self._waiting.remove(one)

@@ -51,13 +51,13 @@ class SequenceControl:
 
     # -- for the runner
 
-    def begin(self) -> None:
+    def start(self) -> None:
         """Record the start."""
         self.place, self.reason = 0, ""
         self.is_running, self.is_paused, self.is_aborted = True, False, False
         self.count += 1
 
-    def step(self) -> None:
+    def begin_step(self) -> None:
         """Record the start of another outermost step."""
         self.place += 1
         self.count += 1

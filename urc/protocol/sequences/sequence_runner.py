@@ -104,7 +104,7 @@ class SequenceRunner:
         self._late_text = ""
         self._logins: list[Conversation] = []
         """Connections whose logins must complete before the first step."""
-        program.reins.begin()
+        program.reins.start()
 
     @property
     def is_over(self) -> bool:
@@ -140,7 +140,7 @@ class SequenceRunner:
             action = next(self._stack[-1], None) if self._stack else None
             if action is not None:
                 if is_outermost:
-                    self.program.reins.step()
+                    self.program.reins.begin_step()
                 events += action(self, now)
             elif self._stack:
                 self._stack.pop()
@@ -209,7 +209,7 @@ class SequenceRunner:
 
     # -- called by the engine
 
-    def look(self, now: float) -> None:
+    def check_conditions(self, now: float) -> None:
         """Check the awaited condition after new samples, or at the start of the wait."""
         if self._awaited is not None and self.host.known.holds(self._awaited, now, self.variables):
             self._awaited = None
@@ -227,7 +227,7 @@ class SequenceRunner:
         self._resume()
         return []
 
-    def heard(self, ear: Expectation, offer: MatchResult, now: float) -> None:
+    def matched(self, ear: Expectation, offer: MatchResult, now: float) -> None:
         """Process the match result of the expected frame."""
         self._listening = None
         if offer.refusal:
@@ -251,7 +251,7 @@ class SequenceRunner:
         """Wait until `due`."""
         self.is_waiting, self.due = True, due
 
-    def begin(self) -> None:
+    def wait(self) -> None:
         """Wait for the call of `done`."""
         self.is_waiting = True
 

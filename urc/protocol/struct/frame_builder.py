@@ -39,7 +39,7 @@ class FrameBuilder:
         self.late: list[tuple[Backpatch, Template, Scope]] = []
         """Computed items that need the whole frame."""
 
-    def put(self, data: bytes) -> None:
+    def append(self, data: bytes) -> None:
         """Append bytes; raise `NotWritable` when the frame becomes too long."""
         if len(self.bytes) + len(data) > LARGEST_FRAME:
             raise NotWritable(f"the frame would have more than {LARGEST_FRAME} bytes")

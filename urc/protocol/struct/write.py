@@ -153,26 +153,26 @@ def _number_step(item: Item, rules: StructWriteScope) -> WriteStep:
     write = number_writer(item.number, item.id)
     if item.const is not None:
         constant = write(const_of(item))
-        return lambda pen, scope: pen.put(constant)
+        return lambda pen, scope: pen.append(constant)
     defer, blank = _deferral(item, rules), bytes(item.number.size)
     if defer is not None:
 
         def leave_gap(pen: FrameBuilder, scope: Scope) -> None:
             defer(pen, scope, Backpatch(len(pen.bytes), item, item.number))
-            pen.put(blank)
+            pen.append(blank)
 
         return leave_gap
     raw_number = _raw_number(item, rules)
-    return lambda pen, scope: pen.put(write(raw_number(scope)))
+    return lambda pen, scope: pen.append(write(raw_number(scope)))
 
 
 def _coded_step(item: Item, rules: StructWriteScope) -> WriteStep:
     write = coded_writer(item.number, item.id)
     if item.const is not None:
         constant = write(int(item.const))
-        return lambda pen, scope: pen.put(constant)
+        return lambda pen, scope: pen.append(constant)
     raw_number = _raw_number(item, rules)
-    return lambda pen, scope: pen.put(write(raw_number(scope)))
+    return lambda pen, scope: pen.append(write(raw_number(scope)))
 
 
 def _zero_of(item: Item) -> float:
@@ -200,7 +200,7 @@ def _bits_step(item: Item, rules: StructWriteScope) -> WriteStep:
                 defer(pen, scope, Backpatch(len(pen.bytes), part, container, shift))
             else:
                 whole |= (raw_number(scope) & mask) << shift
-        pen.put(write(whole))
+        pen.append(write(whole))
 
     return step
 
@@ -225,14 +225,14 @@ def _finisher(item: Item, rules: StructWriteScope) -> Callable[[FrameBuilder, Sc
     """Return the function that writes bytes in their size: padded, counted or terminated."""
     name, size = item.id or item.kind, item.size
     if size is None or item.const is not None:
-        return lambda pen, scope, raw: pen.put(raw + item.until)
+        return lambda pen, scope, raw: pen.append(raw + item.until)
     if size.kind == "fixed":
         padded = fixed_bytes(item)
-        return lambda pen, scope, raw: pen.put(padded(raw))
+        return lambda pen, scope, raw: pen.append(padded(raw))
 
     def finish(pen: FrameBuilder, scope: Scope, raw: bytes) -> None:
         _put_size(pen, scope, size, len(raw), name, rules)
-        pen.put(raw)
+        pen.append(raw)
 
     return finish
 
@@ -242,7 +242,7 @@ def _put_size(
 ) -> None:
     """Write `number` where the reader expects it, or check a constant size."""
     if extent.prefix is not None:
-        pen.put(coded_writer(extent.prefix, name)(int(fitting(extent.prefix, number, name))))
+        pen.append(coded_writer(extent.prefix, name)(int(fitting(extent.prefix, number, name))))
     elif extent.kind == "fixed":
         if number != extent.number:
             raise NotWritable(f"{name}: expected {extent.number} items, found {number}")
@@ -262,14 +262,14 @@ def _padding_step(item: Item, rules: StructWriteScope) -> WriteStep:
         return lambda pen, scope: None
     if item.size.kind == "fixed":
         padding = bytes((item.pad,)) * item.size.number
-        return lambda pen, scope: pen.put(padding)
+        return lambda pen, scope: pen.append(padding)
     expression = item.size.expression
 
     def pad(pen: FrameBuilder, scope: Scope) -> None:
         number = 0 if expression is None else evaluate(expression, scope)
         if not isinstance(number, int) or not 0 <= number <= LARGEST_FRAME:
             raise NotWritable(f"padding: {quoted(number)} is not a size")
-        pen.put(bytes((item.pad,)) * number)
+        pen.append(bytes((item.pad,)) * number)
 
     return pad
 
@@ -277,7 +277,7 @@ def _padding_step(item: Item, rules: StructWriteScope) -> WriteStep:
 def _array_step(item: Item, count: Extent, rules: StructWriteScope) -> WriteStep:
     if item.kind == "packed":
         pack = packed_writer(item._replace(times=None), count)
-        return lambda pen, scope: pen.put(pack(scope, rules.is_lenient))
+        return lambda pen, scope: pen.append(pack(scope, rules.is_lenient))
     if item.kind == "struct" and not item.id:
         return _records_step(item, count, rules)
     name, single = item.id or "an array", item._replace(times=None, value=None)
@@ -362,7 +362,7 @@ def _windowed(body: WriteStep, item: Item, size: Extent, rules: StructWriteScope
     gap = bytes(size.prefix.size) if size.prefix and not is_variable else b""
 
     def windowed(pen: FrameBuilder, scope: Scope) -> None:
-        pen.put(gap)
+        pen.append(gap)
         start = len(pen.bytes)
         body(pen, scope)
         if item.trim is not None and size.kind != "fixed":

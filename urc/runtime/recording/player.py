@@ -159,7 +159,7 @@ class Player:
                 if not isinstance(fault, UrcError):
                     log.exception("%s cannot be played", self.recording.file)
                 text = str(fault) if isinstance(fault, UrcError) else f"unexpected error: {fault!r}"
-                hub.note(LogEntry(self._clock.now(), "error", "recording", text))
+                hub.log(LogEntry(self._clock.now(), "error", "recording", text))
                 self.pause()
                 number = self._number
                 while number == self._number:
@@ -173,7 +173,7 @@ class Player:
                 hub.set_link(LinkStatus(name, "connecting", "", self._clock.now()))
             start_ns = self.recording.start_ns + round(self._base_s * 1e9)
             before = await asyncio.to_thread(self.recording.before, start_ns)
-            self._give(hub, before)
+            self._publish(hub, before)
             self._forget(hub, {message.topic for message in before})
             stream = self.recording.messages(start_ns)
             try:
@@ -198,7 +198,7 @@ class Player:
             due: list[RecordedMessage] = []
             while waiting and waiting[0].time_ns <= due_ns:
                 due.append(waiting.popleft())
-            self._give(hub, due)
+            self._publish(hub, due)
             if waiting:
                 await self._until(waiting[0].time_ns, number)
 
@@ -239,9 +239,9 @@ class Player:
         now_s = self._clock.now()
         later = [name for name in hub.signals if topic_of(name) not in known and hub.latest(name)]
         if later:
-            hub.put(tuple(Sample(name, None, now_s) for name in later))
+            hub.publish(tuple(Sample(name, None, now_s) for name in later))
 
-    def _give(self, hub: Hub, messages: Iterable[RecordedMessage]) -> None:
+    def _publish(self, hub: Hub, messages: Iterable[RecordedMessage]) -> None:
         """Send messages to the hub, with times relative to the current position."""
         now_s = self._clock.now()
         position_ns = self.recording.start_ns + round(self.position_s * 1e9)
@@ -253,17 +253,17 @@ class Player:
                 samples.append(event)
                 continue
             if samples:  # keep the order
-                hub.put(tuple(samples))
+                hub.publish(tuple(samples))
                 samples = []
             match event:
                 case LinkStatus() if event.transport in self.profile.driver.transports:
                     hub.set_link(event)
                 case LogEntry():
-                    hub.note(event)
+                    hub.log(event)
                 case Traffic() if hub.traffic_watchers:
                     hub.saw(event)
         if samples:
-            hub.put(tuple(samples))
+            hub.publish(tuple(samples))
 
 
 class PlaybackSession:

@@ -107,7 +107,7 @@ class Recorder:
         self._thread = threading.Thread(target=self._run, name="urc-recorder", daemon=True)
         self._thread.start()
 
-    def put(self, events: Iterable[Tapped], lost: int = 0) -> None:
+    def record(self, events: Iterable[Tapped], lost: int = 0) -> None:
         """Queue events, with the number of lost events before them; return at once."""
         with self._wakes:
             self._lost += lost
@@ -136,8 +136,8 @@ class Recorder:
         stream: IO[bytes] | None = None
         try:
             check_installed()
-            stream = self._made()
-            self._begin(stream)
+            stream = self._open()
+            self._write_header(stream)
             self._follow()
             self._writer.finish()
         except UrcError as error:
@@ -155,7 +155,7 @@ class Recorder:
                     with suppress(OSError):
                         self.file.unlink()
 
-    def _made(self) -> IO[bytes]:
+    def _open(self) -> IO[bytes]:
         place, name = self.file, self._profile.name
         try:
             (place if self._is_folder else place.parent).mkdir(parents=True, exist_ok=True)
@@ -167,7 +167,7 @@ class Recorder:
             raise UrcError(f"{self.file} cannot be created: {error.strerror or error}") from None
         raise UrcError(f"{self.file} already exists; recordings are never overwritten")
 
-    def _begin(self, stream: IO[bytes]) -> None:
+    def _write_header(self, stream: IO[bytes]) -> None:
         from mcap.writer import Writer  # an extra
 
         profile, document = self._profile, self._document
@@ -184,7 +184,7 @@ class Recorder:
             writer.add_attachment(now_ns, now_ns, PROFILE, "application/yaml", data)
         else:
             text = f"{profile.file} can no longer be loaded: replay this with --profile"
-            self.put([LogEntry(time.monotonic(), "warning", "recording", text)])
+            self.record([LogEntry(time.monotonic(), "warning", "recording", text)])
         for channel in channels(profile.driver):
             schema = json.dumps(channel.schema).encode()
             shape = writer.register_schema(channel.shape, "jsonschema", schema)
@@ -197,7 +197,7 @@ class Recorder:
         whole_s = time.monotonic()
         while (batch := self._next()) is not None:
             for number, event in enumerate(batch, 1):
-                self._keep(event)
+                self._record_event(event)
                 if number % _SLICE == 0:
                     time.sleep(_PAUSE_S)
             if not batch or time.monotonic() - whole_s >= _WHOLE_S:
@@ -221,7 +221,7 @@ class Recorder:
                 return None
             return batch
 
-    def _keep(self, event: Tapped) -> None:
+    def _record_event(self, event: Tapped) -> None:
         try:
             self._write(self._shapes.messages(event))
         except OSError:
@@ -230,7 +230,7 @@ class Recorder:
             if not self._is_faulty:
                 log.exception("%s lacks an event of kind %s", self.file, type(event).__name__)
                 text = "an event is missing here because it could not be written; see URC's log"
-                self.put([LogEntry(time.monotonic(), "warning", "recording", text)])
+                self.record([LogEntry(time.monotonic(), "warning", "recording", text)])
             self._is_faulty = True
 
     def _write(self, messages: Iterable[tuple[str, int, bytes]]) -> None:
@@ -292,7 +292,7 @@ async def recorded(
         finally:
             feeding.cancel()
             await asyncio.gather(feeding, return_exceptions=True)
-            recorder.put(tap.take())
+            recorder.record(tap.drain())
             await asyncio.to_thread(recorder.close)
 
 
@@ -302,13 +302,13 @@ async def _feed(tap: EventTap, hub: Hub, recorder: Recorder) -> None:
         with suppress(TimeoutError):  # the state of the file is also reported without events
             async with asyncio.timeout(_WHOLE_S):
                 await tap.filled()
-        recorder.put(tap.take(), tap.dropped - dropped)
+        recorder.record(tap.drain(), tap.dropped - dropped)
         dropped = tap.dropped
         text = _state(recorder)
         if text and text != said:
             said = text
             level: Any = "warning" if recorder.fault else "info"
-            hub.note(LogEntry(time.monotonic(), level, "recording", text))
+            hub.log(LogEntry(time.monotonic(), level, "recording", text))
         await asyncio.sleep(_GATHER_S)
 
 

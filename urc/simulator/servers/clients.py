@@ -126,7 +126,7 @@ async def converse(
         if not said_by_client and not wait.expired():
             return
         now_s, was_late = clock(), line.has_late
-        said: list[Payload] = list(line.step(now_s - before_s, context.now()))
+        said: list[Payload] = list(line.advance(now_s - before_s, context.now()))
         before_s = now_s
         answers: list[Payload] = []
         if said_by_client:

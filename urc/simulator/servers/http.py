@@ -165,7 +165,7 @@ class _Talk:
             event = self._http.next_event()
             if event is h11.NEED_DATA:
                 if self._http.they_are_waiting_for_100_continue:
-                    await self._say(h11.InformationalResponse(status_code=100, headers=[]))
+                    await self._send(h11.InformationalResponse(status_code=100, headers=[]))
                 self._http.receive_data(await self._reader.read(READ_BYTES))
                 client.active_s = asyncio.get_running_loop().time()
             elif isinstance(event, h11.Request):
@@ -215,7 +215,7 @@ class _Talk:
         """Return the robot's reply, or an error status."""
         for envelope in asked.ways:
             before = line.faults
-            for one in line.ask(envelope, self._context.now()):
+            for one in line.request(envelope, self._context.now()):
                 if isinstance(one, Envelope) and one.verb == "response":
                     return one
             if line.faults == before and line.is_incomplete:
@@ -253,15 +253,15 @@ class _Talk:
         if self._context.spec.connection == "per_request":
             sent.append(("Connection", "close"))
         reason = http.client.responses.get(status, "")
-        await self._say(h11.Response(status_code=status, headers=sent, reason=reason.encode()))
+        await self._send(h11.Response(status_code=status, headers=sent, reason=reason.encode()))
         if body and asked.method != "HEAD":
-            await self._say(h11.Data(data=body))
-        await self._say(h11.EndOfMessage())
+            await self._send(h11.Data(data=body))
+        await self._send(h11.EndOfMessage())
 
     async def _stream(self, client: ClientConnection, asked: HttpRequest, kind: str) -> None:
         """Stream the robot's messages on a topic, until the client leaves."""
         headers = [("Content-Type", _TYPES[kind]), ("Cache-Control", "no-store")]
-        await self._say(h11.Response(status_code=200, headers=headers))
+        await self._send(h11.Response(status_code=200, headers=headers))
         if kind == "mjpeg":
             await self._pictures(asked)
             return
@@ -272,7 +272,7 @@ class _Talk:
                 if isinstance(one, Envelope) and one.verb == "message":
                     topic, _, event = str(one.attributes.get("topic")).partition("#")
                     if topic == path:
-                        await self._say(h11.Data(data=_piece(kind, event, _bytes(one.body))))
+                        await self._send(h11.Data(data=_piece(kind, event, _bytes(one.body))))
 
         await converse(self._context, client, self._gone, put)
 
@@ -285,7 +285,7 @@ class _Talk:
                     await asyncio.wait([gone], timeout=PICTURE_EVERY_S)
                     continue
                 head = f"--{_BOUNDARY}\r\nContent-Type: image/jpeg\r\nContent-Length: {len(taken)}"
-                await self._say(h11.Data(data=f"{head}\r\n\r\n".encode() + taken + b"\r\n"))
+                await self._send(h11.Data(data=f"{head}\r\n\r\n".encode() + taken + b"\r\n"))
                 await asyncio.wait([gone], timeout=PICTURE_EVERY_S)
         finally:
             gone.cancel()
@@ -295,7 +295,7 @@ class _Talk:
         while await self._reader.read(READ_BYTES):
             pass
 
-    async def _say(self, event: h11.Event) -> None:
+    async def _send(self, event: h11.Event) -> None:
         data = self._http.send(event)
         if data:
             self._writer.write(data)
@@ -306,8 +306,8 @@ class _Talk:
         """Reply to a malformed request, if a reply is still possible."""
         if self._http.our_state in (h11.IDLE, h11.SEND_RESPONSE):
             headers = [("Content-Length", "0"), ("Connection", "close")]
-            await self._say(h11.Response(status_code=fault.error_status_hint, headers=headers))
-            await self._say(h11.EndOfMessage())
+            await self._send(h11.Response(status_code=fault.error_status_hint, headers=headers))
+            await self._send(h11.EndOfMessage())
 
 
 def _written(answer: Envelope) -> tuple[int, list[tuple[str, str]], bytes]:

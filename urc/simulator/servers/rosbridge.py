@@ -247,7 +247,7 @@ class BridgeClient:
         elif service in self._bridge.servers:
             self._bridge.passed_on(service, self, number, args)
         else:
-            self._keep(self._calls, number, service)
+            self._remember(self._calls, number, service)
             attributes = {"service": service, "id": number}
             return Envelope("call", attributes, args)
         return None
@@ -275,7 +275,7 @@ class BridgeClient:
     def start(self, operation: Mapping[str, Any], now_s: float) -> Envelope:
         """Send a goal to the robot."""
         action, number = _text(operation, "action"), operation.get("id")
-        self._keep(self._goals, number, action)
+        self._remember(self._goals, number, action)
         attributes = {
             "action": action,
             "type": _text(operation, "action_type"),
@@ -294,7 +294,7 @@ class BridgeClient:
         if topic and kind and len(self._bridge.types) < MAX_TOPICS:
             self._bridge.types[topic] = self._bridge.types.get(topic) or kind
 
-    def _keep(self, table: dict[object, str], number: object, name: str) -> None:
+    def _remember(self, table: dict[object, str], number: object, name: str) -> None:
         if not isinstance(number, str | int):
             return  # replies could not be matched
         while len(table) >= MAX_TOPICS:

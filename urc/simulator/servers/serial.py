@@ -120,7 +120,7 @@ class _PtyServer:
             return None
 
     async def _talk(self, client: ClientConnection, wire: "_Wire") -> None:
-        await converse(self._context, client, wire.take, wire.put)
+        await converse(self._context, client, wire.read, wire.write)
 
 
 class _Wire:
@@ -130,7 +130,7 @@ class _Wire:
         self._number = number
         self._first = first
 
-    async def take(self) -> bytes | None:
+    async def read(self) -> bytes | None:
         """Return the next bytes, None when the client has closed its end."""
         if self._first:
             data, self._first = self._first, b""
@@ -145,7 +145,7 @@ class _Wire:
                     return None
                 raise
 
-    async def put(self, said: Sequence[Payload]) -> None:
+    async def write(self, said: Sequence[Payload]) -> None:
         """Write the robot's data; wait while the client does not read."""
         data = b"".join(one for one in said if isinstance(one, bytes))
         while data:

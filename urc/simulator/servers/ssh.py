@@ -191,14 +191,14 @@ class _Talk:
 
     async def run(self, client: ClientConnection) -> None:
         try:
-            await converse(self._context, client, self._take, self._put)
+            await converse(self._context, client, self._read, self._write)
             self._process.exit(0)
             async with asyncio.timeout(TAKEN_WITHIN_S):
                 await self._process.wait_closed()
         except (asyncssh.Error, BrokenPipeError) as gone:
             raise ConnectionResetError(str(gone)) from gone
 
-    async def _take(self) -> bytes:
+    async def _read(self) -> bytes:
         typed = b""
         while not typed:
             try:
@@ -213,7 +213,7 @@ class _Talk:
                 typed = self._keys.read(data)
         return typed
 
-    async def _put(self, said: Sequence[Payload]) -> None:
+    async def _write(self, said: Sequence[Payload]) -> None:
         for one in said:
             if isinstance(one, bytes):
                 self._process.stdout.write(one)

@@ -42,13 +42,13 @@ class _Talk:
         )
 
     async def run(self, client: ClientConnection) -> None:
-        self._writer.write(self._telnet.ask(ours=(ECHO, SGA), theirs=(SGA, NAWS)))
-        await converse(self._context, client, self._take, self._put)
+        self._writer.write(self._telnet.requests(ours=(ECHO, SGA), theirs=(SGA, NAWS)))
+        await converse(self._context, client, self._read, self._write)
         self._writer.close()
         async with asyncio.timeout(TAKEN_WITHIN_S):
             await self._writer.wait_closed()
 
-    async def _take(self) -> bytes:
+    async def _read(self) -> bytes:
         while data := await self._reader.read(READ_BYTES):
             typed, answers = self._telnet.receive(data)
             if ECHO in self._telnet.ours:
@@ -64,7 +64,7 @@ class _Talk:
                 await self._writer.drain()
         return b""
 
-    async def _put(self, said: Sequence[Payload]) -> None:
+    async def _write(self, said: Sequence[Payload]) -> None:
         for one in said:
             if isinstance(one, bytes):
                 self._writer.write(self._telnet.encode(one))

@@ -73,7 +73,7 @@ class Odometry:
         """Distance of the left wheel, in metres; backwards counts down."""
         self.right = 0.0
 
-    def step(self, motion: Motion, dt_s: float, noise: float) -> None:
+    def advance(self, motion: Motion, dt_s: float, noise: float) -> None:
         """Integrate one step."""
         stride, turn = 1 + noise * (self._stride - 1), 1 + noise * (self._turn - 1)
         ahead, angle = motion.told_forward * stride * dt_s, motion.told_turn * turn * dt_s
@@ -234,7 +234,7 @@ class Battery:
         """Level, 0 to 100 %."""
         return 100 * self.charge / self._spec.capacity
 
-    def step(self, effort: float, dt_s: float) -> None:
+    def advance(self, effort: float, dt_s: float) -> None:
         """Draw the current of a body at an effort of 0 to 1, for `dt_s` seconds."""
         self.current = self._spec.idle + self._spec.drive * effort
         self.charge = max(0.0, self.charge - self.current * dt_s / 3600)

@@ -96,7 +96,7 @@ class World:
             while (steps := int((now_s - self.time_s) / STEP_S + 1e-6)) > 0:
                 inputs = self._inputs(self.time_s)
                 for _ in range(min(steps, round(_ASKED_EVERY_S / STEP_S))):
-                    self._step(inputs)
+                    self._advance(inputs)
         finally:
             self._is_busy = False
 
@@ -181,13 +181,13 @@ class World:
         self._kept[name] = now_s, picture
         return picture
 
-    def _step(self, inputs: Mapping[str, float]) -> None:
+    def _advance(self, inputs: Mapping[str, float]) -> None:
         motion = self.motion
         if self.battery.charge <= 0:
             inputs = {}
         move(self.spec.body, motion, inputs, STEP_S)
-        self.odometry.step(motion, STEP_S, self.noise)
-        self.battery.step(motion.effort, STEP_S)
+        self.odometry.advance(motion, STEP_S, self.noise)
+        self.battery.advance(motion.effort, STEP_S)
         self._collide()
         self.tick += 1
         self.time_s = (self.time_s or 0.0) + STEP_S

@@ -36,14 +36,14 @@ class TopicGraph:
         self._looked.clear()
         found = version_of(types.values())
         if self._declared is not None and found not in (None, self._declared):
-            self._say(f"this bridge is ROS {found}: write 'version: {found}' or 'version: auto'")
+            self._log(f"this bridge is ROS {found}: write 'version: {found}' or 'version: auto'")
 
     def subscribed(self, wanted: Mapping[str, str]) -> None:
         """Check the subscribed topics and their types against the existing ones."""
         for topic, kind in sorted(wanted.items()):
             # In ROS 2, the feedback of an action is not an ordinary topic.
             if topic not in self._types and not topic.endswith("/feedback"):
-                self._say(f"nobody publishes {topic}")
+                self._log(f"nobody publishes {topic}")
             else:
                 self._compare(topic, kind, "carries")
 
@@ -58,14 +58,14 @@ class TopicGraph:
     def subscribers(self, topic: str, nodes: Iterable[object]) -> None:
         """Check the subscribers of a published topic."""
         if not list(nodes):
-            self._say(f"nothing subscribes to {topic}: its messages have no effect")
+            self._log(f"nothing subscribes to {topic}: its messages have no effect")
 
     def _compare(self, topic: str, kind: str, verb: str) -> None:
         known = self._types.get(topic, "")
         if known and kind and _plain(known) != _plain(kind):
-            self._say(f"{topic} {verb} {_plain(known)}, not {_plain(kind)}")
+            self._log(f"{topic} {verb} {_plain(known)}, not {_plain(kind)}")
 
-    def _say(self, text: str) -> None:
+    def _log(self, text: str) -> None:
         if text not in self._told and len(self._told) < MAX_TOLD:
             self._told.add(text)
             self._tell(text)

@@ -81,7 +81,7 @@ class RosbridgeTransport:
         self._subscriptions = subscriptions
         self._ros = ros
         self._session: _Session | None = None
-        self._graph = TopicGraph(self._tell, None if ros == AUTO else ros)
+        self._graph = TopicGraph(self._log, None if ros == AUTO else ros)
 
     @property
     def address(self) -> str:
@@ -95,7 +95,7 @@ class RosbridgeTransport:
         session = self._session = _Session(self._wire, self._ros, self._graph)
         try:
             async with asyncio.timeout(timeout_s):
-                await session.begin(self._subscriptions)
+                await session.start(self._subscriptions)
         except BaseException as fault:
             self._session = None
             await session.end()
@@ -110,7 +110,7 @@ class RosbridgeTransport:
         """Return the next message, response or feedback; raise `PeerClosed` at the end."""
         if self._session is None:
             raise PeerClosed("the connection is closed")
-        return await self._session.inbox.take()
+        return await self._session.inbox.pop()
 
     async def send(self, data: Payload) -> None:
         """Publish, call a service, start or cancel a goal; return once the kernel has the data.
@@ -159,7 +159,7 @@ class RosbridgeTransport:
         finally:
             await self._wire.abort()
 
-    def _tell(self, fault: str) -> None:
+    def _log(self, fault: str) -> None:
         if self._session is not None:
             self._session.inbox.answer(Envelope(NOTICE, {}, fault))
 
@@ -250,11 +250,11 @@ class _Session:
         self._fresh: dict[str, None] = {}
         """Topics with a first message that may not have arrived yet, in order."""
 
-    async def begin(self, subscriptions: tuple[RosSubscription, ...]) -> None:
+    async def start(self, subscriptions: tuple[RosSubscription, ...]) -> None:
         """Query the topics, subscribe, and start reading."""
         self._reader = asyncio.create_task(self._read())
         # Query first: later, ROS 1 would include our own subscriptions.
-        asked = self._client.ask(
+        asked = self._client.call_service(
             "/rosapi/topics", lambda said: self._learn(subscriptions, said), errback=self._unknown
         )
         await self._write(asked)
@@ -286,7 +286,7 @@ class _Session:
             if isinstance(nodes, list):
                 self._graph.subscribers(topic, nodes)
 
-        return self._client.ask("/rosapi/subscribers", told, {"topic": topic})
+        return self._client.call_service("/rosapi/subscribers", told, {"topic": topic})
 
     async def settle(self) -> str:
         """Wait until the published messages have arrived; return the undelivered topics."""
@@ -318,7 +318,7 @@ class _Session:
                 said.set_result(values)
 
         await self._write(
-            self._client.ask(
+            self._client.call_service(
                 "/rosapi/subscribers", told, {"topic": topic}, lambda problem: told(NOTHING)
             )
         )
@@ -346,7 +346,7 @@ class _Session:
         began_s = clock()
         try:
             while True:
-                self._take(await self._wire.receive())
+                self._receive(await self._wire.receive())
                 # Frames in the buffer need no wait, and some take long to parse.
                 if self.inbox.is_filling or clock() - began_s > _TURN_S:
                     await asyncio.sleep(0)
@@ -354,7 +354,7 @@ class _Session:
         except TransportError as ended:
             self.inbox.end(str(ended))
 
-    def _take(self, frame: bytes) -> None:
+    def _receive(self, frame: bytes) -> None:
         try:
             operation = self._frames.read(frame)
             if operation is not None:

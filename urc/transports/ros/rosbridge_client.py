@@ -83,7 +83,7 @@ class RosClient:
         topic.subscribe(lambda body: self._message(wanted.topic, body))
         return self._protocol.written()
 
-    def ask(
+    def call_service(
         self,
         service: str,
         callback: Callable[[Mapping[str, Any]], None],

@@ -67,7 +67,7 @@ class Backlog:
     def __len__(self) -> int:
         return len(self._rows)
 
-    def put(self, row: TrafficRow) -> None:
+    def push(self, row: TrafficRow) -> None:
         """Add a row; drop the oldest ones beyond the limit."""
         row.n = self.first + len(self._rows)
         self._rows.append(row)
@@ -75,7 +75,7 @@ class Backlog:
         while len(self._rows) > ROWS_KEPT or (self._bytes > BYTES_KEPT and len(self._rows) > 1):
             self._pop()
 
-    def take(self) -> list[TrafficRow]:
+    def pop(self) -> list[TrafficRow]:
         """Remove and return the oldest rows, up to the limit of one message."""
         return [self._pop() for _ in range(min(ROWS_AT_ONCE, len(self._rows)))]
 
@@ -144,12 +144,12 @@ class DevClient:
                 try:
                     live = await self._station.live()
                 except SessionFailed as error:
-                    self._put(note_row(self._note(str(error))))
+                    self._push(note_row(self._log_entry(str(error))))
                     await self._clock.sleep(RETRY_S)
                     continue
                 with live.session.hub.tap(with_traffic=True) as tap:
                     for note in live.session.hub.notes:
-                        self._put(note_row(note))
+                        self._push(note_row(note))
                     listening = asyncio.ensure_future(self._listen(tap))
                     ended = asyncio.ensure_future(live.ended.wait())
                     try:
@@ -162,21 +162,21 @@ class DevClient:
         dropped = 0
         while True:
             await tap.filled()
-            for one in tap.take():
+            for one in tap.drain():
                 if isinstance(one, Traffic):
-                    self._put(traffic_row(one))
+                    self._push(traffic_row(one))
                 elif isinstance(one, LogEntry):
-                    self._put(note_row(one))
+                    self._push(note_row(one))
             if tap.dropped > dropped:
                 lost, dropped = tap.dropped - dropped, tap.dropped
                 text = f"{lost} rows of traffic were lost: the server cannot keep up"
-                self._put(note_row(self._note(text)))
+                self._push(note_row(self._log_entry(text)))
 
-    def _note(self, text: str) -> LogEntry:
+    def _log_entry(self, text: str) -> LogEntry:
         return LogEntry(self._clock.now(), "warning", "URC", text)
 
-    def _put(self, row: TrafficRow) -> None:
-        self._backlog.put(row)
+    def _push(self, row: TrafficRow) -> None:
+        self._backlog.push(row)
         self._news.set()
 
     # -- writing
@@ -194,7 +194,7 @@ class DevClient:
                 return
             if len(self._backlog):
                 first = self._backlog.first
-                rows = self._backlog.take()
+                rows = self._backlog.pop()
                 await self._send(wire.encode_rows(rows, first, self._clock.now()))
                 await self._clock.sleep(BEHIND_S)
             else:
@@ -230,12 +230,12 @@ class DevClient:
         message: Message = await self._line.receive()
         while message["type"] != "websocket.disconnect":
             if not self._closing:
-                self._take(message)
+                self._handle(message)
             message = await self._line.receive()
 
-    def _take(self, message: Message) -> None:
+    def _handle(self, message: Message) -> None:
         now_s = self._clock.now()
-        if not self._allowance.take(now_s):
+        if not self._allowance.allow(now_s):
             self._close(CLOSE_TOO_FAST, f"more than {MESSAGES_PER_S} messages a second")
             return
         try:
@@ -245,24 +245,24 @@ class DevClient:
             if self._bad >= BAD_MESSAGES:
                 self._close(CLOSE_BAD_MESSAGES, f"{BAD_MESSAGES} messages were invalid")
             else:
-                self._say(encode_error("bad-message", str(error)))
+                self._log(encode_error("bad-message", str(error)))
             return
         if len(self._answers) > MOST_ANSWERS:
             self._close(CLOSE_TOO_FAST, "the page does not take its replies")
             return
         if isinstance(asked, Ping):
-            self._say(encode_pong(asked, now_s))
+            self._log(encode_pong(asked, now_s))
             return
         try:
             self._questions.put_nowait(asked)
         except asyncio.QueueFull:
-            self._say(_refused(asked, f"{QUESTIONS} requests are pending already"))
+            self._log(_refused(asked, f"{QUESTIONS} requests are pending already"))
 
     def _close(self, code: int, reason: str) -> None:
         self._closing = (code, reason)
-        self._say(encode_error("closing", reason))
+        self._log(encode_error("closing", reason))
 
-    def _say(self, text: str) -> None:
+    def _log(self, text: str) -> None:
         self._answers.append(text)
         self._news.set()
 
@@ -273,7 +273,7 @@ class DevClient:
             robot = self._watch.robot
             settings = sample_settings(robot.profile.settings) | dict(robot.settings)
             known = _Known(robot.profile, stand_ins(robot.profile, settings))
-            self._say(await asyncio.to_thread(_answered, asked, known))
+            self._log(await asyncio.to_thread(_answered, asked, known))
 
 
 def _answered(asked: wire.ParseRequest | wire.PreviewRequest, known: _Known) -> str:

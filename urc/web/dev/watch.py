@@ -81,11 +81,11 @@ class ProfileWatch:
         watched = FileWatcher([self.file])
         found = await asyncio.to_thread(examine, self.file)
         self.problems = found.problems
-        self._tell("running", "")
+        self._report("running", "")
         while True:
             watched.add(found.files)
             while not watched.changed():
-                self._go_on()
+                self._try_switch()
                 await sleep(PERIOD_S)
             await self._settled(watched)
             # Taken before the file is read, so that no change is missed.
@@ -95,7 +95,7 @@ class ProfileWatch:
                 self._judge(found)
             except Exception as bug:  # a supervisor: the old version goes on
                 log.exception("%s could not be checked", self.file)
-                self._tell("broken", f"the check failed ({type(bug).__name__}: {bug})")
+                self._report("broken", f"the check failed ({type(bug).__name__}: {bug})")
 
     async def _settled(self, watched: FileWatcher) -> None:
         """Wait until the files are stable: a program may write a file in several steps."""
@@ -112,18 +112,18 @@ class ProfileWatch:
             errors = [problem for problem in found.problems if problem.severity == "error"]
             if errors:
                 log.warning("%s", ProblemsError(errors))
-            self._tell("broken", "cannot be used; the version before it goes on")
+            self._report("broken", "cannot be used; the version before it goes on")
         elif found.profile.name != name:
             self._next = None
             text = f"its name is {found.profile.name!r} now; {name!r} keeps running: restart URC"
-            self._tell("broken", text)
+            self._report("broken", text)
         else:
             self._next = found.profile
-            if not self._go_on():
+            if not self._try_switch():
                 text = "is valid, and waits until the controls are free and every stop has arrived"
-                self._tell("waiting", text)
+                self._report("waiting", text)
 
-    def _go_on(self) -> bool:
+    def _try_switch(self) -> bool:
         """Switch to the new version if there is one and the robot is at rest."""
         if self._next is None or not self.station.is_at_rest:
             return False
@@ -132,14 +132,14 @@ class ProfileWatch:
             robot = self.remake(profile)
             self.take(robot)
         except UrcError as error:
-            self._tell("broken", f"cannot be used: {error}; the version before it goes on")
+            self._report("broken", f"cannot be used: {error}; the version before it goes on")
             return True
         self._robot = robot
         failed = " with findings" if has_errors(self.problems) else ""
-        self._tell("running", f"was saved and is running now{failed}")
+        self._report("running", f"was saved and is running now{failed}")
         return True
 
-    def _tell(self, state: State, told: str) -> None:
+    def _report(self, state: State, told: str) -> None:
         self.state, self.told = state, told
         self.edition += 1
         for wake in tuple(self.listeners):

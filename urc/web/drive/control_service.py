@@ -170,7 +170,7 @@ class ControlService:
             (one for one in self._seats.values() if compare_digest(one.key.encode(), said)), None
         )
 
-    def take(self, seat: OperatorSession) -> list[str]:
+    def changes(self, seat: OperatorSession) -> list[str]:
         """Return the messages that bring a page up to date."""
         texts: list[str] = []
         is_told = self.desk.can_move or seat.client.role == "viewer"  # a watcher gives no commands
@@ -209,13 +209,13 @@ class ControlService:
             return "no tick"
         pace = seat.paces.get(tick.command)
         is_moving = now - seat.moved_at_s < PATIENCE_S and not seat.alarms
-        if is_moving and not seat.doubled and pace is not None and pace.take(now):
+        if is_moving and not seat.doubled and pace is not None and pace.allow(now):
             self._tick(seat, tick, now)
             return "in time"
         self._thin(seat, tick)
         return "one more"
 
-    def hear(self, seat: OperatorSession, said: wire.Driving) -> None:
+    def handle(self, seat: OperatorSession, said: wire.Driving) -> None:
         """Handle a message from a page."""
         match said:
             case wire.Tick():
@@ -265,7 +265,7 @@ class ControlService:
             pace = seat.paces[tick.command] = RateLimiter(THINNED_S)
         if tick.command in seat.alarms:
             self._wait(seat, tick.command, tick)
-        elif pace.take(now):
+        elif pace.allow(now):
             self._tick(seat, tick, now)
         else:
             alarm = self._clock.call_at(pace.free_at, lambda: self._ripe(seat, tick.command))
@@ -285,7 +285,7 @@ class ControlService:
             tick = self._read(seat, tick)
         if tick is not None:
             now = self._clock.now()
-            seat.paces[command].take(now)
+            seat.paces[command].allow(now)
             self._tick(seat, tick, now)
 
     def _read(self, seat: OperatorSession, data: bytes) -> wire.Tick | None:
@@ -337,11 +337,11 @@ class ControlService:
         """Report that STOP would not survive a restart, or that it would again."""
         if fault:
             text = f"STOP works, but would not survive a restart of the server: {fault}"
-            self._tell("error", text)
+            self._log("error", text)
             for seat in self._seats.values():
                 seat.notice("latch", wire.encode_refused("latch", "", text))
         else:
-            self._tell("info", "STOP survives a restart of the server again")
+            self._log("info", "STOP survives a restart of the server again")
 
     def _held_up(self, late_s: float, is_first: bool) -> None:
         if late_s > TOO_LATE_S:
@@ -353,16 +353,16 @@ class ControlService:
                     seat.moved_s.pop(command, None)
                     seat.notice(command, wire.encode_stopped(command, "expired"))
         if is_first:
-            self._tell("warning", f"the server was blocked for {late_s * 1000:.0f} ms")
+            self._log("warning", f"the server was blocked for {late_s * 1000:.0f} ms")
 
-    def _tell(self, level: Literal["info", "warning", "error"], text: str) -> None:
+    def _log(self, level: Literal["info", "warning", "error"], text: str) -> None:
         if self._hub is not None:
-            self._hub.note(LogEntry(self._clock.now(), level, "URC", text))
+            self._hub.log(LogEntry(self._clock.now(), level, "URC", text))
 
     def _changed(self, state: LeaseState) -> None:
         self._number += 1
         if self._file is not None:
-            self._file.keep(Latch(state, not self.desk.is_confirmed))
+            self._file.save(Latch(state, not self.desk.is_confirmed))
         for seat in self._seats.values():
             seat.wake()
         self.trail.leased(state, self._clock.now())

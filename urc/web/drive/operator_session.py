@@ -107,7 +107,7 @@ class OperatorSession:
 
     def is_first(self, about: str, number: int) -> bool:
         """Return whether a message is the first with its number; the other is a duplicate."""
-        return self.doubled is None or not number or self.doubled.take(about, number)
+        return self.doubled is None or not number or self.doubled.accept(about, number)
 
     def forget(self, command: str) -> None:
         """Drop the pending tick of a control."""

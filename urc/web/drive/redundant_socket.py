@@ -85,17 +85,17 @@ class RedundantSocket:
 
     async def _listen(self, seat: OperatorSession) -> None:
         while (message := await self._line.receive())["type"] != "websocket.disconnect":
-            if not self._take(seat, message.get("text") or message.get("bytes") or b""):
+            if not self._receive(seat, message.get("text") or message.get("bytes") or b""):
                 await self._line.close(CLOSE_NOT_TAKEN, "only held controls may use this socket")
                 return
 
-    def _take(self, seat: OperatorSession, data: str | bytes) -> bool:
-        if self._is_over or not self._allowance.take(self._clock.now()):
+    def _receive(self, seat: OperatorSession, data: str | bytes) -> bool:
+        if self._is_over or not self._allowance.allow(self._clock.now()):
             return False
         try:
             said = _said.decode(data)
         except _BAD:
             return False
         if said.number > 0:  # without a number, duplicates cannot be found
-            self._controls.hear(seat, said)
+            self._controls.handle(seat, said)
         return said.number > 0

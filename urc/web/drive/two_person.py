@@ -129,7 +129,7 @@ class TwoPersonRule:
         one = _Question(next(self._numbers), run, asker, command, confirm, until_s, answer)
         self._questions[one.number] = one
         for seat in self._seats():
-            self._tell(seat, one)
+            self._send(seat, one)
         try:
             async with within(self._clock, WAIT_S):
                 second = await answer
@@ -154,9 +154,9 @@ class TwoPersonRule:
     def welcome(self, seat: OperatorSession) -> None:
         """Send the pending questions to a new page."""
         for one in self._questions.values():
-            self._tell(seat, one)
+            self._send(seat, one)
 
-    def hear(self, seat: OperatorSession, said: wire.Approval) -> None:
+    def handle(self, seat: OperatorSession, said: wire.Approval) -> None:
         """Take the answer of a page; ignore it when the question is over."""
         one = self._questions.get(said.n)
         if one is None or one.answer.done() or seat.client.role == "viewer":
@@ -166,7 +166,7 @@ class TwoPersonRule:
         elif seat is not one.asker:
             one.answer.set_result(seat)
 
-    def _tell(self, seat: OperatorSession, one: _Question) -> None:
+    def _send(self, seat: OperatorSession, one: _Question) -> None:
         if seat.client.role == "viewer" and seat is not one.asker:
             return
         text = wire.encode_ask(

@@ -65,7 +65,7 @@ class SocketFlow:
 
     # Called by the protocol
 
-    def made(self, transport: asyncio.Transport) -> None:
+    def connected(self, transport: asyncio.Transport) -> None:
         """Take the transport, and make it report the first byte that the kernel does not take."""
         self._transport = transport
         transport.set_write_buffer_limits(high=0)
@@ -126,7 +126,7 @@ class TokenBucket:
         self._left = rate_hz
         self._time_s = now_s
 
-    def take(self, now_s: float) -> bool:
+    def allow(self, now_s: float) -> bool:
         """Count one message; return False above the limit."""
         earned = (now_s - self._time_s) * self._rate_hz
         self._left = min(self._rate_hz, self._left + earned)

@@ -88,7 +88,7 @@ class Fanout:
         each: Iterable[str] = (),
     ) -> None:
         """Start without clients; `each` names the signals whose every reading is sent."""
-        hub.streams.keep(each)
+        hub.streams.watch(each)
         self.hub = hub
         self._wakes: set[Callable[[], None]] = set()
         self._indexes = Indexes(hub.index)
@@ -156,7 +156,7 @@ class Fanout:
         """Stop calling `wake`."""
         self._wakes.discard(wake)
 
-    def take(self, place: Place) -> bytes:
+    def frames_for(self, place: Place) -> bytes:
         """Return the frames that bring `place` up to date, and advance it; may be empty."""
         if self._encoded_at != self.hub.revision:
             self._encoded_at = self.hub.revision

@@ -61,7 +61,7 @@ class ImageCache:
         self._encoded: dict[str, EncodedImage] = {}
         self._count = 0
 
-    def take(self, looks: ImageSubscription) -> EncodedImage | None:
+    def next_image(self, looks: ImageSubscription) -> EncodedImage | None:
         """Return a shown image that the client lacks, or None; it then counts as sent."""
         count = len(looks.names)
         for step in range(count):

@@ -54,12 +54,12 @@ class PackageCatalog:
         """Return the list of repositories."""
         return Repositories(self._folder, complain)
 
-    def ask(self, *, force: bool = False) -> None:
+    def refresh(self, *, force: bool = False) -> None:
         """Start a refresh from all repositories, unless the last one is recent."""
         is_fresh = self._asked_s is not None and self._now() - self._asked_s < FRESH_S
         if self.is_asking or (is_fresh and not force):
             return
-        self._asking = asyncio.get_running_loop().create_task(self._ask())
+        self._asking = asyncio.get_running_loop().create_task(self._refresh())
 
     async def close(self) -> None:
         """Abandon pending requests."""
@@ -90,7 +90,7 @@ class PackageCatalog:
         """Return the URL of its repository."""
         return next((url for one, url in self.found.get(entry.key, ()) if one is entry), "")
 
-    async def _ask(self) -> None:
+    async def _refresh(self) -> None:
         try:
             known = await asyncio.to_thread(self.repositories(_unheard).all)
             self.fault = ""

@@ -208,7 +208,7 @@ class Jobs:
             await asyncio.wait((self._task,))
         return self.newest
 
-    def give_up(self, number: int) -> Job:
+    def cancel(self, number: int) -> Job:
         """Cancel a job that has changed nothing yet; raise `Busy` if it is not the newest."""
         job = self._asked(number)
         if job.state in ("working", "asks") and job.line != _INSTALLING:

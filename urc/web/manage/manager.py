@@ -135,7 +135,7 @@ class Manager:
             except (UrcError, OSError) as error:
                 log.warning("%s: %s", name, error)
 
-    async def take(self, name: str, robot: Robot, version: str) -> None:
+    async def apply_settings(self, name: str, robot: Robot, version: str) -> None:
         """Switch to a robot with new settings; raise `UrcError` when widgets clash."""
         if name in self.fleet.robots:
             self._renew(name, robot)
@@ -163,7 +163,7 @@ class Manager:
 
     # Changes
 
-    async def look(self) -> None:
+    async def refresh(self) -> None:
         """Update the menu if another program has installed or removed a package."""
         if await asyncio.to_thread(self.garage.stamp) != self._seen:
             await self.changed()
@@ -185,13 +185,13 @@ class Manager:
         """Add a repository that responds; raise `PackageError`."""
         known = self.catalogue.repositories(log.info)
         await in_daemon(lambda: known.add(url), "connect")
-        self.catalogue.ask(force=True)
+        self.catalogue.refresh(force=True)
 
     async def disconnect(self, url: str) -> None:
         """Remove a repository; raise `PackageError` if it was never added."""
         known = self.catalogue.repositories(log.info)
         await asyncio.to_thread(known.remove, url)
-        self.catalogue.ask(force=True)
+        self.catalogue.refresh(force=True)
 
     def gone(self, wish: PackageRequirement) -> list[str]:
         """Return all packages that a removal would remove, as ``drivers/puppet 1.0.0``; raise."""

@@ -186,7 +186,7 @@ class ManageRoutes:
         """Return the routes of the pages and of their requests."""
         posts = {
             "repositories": self.connect,
-            "repositories/ask": self.ask,
+            "repositories/ask": self.refresh,
             "repositories/remove": self.disconnect,
             "packages/install": self.install,
             "packages/add": self.add,
@@ -237,13 +237,13 @@ class ManageRoutes:
         return answer(shelf)
 
     @_api
-    async def ask(self, request: Request) -> Response:
+    async def refresh(self, request: Request) -> Response:
         """Start a refresh from the repositories; ``force`` ignores the age of the last one.
 
         Any visitor may start a refresh, but only now and then.
         """
         said = await body_of(request, RefreshRequest)
-        self._manager.catalogue.ask(force=said.force and self.may_manage(request))
+        self._manager.catalogue.refresh(force=said.force and self.may_manage(request))
         return answer(ResultLine(t("asking the repositories")), 202)
 
     @_api
@@ -336,7 +336,7 @@ class ManageRoutes:
         """Cancel the job; nothing has changed."""
         self.check(request)
         said = await body_of(request, JobDecision)
-        return answer(self._manager.jobs.give_up(said.number).news())
+        return answer(self._manager.jobs.cancel(said.number).news())
 
     def _begun(self, what: Wanted) -> Response:
         news: JobNews = self._manager.jobs.begin(what).news()

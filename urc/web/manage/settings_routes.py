@@ -142,7 +142,7 @@ class SettingsRoutes:
                 return SettingsAnswer(is_saved=False, text=text, lines=lines)
         manager.check_idle(name)  # again: the test takes a while
         await asyncio.to_thread(garage.kept(name).save, kept)
-        await manager.take(name, robot, said.version)
+        await manager.apply_settings(name, robot, said.version)
         text = t("saved, and used from now on")
         if missing:
             text = t("saved; not set yet: {names}", names=", ".join(missing))

@@ -133,14 +133,14 @@ class HttpConnection(H11Protocol):
         if not (is_ours and is_open) or self.transport.is_closing():
             self._unwatch()
         elif self._alarm is None:
-            self._alarm = self.loop.call_later(self._request_s, self._give_up)
+            self._alarm = self.loop.call_later(self._request_s, self._timed_out)
 
     def _unwatch(self) -> None:
         if self._alarm is not None:
             self._alarm.cancel()
             self._alarm = None
 
-    def _give_up(self) -> None:
+    def _timed_out(self) -> None:
         self._alarm = None
         if self._has_spoken:
             text = f"The request did not arrive within {self._request_s:g} s."

@@ -141,7 +141,7 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Take the transport, and ask to be paused as soon as the kernel's buffer is full."""
         super().connection_made(transport)
-        self._urc_flow.made(cast("asyncio.Transport", transport))
+        self._urc_flow.connected(cast("asyncio.Transport", transport))
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Wake a waiting writer, so that it notices the end of the connection."""

@@ -36,9 +36,9 @@ def file(tmp_path: Path) -> Path:
     kept._shapes._utc_ns = lambda time_s: round(time_s * 1e9)
     kept._writer._Writer__chunk_size = 400
     for at in range(COUNT):
-        kept.put([Sample("battery", at, 1000.0 + at)])
+        kept.record([Sample("battery", at, 1000.0 + at)])
         if at == 10:
-            kept.put(
+            kept.record(
                 [LinkStatus("wire", "live", "tcp", 1010.0), LogEntry(1010.0, "info", "wire", "x")]
             )
     kept.close()

@@ -51,7 +51,7 @@ def file(tmp_path: Path) -> Path:
 def test_a_file_is_one_that_others_read(file: Path) -> None:
     """With its end, its index, the document, and the meaning of every topic."""
     kept = recorder(file)
-    kept.put(readings(1, 2, 3))
+    kept.record(readings(1, 2, 3))
     kept.close()
     with file.open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True)
@@ -70,7 +70,7 @@ def test_a_file_is_one_that_others_read(file: Path) -> None:
 
 def test_it_is_read_again(file: Path) -> None:
     kept = recorder(file)
-    kept.put(readings(1))
+    kept.record(readings(1))
     kept.close()
     found = open_recording(file)
     assert (found.document, found.unread_bytes) == (DOCUMENT, 0)
@@ -84,7 +84,7 @@ def test_what_is_more_than_it_can_keep_is_counted(
     monkeypatch.setattr(module, "MOST_WAITING", 2)
     kept = recorder(file)
     with kept._wakes:  # nothing is taken meanwhile
-        kept.put(readings(1, 2, 3, 4), lost=5)
+        kept.record(readings(1, 2, 3, 4), lost=5)
     kept.close()
     texts = [message.data for message in open_recording(file).messages(0)]
     assert len(texts) == 3
@@ -98,7 +98,7 @@ def test_what_is_too_much_in_bytes_is_counted_too(
     monkeypatch.setattr(module, "MOST_WAITING_BYTES", 10_000)
     kept = recorder(file)
     with kept._wakes:
-        kept.put([Sample("note", "x" * 4000, 1.0)] * 5)
+        kept.record([Sample("note", "x" * 4000, 1.0)] * 5)
         assert (len(kept._waiting), kept._lost) == (2, 3)
     kept.close()
 
@@ -134,7 +134,7 @@ def test_a_file_that_is_removed_is_missed(file: Path, monkeypatch: pytest.Monkey
 
 def test_the_document_is_in_it_without_the_folders_of_who_recorded(file: Path) -> None:
     kept = Recorder(file, load_profile(shipped("robots") / "turtlebot4.yaml", CATALOG))
-    kept.put(readings(1))
+    kept.record(readings(1))
     kept.close()
     document = open_recording(file).document
     assert "# turtlebot4.yaml:" in document
@@ -155,7 +155,7 @@ def test_a_place_that_takes_no_file_is_told(tmp_path: Path, place: str, said: st
 def test_a_document_that_is_gone_is_told_in_the_recording(file: Path) -> None:
     """Its profile was loaded once, and the robot is driven; it can be played with another."""
     kept = Recorder(file, PROFILE)
-    kept.put(readings(1))
+    kept.record(readings(1))
     kept.close()
     assert kept.fault == ""
     with pytest.raises(UrcError, match=r"it contains no profile\.yaml"):
@@ -190,10 +190,10 @@ def test_a_full_disk_ends_the_recording_and_says_so(
     if not is_full_at_once:
         wait(lambda: kept.is_begun)
         disk.is_full = True
-    kept.put(readings(1))
+    kept.record(readings(1))
     kept.close()
     assert kept.fault == f"{file} cannot be written: No space left on device"
-    kept.put(readings(2))  # taken by nobody, and kept nowhere
+    kept.record(readings(2))  # taken by nobody, and kept nowhere
     assert not kept._waiting
 
 
@@ -219,7 +219,7 @@ def test_a_disk_that_hangs_is_waited_for_a_while_only(
     monkeypatch.setattr(Recorder, "_made", lambda self: (goes_on.wait(), self.file.open("xb"))[1])
     file.parent.mkdir()
     kept = recorder(file)
-    kept.put(readings(1))
+    kept.record(readings(1))
     kept.close()
     assert kept.fault == f"{file}: the end of the file was not written within 0.05 s"
     goes_on.set()
@@ -229,7 +229,7 @@ def test_a_disk_that_hangs_is_waited_for_a_while_only(
 def test_one_thing_that_cannot_be_written_costs_itself_only(file: Path) -> None:
     """A mistake of ours, or a signal that nobody declared; the file says that something is gone."""
     kept = recorder(file)
-    kept.put([Sample("nobody", 1, 1.0), LogEntry(2.0, "info", "wire", "live")])
+    kept.record([Sample("nobody", 1, 1.0), LogEntry(2.0, "info", "wire", "live")])
     wait(lambda: kept.counts["/log"] == 2)
     kept.close()
     assert kept.fault == ""
