@@ -139,9 +139,9 @@ def encode_by_hand(values: Mapping[str, Any]) -> bytes:
 
 def run(*, full: bool = False) -> Sequence[Result]:
     """Measure reading, alone and through the whole engine, and writing."""
-    seal = FrameCodec(FrameLayout(tail=2, size=24, checksum=CHECKSUM))
-    open_frame, read, write = seal.open, reader(DECLARED).read, writer(DECLARED).write
-    data = seal.close(encode_by_hand(VALUES))
+    codec = FrameCodec(FrameLayout(tail=2, size=24, checksum=CHECKSUM))
+    open_frame, read, write = codec.open, reader(DECLARED).read, writer(DECLARED).write
+    data = codec.close(encode_by_hand(VALUES))
     one = Frame(b"", "utf-8")
 
     def decode(frame: bytes) -> Mapping[str, object] | None:

@@ -60,10 +60,10 @@ async def _urc(clients: int, ticks: int) -> tuple[float, int]:
 
     async with speaking(ticks, RATE_HZ) as line:
         path = "/ws?robot=puppet"
-        spent_s, tally = await cost_s(app, path, clients, [], lambda: line.heard(tell))
-    if min(messages for messages, _ in tally) < ticks * 0.9:
+        spent_s, sent_counters = await cost_s(app, path, clients, [], lambda: line.heard(tell))
+    if min(messages for messages, _ in sent_counters) < ticks * 0.9:
         raise SystemExit("bench: the machine was too busy for every frame")
-    return spent_s, tally[0][1] // ticks
+    return spent_s, sent_counters[0][1] // ticks
 
 
 def _loop(clients: int, size: int, ticks: int) -> float:

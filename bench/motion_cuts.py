@@ -46,7 +46,7 @@ def run(*, full: bool) -> Sequence[Result]:
         ThreadPoolExecutor(len(kinds)) as threads,
     ):
         rig.cut(SHORTEST_S)  # starts the guards
-        done = [threads.submit(_lane, rig, lane, plans[kinds[lane]]) for lane in rig.lanes]
+        done = [threads.submit(_queue, rig, queue, plans[kinds[queue]]) for queue in rig.lanes]
         cuts = [cut for one in done for cut in one.result()]
     return [_told(kind, [one for one in cuts if one.kind == kind], each) for kind in KINDS]
 
@@ -59,7 +59,7 @@ def _spread(count: int, longest_s: float, dice: random.Random) -> list[tuple[flo
     return [(seconds, 0.1 + dice.random() * 0.8) for seconds in times]
 
 
-def _lane(rig: CutRig, lane: int, plan: list[tuple[float, float]]) -> list[Cut]:
+def _queue(rig: CutRig, queue: int, plan: list[tuple[float, float]]) -> list[Cut]:
     """Run the rest of the plan, in parallel with others; repeat an invalid cut."""
     cuts: list[Cut] = []
     while True:
@@ -67,7 +67,7 @@ def _lane(rig: CutRig, lane: int, plan: list[tuple[float, float]]) -> list[Cut]:
             seconds, share = plan.pop()
         except IndexError:
             return cuts
-        cuts.append(rig.cut_one(lane, seconds, share))
+        cuts.append(rig.cut_one(queue, seconds, share))
         if cuts[-1].is_excused and sum(one.is_excused for one in cuts) < len(cuts) / 2:
             plan.append((seconds, share))
 

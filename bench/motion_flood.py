@@ -71,8 +71,8 @@ def _profiles(folder: Path, ports: Sequence[int]) -> tuple[list[Path], list[Path
     """Write the documents of the measured server, and of the other one."""
     path, *lanes = folder / "path.yaml", folder / "lane-1.yaml", folder / "lane-2.yaml"
     path.write_text(PROFILE.format(port=ports[0]), "utf-8")
-    for number, lane in enumerate(lanes, 1):
-        lane.write_text(lane_profile(number, "127.0.0.1", ports[number]), "utf-8")
+    for number, queue in enumerate(lanes, 1):
+        queue.write_text(lane_profile(number, "127.0.0.1", ports[number]), "utf-8")
     return [path, lanes[0]], [lanes[1]]
 
 

@@ -61,13 +61,13 @@ def run(*, full: bool) -> Sequence[Result]:
 
 def _calm(rig: Rig) -> None:
     """Wait until the last pages are forgotten, so that their stops do not count later."""
-    for lane in rig.lanes:
-        rig.robots.wait_until(partial(_is_still, rig, lane), CALM_S, "a robot at rest")
+    for queue in rig.lanes:
+        rig.robots.wait_until(partial(_is_still, rig, queue), CALM_S, "a robot at rest")
     time.sleep(LOOK_S)
 
 
-def _is_still(rig: Rig, lane: int) -> bool:
-    return rig.robots.heard[lane][-1].text == "M 0"
+def _is_still(rig: Rig, queue: int) -> bool:
+    return rig.robots.heard[queue][-1].text == "M 0"
 
 
 def _drive(rig: Rig, seconds: float, *, has_spare: bool) -> tuple[float, int, int]:
@@ -76,23 +76,23 @@ def _drive(rig: Rig, seconds: float, *, has_spare: bool) -> tuple[float, int, in
     The third number counts the stops after a delay of the machine.
     """
     until_s = time.monotonic() + seconds
-    pages = {lane: rig.drive(lane, has_spare=has_spare) for lane in rig.lanes}
-    began_ns = {lane: time.monotonic_ns() for lane in pages}
+    pages = {queue: rig.drive(queue, has_spare=has_spare) for queue in rig.lanes}
+    began_ns = {queue: time.monotonic_ns() for queue in pages}
     moved_ns = stops = excused = 0
     while time.monotonic() < until_s:
         time.sleep(LOOK_S)
-        for lane, number in pages.items():
-            heard = rig.robots.since(lane, began_ns[lane])
+        for queue, number in pages.items():
+            heard = rig.robots.since(queue, began_ns[queue])
             if len(heard) > 1 and heard[-1].text == "M 0":
                 at_ns = heard[-1].time_ns
                 is_late = rig.late_ms(at_ns - LATE_WITHIN_NS, at_ns) > LATE_MS
                 stops, excused = stops + (not is_late), excused + is_late
                 moved_ns += heard[-1].time_ns - heard[0].time_ns
                 rig.operators.kill(number)
-                began_ns[lane] = time.monotonic_ns()
-                pages[lane] = rig.drive(lane, has_spare=has_spare)
-    for lane, number in pages.items():
-        heard = rig.robots.since(lane, began_ns[lane])
+                began_ns[queue] = time.monotonic_ns()
+                pages[queue] = rig.drive(queue, has_spare=has_spare)
+    for queue, number in pages.items():
+        heard = rig.robots.since(queue, began_ns[queue])
         moved_ns += heard[-1].time_ns - heard[0].time_ns if heard else 0
         rig.operators.kill(number)
     return moved_ns / 60e9, stops, excused

@@ -70,7 +70,7 @@ class TimedPage(Page):
             "command": "go",
             "epoch": self.epoch,
             "number": self.sent,
-            "echo": self.beat,
+            "echo": self.heartbeat,
             "arguments": {"value": number},
         }
         data = json.dumps(body, separators=(",", ":")).encode()

@@ -50,8 +50,8 @@ def found(*places):
 from urc.config.load import check
 from urc.config.resolve import resolve
 widgets = found("urc.config.parse.widget:WidgetFolder", "urc.config.load:Shelf",
-                "urc.config.parse.widget:WidgetFolder")
-known = found("urc.runtime.registries:built_in_catalog", "urc.runtime.registries:built_in_registries",
+                "urc.config.parse.widget:Shelf")
+known = found("urc.runtime.catalog:built_in_catalog", "urc.runtime.registries:built_in_registries",
               "urc.runtime.registries:built_in_catalog")()
 root = Path.cwd()
 os.chdir(root / "tests/broken")

@@ -2,7 +2,7 @@
 
 Private to `urc.filters.table`. A quaternion is [x, y, z, w] or {x, y, z, w}, of any length but
 zero. The angles are about x, then y, then z in its axis convention (REP-103). Without an
-orientation the angles are not-a-number, which any arithmetic preserves and which means "not available".
+orientation the angles are not-a-number, which any arithmetic preserves: "not available".
 """
 
 import math

@@ -130,48 +130,50 @@ def _profile(port: int) -> Profile:
 
 async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
     """Hold one control all the time and another sometimes; then release them, or fall silent."""
-    desk, loop = MotionController(session.profile.driver), asyncio.get_running_loop()
-    desk.join(Operator("hand", "hand", "driver"))
-    desk.attach(session.frames, session.movers)
+    controller, loop = MotionController(session.profile.driver), asyncio.get_running_loop()
+    controller.join(Operator("hand", "hand", "driver"))
+    controller.attach(session.frames, session.backend)
     ready_s = loop.time() + _READY_S
     while not session.frames.is_ready("drive"):
         if loop.time() > ready_s:
             return "the line was never ready"
         await asyncio.sleep(0.02)
-    desk.drive("hand", "take", loop.time())
+    controller.drive("hand", "take", loop.time())
     ends_s, ticks = loop.time() + lasts_s, 0
-    following = asyncio.create_task(_follow(session, desk))
+    following = asyncio.create_task(_follow(session, controller))
     while loop.time() < ends_s:
         refused = ""
         for command in ("drive", "lift") if ticks % 60 > 30 else ("drive",):
             ticks, now = ticks + 1, loop.time()
-            given = ControlInput(desk.lease.state.epoch, ticks, desk.beat("hand", now))
+            given = ControlInput(
+                controller.lease.state.epoch, ticks, controller.heartbeat("hand", now)
+            )
             with suppress(UrcError):
                 value = {"v": dice.randrange(1, 99)}
-                refused = refused or desk.tick("hand", command, value, given, now)
+                refused = refused or controller.tick("hand", command, value, given, now)
         if ticks % 60 == 0:
-            desk.release("hand", "lift")
+            controller.release("hand", "lift")
         if refused:  # the machine was too slow for the lease: release, and start a new gesture
-            desk.release("hand", "drive")
-            desk.release("hand", "lift")
-            desk.drive("hand", "leave", loop.time())
-            desk.drive("hand", "take", loop.time())
+            controller.release("hand", "drive")
+            controller.release("hand", "lift")
+            controller.drive("hand", "leave", loop.time())
+            controller.drive("hand", "take", loop.time())
         await asyncio.sleep(_TICK_S * dice.uniform(0.5, 1.2))
     if dice.random() < 0.5:
-        desk.release("hand", "drive")
-        desk.release("hand", "lift")
+        controller.release("hand", "drive")
+        controller.release("hand", "lift")
     await asyncio.sleep(_SETTLED_S)
     following.cancel()
-    desk.detach()
+    controller.detach()
     return ""
 
 
-async def _follow(session: Session, desk: MotionController) -> None:
+async def _follow(session: Session, controller: MotionController) -> None:
     """Report stops to the motion controller, without end."""
-    assert session.movers is not None
+    assert session.backend is not None
     while True:
-        for command, reason in await session.movers.stops():
-            desk.stopped(command, reason)
+        for command, reason in await session.backend.stops():
+            controller.stopped(command, reason)
 
 
 def _judged(lasts_s: float, heard: Sequence[tuple[int, int, str]], fault: str) -> Gesture:

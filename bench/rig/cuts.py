@@ -115,16 +115,16 @@ class CutRig:
         self.relay = enter(Relay())
         here, there = self.relay.inside("a"), self.relay.inside("b")
         others = [
-            start_counterpart(kind, lane, folder, there) for lane, kind in enumerate(self.kinds)
+            start_counterpart(kind, queue, folder, there) for queue, kind in enumerate(self.kinds)
         ]
         for other in others:
             if other is not None:
                 enter(other)
-        places = [place_of(kind, lane) for lane, kind in enumerate(self.kinds)]
+        places = [place_of(kind, queue) for queue, kind in enumerate(self.kinds)]
         self.robots = enter(Robots(places, inside=there))
-        files = [folder / f"lane-{lane}.yaml" for lane in self.lanes]
-        for lane, (kind, file) in enumerate(zip(self.kinds, files, strict=True)):
-            text = document(kind, lane, self.robots.ports[lane], others[lane])
+        files = [folder / f"lane-{queue}.yaml" for queue in self.lanes]
+        for queue, (kind, file) in enumerate(zip(self.kinds, files, strict=True)):
+            text = document(kind, queue, self.robots.ports[queue], others[queue])
             file.write_text(text, "utf-8")
         self.server = enter(Server(files, folder / "data", inside=here))
         self.operators = enter(Operators(inside=here))
@@ -148,10 +148,10 @@ class CutRig:
         """Indexes of the robots."""
         return range(len(self.kinds))
 
-    def port(self, lane: int) -> int:
+    def port(self, queue: int) -> int:
         """Return the port for cuts of one robot's link."""
-        first = FIRST_PORT.get(self.kinds[lane])
-        return self.robots.ports[lane] if first is None else first + lane
+        first = FIRST_PORT.get(self.kinds[queue])
+        return self.robots.ports[queue] if first is None else first + queue
 
     def cut(self, seconds: float, order: str = "cut") -> list[Cut]:
         """Cut the link while each robot is driven; return the results.
@@ -162,30 +162,30 @@ class CutRig:
         """
         return self._trial(self.lanes, seconds, order, self._share())
 
-    def cut_one(self, lane: int, seconds: float, share: float) -> Cut:
+    def cut_one(self, queue: int, seconds: float, share: float) -> Cut:
         """Cut the link of one robot; safe to call from its own thread.
 
         Args:
-            lane: index of the robot.
+            queue: index of the robot.
             seconds: length of the cut.
             share: share of the cut after which the control is released, in every second cut.
         """
         for _ in range(ATTEMPTS - 1):
             try:
-                return self._trial((lane,), seconds, f"cut {self.port(lane)}", share)[0]
+                return self._trial((queue,), seconds, f"cut {self.port(queue)}", share)[0]
             except NotDrivenError:
                 continue
-        return self._trial((lane,), seconds, f"cut {self.port(lane)}", share)[0]
+        return self._trial((queue,), seconds, f"cut {self.port(queue)}", share)[0]
 
-    def drive_once(self, lane: int, life_s: float) -> None:
+    def drive_once(self, queue: int, life_s: float) -> None:
         """Let a page drive a robot and release it; the page lives on, and keeps the controls."""
         began_ns = time.monotonic_ns()
-        number = self._drive(lane, life_s)
-        self._await_motion(lane, began_ns)
+        number = self._drive(queue, life_s)
+        self._await_motion(queue, began_ns)
         self.operators.order(json.dumps({"let_go": number}))
         robots = self.robots
         robots.wait_until(
-            lambda: robots.heard[lane][-1].text == "M 0", READY_S, f"the stop of lane {lane}"
+            lambda: robots.heard[queue][-1].text == "M 0", READY_S, f"the stop of lane {queue}"
         )
 
     def _share(self) -> float:
@@ -193,10 +193,10 @@ class CutRig:
 
     def _trial(self, lanes: Sequence[int], seconds: float, order: str, share: float) -> list[Cut]:
         began_ns = time.monotonic_ns()
-        pages = {lane: self._drive(lane) for lane in lanes}
+        pages = {queue: self._drive(queue) for queue in lanes}
         try:
-            for lane in lanes:
-                self._await_motion(lane, began_ns)
+            for queue in lanes:
+                self._await_motion(queue, began_ns)
         except NotDrivenError:
             for number in pages.values():
                 self.operators.kill(number)
@@ -204,20 +204,20 @@ class CutRig:
         time.sleep(LEAD_S + share * 0.05)
         cut_ns = self.relay.do(order)
         time.sleep(seconds * share)
-        released = {lane: number for lane, number in pages.items() if number % 2}
+        released = {queue: number for queue, number in pages.items() if number % 2}
         for number in released.values():
             self.operators.order(json.dumps({"let_go": number}))
         time.sleep(seconds - seconds * share)
         healed_ns = self.relay.do(order.replace("cut", "heal").replace("down", "up"))
         self._watch(pages, released, cut_ns, healed_ns)
         cuts = [
-            self._judge(lane, cut_ns, healed_ns, was_held=lane not in released) for lane in lanes
+            self._judge(queue, cut_ns, healed_ns, was_held=queue not in released) for queue in lanes
         ]
         for number in pages.values():
             self.operators.kill(number)
         return cuts
 
-    def _drive(self, lane: int, life_s: float = 120.0) -> int:
+    def _drive(self, queue: int, life_s: float = 120.0) -> int:
         """Let a page drive a robot; return the page's number."""
         with self._lock:
             self._numbers += 1
@@ -227,7 +227,7 @@ class CutRig:
             "host": "127.0.0.1",
             "port": self.server.port,
             "key": self.server.key,
-            "robot": f"lane-{lane}",
+            "robot": f"lane-{queue}",
             "death": "outside",
             "drive_s": 0.0,
             "life_s": life_s,
@@ -235,11 +235,11 @@ class CutRig:
         self.operators.start(plan)
         return number
 
-    def _await_motion(self, lane: int, began_ns: int) -> None:
+    def _await_motion(self, queue: int, began_ns: int) -> None:
         def moves() -> bool:
-            return any(one.text != "M 0" for one in self.robots.since(lane, began_ns))
+            return any(one.text != "M 0" for one in self.robots.since(queue, began_ns))
 
-        what = f"motion of lane {lane} ({self.kinds[lane]})"
+        what = f"motion of lane {queue} ({self.kinds[queue]})"
         try:
             self.robots.wait_until(moves, READY_S, what)
         except AssertionError as error:
@@ -250,15 +250,15 @@ class CutRig:
         cut_ns: int, healed_ns: int,
     ) -> None:  # fmt: skip
         """Wait for the required stops, and then for forbidden events."""
-        for lane in pages:
-            bounds = bounds_of(self.kinds[lane])
+        for queue in pages:
+            bounds = bounds_of(self.kinds[queue])
             is_short = (healed_ns - cut_ns) / 1e9 < bounds.unnoticed_s
-            if not bounds.is_told or (is_short and lane not in released):
+            if not bounds.is_told or (is_short and queue not in released):
                 continue
             left_s = bounds.stop_ms / 1000 - (time.monotonic_ns() - healed_ns) / 1e9
             try:
                 self.robots.wait_until(
-                    lambda lane=lane: self._stops(lane, cut_ns),  # type: ignore[misc]
+                    lambda queue=queue: self._stops(queue, cut_ns),  # type: ignore[misc]
                     max(left_s, 0.01),
                     "a stop",
                 )
@@ -266,11 +266,11 @@ class CutRig:
                 continue  # checked later
         time.sleep(WATCH_S)
 
-    def _stops(self, lane: int, cut_ns: int) -> bool:
-        return any(one.text == "M 0" for one in self.robots.since(lane, cut_ns))
+    def _stops(self, queue: int, cut_ns: int) -> bool:
+        return any(one.text == "M 0" for one in self.robots.since(queue, cut_ns))
 
-    def _judge(self, lane: int, cut_ns: int, healed_ns: int, *, was_held: bool) -> Cut:
-        kind, all_heard = self.kinds[lane], self.robots.since(lane, cut_ns)
+    def _judge(self, queue: int, cut_ns: int, healed_ns: int, *, was_held: bool) -> Cut:
+        kind, all_heard = self.kinds[queue], self.robots.since(queue, cut_ns)
         heard = [one for one in all_heard if one.time_ns > healed_ns]
         stops = [place for place, one in enumerate(heard) if one.text == "M 0"]
         ages_ms = [
@@ -292,7 +292,7 @@ class CutRig:
             is_noticed=is_noticed, was_held=was_held, burst_ms=BURST_MS + late_ms,
         )  # fmt: skip
         oldest_ms = max(ages_ms, default=0.0)
-        earlier = [one.text for one in self.robots.heard[lane] if one.time_ns < cut_ns]
+        earlier = [one.text for one in self.robots.heard[queue] if one.time_ns < cut_ns]
         was_moving = earlier[-1:] != ["M 0"]
         return Cut(kind, lasted_s, was_held, oldest_ms, stop_ms, fault, late_ms, was_moving)
 

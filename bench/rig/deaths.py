@@ -49,10 +49,10 @@ commands:
 """
 
 
-def lane_profile(lane: int, host: str, port: int, kind: str = "tcp") -> str:
+def lane_profile(queue: int, host: str, port: int, kind: str = "tcp") -> str:
     """Return the document of one robot of the rig: ``M TIME`` moves it, ``M 0`` stops it."""
     framing = "delimiter, tx: LF, rx: LF" if kind == "tcp" else "datagram"
-    return _PROFILE.format(lane=lane, kind=kind, host=host, port=port, framing=framing)
+    return _PROFILE.format(queue=queue, kind=kind, host=host, port=port, framing=framing)
 
 
 class Trial(NamedTuple):
@@ -117,9 +117,9 @@ class Rig:
             there = self.relay.inside("b") if self.relay else ()
             self.host = SERVER_ADDRESS if self.relay else "127.0.0.1"
             self.robots = enter(Robots(["tcp:127.0.0.1:0"] * lanes, inside=there))
-            files = [folder / f"lane-{lane}.yaml" for lane in range(lanes)]
-            for lane, file in enumerate(files):
-                text = lane_profile(lane, "127.0.0.1", self.robots.ports[lane])
+            files = [folder / f"lane-{queue}.yaml" for queue in range(lanes)]
+            for queue, file in enumerate(files):
+                text = lane_profile(queue, "127.0.0.1", self.robots.ports[queue])
                 file.write_text(text, "utf-8")
             self._serve = partial(
                 Server, files, folder / "data", *options, host=self.host, inside=(*there, *inside),
@@ -155,13 +155,13 @@ class Rig:
         began_ns = time.monotonic_ns()
         pages = self._begin(death)
         self._let_die(death, pages)
-        heard = {lane: self._await_stop(lane, began_ns) for lane in pages}
+        heard = {queue: self._await_stop(queue, began_ns) for queue in pages}
         self._heal(death, pages)
         for number in pages.values():
             self.operators.kill(number)
         return [
-            self._judge(death, lane, began_ns, heard[lane], number)
-            for lane, number in pages.items()
+            self._judge(death, queue, began_ns, heard[queue], number)
+            for queue, number in pages.items()
         ]
 
     @property
@@ -174,12 +174,12 @@ class Rig:
         self._link().do(*orders)
 
     def drive(
-        self, lane: int, death: str = "outside", drive_s: float = 0.0, *, has_spare: bool = False
+        self, queue: int, death: str = "outside", drive_s: float = 0.0, *, has_spare: bool = False
     ) -> int:
         """Let a page drive a robot until it vanishes; return the page's number."""
         self._numbers += 1
         plan = Plan(
-            self._numbers, self.host, self.server.port, f"lane-{lane}", death, drive_s,
+            self._numbers, self.host, self.server.port, f"lane-{queue}", death, drive_s,
             life_s=LIFE_S, key=self.server.key, has_spare=has_spare,
         )  # fmt: skip
         self.operators.start(plan._asdict())
@@ -187,7 +187,9 @@ class Rig:
 
     def _begin(self, death: str) -> Mapping[int, int]:
         how = "outside" if death in LINK_DEATHS else death
-        return {lane: self.drive(lane, how, 0.3 + self._dice.random() * 0.2) for lane in self.lanes}
+        return {
+            queue: self.drive(queue, how, 0.3 + self._dice.random() * 0.2) for queue in self.lanes
+        }
 
     def _let_die(self, death: str, pages: Mapping[int, int]) -> None:
         for number in pages.values():
@@ -211,21 +213,21 @@ class Rig:
             raise ValueError("this rig has no relay")
         return self.relay
 
-    def _await_stop(self, lane: int, began_ns: int) -> int:
+    def _await_stop(self, queue: int, began_ns: int) -> int:
         """Wait until a robot has received motion, and then a stop; return the number of lines."""
 
         def is_still() -> bool:
-            texts = [one.text for one in self.robots.since(lane, began_ns)]
+            texts = [one.text for one in self.robots.since(queue, began_ns)]
             return len(texts) > 1 and texts[-1] == "M 0"
 
         try:
-            self.robots.wait_until(is_still, STOP_WITHIN_S, f"the stop of lane {lane}")
+            self.robots.wait_until(is_still, STOP_WITHIN_S, f"the stop of lane {queue}")
         except AssertionError:
             return 0
-        return len(self.robots.since(lane, began_ns))
+        return len(self.robots.since(queue, began_ns))
 
-    def _judge(self, death: str, lane: int, began_ns: int, until_stop: int, number: int) -> Trial:
-        heard = self.robots.since(lane, began_ns)
+    def _judge(self, death: str, queue: int, began_ns: int, until_stop: int, number: int) -> Trial:
+        heard = self.robots.since(queue, began_ns)
         moved = [place for place, one in enumerate(heard) if one.text != "M 0"]
         stop = next((one for one in heard[moved[-1] + 1 :] if one.text == "M 0"), None) if (
             moved

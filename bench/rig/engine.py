@@ -30,11 +30,11 @@ class EngineRig(Rig):
             self.operators.await_told("dying", number)  # it has driven, and continues
         told = len(self.server.lines)
         self._strike(death)
-        heard = {lane: self._await_stop(lane, began_ns) for lane in pages}
+        heard = {queue: self._await_stop(queue, began_ns) for queue in pages}
         self._mend(death, told)
         trials = [
-            self._judge(death, lane, began_ns, heard[lane], number)
-            for lane, number in pages.items()
+            self._judge(death, queue, began_ns, heard[queue], number)
+            for queue, number in pages.items()
         ]
         for number in pages.values():
             self.operators.kill(number)
@@ -67,8 +67,8 @@ class EngineRig(Rig):
         trials = [trial for guard in self.server.guards for trial in self._kill(guard)]
         for number in pages.values():
             self.operators.kill(number)
-        for lane in pages:
-            self._await_stop(lane, began_ns)
+        for queue in pages:
+            self._await_stop(queue, began_ns)
         return trials
 
     def _kill(self, guard: int) -> list[Trial]:
@@ -81,21 +81,21 @@ class EngineRig(Rig):
         def again() -> list[tuple[int, int]]:
             """Return the lanes that were reconnected, and when."""
             return [
-                (lane, at)
-                for lane in lanes
-                for at, is_open in robots.visits[lane]
-                if is_open and at > killed_ns and (robots.since(lane, at) or not moved(lane))
+                (queue, at)
+                for queue in lanes
+                for at, is_open in robots.visits[queue]
+                if is_open and at > killed_ns and (robots.since(queue, at) or not moved(queue))
             ]
 
-        def moved(lane: int) -> bool:
-            before = [one.text for one in robots.heard[lane] if one.time_ns <= killed_ns]
+        def moved(queue: int) -> bool:
+            before = [one.text for one in robots.heard[queue] if one.time_ns <= killed_ns]
             return before[-1:] != ["M 0"]
 
         robots.wait_until(lambda: bool(again()), AGAIN_S, "another guard with something to say")
-        lane, opened_ns = again()[0]
-        if not moved(lane):
+        queue, opened_ns = again()[0]
+        if not moved(queue):
             return []
-        first = robots.since(lane, opened_ns)[0]
+        first = robots.since(queue, opened_ns)[0]
         fault = "" if first.text == "M 0" else f"{first.text} came before the stop"
         late_ms = self.late_ms(killed_ns, first.time_ns)
         took_ms = (first.time_ns - killed_ns) / 1e6

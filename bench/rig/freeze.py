@@ -98,11 +98,11 @@ async def freeze(
 
     async with asyncio.TaskGroup() as group:
         for each in moments:
-            group.create_task(_lane(each, lasts_s, take))
+            group.create_task(_queue(each, lasts_s, take))
     return done
 
 
-async def _lane(moments: Sequence[float], lasts_s: float, told: Callable[[Freeze], None]) -> None:
+async def _queue(moments: Sequence[float], lasts_s: float, told: Callable[[Freeze], None]) -> None:
     robots = await asyncio.to_thread(Robots, ["bridge:127.0.0.1:0"])
     try:
         profile = _profile(robots.ports[0])
@@ -124,16 +124,16 @@ def _profile(port: int) -> Profile:
 
 async def _one(session: Session, robots: Robots, moment_s: float, lasts_s: float) -> Freeze:
     """Drive, freeze and resume the counterpart, and check the data that it received."""
-    movers = session.movers
-    assert movers is not None
+    backend = session.backend
+    assert backend is not None
     ends_s = time.monotonic() + _READY_S
-    while not (movers.is_open("go") and session.frames.is_ready("go")):
+    while not (backend.is_open("go") and session.frames.is_ready("go")):
         if time.monotonic() > ends_s:
             return Freeze(0.0, inf, inf, is_last=False, late_ms=0.0)
         await asyncio.sleep(0.02)
     await asyncio.sleep(_AFTERWARDS_S)
     stop, lossy = session.frames.stop_frame("go"), is_lossy(session.profile.driver, "wire")
-    movers.arm("go", HoldTerms(b"", period_s=_TICK_S, is_lossy=lossy).stopped_by(stop))
+    backend.arm("go", HoldTerms(b"", period_s=_TICK_S, is_lossy=lossy).stopped_by(stop))
     holding = asyncio.create_task(_hold(session))
     try:
         await asyncio.sleep(moment_s)
@@ -150,11 +150,13 @@ async def _one(session: Session, robots: Robots, moment_s: float, lasts_s: float
 
 async def _hold(session: Session) -> None:
     """Send ticks without end, as a hand that notices nothing."""
-    assert session.movers is not None
+    assert session.backend is not None
     while True:
         now_ns = time.monotonic_ns()
         with suppress(UrcError):  # the connection is closed, but the hand continues
-            session.movers.tick("go", session.frames.motion_frame("go", {"t": now_ns // 1000}, 0.0))
+            session.backend.tick(
+                "go", session.frames.motion_frame("go", {"t": now_ns // 1000}, 0.0)
+            )
         await asyncio.sleep(_TICK_S)
 
 

@@ -67,7 +67,7 @@ class Page:
         self.key = ""
         self.spare: Page | None = None
         self.epoch = -1
-        self.beat = -1
+        self.heartbeat = -1
         self.you = ""
         self.is_mine = False
         self.is_latched = False
@@ -141,7 +141,7 @@ class Page:
             for one in lines:
                 if one.socket in ready:
                     one.hear()
-                    self.beat = max(self.beat, one.beat)
+                    self.heartbeat = max(self.heartbeat, one.heartbeat)
         time.sleep(max(0.0, (until_ns - time.monotonic_ns()) / 1e9))
 
     def hear(self) -> None:
@@ -180,7 +180,7 @@ class Page:
         elif kind == "links":
             self.is_live = all(one["state"] == "live" for one in message["links"])
         elif kind == "beat":
-            self.beat = message["n"]
+            self.heartbeat = message["n"]
         elif kind in ("refused", "error"):
             self.refusal = message.get("message", "")
 
@@ -194,7 +194,7 @@ class Page:
                 "command": self.plan.command,
                 "epoch": self.epoch,
                 "number": self.sent,
-                "echo": self.beat,
+                "echo": self.heartbeat,
                 "arguments": {self.plan.argument: value},
             }
         )
@@ -221,10 +221,10 @@ class Page:
         """Wait for the lease, a beat and a robot; raise `TimeoutError` at the limit."""
         until_ns = time.monotonic_ns() + int(ANSWER_S * 1e9)
         asked_ns = 0
-        while not (self.is_mine and self.is_live and self.beat >= 0):
+        while not (self.is_mine and self.is_live and self.heartbeat >= 0):
             now_ns = time.monotonic_ns()
             if now_ns > until_ns or self.is_closed:
-                state = f"live {self.is_live}, mine {self.is_mine}, beat {self.beat}"
+                state = f"live {self.is_live}, mine {self.is_mine}, beat {self.heartbeat}"
                 raise TimeoutError(f"no controls ({state}): {self.refusal or 'no answer'}")
             # The last operator is leaving, so repeat the request until the controls are free.
             if self.you and not self.is_mine and now_ns - asked_ns > TICK_NS:

@@ -181,7 +181,7 @@ class Visit:
 
     robot: int
     socket: socket.socket
-    ear: Ear
+    expectation: Ear
     began_ns: int = 0
     """Time of the first byte of an incomplete line."""
     is_told: bool = False
@@ -306,21 +306,21 @@ class Robots:
             visit.socket.close()
             self._tell("gone", visit.robot, now_ns)
             return
-        ear = visit.ear
-        began_ns = visit.began_ns if ear.rest else now_ns
-        for text in ear.take(data):
+        expectation = visit.expectation
+        began_ns = visit.began_ns if expectation.rest else now_ns
+        for text in expectation.take(data):
             self._tell("line", visit.robot, began_ns, text)
             began_ns = now_ns
         visit.began_ns = began_ns
-        if ear.reply:
+        if expectation.reply:
             with contextlib.suppress(OSError):  # disconnected; the next check reports it
-                visit.socket.sendall(ear.reply)
-            ear.reply = b""
+                visit.socket.sendall(expectation.reply)
+            expectation.reply = b""
         self._look(visit, now_ns)
 
     def _look(self, visit: Visit, now_ns: int) -> None:
         """Report once that a connection can carry lines."""
-        if visit.ear.is_ready and not visit.is_told:
+        if visit.expectation.is_ready and not visit.is_told:
             visit.is_told = True
             self._tell("open", visit.robot, now_ns)
 

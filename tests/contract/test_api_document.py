@@ -11,7 +11,7 @@ from starlette.applications import Starlette
 from starlette.routing import Route
 from starlette.testclient import TestClient
 
-from tests.unit.web.test_manage_routes import ADDRESS, stock, workshop
+from tests.unit.web.test_manage_routes import ADDRESS, robot_options, stock
 from urc.testing.entry import ACCESS, HERE
 from urc.web.api_document import DOCUMENT, api_document
 from urc.web.app import build_app
@@ -22,7 +22,9 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 @pytest.fixture
 def app(tmp_path: Path) -> Starlette:
     stock(tmp_path)
-    return build_app({}, access=ACCESS, data=tmp_path, workshop=workshop(tmp_path), remake={})
+    return build_app(
+        {}, access=ACCESS, data=tmp_path, robot_options=robot_options(tmp_path), remake={}
+    )
 
 
 @pytest.fixture

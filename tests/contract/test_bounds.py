@@ -25,7 +25,7 @@ def test_every_robot_is_looked_at_with_half_of_the_memory_and_time(
 ) -> None:
     half = (
         "from urc.runtime import isolation;"
-        "apart.PROCESSOR_S //= 2; isolation.MEMORY_BYTES //= 2; isolation._main()"
+        "isolation.PROCESSOR_S //= 2; isolation.MEMORY_BYTES //= 2; isolation._main()"
     )
     monkeypatch.setattr(isolation, "COMMAND", ("-P", "-c", half))
     assert look_apart(document, TOP, []).permissions
@@ -37,14 +37,14 @@ def test_every_template_of_ours_is_rendered_with_half_of_the_length(
     """In all states of its demo, by the one process that a page has for all of them."""
     half = (
         "from urc.web.show import isolated_markup;"
-        "markup_apart.MOST_CHARACTERS //= 2; isolated_markup._main()"
+        "isolated_markup.MOST_CHARACTERS //= 2; isolated_markup._main()"
     )
     monkeypatch.setattr(isolated_markup, "_COMMAND", ("-P", "-c", half))
     monkeypatch.setattr(isolated_markup, "_KEPT", 10_000)
-    shelf = WidgetFolder(shipped("widgets"))
+    registry = WidgetFolder(shipped("widgets"))
     wanted = []
     for name in sorted(OURS):
-        widget = shelf.get(name)
+        widget = registry.get(name)
         assert widget is not None
         source = (widget.folder / TEMPLATE).read_text(encoding="utf-8")
         for state in demo_states(widget):

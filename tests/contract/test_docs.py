@@ -138,10 +138,10 @@ def test_the_widget_of_the_page_renders_in_each_state(folder: Path) -> None:
     lamp = folder / "widgets" / "lamp"
     needed = {"widget.yaml", "template.html.j2", "widget.js", "widget.css", "demo.yaml"}
     assert {path.name for path in lamp.iterdir()} == needed
-    shelf = WidgetFolder(lamp.parent)
-    widget = shelf.get("lamp")
+    registry = WidgetFolder(lamp.parent)
+    widget = registry.get("lamp")
     assert widget is not None
-    assert shelf.problems == []
+    assert registry.problems == []
     demo = yaml.safe_load((lamp / "demo.yaml").read_text("utf-8"))
     signals = {
         name: Signal(name, **{**given, "limits": AlarmLimits(**given.get("limits", {}))})

@@ -73,7 +73,7 @@ class Conversation:
         self.profile = profile
         self.now = 0.0
         self.engine = Engine(profile.driver, settings)
-        self.twin = EmulatedRobot(profile, settings)
+        self.emulated_robot = EmulatedRobot(profile, settings)
         self.lines: dict[str, EmulatedConnection] = {}
         self.read: set[str] = set()
         """Signals that had a value."""
@@ -92,7 +92,7 @@ class Conversation:
 
     def connect(self, transport: str) -> None:
         """Let a line be connected to a robot that knows nothing of earlier connections."""
-        self.lines[transport] = self.twin.line(transport)
+        self.lines[transport] = self.emulated_robot.line(transport)
         self.perform(self.engine.start(transport, self.now))
 
     def perform(self, events: list[Event]) -> None:

@@ -38,8 +38,8 @@ def file(request: pytest.FixtureRequest) -> Path:
 def test_every_shipped_document_has_no_finding() -> None:
     """What ships is an example, so not even a warning is left in it."""
     files = [*FOLDER.glob("**/*.yaml"), *WIDGETS.glob("*/widget.yaml")]
-    shelf = WidgetFolder(WIDGETS)
-    found = {os.fspath(file): check(file, built_in_catalog(), shelf).problems for file in files}
+    registry = WidgetFolder(WIDGETS)
+    found = {os.fspath(file): check(file, built_in_catalog(), registry).problems for file in files}
     assert len(found) >= 2
     assert {name: problems for name, problems in found.items() if problems} == {}
 

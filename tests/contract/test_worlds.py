@@ -60,7 +60,7 @@ def command(talk: Conversation, name: str, arguments: Mapping[str, object]) -> N
 
 def body_of(talk: Conversation) -> SimulatedBody:
     """Return what moves."""
-    body = talk.twin.body
+    body = talk.emulated_robot.body
     assert body is not None
     return body
 

@@ -38,11 +38,11 @@ def groups() -> list[str]:
 
 def states_of(group: str) -> dict[tuple[str, str], WidgetState]:
     """Return (widget, state) → the state, of all widgets of a group."""
-    shelf = WidgetFolder(shipped("widgets"))
+    registry = WidgetFolder(shipped("widgets"))
     found = {}
     for name in group.split("+"):
-        widget = shelf.get(name)
-        assert widget is not None, [problem.message for problem in shelf.problems]
+        widget = registry.get(name)
+        assert widget is not None, [problem.message for problem in registry.problems]
         found |= {(name, state.name): state for state in demo_states(widget)}
     return found
 

@@ -155,12 +155,12 @@ async def running_managed(
 ) -> AsyncIterator[str]:
     """Serve what `urc serve --data-dir DATA` would; give the address, and end cleanly."""
     place = DashboardAddress("127.0.0.1", 0, data=data, shows_installed=not profiles)
-    workshop = workshop_of(place)
-    garage = RobotFactory(workshop)
-    robots = {one.name: garage.robot(one.name, one) for one in profiles}
-    remake = {name: partial(garage.robot, name) for name in robots} if is_dev else None
+    robot_options = workshop_of(place)
+    factory = RobotFactory(robot_options)
+    robots = {one.name: factory.robot(one.name, one) for one in profiles}
+    remake = {name: partial(factory.robot, name) for name in robots} if is_dev else None
     app = build_app(
-        robots, access=ACCESS, data=data, remake=remake, workshop=workshop, linger_s=0.2
+        robots, access=ACCESS, data=data, remake=remake, robot_options=robot_options, linger_s=0.2
     )
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
     task = asyncio.create_task(serve(app, port=0, on_ready=ready.set_result))

@@ -417,7 +417,7 @@ async def held_by_its_form(page: Page, robot: FakeRobot) -> None:
     x, y = await centre(page, "[data-command='lift'] button")
     await page.mouse.move(x, y)
     await page.mouse.down()
-    line = robot.movers
+    line = robot.backend
     assert isinstance(line, FakeMotionBackend)
     await until(lambda: any("rate=0.5" in text for text in line.texts))
     await page.mouse.up()

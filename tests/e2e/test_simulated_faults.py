@@ -114,9 +114,9 @@ async def test_a_camera_shows_the_world_and_fails_on_demand() -> None:
     """Two pictures of its stream differ, for the board turns; then there is none, and 503."""
     profile = load_profile(ROOT / "robots" / "esp32-cam.yaml", built_in_catalog())
     settings = sample_settings(profile.settings)
-    twin = EmulatedRobot(profile, settings)
+    emulated_robot = EmulatedRobot(profile, settings)
     async with (
-        serve(profile, settings, is_anywhere=True, twin=twin) as places,
+        serve(profile, settings, is_anywhere=True, emulated_robot=emulated_robot) as places,
         httpx2.AsyncClient(timeout=WAIT_S) as client,
     ):
         pictures: list[bytes] = []
@@ -134,10 +134,10 @@ async def test_a_camera_shows_the_world_and_fails_on_demand() -> None:
         assert pictures[0] != pictures[4]
         status = f"{places['web'].options['url']}status"
         assert (await client.get(status)).json()["framesize"] == 8
-        twin.inject("dropout=frame_size", time.time())
+        emulated_robot.inject("dropout=frame_size", time.time())
         assert (await client.get(status)).status_code == 503
-        twin.mend()
-        twin.inject("loss=100%", time.time())
+        emulated_robot.mend()
+        emulated_robot.inject("loss=100%", time.time())
         with pytest.raises(httpx2.TransportError):
             await client.get(status)
 

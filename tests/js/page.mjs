@@ -9,7 +9,7 @@ const STATIC = new URL("../../urc/web/static/", import.meta.url).href;
 // Without a package.json that says so, Node takes a page's modules for scripts of its own kind.
 const hooks = `
 const STATIC = ${JSON.stringify(STATIC)};
-const OURS = /^urc\\/([a-z]+)$/;
+const OURS = /^urc\\/([a-z_]+)$/;
 export async function resolve(name, context, next) {
   const ours = OURS.exec(name)?.[1];
   // English is the key of every text, so nothing has to be said for it.

@@ -205,8 +205,8 @@ def test_an_explanation_that_is_not_needed_is_told(
 ) -> None:
     code, said = summary(tmp_path, capsys, EXPLAINED, _1=1, _2=36)
     assert (
-        "mutants.toml: no mutant that lives is so any more: urc.guard.motion_scheduler.MotionScheduler.tick"
-        in said
+        "mutants.toml: no mutant that lives is so any more: "
+        "urc.guard.motion_scheduler.MotionScheduler.tick" in said
     )
     assert code == 0
 
@@ -262,10 +262,10 @@ def test_a_run_has_every_test_of_the_desk() -> None:
     """A fault that only a left-out test notices counts as a survivor."""
     told = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["mutmut"]
     run = told["pytest_add_cli_args_test_selection"]
-    desk = [
+    controller = [
         path.relative_to(ROOT).as_posix()
         for path in (ROOT / "tests" / "unit" / "runtime").glob("test_*.py")
         if "tests.unit.runtime.desks" in path.read_text("utf-8")
     ]
-    assert set(desk) <= set(run)
+    assert set(controller) <= set(run)
     assert [name for name in run if not (ROOT / name).exists()] == []

@@ -107,40 +107,40 @@ async def _serve(
     faults: Sequence[str],
 ) -> int:
     async with AsyncExitStack() as stack:
-        workshop = workshop_of(place, given, faulty)
+        robot_options = workshop_of(place, given, faulty)
         access = access_for(place.host, place.token)
 
         def ready(url: str) -> None:
-            entrance = ReadyDashboard(url, access)
-            announce(stack, workshop.data, place.host, entrance)
-            on_ready(entrance)
+            ready_dashboard = ReadyDashboard(url, access)
+            announce(stack, robot_options.data, place.host, ready_dashboard)
+            on_ready(ready_dashboard)
 
-        garage = RobotFactory(workshop)
+        factory = RobotFactory(robot_options)
         robots: dict[str, Robot] = {}
         for profile in profiles:
-            robot = _first(garage, profile)
+            robot = _first(factory, profile)
             if faulty is not None:
                 # Emulated from the start, even without a viewer.
-                twin = EmulatedRobot(robot.profile, robot.settings)
-                stack.enter_context(faulty.watch(profile.name, twin))
+                emulated_robot = EmulatedRobot(robot.profile, robot.settings)
+                stack.enter_context(faulty.watch(profile.name, emulated_robot))
                 redirected = await stack.enter_async_context(
-                    stand_in(robot.profile, robot.settings, twin)
+                    stand_in(robot.profile, robot.settings, emulated_robot)
                 )
                 robot = _robot(place, None, redirected, robot.settings)
-                robot = replace(robot, glimpse=partial(_seen, twin), is_emulated=True)
+                robot = replace(robot, glimpse=partial(_seen, emulated_robot), is_emulated=True)
             robots[profile.name] = robot
         if faulty is not None:
             faulty.begin(faults)
             await stack.enter_async_context(_listening(faulty))
-        remade = {name: partial(garage.robot, name) for name in robots} if is_dev else None
+        remade = {name: partial(factory.robot, name) for name in robots} if is_dev else None
         app = build_app(
             robots,
             access=access,
             allowed_hosts=place.allowed_hosts,
-            data=workshop.data,
+            data=robot_options.data,
             tiles=place.tiles,
             remake=remade,
-            workshop=workshop,
+            robot_options=robot_options,
             trusted=place.trusted,
         )
         gc.collect()
@@ -177,13 +177,13 @@ def _motion(place: DashboardAddress) -> Motion:
     return "guarded" if place.has_guard else "here"
 
 
-def _first(garage: RobotFactory, profile: Profile) -> Robot:
+def _first(factory: RobotFactory, profile: Profile) -> Robot:
     """Return a robot that exists from the start, with its stored settings if they are valid."""
     try:
-        return garage.robot(profile.name, profile)
+        return factory.robot(profile.name, profile)
     except UrcError as error:
         complain(f"urc: {error}; the stored settings of {profile.name} are ignored")
-        return garage.robot(profile.name, profile, StoredSettings())
+        return factory.robot(profile.name, profile, StoredSettings())
 
 
 def _robot(
@@ -198,10 +198,14 @@ def _robot(
     return Robot(profile, settings, opened, is_emulated=faulty is not None)
 
 
-def _seen(twin: EmulatedRobot) -> Glimpse:
+def _seen(emulated_robot: EmulatedRobot) -> Glimpse:
     """Return the preview of an emulated robot: its camera, a view from above, or readings."""
     now_s = time.time()
-    return twin.camera(now_s) or twin.top_view(*_LOOK, now_s) or twin.readings(now_s)
+    return (
+        emulated_robot.camera(now_s)
+        or emulated_robot.top_view(*_LOOK, now_s)
+        or emulated_robot.readings(now_s)
+    )
 
 
 @asynccontextmanager
@@ -218,9 +222,9 @@ async def _session(
         settings = values
         if faulty is not None:
             settings = _complete(profile, values)
-            twin = EmulatedRobot(profile, settings)
-            stack.enter_context(faulty.watch(profile.name, twin))
-            profile = await stack.enter_async_context(stand_in(profile, settings, twin))
+            emulated_robot = EmulatedRobot(profile, settings)
+            stack.enter_context(faulty.watch(profile.name, emulated_robot))
+            profile = await stack.enter_async_context(stand_in(profile, settings, emulated_robot))
         session = Session(profile, settings, transports, motion=motion)
         if recordings is not None:
             # Opened first and closed last, so that both ends of the session are recorded.

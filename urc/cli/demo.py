@@ -44,12 +44,12 @@ def run(arguments: argparse.Namespace) -> int:
     if not profiles:
         raise UrcError(f"there are no robots in {shipped('robots')}")
 
-    def announce(entrance: ReadyDashboard) -> None:
-        first, *others = entrance.lines()
+    def announce(ready_dashboard: ReadyDashboard) -> None:
+        first, *others = ready_dashboard.lines()
         print("\n".join((f"{first}   (Ctrl-C ends it)", *others)), flush=True)
         if not arguments.no_browser and has_screen(sys.platform, os.environ):
             # Every user of this machine can read the command line of a browser.
-            url = entrance.address_once
+            url = ready_dashboard.address_once
             threading.Thread(target=_open_browser, args=(url,), daemon=True).start()
 
     return run_dashboard(

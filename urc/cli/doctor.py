@@ -84,7 +84,7 @@ def _findings(port: int) -> Iterator[_Finding]:
     is_vendored = vendored() is not None
     text = "third-party modules for the browser" if is_vendored else _VENDOR_REMEDY
     yield _Finding("urc_vendor", is_vendored, text, is_required=False)
-    yield _precedence()
+    yield _priority()
     yield _attempt("port", lambda: _try_port(port), is_required=False)
 
 
@@ -102,7 +102,7 @@ def _attempt(name: str, check: Callable[[], str], *, is_required: bool = True) -
         return _Finding(name, False, str(fault), is_required)
 
 
-def _precedence() -> _Finding:
+def _priority() -> _Finding:
     from urc.guard.real_time_priority import why_not
 
     refusal = why_not()

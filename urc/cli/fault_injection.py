@@ -115,22 +115,22 @@ class FaultInjector:
             now: seconds since the epoch.
         """
         self._now = now
-        self._twins: dict[str, list[EmulatedRobot]] = {}
+        self._emulated_robots: dict[str, list[EmulatedRobot]] = {}
         self._wrong: dict[str, dict[str, str]] = {}
         """Robot → its faults as written, for its next emulation."""
 
     @contextmanager
-    def watch(self, name: str, twin: "EmulatedRobot") -> Iterator[None]:
+    def watch(self, name: str, emulated_robot: "EmulatedRobot") -> Iterator[None]:
         """Inject the faults of a robot during the context."""
-        twins = self._twins.setdefault(name, [])
+        emulated_robots = self._emulated_robots.setdefault(name, [])
         for text in self._wrong.get(name, {}).values():
             with suppress(UrcError):  # another version may lack that signal
-                twin.inject(text, self._now())
-        twins.append(twin)
+                emulated_robot.inject(text, self._now())
+        emulated_robots.append(emulated_robot)
         try:
             yield
         finally:
-            twins.remove(twin)
+            emulated_robots.remove(emulated_robot)
 
     def begin(self, texts: Sequence[str]) -> None:
         """Inject the faults of the command line; raise `Misuse` for an impossible fault."""
@@ -151,13 +151,13 @@ class FaultInjector:
         from urc.simulator.faults import parse_fault
 
         robot, colon, fault = text.strip().rpartition(":")
-        names = self._named(robot) if colon else [*self._twins]
+        names = self._named(robot) if colon else [*self._emulated_robots]
         said = parse_fault(fault)
         refusals = []
         for name in names:
             try:
-                for twin in self._twins[name]:
-                    twin.inject(fault, self._now())
+                for emulated_robot in self._emulated_robots[name]:
+                    emulated_robot.inject(fault, self._now())
             except UrcError as error:
                 refusals.append(error)
             else:
@@ -171,24 +171,26 @@ class FaultInjector:
         Raises:
             UrcError: an unknown robot; one line.
         """
-        for name in self._named(robot) if robot else [*self._twins]:
+        for name in self._named(robot) if robot else [*self._emulated_robots]:
             self._wrong.pop(name, None)
-            for twin in self._twins[name]:
-                twin.mend()
+            for emulated_robot in self._emulated_robots[name]:
+                emulated_robot.mend()
 
     def _named(self, robot: str) -> list[str]:
-        if robot in self._twins:
+        if robot in self._emulated_robots:
             return [robot]
-        hint = did_you_mean(robot, self._twins, "robots")
+        hint = did_you_mean(robot, self._emulated_robots, "robots")
         raise UrcError(f"no robot {robot!r} is emulated here" + (f"; {hint}" if hint else ""))
 
     def __str__(self) -> str:
         """Return the injected faults, for people."""
         found = []
-        for name, twins in self._twins.items():
-            faults = ", ".join(twins[0].faults if twins else self._wrong.get(name, {}).values())
+        for name, emulated_robots in self._emulated_robots.items():
+            faults = ", ".join(
+                emulated_robots[0].faults if emulated_robots else self._wrong.get(name, {}).values()
+            )
             if faults:
-                found.append(faults if len(self._twins) == 1 else f"{name}: {faults}")
+                found.append(faults if len(self._emulated_robots) == 1 else f"{name}: {faults}")
         return f"faults: {'; '.join(found) or 'none'}"
 
     def obey(self, line: str) -> None:

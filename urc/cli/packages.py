@@ -75,17 +75,17 @@ def installed_document(word: str) -> Path | None:
     from urc.packages.names import PackageError, parse_wish
 
     try:
-        wish = parse_wish(word)
+        required = parse_wish(word)
     except PackageError:
         return None  # a path, for example
     from urc.runtime.settings_store import in_use
 
     store = open_store()
-    used = in_use(data_folder() / "robots", wish.name, store.installed())
-    if used is not None and wish.range == "*" and wish.kind in ("", used.key.kind):
+    used = in_use(data_folder() / "robots", required.name, store.installed())
+    if used is not None and required.range == "*" and required.kind in ("", used.key.kind):
         return store.document(used)
     for kind in ("robot", "driver"):
-        if wish.kind in ("", kind) and (lock := store.find(wish._replace(kind=kind))):
+        if required.kind in ("", kind) and (lock := store.find(required._replace(kind=kind))):
             return store.document(lock)
     return None
 

@@ -80,7 +80,7 @@ async def _serve(player: "Player", host: str, port: int) -> int:
     from urc.web.app import Robot, build_app, serve
 
     profile = player.profile
-    robot = Robot(profile, player.settings, player.session, tape=player)
+    robot = Robot(profile, player.settings, player.session, playback=player)
     access = access_for(host)
     app = build_app({profile.name: robot}, access=access)
     await serve(

@@ -193,18 +193,18 @@ def _index(arguments: argparse.Namespace) -> int:
     from urc.packages.index_builder import make_index
     from urc.runtime.package_check import examine
 
-    folder, seal = Path(_one(arguments, "DIR")), _seal(arguments)
-    listing = make_index(folder, _name(arguments, folder), examine, seal)
+    folder, codec = Path(_one(arguments, "DIR")), _codec(arguments)
+    listing = make_index(folder, _name(arguments, folder), examine, codec)
     for fault in listing.faults:
         complain(f"not listed: {fault}")
     print(f"{folder / 'index.json'}  {len(listing.listed.packages)} versions of packages")
-    if seal is not None:
-        print(f"signed by {seal.signer}; sign it again ('urc repo index', or a running"
+    if codec is not None:
+        print(f"signed by {codec.signer}; sign it again ('urc repo index', or a running"
               f" 'urc repo serve') within {arguments.valid / 2:g} days")  # fmt: skip
     return 1 if listing.faults else 0
 
 
-def _seal(arguments: argparse.Namespace) -> "IndexSigner | None":
+def _codec(arguments: argparse.Namespace) -> "IndexSigner | None":
     """Return the signature settings of the index; None without a key."""
     from urc.cli.packages import signer
     from urc.packages.index_head import IndexSigner
@@ -232,7 +232,7 @@ def _note(arguments: argparse.Namespace, why: str) -> int:
     if len(arguments.words) != 3:
         raise Misuse(f"'urc repo {arguments.action}' takes DIR PACKAGE VERSION")
     folder, package, version = arguments.words
-    entry = withdraw(Path(folder), parse_key(package), version, why, _seal(arguments))
+    entry = withdraw(Path(folder), parse_key(package), version, why, _codec(arguments))
     print(f"{entry} is withdrawn: {why}" if why else f"{entry} is offered again")
     return 0
 
@@ -246,16 +246,16 @@ def _serve(arguments: argparse.Namespace) -> int:
     from urc.web.serve.server import serve
 
     folder = Path(_one(arguments, "DIR"))
-    tokens, seal = _tokens(arguments, folder), _seal(arguments)
+    tokens, codec = _tokens(arguments, folder), _codec(arguments)
     _index(arguments)
     if not is_loopback(arguments.host):
         complain(f"urc repo: anyone on the network of {arguments.host} can read this repository")
 
     async def work() -> int:
-        renewing = asyncio.create_task(_renewing(folder, seal))
+        renewing = asyncio.create_task(_renewing(folder, codec))
         try:
             await serve(
-                repository_app(folder, tokens, examine_apart, seal),
+                repository_app(folder, tokens, examine_apart, codec),
                 host=arguments.host,
                 port=arguments.port,
                 on_ready=_print_url,
@@ -268,15 +268,15 @@ def _serve(arguments: argparse.Namespace) -> int:
     return run_loop(work(), code_when_ended=0)
 
 
-async def _renewing(folder: Path, seal: "IndexSigner | None") -> None:
+async def _renewing(folder: Path, codec: "IndexSigner | None") -> None:
     """Sign the index again before it expires, as long as it is served."""
     from urc.packages.index_builder import renew
     from urc.packages.names import PackageError
 
-    while seal is not None:
+    while codec is not None:
         await asyncio.sleep(_RENEW_S)
         try:
-            await asyncio.to_thread(renew, folder, seal)
+            await asyncio.to_thread(renew, folder, codec)
         except (PackageError, OSError) as error:
             complain(f"urc repo: the signature of the index is not renewed: {error}")
 

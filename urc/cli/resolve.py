@@ -23,9 +23,9 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.runtime.widget_registry import shelf_of
 
     path = profile_path(arguments.profile)
-    shelf = shelf_of(path)
-    checked = check(path, built_in_catalog(), shelf)
-    resolved = resolve(path, shelf, checked.profile)
+    registry = shelf_of(path)
+    checked = check(path, built_in_catalog(), registry)
+    resolved = resolve(path, registry, checked.profile)
     if not resolved.text:
         raise ProblemsError(resolved.problems)
     print(resolved.text, end="")

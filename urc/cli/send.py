@@ -261,8 +261,8 @@ async def _send(
     async with Session(profile, settings, transports, motion=motion) as session:
         await _known(session, command)
         try:
-            async with _heeding(session, command, arguments) as hindrance:
-                replied = await _given(session, command, values, arguments.hold_s, hindrance)
+            async with _heeding(session, command, arguments) as interlock:
+                replied = await _given(session, command, values, arguments.hold_s, interlock)
         except CommandFailed as failed:
             text = f"{command.name} failed ({failed.code}): {_why(session, command, failed)}"
             raise (Misuse if failed.code in _WRONG_USE else UrcError)(text) from failed
@@ -278,7 +278,7 @@ async def _given(
     command: "Command",
     values: Mapping[str, "Reading"],
     hold_s: float | None,
-    hindrance: "MotionInterlock | None",
+    interlock: "MotionInterlock | None",
 ) -> dict[str, "Reading"]:
     """Give the command, or hold it; return the values of its reply."""
     if hold_s is None:
@@ -291,7 +291,7 @@ async def _given(
         check_arguments(command, values)
     except BadArgument as wrong:
         raise CommandFailed("bad-argument", str(wrong)) from wrong
-    why_not = (lambda: hindrance.why) if hindrance is not None else str
+    why_not = (lambda: interlock.why) if interlock is not None else str
     await hold(session, command.name, values, hold_s, why_not)
     return {}
 
@@ -309,16 +309,16 @@ async def _heeding(
 
     clock = asyncio.get_running_loop().time
     data = arguments.data or data_folder()
-    hindrance = MotionInterlock(data, session.profile.name, clock)
+    interlock = MotionInterlock(data, session.profile.name, clock)
 
     def tell(why: str) -> None:
         session.latch(f"{why}; --despite-stop overrides this" if why else "")
 
-    if await hindrance.check():
-        tell(hindrance.why)
-    following = asyncio.create_task(hindrance.follow(tell))
+    if await interlock.check():
+        tell(interlock.why)
+    following = asyncio.create_task(interlock.follow(tell))
     try:
-        yield hindrance
+        yield interlock
     finally:
         following.cancel()
 

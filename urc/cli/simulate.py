@@ -48,10 +48,10 @@ def run(arguments: argparse.Namespace) -> int:
     # Samples replace the values that only a real robot needs.
     settings = sample_settings(profile.settings) | values
     settings |= {name: 0 for name in missing if profile.settings[name].type == "port"}
-    twin, faulty = EmulatedRobot(profile, settings), FaultInjector()
-    with faulty.watch(profile.name, twin):
+    emulated_robot, faulty = EmulatedRobot(profile, settings), FaultInjector()
+    with faulty.watch(profile.name, emulated_robot):
         faulty.begin(arguments.faults)
-        work = _simulate(profile, settings, arguments.host, twin, faulty)
+        work = _simulate(profile, settings, arguments.host, emulated_robot, faulty)
         return run_loop(work, code_when_ended=0)
 
 
@@ -59,7 +59,7 @@ async def _simulate(
     profile: "Profile",
     settings: Mapping[str, "Value"],
     host: str,
-    twin: "EmulatedRobot",
+    emulated_robot: "EmulatedRobot",
     faulty: FaultInjector,
 ) -> int:
     from urc.simulator.server import serve
@@ -70,7 +70,7 @@ async def _simulate(
     log.propagate = False
     log.addHandler(complaints)
     try:
-        async with serve(profile, settings, host, twin=twin) as listening:
+        async with serve(profile, settings, host, emulated_robot=emulated_robot) as listening:
             for name, place in listening.items():
                 print(f"listening {name} {place.text}", flush=True)
             await faulty.listen()

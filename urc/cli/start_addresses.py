@@ -49,9 +49,9 @@ class ReadyDashboard(NamedTuple):
             yield f"for managers {managers}"
 
 
-def print_entrance(entrance: ReadyDashboard) -> None:
+def print_entrance(ready_dashboard: ReadyDashboard) -> None:
     """Print the addresses."""
-    print("\n".join(entrance.lines()), flush=True)
+    print("\n".join(ready_dashboard.lines()), flush=True)
 
 
 def access_for(host: str, token: str = "") -> "Access":
@@ -85,14 +85,16 @@ def token_in(file: Path) -> str:
 
 
 def announce(
-    stack: ExitStack | AsyncExitStack, data: Path, host: str, entrance: ReadyDashboard
+    stack: ExitStack | AsyncExitStack, data: Path, host: str, ready_dashboard: ReadyDashboard
 ) -> None:
     """Let other programs of this user find a dashboard until `stack` ends."""
     from urc.runtime.running_servers import RunningServer, announced
 
-    server = RunningServer(_near(entrance.url, host), entrance.access.key, os.getpid())
+    server = RunningServer(
+        _near(ready_dashboard.url, host), ready_dashboard.access.key, os.getpid()
+    )
     try:
-        stack.enter_context(announced(data, entrance.access.instance, server))
+        stack.enter_context(announced(data, ready_dashboard.access.instance, server))
     except OSError as error:
         reason = error.strerror or error
         complain(f"urc: cannot write into {data}: {reason}; 'urc send' will not find this server")

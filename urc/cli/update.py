@@ -63,11 +63,11 @@ def _installed(store: "Store", word: str) -> "tuple[Lock, str]":
     """Return the installed package of a name, and its wanted range."""
     from urc.packages.names import PackageError, parse_wish
 
-    wish = parse_wish(word)
-    lock = store.find(wish._replace(range="*"))
+    required = parse_wish(word)
+    lock = store.find(required._replace(range="*"))
     if lock is None:
-        raise PackageError(f"{wish} is not installed; 'urc install {word}' installs it")
-    return lock, wish.range
+        raise PackageError(f"{required} is not installed; 'urc install {word}' installs it")
+    return lock, required.range
 
 
 def _all(store: "Store") -> "list[tuple[Lock, str]]":

@@ -108,10 +108,10 @@ def _examine(paths: list[str], *, with_tests: bool) -> _Report:
     from urc.runtime.registries import built_in_catalog
     from urc.shipped import shipped
 
-    report, catalog, shelf = _Report(), built_in_catalog(), WidgetFolder(shipped("widgets"))
+    report, catalog, registry = _Report(), built_in_catalog(), WidgetFolder(shipped("widgets"))
     for path in paths:
         report.files += 1
-        checked = check(path, catalog, _shelf_of_package(path) or shelf)
+        checked = check(path, catalog, _shelf_of_package(path) or registry)
         report.add(list(checked.problems))
         report.is_cut_short |= checked.is_cut_short
         report.looked_at |= dict.fromkeys(checked.files)

@@ -61,21 +61,21 @@ _STEERED: Final = 2
 """Rank of controls that steer."""
 
 
-def automatic_slots(driver: Driver, shelf: WidgetFolder) -> dict[str, WidgetUse]:
+def automatic_slots(driver: Driver, registry: WidgetFolder) -> dict[str, WidgetUse]:
     """Return the widget of each slot: views of signals first, then controls."""
     slots: dict[str, WidgetUse] = {}
     left = dict(driver.signals)
-    for use in _grouped(left, shelf):
+    for use in _grouped(left, registry):
         _put(slots, use)
     plain = [one for one in left.values() if one.type not in ("blob", "object", "array")]
-    table = _table(plain[MOST_PLAIN:], shelf) if len(plain) > MOST_PLAIN else None
+    table = _table(plain[MOST_PLAIN:], registry) if len(plain) > MOST_PLAIN else None
     for signal in plain[:MOST_PLAIN] if table is not None else plain:
-        shown = _shown(signal, shelf)
+        shown = _shown(signal, registry)
         if shown is not None:
             _put(slots, shown)
     if table is not None:
         _put(slots, table)
-    given = [_given(one, driver, shelf) for one in driver.commands.values()]
+    given = [_given(one, driver, registry) for one in driver.commands.values()]
     for use in [one for one in given if one is not None][:MOST_COMMANDS]:
         _put(slots, use)
     return slots
@@ -92,10 +92,10 @@ def _put(slots: dict[str, WidgetUse], use: WidgetUse) -> None:
 # ---- signals
 
 
-def _grouped(left: dict[str, Signal], shelf: WidgetFolder) -> Iterator[WidgetUse]:
+def _grouped(left: dict[str, Signal], registry: WidgetFolder) -> Iterator[WidgetUse]:
     """Yield the widgets that take several signals, and remove those signals from `left`."""
     for widget_name, inputs, needed in _GROUPS:
-        widget = shelf.get(widget_name)
+        widget = registry.get(widget_name)
         if widget is None or not needed <= widget.inputs.keys():
             continue
         for stem, found in _stems(left, inputs).items():
@@ -125,10 +125,10 @@ def _stems(
     return stems
 
 
-def _shown(signal: Signal, shelf: WidgetFolder) -> WidgetUse | None:
+def _shown(signal: Signal, registry: WidgetFolder) -> WidgetUse | None:
     """Return the first widget that fits a signal, from the most specific to the simplest."""
     for name in _candidates(signal):
-        use = _one_input(shelf.get(name), signal)
+        use = _one_input(registry.get(name), signal)
         if use is not None:
             return use
     return None
@@ -163,8 +163,8 @@ def _one_input(widget: Widget | None, signal: Signal) -> WidgetUse | None:
     return _use(widget, signal.name, {fitting[0]: signal.name}, signal.title)
 
 
-def _table(signals: list[Signal], shelf: WidgetFolder) -> WidgetUse | None:
-    widget = shelf.get("table")
+def _table(signals: list[Signal], registry: WidgetFolder) -> WidgetUse | None:
+    widget = registry.get("table")
     port = (
         next((one for one in widget.inputs.values() if one.is_multiple), None) if widget else None
     )
@@ -179,20 +179,20 @@ def _table(signals: list[Signal], shelf: WidgetFolder) -> WidgetUse | None:
 # ---- commands
 
 
-def _given(command: Command, driver: Driver, shelf: WidgetFolder) -> WidgetUse | None:
+def _given(command: Command, driver: Driver, registry: WidgetFolder) -> WidgetUse | None:
     """Return the control of a command; None when no widget has enough values."""
     if command.hold is not None:
-        held = _held(command, shelf)
+        held = _held(command, registry)
         return held if held is not None and _is_complete(held, command) else None
     needed = [one for one in command.arguments.values() if one.is_required]
     if not needed:
-        return _output(shelf.get("button"), command, {})
+        return _output(registry.get("button"), command, {})
     if len(needed) > 1:
         return None
     for name in _inputs_for(needed[0]):
-        use = _output(shelf.get(name), command, {needed[0].name: "value"})
+        use = _output(registry.get(name), command, {needed[0].name: "value"})
         if use is not None:
-            return _with_state(use, needed[0], driver, shelf)
+            return _with_state(use, needed[0], driver, registry)
     return None
 
 
@@ -207,22 +207,22 @@ def _inputs_for(argument: Argument) -> tuple[str, ...]:
     return ("text",) if argument.type == "string" else ()
 
 
-def _held(command: Command, shelf: WidgetFolder) -> WidgetUse | None:
+def _held(command: Command, registry: WidgetFolder) -> WidgetUse | None:
     axes = [
         one.name
         for one in command.arguments.values()
         if one.type in ("integer", "number") and one.max is not None
     ]
     if len(axes) == 1:
-        return _output(shelf.get("axis"), command, {axes[0]: "value"}) or _output(
-            shelf.get("hold-button"), command, {axes[0]: "level"}
+        return _output(registry.get("axis"), command, {axes[0]: "value"}) or _output(
+            registry.get("hold-button"), command, {axes[0]: "level"}
         )
     if axes:
         forward = next((one for one in axes if _says(one, _FORWARD)), axes[0])
         others = [one for one in axes if one != forward]
         turn = next((one for one in others if _says(one, _TURN)), others[0])
-        return _output(shelf.get("joystick"), command, {forward: "x", turn: "y"})
-    return _output(shelf.get("hold-button"), command, {})
+        return _output(registry.get("joystick"), command, {forward: "x", turn: "y"})
+    return _output(registry.get("hold-button"), command, {})
 
 
 def _is_complete(use: WidgetUse, command: Command) -> bool:
@@ -252,10 +252,10 @@ def _output(widget: Widget | None, command: Command, names: Mapping[str, str]) -
 
 
 def _with_state(
-    use: WidgetUse, argument: Argument, driver: Driver, shelf: WidgetFolder
+    use: WidgetUse, argument: Argument, driver: Driver, registry: WidgetFolder
 ) -> WidgetUse:
     """Show the robot's value, if a signal has the name of the argument or command."""
-    widget = shelf.get(use.widget)
+    widget = registry.get(use.widget)
     port = widget.inputs.get("state") if widget is not None else None
     command = next(iter(use.outputs.values()))
     for name in (argument.name, command):

@@ -51,13 +51,13 @@ class _Known(WidgetFolder):
         return name in self._mine or self._behind.has(name)
 
 
-def fit_interface(path: str, profile: Profile, shelf: WidgetFolder) -> InterfaceFit:
+def fit_interface(path: str, profile: Profile, registry: WidgetFolder) -> InterfaceFit:
     """Return an interface with the slots of a robot's driver.
 
     Args:
         path: the interface's document.
         profile: of the robot.
-        shelf: more widgets for the document, after the robot's own.
+        registry: more widgets for the document, after the robot's own.
     """
     gathered = gather(path)
     sources = gathered.sources
@@ -66,12 +66,12 @@ def fit_interface(path: str, profile: Profile, shelf: WidgetFolder) -> Interface
         return InterfaceFit(None, fault=next(iter(faults), "it is not an interface"))
     findings = Problems()
     interface = parse_interface(sources.root, sources.root.text("name"), findings)
-    known = _Known(profile.widgets, shelf)
+    known = _Known(profile.widgets, registry)
     if not has_errors(findings):
         interface = link_interface(
             sources.root, interface, profile.slots, profile.driver, known, findings
         )
-    errors = [one.message for one in (*findings, *shelf.problems) if one.severity == "error"]
+    errors = [one.message for one in (*findings, *registry.problems) if one.severity == "error"]
     if errors:
         return InterfaceFit(None, fault=errors[0])
     uses = {

@@ -52,14 +52,14 @@ class CheckResult(NamedTuple):
 
 
 def load_profile(
-    path: str | PathLike[str], catalog: Registries, shelf: WidgetFolder | None = None
+    path: str | PathLike[str], catalog: Registries, registry: WidgetFolder | None = None
 ) -> Profile:
     """Return the profile in a robot's or driver's document.
 
     Raises:
         ProblemsError: with every problem of the pass that stopped it.
     """
-    checked = check(path, catalog, shelf)
+    checked = check(path, catalog, registry)
     if checked.profile is not None:
         return checked.profile
     if not has_errors(checked.problems):
@@ -80,22 +80,22 @@ def load_profile(
 
 
 def check(
-    path: str | PathLike[str], catalog: Registries, shelf: WidgetFolder | None = None
+    path: str | PathLike[str], catalog: Registries, registry: WidgetFolder | None = None
 ) -> CheckResult:
     """Return every problem of a document of any kind, and of its references.
 
     Args:
         path: the document; problems name it in this form.
         catalog: the transports and framings.
-        shelf: the widgets; by default those that ship with URC. With one shelf for several calls,
-            each manifest is read once.
+        registry: the widgets; by default those that ship with URC.
+            With one registry for several calls, each manifest is read once.
     """
     path = fspath(path)
     sources, problems, kind, files = gather(path)
     if sources is None:
         is_short = any(one.severity == "error" and one.code != "no-such-file" for one in problems)
         return CheckResult(None, tuple(_told_once(problems)), kind, files, is_cut_short=is_short)
-    shelf = shelf or WidgetFolder(shipped("widgets"))
+    registry = registry or WidgetFolder(shipped("widgets"))
     findings = Problems()
     profile: Profile | None = None
     widget: Widget | None = None
@@ -105,20 +105,20 @@ def check(
     elif sources.kind == "interface":
         interface = parse_interface(sources.root, sources.root.text("name"), findings)
         if not has_errors(findings):
-            interface = link_interface(sources.root, interface, {}, None, shelf, findings)
+            interface = link_interface(sources.root, interface, {}, None, registry, findings)
             uses += interface.widgets.values()
     else:
-        profile = _profile(sources, catalog, shelf, findings)
+        profile = _profile(sources, catalog, registry, findings)
     if profile is not None:
         uses += profile.slots.values()
         uses += [use for each in profile.interfaces.values() for use in each.widgets.values()]
     problems += sorted(findings, key=lambda one: (one.file != path, one.file, one.line, one.column))
-    problems += shelf.problems
+    problems += registry.problems
     problems = _told_once(problems)
     is_short = has_errors(problems)
     if is_short:
         profile, widget = None, None
-    every = (*files, *shelf.files)
+    every = (*files, *registry.files)
     return CheckResult(
         profile, tuple(problems), sources.kind, every, _pages(uses), widget, is_short
     )
@@ -152,7 +152,7 @@ class _Parsed(NamedTuple):
 
 
 def _profile(
-    sources: Sources, catalog: Registries, shelf: WidgetFolder, findings: Problems
+    sources: Sources, catalog: Registries, registry: WidgetFolder, findings: Problems
 ) -> Profile | None:
     driver = parse_driver(sources.driver, findings, catalog)
     if sources.kind == "robot":
@@ -172,11 +172,11 @@ def _profile(
     )
     if has_errors(findings):
         return None
-    return _link(sources, parsed, shelf, findings)
+    return _link(sources, parsed, registry, findings)
 
 
 def _link(
-    sources: Sources, parsed: _Parsed, shelf: WidgetFolder, findings: Problems
+    sources: Sources, parsed: _Parsed, registry: WidgetFolder, findings: Problems
 ) -> Profile | None:
     driver = parsed.driver
     uses = link_driver(sources.driver, driver, parsed.settings, findings)
@@ -186,23 +186,23 @@ def _link(
         link_test(part, test, driver, parsed.settings, findings)
         for part, test in zip(sources.tests, parsed.tests, strict=True)
     ]
-    slots = link_slots(sources, driver, shelf, findings)
+    slots = link_slots(sources, driver, registry, findings)
     interfaces = {
-        name: link_interface(sources.interfaces[name], interface, slots, driver, shelf, findings)
+        name: link_interface(sources.interfaces[name], interface, slots, driver, registry, findings)
         for name, interface in parsed.interfaces.items()
     }
-    if has_errors(findings) or has_errors(shelf.problems):
+    if has_errors(findings) or has_errors(registry.problems):
         return None
     check_profile(sources, driver, interfaces, uses, findings)
     root = sources.root
     name = root.text("name")
     title = root.text("title", spoken_name(name))
     if not interfaces:
-        slots = slots or automatic_slots(driver, shelf)
+        slots = slots or automatic_slots(driver, registry)
         interfaces = {"default": default_interface(slots, title)}
     used = {use.widget for use in slots.values()}
     used |= {use.widget for one in interfaces.values() for use in one.widgets.values()}
-    widgets = {one: shelf.get(one) for one in sorted(used)}
+    widgets = {one: registry.get(one) for one in sorted(used)}
     return Profile(
         name=name,
         title=title,

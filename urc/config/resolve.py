@@ -41,12 +41,12 @@ class ResolvedProfile(NamedTuple):
     problems: tuple[Problem, ...]
 
 
-def resolve(path: str, shelf: WidgetFolder, profile: Profile | None = None) -> ResolvedProfile:
+def resolve(path: str, registry: WidgetFolder, profile: Profile | None = None) -> ResolvedProfile:
     """Return the document at `path` merged with all its sources.
 
     Args:
         path: a robot, driver, interface or widget.
-        shelf: the widgets.
+        registry: the widgets.
         profile: the loaded profile. It gives the text a default interface if none is declared.
     """
     sources, problems, _, _ = gather(path)
@@ -60,12 +60,12 @@ def resolve(path: str, shelf: WidgetFolder, profile: Profile | None = None) -> R
     if made:
         told = " and ".join(f"'{key}'" for key in made)
         lines.append(f"# URC made {told}: the document declares no interface.")
-    for key, node in (*_sections(sources, shelf), *made.items()):
+    for key, node in (*_sections(sources, registry), *made.items()):
         lines += _entry(key, node, 0)
     return ResolvedProfile("\n".join(lines) + "\n", tuple(problems))
 
 
-def _sections(sources: Sources, shelf: WidgetFolder) -> Iterator[tuple[str, object]]:
+def _sections(sources: Sources, registry: WidgetFolder) -> Iterator[tuple[str, object]]:
     root = sources.root
     if sources.kind not in ("robot", "driver"):
         yield from ((key, part) for key, part in root.entries().items() if key not in _BUILDING)
@@ -79,7 +79,7 @@ def _sections(sources: Sources, shelf: WidgetFolder) -> Iterator[tuple[str, obje
         if key in sources.driver.data and key not in _BESIDE:
             yield key, sources.driver.must(key)
     if sources.slots:
-        yield "widgets", {slot: _slot(parts, shelf) for slot, parts in sources.slots.items()}
+        yield "widgets", {slot: _slot(parts, registry) for slot, parts in sources.slots.items()}
     if sources.interfaces:
         yield "interfaces", {name: _layout(part) for name, part in sources.interfaces.items()}
     if sources.tests:
@@ -97,13 +97,13 @@ def _layout(part: Node) -> Mapping[str, Node]:
     return {key: inner for key, inner in part.entries().items() if key in keys}
 
 
-def _slot(parts: list[Node], shelf: WidgetFolder) -> Node:
+def _slot(parts: list[Node], registry: WidgetFolder) -> Node:
     """Return the widget of a slot, a later part over an earlier one."""
     tree = _tree(parts[0])
     for part in parts[1:]:
         over = _tree(part)
         if part.data.get("use", tree.value["use"]) != tree.value["use"]:  # type: ignore[index]
-            tree = _for_widget(tree, str(part.data["use"]), shelf)
+            tree = _for_widget(tree, str(part.data["use"]), registry)
         tree = merge(tree, over)
     home = tree.home
     document = Document(home.file, home.text, home.lines, tree.value, tree.mark)
@@ -115,9 +115,9 @@ def _tree(part: Node) -> Tree:
     return Tree(part.data, mark, part.document.source_of(part.path))
 
 
-def _for_widget(tree: Tree, name: str, shelf: WidgetFolder) -> Tree:
+def _for_widget(tree: Tree, name: str, registry: WidgetFolder) -> Tree:
     """Return the keys that another widget keeps: bindings of the same names, no options."""
-    widget = shelf.get(name)
+    widget = registry.get(name)
     ports = {**widget.inputs, **widget.outputs} if widget is not None else {}
     value = {key: item for key, item in dict(tree.value).items() if key != "options"}  # type: ignore[call-overload]
     bind = value.get("bind")

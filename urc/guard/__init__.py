@@ -5,6 +5,6 @@ document: no template, no pattern, no parser. It gets rendered frames, and the s
 motion.
 
 `guard_client` is the engine's side: `GuardClient` talks to a guard over a `Channel`, by the
-messages of `wire`. A `PipeChannel` leads to a process with a `Host`, a `LocalChannel` to a `Host`
-in this process.
+messages of `messages`. A `PipeChannel` leads to a process with a `GuardServer`, a `LocalChannel`
+to a `GuardServer` in this process.
 """

@@ -42,7 +42,7 @@ class _Clock:
         return self._loop.call_later(max(0.0, time_s - time.monotonic()), action)
 
 
-async def _guard(line: socket.socket, precedence: RealTimePriority) -> None:
+async def _guard(line: socket.socket, priority: RealTimePriority) -> None:
     loop = asyncio.get_running_loop()
     over = asyncio.Event()
     for name in ("SIGTERM", "SIGHUP"):
@@ -63,16 +63,16 @@ async def _guard(line: socket.socket, precedence: RealTimePriority) -> None:
     )
     due_s = loop.time()
 
-    def beat() -> None:
+    def heartbeat() -> None:
         nonlocal due_s
-        precedence.retry()
+        priority.retry()
         late_s = loop.time() - due_s
         if not pipe.is_backed_up:
             pipe.post(messages.Heartbeat(late_s))
         due_s = loop.time() + BEAT_S
-        loop.call_at(due_s, beat)
+        loop.call_at(due_s, heartbeat)
 
-    beat()
+    heartbeat()
     await over.wait()
     with suppress(TimeoutError):
         async with asyncio.timeout(FINISH_S + _GRACE_S):
@@ -101,9 +101,9 @@ def main() -> None:
     OWN_DOORS.learn(sys.argv[2:])
     gc.collect()
     gc.freeze()  # what is loaded by now stays: no need to look through it again
-    precedence = RealTimePriority()
-    precedence.request()  # where it is refused, the guard is a process like others: see `urc doctor`
-    run(_guard(line, precedence))
+    priority = RealTimePriority()
+    priority.request()  # where it is refused, the guard is a process like others: see `urc doctor`
+    run(_guard(line, priority))
 
 
 if __name__ == "__main__":

@@ -77,32 +77,32 @@ class GuardedConnection:
         self._emit = emit
         self._clock = clock
         self._is_dear = make.is_strict
-        self._tally = SentCounters()
-        self.reins = MotionScheduler(
+        self._sent_counters = SentCounters()
+        self.scheduler = MotionScheduler(
             transport,
             clock,
             stalled_s=make.stalled_s,
             is_strict=make.is_strict,
             told=lambda control, reason, number: self._report_stop(control, reason, number),
             failed=self._stall,
-            tally=self._tally,
+            sent_counters=self._sent_counters,
             counted=self._tell_counted,
         )
-        self._hearing = LivenessWatch(
+        self._liveness = LivenessWatch(
             transport,
             clock,
             silent_s=make.silent_s,
-            is_moving=lambda: self.reins.is_moving,
+            is_moving=lambda: self.scheduler.is_moving,
             failed=self._stall,
         )
         self._offer = transport.offer if isinstance(transport, SupportsOffer) else None
         self._prompt = transport if isinstance(transport, Prompt) else None
         self._abort = transport.abort if isinstance(transport, SupportsAbort) else None
-        self._lane: SendQueue[int] = SendQueue(
+        self._queue: SendQueue[int] = SendQueue(
             transport,
             clock,
             self._sent,
-            after=self.reins.lane,  # type: ignore[arg-type]
+            after=self.scheduler.queue,  # type: ignore[arg-type]
         )
         self._task: asyncio.Task[None] | None = None
         self._turn = 0
@@ -147,25 +147,25 @@ class GuardedConnection:
             self._forget_waiting()
             self._emit(messages.LineClosed(self.name, turn))
         else:
-            self.reins.stop_all()
-            self.reins.write_due()
-            self.reins.check_arrivals()
+            self.scheduler.stop_all()
+            self.scheduler.write_due()
+            self.scheduler.check_arrivals()
             self._switch(self._shut(turn))
 
     def send(self, said: messages.SendBytes) -> None:
-        """Send what is no motion; told by `SendDone`, `Refused` or `SendStale`."""
+        """Send what is no motion; told by `SendDone`, `SendRefused` or `SendStale`."""
         if said.turn != self._turn or not self._is_handed or said.round != self._round:
             return  # of an earlier connection, or made again meanwhile
         data, number = said.data, said.number
         offer = self._offer if self._is_free() and isinstance(data, bytes) else None
-        if offer is not None and not self._tally.fits(said.count):
+        if offer is not None and not self._sent_counters.fits(said.count):
             self._refuse(number)
         elif offer is None or not offer(data):  # type: ignore[arg-type] # no envelope, see above
-            self._lane.push(partial(self._leave, said), number)
+            self._queue.push(partial(self._leave, said), number)
         else:
             self._count(said)
             if self._prompt is not None and self._prompt.is_clogged:
-                self._lane.push(lambda: b"", number)  # is handed over with the rest
+                self._queue.push(lambda: b"", number)  # is handed over with the rest
             else:
                 self._acked = number
 
@@ -173,23 +173,23 @@ class GuardedConnection:
         """Return what is sent, now that its turn has come; None: it must not be sent any more."""
         if said.round != self._round:
             return None
-        if not self._tally.fits(said.count):
+        if not self._sent_counters.fits(said.count):
             self._refuse(said.number)
             return None
         self._count(said)
         # Told once the transport has the frame: the engine may answer at once.
-        asyncio.get_running_loop().call_soon(self.reins.tell_counted)
+        asyncio.get_running_loop().call_soon(self.scheduler.tell_counted)
         return said.data
 
     def _count(self, said: messages.SendBytes) -> None:
-        self._tally.left(said.count)
+        self._sent_counters.left(said.count)
         if said.count is not None:
             self._counted = said.number
 
     def _refuse(self, number: int) -> None:
         """Send nothing of this round any more: other frames have used its numbers up."""
         self._round += 1
-        self._emit(messages.SendStale(self.name, self._turn, number, self._tally.stand))
+        self._emit(messages.SendStale(self.name, self._turn, number, self._sent_counters.stand))
 
     def credit(self, turn: int, amount: int) -> None:
         """Take note that the engine has taken so much."""
@@ -202,8 +202,8 @@ class GuardedConnection:
         if self._acked:
             number, self._acked = self._acked, 0
             self._emit(messages.SendDone(self.name, self._turn, number))
-        self.reins.tell_counted()
-        self._hearing.start()
+        self.scheduler.tell_counted()
+        self._liveness.start()
 
     def rescue(self) -> None:
         """Open the line by ourselves, because a stop is owed."""
@@ -212,8 +212,8 @@ class GuardedConnection:
 
     async def finish(self, within_s: float) -> None:
         """Stop what moves, wait until that has gone out, and close; takes `within_s` and little."""
-        self.reins.stop_all()
-        self.reins.write_due()
+        self.scheduler.stop_all()
+        self.scheduler.write_due()
         until_s = self._clock.now() + within_s
         while self._clock.now() < until_s and not self._is_quiet:
             await self._clock.sleep(_PAUSE_S)
@@ -222,18 +222,18 @@ class GuardedConnection:
             task.cancel()
             await asyncio.wait({task}, timeout=_CLOSE_S)
         self._is_open = False
-        self._hearing.end()
-        self.reins.cut()
-        self._lane.end()
+        self._liveness.end()
+        self.scheduler.cut()
+        self._queue.end()
         await self._close_transport()
 
     @property
     def _is_quiet(self) -> bool:
-        reins = self.reins
-        return reins.is_settled and not reins.owes and not reins.is_in_doubt
+        scheduler = self.scheduler
+        return scheduler.is_settled and not scheduler.owes and not scheduler.is_in_doubt
 
     def _is_free(self) -> bool:
-        return self._lane.is_idle and self.reins.lane.is_idle
+        return self._queue.is_idle and self.scheduler.queue.is_idle
 
     # -- one connection
 
@@ -256,7 +256,7 @@ class GuardedConnection:
         fault = await self._attempt(timeout_s)
         if fault:
             self._emit(messages.OpenFailed(self.name, self._turn, fault))
-            if self.reins.owes:
+            if self.scheduler.owes:
                 await self._rescue()
             return
         self._begin()
@@ -283,8 +283,8 @@ class GuardedConnection:
     def _begin(self) -> None:
         self._is_open = True
         self._handed.clear()
-        self._hearing.begin()
-        self.reins.begin()
+        self._liveness.begin()
+        self.scheduler.begin()
 
     def _hand_over(self) -> None:
         self._forget_waiting()
@@ -295,7 +295,7 @@ class GuardedConnection:
         self._handed.set()
         if self._prompt is not None:
             self._prompt.divert(self._arrived)
-        address, stand = self.transport.address, self._tally.stand
+        address, stand = self.transport.address, self._sent_counters.stand
         self._emit(messages.LineOpened(self.name, self._turn, address, stand))
 
     async def _serve(self) -> None:
@@ -313,7 +313,7 @@ class GuardedConnection:
             while self._credit <= 0:
                 self._credited.clear()
                 await self._credited.wait()
-                self._hearing.note_arrival()  # it is the engine that was slow
+                self._liveness.note_arrival()  # it is the engine that was slow
             self._is_reading = True
             try:
                 data = await self.transport.receive()
@@ -330,7 +330,7 @@ class GuardedConnection:
         return True
 
     def _pass_on(self, data: Payload) -> None:
-        self._hearing.note_arrival()
+        self._liveness.note_arrival()
         try:
             self._credit -= self._emit(messages.BytesReceived(self.name, self._turn, data))
         except UNFIT as fault:
@@ -338,17 +338,17 @@ class GuardedConnection:
 
     async def _recover(self, reason: str, *, is_abort: bool = False) -> None:
         """Close what is broken, tell the engine, and stop the robot if that is owed."""
-        is_abort = is_abort or self.reins.is_in_doubt  # else the kernel would send it later
+        is_abort = is_abort or self.scheduler.is_in_doubt  # else the kernel would send it later
         self._cut(reason)
         await self._close_transport(is_abort=is_abort)
-        if self.reins.owes:
+        if self.scheduler.owes:
             await self._rescue()
 
     def _cut(self, reason: str) -> None:
         self._is_open = False
-        self._hearing.end()
-        self.reins.cut()
-        self._lane.end()
+        self._liveness.end()
+        self.scheduler.cut()
+        self._queue.end()
         if self._is_handed:
             self._is_handed = False
             self._emit(messages.LineLost(self.name, self._turn, reason))
@@ -358,11 +358,11 @@ class GuardedConnection:
         while self._is_open and not self._is_quiet and self._clock.now() < until_s:
             await self._clock.sleep(_PAUSE_S)
         self._is_handed = False
-        is_abort = self.reins.is_in_doubt
+        is_abort = self.scheduler.is_in_doubt
         self._cut("")
         await self._close_transport(is_abort=is_abort)
         self._emit(messages.LineClosed(self.name, turn))
-        if self.reins.owes:
+        if self.scheduler.owes:
             await self._rescue()
 
     async def _close_transport(self, *, is_abort: bool = False) -> None:
@@ -381,7 +381,7 @@ class GuardedConnection:
         """Reset the line: what waits in the kernel must not arrive later."""
         if self._is_open:
             self._is_open = False
-            self._hearing.end()
+            self._liveness.end()
             self._switch(self._recover(reason, is_abort=True))
 
     async def _rescue(self) -> None:
@@ -390,7 +390,7 @@ class GuardedConnection:
         until_s = self._clock.now() + _RESCUE_S
         hurry = HURRY.set(self._hurry)
         try:
-            while self.reins.owes and self._clock.now() < until_s:
+            while self.scheduler.owes and self._clock.now() < until_s:
                 began_s = self._clock.now()
                 # Where tries overlap, a way that has become long is no reason to give up.
                 enough_s = _LOG_IN_S if self._is_dear else _LONGEST_S
@@ -441,7 +441,7 @@ class GuardedConnection:
 
     def _tell_counted(self, stale: list[tuple[str, int]]) -> None:
         if self._is_handed:
-            stand = self._tally.stand
+            stand = self._sent_counters.stand
             self._emit(
                 messages.CountersAdvanced(self.name, self._turn, self._counted, stand, stale)
             )

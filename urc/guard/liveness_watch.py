@@ -39,7 +39,7 @@ class LivenessWatch:
         self._silent_s = silent_s
         self._is_moving = is_moving
         self._failed = failed
-        self._hearing = Liveness(silent_s)
+        self._liveness = Liveness(silent_s)
         self._is_open = False
         self._alarm: TimerHandle | None = None
         self._asking: asyncio.Task[None] | None = None
@@ -52,7 +52,7 @@ class LivenessWatch:
     def begin(self) -> None:
         """Take note that the line is open."""
         self._is_open = True
-        self._hearing = Liveness(self._silent_s)
+        self._liveness = Liveness(self._silent_s)
         self.note_arrival()
 
     def end(self) -> None:
@@ -67,7 +67,7 @@ class LivenessWatch:
 
     def note_arrival(self) -> None:
         """Take note that something came, or that nothing is read because of us."""
-        self._hearing.note_arrival(self._clock.now())
+        self._liveness.note_arrival(self._clock.now())
 
     def start(self) -> None:
         """Watch, where something moves, until nothing does."""
@@ -79,17 +79,17 @@ class LivenessWatch:
         if not (self._is_open and self._is_moving()):
             return
         now = self._clock.now()
-        if now >= self._hearing.deadline:
-            ms = 1000 * (SILENCE_S if self._hearing.is_asked else self._silent_s or SILENCE_S)
+        if now >= self._liveness.deadline:
+            ms = 1000 * (SILENCE_S if self._liveness.is_asked else self._silent_s or SILENCE_S)
             self._failed(f"the robot's side has said nothing for {ms:.0f} ms while it moved")
             return
         if self._transport is not None:
-            self._hearing.asked(now)
+            self._liveness.asked(now)
             if self._asking is None:
                 self._asking = asyncio.get_running_loop().create_task(
                     self._send_probe(self._transport)
                 )
-        at_s = min(now + _LOOK_S, self._hearing.deadline)
+        at_s = min(now + _LOOK_S, self._liveness.deadline)
         self._alarm = self._clock.call_at(at_s, self._check)
 
     async def _send_probe(self, transport: SupportsProbe) -> None:

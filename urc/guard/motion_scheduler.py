@@ -47,7 +47,7 @@ class MotionScheduler:
         is_strict: bool,
         told: Callable[[str, Reason, int], None],
         failed: Callable[[str], None],
-        tally: SentCounters | None = None,
+        sent_counters: SentCounters | None = None,
         counted: Callable[[list[tuple[str, int]]], None] | None = None,
     ) -> None:
         """Prepare; nothing is written before `begin`.
@@ -60,7 +60,7 @@ class MotionScheduler:
             is_strict: motion waits until nothing at all is unsent.
             told: has each stop that was written: control, reason, number of its newest tick.
             failed: told why when the line is stalled, or takes nothing any more.
-            tally: the counters of the line.
+            sent_counters: the counters of the line.
             counted: told when these have changed, with control and number of each tick that cannot
                 be written any more.
         """
@@ -71,15 +71,15 @@ class MotionScheduler:
         self._is_strict = is_strict or self._forget is not None
         self._told = told
         self._failed = failed
-        self._tally = tally or SentCounters()
+        self._sent_counters = sent_counters or SentCounters()
         self._counted = counted
         self._counts: dict[str, Count | None] = {}
         """Control → what its newest tick does to the counters."""
         self._stale: list[tuple[str, int]] = []
         self._watch = StallWatch(stalled_s)
-        self.lane: SendQueue[tuple[str, bool]] = SendQueue(transport, clock, self._sent)
+        self.queue: SendQueue[tuple[str, bool]] = SendQueue(transport, clock, self._sent)
         """For what cannot be handed over at once."""
-        self._movers: dict[str, HoldToRun] = {}
+        self._backend: dict[str, HoldToRun] = {}
         self._numbers: dict[str, int] = {}
         self._doubtful: set[str] = set()
         self._is_stop_under_way = False
@@ -92,17 +92,17 @@ class MotionScheduler:
     @property
     def owes(self) -> bool:
         """Whether a control is to be stopped as soon as the line is open again."""
-        return any(mover.owes_stop for mover in self._movers.values())
+        return any(hold_to_run.owes_stop for hold_to_run in self._backend.values())
 
     @property
     def is_moving(self) -> bool:
         """Whether a control is held."""
-        return any(mover.state == "moving" for mover in self._movers.values())
+        return any(hold_to_run.state == "moving" for hold_to_run in self._backend.values())
 
     @property
     def is_settled(self) -> bool:
         """Whether nothing moves, and every stop was handed over, as often as it is to be."""
-        return self.lane.is_idle and all(one.state == "idle" for one in self._movers.values())
+        return self.queue.is_idle and all(one.state == "idle" for one in self._backend.values())
 
     @property
     def is_in_doubt(self) -> bool:
@@ -113,66 +113,66 @@ class MotionScheduler:
 
     def arm(self, control: str, terms: HoldTerms) -> None:
         """Take ticks of `control`."""
-        self._mover(control, terms).arm()
+        self._hold_to_run(control, terms).arm()
 
     def tick(
         self, control: str, number: int, data: Payload, at_s: float, count: Count | None = None
     ) -> None:
         """Take sampled input of the time `at_s`; no bytes renew the lease and write nothing."""
-        mover = self._movers.get(control)
-        if mover is None:
+        hold_to_run = self._backend.get(control)
+        if hold_to_run is None:
             return
         self._numbers[control] = number
         self._counts[control] = count
         now = self._clock.now()
-        if now - at_s >= mover.terms.lease_s:
+        if now - at_s >= hold_to_run.terms.lease_s:
             return  # it waited so long that it renews nothing
-        is_stale = not self._tally.fits(count)
-        if mover.tick(None if is_stale else data or None, min(at_s, now)) and is_stale:
+        is_stale = not self._sent_counters.fits(count)
+        if hold_to_run.tick(None if is_stale else data or None, min(at_s, now)) and is_stale:
             self._stale.append((control, number))
 
     def renew(self, control: str, stop: Payload, stops: tuple[Numbered, ...] = ()) -> None:
         """Stop `control` with `stop` from now on."""
-        mover = self._movers.get(control)
-        if mover is not None:
-            mover.renew(mover.terms._replace(stop=stop, stops=stops))
+        hold_to_run = self._backend.get(control)
+        if hold_to_run is not None:
+            hold_to_run.renew(hold_to_run.terms._replace(stop=stop, stops=stops))
 
     def release(self, control: str) -> None:
         """Stop what was let go."""
-        mover = self._movers.get(control)
-        if mover is not None:
-            mover.stop("released", self._clock.now())
+        hold_to_run = self._backend.get(control)
+        if hold_to_run is not None:
+            hold_to_run.stop("released", self._clock.now())
 
     def stop(self, control: str, terms: HoldTerms) -> None:
         """Stop `control`, whether it moves or not."""
-        mover = self._mover(control, terms)
-        mover.stop("stopped", self._clock.now())
+        hold_to_run = self._hold_to_run(control, terms)
+        hold_to_run.stop("stopped", self._clock.now())
         if not self._is_open:
-            mover.cut()
+            hold_to_run.cut()
 
     def owe(self, control: str, terms: HoldTerms) -> None:
         """Take note that `control` may be moving: it is stopped as soon as the line is open."""
-        self._mover(control, terms).cut(is_doubtful=True)
+        self._hold_to_run(control, terms).cut(is_doubtful=True)
 
     def stop_all(self) -> None:
         """Stop what moves, because the line is to be closed."""
         now = self._clock.now()
-        for mover in self._movers.values():
-            if mover.state == "moving":
-                mover.stop("revoked", now)
-            mover.is_armed = False
+        for hold_to_run in self._backend.values():
+            if hold_to_run.state == "moving":
+                hold_to_run.stop("revoked", now)
+            hold_to_run.is_armed = False
 
-    def _mover(self, control: str, terms: HoldTerms) -> HoldToRun:
-        mover = self._movers.get(control)
-        if mover is None:
-            mover = self._movers[control] = HoldToRun(terms)
+    def _hold_to_run(self, control: str, terms: HoldTerms) -> HoldToRun:
+        hold_to_run = self._backend.get(control)
+        if hold_to_run is None:
+            hold_to_run = self._backend[control] = HoldToRun(terms)
         else:
-            mover.renew(terms)
-        return mover
+            hold_to_run.renew(terms)
+        return hold_to_run
 
     def check_arrivals(self) -> None:
         """Take note of what has arrived by now; only of a line that works."""
-        if self._unsent is not None and self.lane.is_idle and not self._unsent():
+        if self._unsent is not None and self.queue.is_idle and not self._unsent():
             self._all_arrived()
 
     def _all_arrived(self) -> None:
@@ -184,22 +184,22 @@ class MotionScheduler:
     def begin(self) -> None:
         """Take note that the line is open: what is owed is written first."""
         self._is_open = True
-        self._tally.reset()
+        self._sent_counters.reset()
         self._stale.clear()
         self._watch.reset()
         now = self._clock.now()
-        for mover in self._movers.values():
-            mover.restored(now)
+        for hold_to_run in self._backend.values():
+            hold_to_run.restored(now)
         self.write_due()
 
     def cut(self) -> None:
         """Take note that the line is closed: nothing that waits is kept."""
         self._is_open = False
-        for control, is_stop in self.lane.end():
+        for control, is_stop in self.queue.end():
             if is_stop:
                 self._doubtful.add(control)
-        for control, mover in self._movers.items():
-            mover.cut(is_doubtful=control in self._doubtful)
+        for control, hold_to_run in self._backend.items():
+            hold_to_run.cut(is_doubtful=control in self._doubtful)
         self._all_arrived()
         if self._alarm is not None:
             self._alarm.cancel()
@@ -211,16 +211,16 @@ class MotionScheduler:
             return
         now = self._clock.now()
         waiting: list[tuple[str, HoldToRun]] = []
-        for control, mover in self._movers.items():
-            if mover.must_stop(now):
-                data = mover.due(now, is_clear=False)
+        for control, hold_to_run in self._backend.items():
+            if hold_to_run.must_stop(now):
+                data = hold_to_run.due(now, is_clear=False)
                 if data is not None:
                     self._write(control, data, now, is_stop=True)
-            elif mover.is_waiting:
-                waiting.append((control, mover))
-        for control, mover in waiting:
-            if self._tally.fits(self._counts.get(control)) and self._is_clear(now):
-                data = mover.due(now, is_clear=True)
+            elif hold_to_run.is_waiting:
+                waiting.append((control, hold_to_run))
+        for control, hold_to_run in waiting:
+            if self._sent_counters.fits(self._counts.get(control)) and self._is_clear(now):
+                data = hold_to_run.due(now, is_clear=True)
                 if data is not None:
                     self._write(control, data, now, is_stop=False)
         self._set_alarm(now)
@@ -228,20 +228,22 @@ class MotionScheduler:
 
     def tell_counted(self) -> None:
         """Tell how the counters stand, where they have changed, and what cannot be written now."""
-        if self._tally.is_changed:
-            for control, mover in self._movers.items():
-                if mover.is_waiting and not self._tally.fits(self._counts.get(control)):
-                    mover.forget()
+        if self._sent_counters.is_changed:
+            for control, hold_to_run in self._backend.items():
+                if hold_to_run.is_waiting and not self._sent_counters.fits(
+                    self._counts.get(control)
+                ):
+                    hold_to_run.forget()
                     self._stale.append((control, self._numbers[control]))
         elif not self._stale:
             return
-        self._tally.is_changed = False
+        self._sent_counters.is_changed = False
         stale, self._stale = self._stale, []
         if self._counted is not None:
             self._counted(stale)
 
     def _is_clear(self, now: float) -> bool:
-        if not self.lane.is_idle:
+        if not self.queue.is_idle:
             return False
         if self._unsent is None or not (self._doubtful or self._is_strict):
             return True  # all that was written has gone: asking the system would take its time
@@ -265,14 +267,14 @@ class MotionScheduler:
         self._is_stop_under_way |= is_stop
         offer = self._offer
         data, count = self._turn(control, data, is_stop=is_stop)
-        if offer is None or type(data) is not bytes or not self.lane.is_idle or not offer(data):
+        if offer is None or type(data) is not bytes or not self.queue.is_idle or not offer(data):
             self._doubtful.add(control)
             if is_stop:
-                self.lane.push(partial(self._leave_stop, control, data), (control, is_stop))
+                self.queue.push(partial(self._leave_stop, control, data), (control, is_stop))
             else:
-                self.lane.push(partial(self._leave, control, data, count), (control, is_stop))
+                self.queue.push(partial(self._leave, control, data, count), (control, is_stop))
         else:
-            self._tally.left(count)
+            self._sent_counters.left(count)
             if is_stop:
                 self._report_stop(control)
         if self._unsent is not None:
@@ -286,21 +288,21 @@ class MotionScheduler:
         """Return what is written now, and what it does to the counters."""
         if not is_stop:
             return data, self._counts.get(control)
-        stops = self._movers[control].terms.stops
-        return self._tally.choose(stops) if stops else (data, None)
+        stops = self._backend[control].terms.stops
+        return self._sent_counters.choose(stops) if stops else (data, None)
 
     def _leave_stop(self, control: str, data: Payload) -> Payload:
         """Return a stop, now that its turn in the lane has come."""
         data, count = self._turn(control, data, is_stop=True)
-        self._tally.left(count)
+        self._sent_counters.left(count)
         self._tell_soon()
         return data
 
     def _leave(self, control: str, data: Payload, count: Count | None) -> Payload | None:
         """Return a frame of motion in its turn; None: its numbers were used up before."""
-        fits = self._tally.fits(count)
+        fits = self._sent_counters.fits(count)
         if fits:
-            self._tally.left(count)
+            self._sent_counters.left(count)
         else:
             self._stale.append((control, self._numbers[control]))
         self._tell_soon()
@@ -323,19 +325,19 @@ class MotionScheduler:
         self.write_due()
 
     def _report_stop(self, control: str) -> None:
-        mover = self._movers[control]
-        if mover.reason is not None and not mover.is_told:
-            mover.is_told = True
-            self._told(control, mover.reason, self._numbers.get(control, 0))
+        hold_to_run = self._backend[control]
+        if hold_to_run.reason is not None and not hold_to_run.is_told:
+            hold_to_run.is_told = True
+            self._told(control, hold_to_run.reason, self._numbers.get(control, 0))
 
     # -- time
 
     def _set_alarm(self, now: float) -> None:
         # What is due already waits for the line to be clear.
-        dues = [one.deadline for one in self._movers.values() if one.state != "idle"]
+        dues = [one.deadline for one in self._backend.values() if one.state != "idle"]
         at_s = min((due for due in dues if due is not None), default=float("inf"))
         at_s = max(at_s, now + _LOOK_S)
-        if self._is_watched or not self.lane.is_idle:
+        if self._is_watched or not self.queue.is_idle:
             # The end of a line's time is looked for when it comes, not a look later.
             stalled_s = self._watch.deadline or at_s
             at_s = min(at_s, now + self._look_s, max(stalled_s, now))
@@ -360,16 +362,16 @@ class MotionScheduler:
         self.write_due()
 
     def _is_stalled(self, now: float) -> bool:
-        since = self.lane.busy_since_s
+        since = self.queue.busy_since_s
         if since is not None and now - since >= self._watch.limit_s:
             return True
         if self._unsent is None or not self._is_watched:
             return False
         unsent = self._unsent()
-        if not unsent and self._forget is not None and not self.lane.is_idle:
+        if not unsent and self._forget is not None and not self.queue.is_idle:
             # What was given up has left nothing, and what came after it has no connection yet.
             return self._watch.age_s(now) >= self._watch.limit_s
-        if not unsent and self.lane.is_idle:
+        if not unsent and self.queue.is_idle:
             self._all_arrived()
         self._look_s = _LOOK_S if self._is_wanted else min(2 * self._look_s, _LONGEST_LOOK_S)
         return self._watch.saw(unsent, now)
@@ -377,7 +379,7 @@ class MotionScheduler:
     @property
     def _is_wanted(self) -> bool:
         """Whether motion waits to be written."""
-        return any(mover.is_waiting for mover in self._movers.values())
+        return any(hold_to_run.is_waiting for hold_to_run in self._backend.values())
 
     @property
     def _is_watched(self) -> bool:

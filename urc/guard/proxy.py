@@ -79,7 +79,7 @@ class GuardedTransport:
         self._opening: asyncio.Future[str] | None = None
         self._closing: asyncio.Future[None] | None = None
         self._ended = _CLOSED
-        self._inbox: deque[tuple[Payload, int]] = deque()
+        self._receiver: deque[tuple[Payload, int]] = deque()
         self._arrived = asyncio.Event()
         self._sink: Callable[[bytes], bool] | None = None
         self._taken_bytes = 0
@@ -124,12 +124,12 @@ class GuardedTransport:
 
     async def receive(self) -> Payload:
         """Return what arrived next; raise `PeerClosed` when no more will come."""
-        while not self._inbox:
+        while not self._receiver:
             if not self._is_open:
                 raise PeerClosed(self._ended)
             self._arrived.clear()
             await self._arrived.wait()
-        data, size = self._inbox.popleft()
+        data, size = self._receiver.popleft()
         self._count(size)
         return data
 
@@ -145,7 +145,7 @@ class GuardedTransport:
         """Close at once. Never raises, may be called twice."""
         self._end(_CLOSED)
         self._ended = _CLOSED
-        self._inbox.clear()
+        self._receiver.clear()
         if not self._is_known:
             return
         self._is_known = False
@@ -232,7 +232,7 @@ class GuardedTransport:
         self._is_open = True
         self._ended = ""
         self._sink = None
-        self._inbox.clear()
+        self._receiver.clear()
         self._taken_bytes = self._number = self._round = 0
         if self._opening is not None and not self._opening.done():
             self._opening.set_result("")
@@ -244,13 +244,13 @@ class GuardedTransport:
     def _received(self, data: Payload, size: int) -> None:
         if (
             self._sink is not None
-            and not self._inbox
+            and not self._receiver
             and isinstance(data, bytes)
             and self._sink(data)
         ):
             self._count(size)
             return
-        self._inbox.append((data, size))
+        self._receiver.append((data, size))
         self._arrived.set()
 
     def _count(self, size: int) -> None:

@@ -46,7 +46,7 @@ class GuardServer:
         if type(said) is messages.RenewLease and not self._is_finishing:
             line = self._controls.get(said.control)
             if line is not None:
-                line.reins.tick(said.control, said.number, said.data, said.at_s, said.count)
+                line.scheduler.tick(said.control, said.number, said.data, said.at_s, said.count)
                 self._stirred.add(line)
         elif not self._is_finishing:
             self._handlers[type(said)](said)
@@ -55,7 +55,7 @@ class GuardServer:
         """Write what is due after all that was said together."""
         while self._stirred:
             line = self._stirred.pop()
-            line.reins.write_due()
+            line.scheduler.write_due()
             line.settle()
 
     async def finish(self) -> None:
@@ -84,26 +84,26 @@ class GuardServer:
     def _release(self, said: messages.ReleaseControl) -> None:
         line = self._controls.get(said.control)
         if line is not None:
-            line.reins.release(said.control)
+            line.scheduler.release(said.control)
             self._stirred.add(line)
 
     def _arm(self, said: messages.ArmControl) -> None:
         line = self._controls[said.control] = self._lines[said.line]
-        line.reins.arm(said.control, said.terms)
+        line.scheduler.arm(said.control, said.terms)
 
     def _renew(self, said: messages.ReplaceStop) -> None:
         line = self._controls.get(said.control)
         if line is not None:
-            line.reins.renew(said.control, said.stop, said.stops)
+            line.scheduler.renew(said.control, said.stop, said.stops)
 
     def _stop(self, said: messages.StopMotion) -> None:
         for name, control, terms in said.controls:
             line = self._controls[control] = self._lines[name]
-            line.reins.stop(control, terms)
+            line.scheduler.stop(control, terms)
             self._stirred.add(line)
         self.settle()  # before anything else that came with it
 
     def _owe(self, said: messages.RecoverStop) -> None:
         line = self._controls[said.control] = self._lines[said.line]
-        line.reins.owe(said.control, said.terms)
+        line.scheduler.owe(said.control, said.terms)
         line.rescue()

@@ -165,7 +165,7 @@ class FrameLayout(NamedTuple):
     """Those before it."""
     escape: EscapeSpec | None = None
     """Byte stuffing of the payload alone."""
-    trail: TrailerSpec | None = None
+    trailer: TrailerSpec | None = None
     """Trailing checksum, removed before all other checks and added after all others."""
     digits: Digits = ""
     """Notation of the bytes between start and end; places and `checksums` count decoded bytes."""

@@ -74,7 +74,7 @@ class HoldToRun:
         """Whether whoever it concerns was told of that stop; kept for the owner of the line."""
         self.owes_stop = False
         """The line was cut before the robot can have had the stop."""
-        self._pace = RateLimiter(terms.period_s, is_strict=terms.stop == b"")
+        self._rate_limiter = RateLimiter(terms.period_s, is_strict=terms.stop == b"")
         self._waiting: Payload | None = None
         self._expires_at = 0.0
         self._stop_at = 0.0
@@ -95,7 +95,7 @@ class HoldToRun:
         if self.state == "moving":
             if self._waiting is None:
                 return self._expires_at
-            return min(self._expires_at, self._pace.free_at)
+            return min(self._expires_at, self._rate_limiter.free_at)
         return self._stop_at if self.state == "stopping" else None
 
     def renew(self, terms: HoldTerms) -> None:
@@ -106,7 +106,7 @@ class HoldToRun:
         """
         fresh = HoldToRun(terms)
         if terms.period_s != self.terms.period_s:
-            self._pace = fresh._pace
+            self._rate_limiter = fresh._rate_limiter
         self.terms = terms
 
     def arm(self) -> None:
@@ -159,7 +159,7 @@ class HoldToRun:
             self.stop("expired", now)
         if self.state == "stopping":
             return self._next_stop(now)
-        if self._waiting is None or not is_clear or not self._pace.allow(now):
+        if self._waiting is None or not is_clear or not self._rate_limiter.allow(now):
             return None
         data, self._waiting = self._waiting, None
         return data

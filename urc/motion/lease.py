@@ -92,7 +92,7 @@ class Lease:
             return "the controls were taken anew meanwhile"
         return ""
 
-    def hindrance(self, client: Operator, stops: int | None = None) -> str:
+    def interlock(self, client: Operator, stops: int | None = None) -> str:
         """Return why a client may not begin what moves by itself, or "".
 
         It needs no lease: nothing is held. But it goes neither against a stop, nor against whoever

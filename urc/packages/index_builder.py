@@ -63,7 +63,10 @@ class IndexListing(NamedTuple):
 
 
 def make_index(
-    folder: Path, name: str, examine: Callable[[Path], list[str]], seal: IndexSigner | None = None
+    folder: Path,
+    name: str,
+    examine: Callable[[Path], list[str]],
+    index_signer: IndexSigner | None = None,
 ) -> IndexListing:
     """Check every package in a folder, list the valid ones, and write `index.json`.
 
@@ -71,7 +74,7 @@ def make_index(
         folder: folder of the repository.
         name: name of the repository.
         examine: returns the errors of a package's document, one line each.
-        seal: signer of the maintainer, for the index and for new source packages.
+        index_signer: signer of the maintainer, for the index and for new source packages.
 
     Raises:
         PackageError: the folder is missing or not writable.
@@ -81,7 +84,7 @@ def make_index(
     try:
         with changing(folder) as work:
             faults: list[str] = []
-            signer = seal.signer if seal is not None else None
+            signer = index_signer.signer if index_signer is not None else None
             for home in _homes(folder):
                 faults += _take(folder, home, work, examine, signer)
             entries = []
@@ -91,7 +94,7 @@ def make_index(
                     entries.append(_entry(folder, file, known))
                 except PackageError as error:
                     faults.append(str(error))
-            index = write_index(folder, name, entries, work, seal)
+            index = write_index(folder, name, entries, work, index_signer)
     except OSError as error:
         raise PackageError(f"{error.filename or folder}: {error.strerror or error}") from None
     return IndexListing(index, tuple(faults))
@@ -148,7 +151,7 @@ def notes_of(entry: IndexEntry) -> Notes:
 
 
 def withdraw(
-    folder: Path, key: PackageId, version: str, why: str, seal: IndexSigner | None
+    folder: Path, key: PackageId, version: str, why: str, index_signer: IndexSigner | None
 ) -> IndexEntry:
     """Withdraw a version, or offer it again; return its entry of the index.
 
@@ -157,7 +160,7 @@ def withdraw(
         key: the package.
         version: its version.
         why: reason for users who have it installed; "" to offer it again.
-        seal: signer of the maintainer, for a signed index.
+        index_signer: signer of the maintainer, for a signed index.
 
     Raises:
         PackageError: the version is not listed, or the repository is not writable.
@@ -167,7 +170,7 @@ def withdraw(
             with open(folder / INDEX, "rb") as file:
                 index = read_index(file.read(INDEX_BYTES + 1), INDEX)
             head = head_in(folder)
-            check_key(head, seal)  # before any write
+            check_key(head, index_signer)  # before any write
             before = _listed(index, key, version)
             after = msgspec.structs.replace(before, withdrawn=why or msgspec.UNSET)
             notes = _checked(notes_of(after))
@@ -175,7 +178,7 @@ def withdraw(
             # The note goes first, so that an index written in between agrees with it.
             write_notes(folder / before.file, notes, work)
             is_signed = head is not None and head.signed is not None
-            write_index(folder, index.name, entries, work, seal if is_signed else None)
+            write_index(folder, index.name, entries, work, index_signer if is_signed else None)
     except OSError as error:
         raise PackageError(f"{error.filename or folder}: {error.strerror or error}") from None
     return after
@@ -197,12 +200,12 @@ def _checked(notes: Notes) -> Notes:
         raise PackageError(f"--why: {error}") from None
 
 
-def renew(folder: Path, seal: IndexSigner) -> None:
+def renew(folder: Path, index_signer: IndexSigner) -> None:
     """Sign an index again if that is due; raise `PackageError`, or `OSError`."""
     with changing(folder) as work:
         with open(folder / INDEX, "rb") as file:
             index = read_index(file.read(INDEX_BYTES + 1), INDEX)
-        write_index(folder, index.name, index.packages, work, seal)
+        write_index(folder, index.name, index.packages, work, index_signer)
 
 
 def write_index(
@@ -210,7 +213,7 @@ def write_index(
     name: str,
     entries: Sequence[IndexEntry],
     work: Path,
-    seal: IndexSigner | None = None,
+    index_signer: IndexSigner | None = None,
 ) -> Index:
     """Write the index of a repository, then its head.
 
@@ -221,7 +224,7 @@ def write_index(
         name: name of the repository.
         entries: all versions.
         work: folder for incomplete files.
-        seal: signer of the maintainer, for the head.
+        index_signer: signer of the maintainer, for the head.
 
     Raises:
         PackageError: the index is signed with another key; nothing has changed.
@@ -234,7 +237,7 @@ def write_index(
         number += 1
         index = Index(1, name, index.packages, number)
     data = index.to_bytes()
-    head = next_head(head_in(folder), number, sha256(data), seal).to_bytes()
+    head = next_head(head_in(folder), number, sha256(data), index_signer).to_bytes()
     if is_new:
         atomic_files.put_file(folder / INDEX, data, work)
     if _content(folder / HEAD, HEAD_BYTES) != head:

@@ -87,13 +87,13 @@ def read_head(data: bytes, where: str) -> IndexHead:
         raise PackageError(f"{where}: this is not a head of an index: {error}") from None
 
 
-def check_key(old: IndexHead | None, seal: IndexSigner | None) -> None:
+def check_key(old: IndexHead | None, index_signer: IndexSigner | None) -> None:
     """Raise `PackageError` if the key of a signed head is not available.
 
     Clients have pinned that key, so they would reject a head with another one.
     """
     signed = old.signed if old is not None else None
-    if signed is not None and (seal is None or seal.signer.key != signed.key):
+    if signed is not None and (index_signer is None or index_signer.signer.key != signed.key):
         raise PackageError(
             f"the index is signed by {signed}: name that key with --key; if it is lost, remove"
             f" {HEAD}, and ask all users to remove the repository and to add it again"
@@ -101,7 +101,7 @@ def check_key(old: IndexHead | None, seal: IndexSigner | None) -> None:
 
 
 def next_head(
-    old: IndexHead | None, number: int, digest: str, seal: IndexSigner | None
+    old: IndexHead | None, number: int, digest: str, index_signer: IndexSigner | None
 ) -> IndexHead:
     """Return the head of an index, or the old one while it is still valid.
 
@@ -109,25 +109,25 @@ def next_head(
         old: the current head, if it is valid.
         number: number of the index.
         digest: digest of its bytes.
-        seal: signer of the maintainer; None without a signature.
+        index_signer: signer of the maintainer; None without a signature.
 
     Raises:
         PackageError: the key of the signed old head is not available.
     """
     signed = old.signed if old is not None else None
     is_same = old is not None and (old.number, old.sha256) == (number, digest)
-    if seal is None and is_same and old is not None:
+    if index_signer is None and is_same and old is not None:
         return old
-    check_key(old, seal)
-    if seal is None:
+    check_key(old, index_signer)
+    if index_signer is None:
         return IndexHead(1, number, digest)
-    now_s = seal.now()
-    if is_same and old is not None and signed and old.left_s(now_s) > seal.valid_s / 2:
+    now_s = index_signer.now()
+    if is_same and old is not None and signed and old.left_s(now_s) > index_signer.valid_s / 2:
         return old
-    expires = datetime.fromtimestamp(now_s + seal.valid_s, UTC).strftime(_TIME)
-    by = seal.signer.by
+    expires = datetime.fromtimestamp(now_s + index_signer.valid_s, UTC).strftime(_TIME)
+    by = index_signer.signer.by
     statement = _STATEMENT.format(number=number, sha256=digest, expires=expires, by=by)
-    return IndexHead(1, number, digest, expires, seal.signer.signs(statement.encode()))
+    return IndexHead(1, number, digest, expires, index_signer.signer.signs(statement.encode()))
 
 
 def _statement(head: IndexHead, by: str) -> bytes:

@@ -29,7 +29,7 @@ Found = dict[PackageId, list[tuple[IndexEntry, Source]]]
 
 
 def plan_wish(
-    wish: PackageRequirement,
+    required: PackageRequirement,
     sources: Sequence[Source],
     store: Store,
     complain: Callable[[str], None],
@@ -40,7 +40,7 @@ def plan_wish(
     """Return the plan of a requirement, with all archives.
 
     Args:
-        wish: the requirement.
+        required: the requirement.
         sources: the sources, in the order of requests.
         store: store whose archives are not fetched again.
         complain: receives lines for people.
@@ -57,10 +57,10 @@ def plan_wish(
     elif not takes_withdrawn:
         found = offered(everything)
     try:
-        root = choose({key: [entry for entry, _ in some] for key, some in found.items()}, wish)
-        return plan_root(root, wish.range, found, store, pinned)
+        root = choose({key: [entry for entry, _ in some] for key, some in found.items()}, required)
+        return plan_root(root, required.range, found, store, pinned)
     except PackageError as error:
-        if found is not everything and (told := _withdrawn(wish, everything)):
+        if found is not everything and (told := _withdrawn(required, everything)):
             raise PackageError(f"{error}; {told}") from None
         raise
 
@@ -176,15 +176,15 @@ def _remark(entry: IndexEntry) -> str:
     return joined("; ", said + ([str(entry.provenance)] if entry.provenance else []))
 
 
-def _withdrawn(wish: PackageRequirement, found: Found) -> str:
+def _withdrawn(required: PackageRequirement, found: Found) -> str:
     """Return the withdrawn versions that match the requirement, with the reasons."""
-    wanted = parse_range(wish.range)
+    wanted = parse_range(required.range)
     gone = [
         f"{entry} was withdrawn: {entry.why_withdrawn}"
         for key, some in found.items()
         for entry, _ in some
-        if key.name == wish.name
-        and wish.kind in ("", key.kind)
+        if key.name == required.name
+        and required.kind in ("", key.kind)
         and entry.why_withdrawn
         and wanted.allows(entry.number)
     ]

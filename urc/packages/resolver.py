@@ -31,23 +31,27 @@ class _Need(NamedTuple):
 Entries = Mapping[PackageId, Sequence[IndexEntry]]
 
 
-def choose(entries: Entries, wish: PackageRequirement) -> PackageId:
+def choose(entries: Entries, required: PackageRequirement) -> PackageId:
     """Return the package of a requirement.
 
     Raises:
         PackageError: no package, or packages of several kinds, have this name.
     """
-    found = [key for key in entries if key.name == wish.name and wish.kind in ("", key.kind)]
+    found = [
+        key for key in entries if key.name == required.name and required.kind in ("", key.kind)
+    ]
     if len(found) == 1:
         return found[0]
     if found:
         names = ", ".join(map(str, sorted(found)))
-        raise PackageError(f"{wish.name!r} is ambiguous; write one of {names}")
+        raise PackageError(f"{required.name!r} is ambiguous; write one of {names}")
     from difflib import get_close_matches
 
-    near = get_close_matches(wish.name, [key.name for key in entries], 1)
+    near = get_close_matches(required.name, [key.name for key in entries], 1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise PackageError(f"no repository has {PackageRequirement(wish.kind, wish.name)}{hint}")
+    raise PackageError(
+        f"no repository has {PackageRequirement(required.kind, required.name)}{hint}"
+    )
 
 
 def resolve(root: PackageId, wanted: str, entries: Entries) -> dict[PackageId, IndexEntry]:

@@ -50,12 +50,12 @@ class UploadService:
         folder: Path,
         tokens: UploadTokens,
         examine: Callable[[Path], list[str]],
-        seal: IndexSigner | None = None,
+        index_signer: IndexSigner | None = None,
     ) -> None:
         self._folder = folder
         self._tokens = tokens
         self._examine = examine
-        self._seal = seal
+        self._index_signer = index_signer
         self._turn = asyncio.Lock()
         self._waiting = 0
 
@@ -134,7 +134,7 @@ class UploadService:
                         signature,
                         self._examine,
                         provenance,
-                        self._seal,
+                        self._index_signer,
                     )
                 )
         finally:
@@ -142,7 +142,7 @@ class UploadService:
 
 
 async def _body(request: Request, *, is_kept: bool) -> bytes:
-    """Return the body, or nothing if it is not kept; raise `SubmissionRefused` if it is too large."""
+    """Return the body, or b"" if it is not kept; raise `SubmissionRefused` if too large."""
     size = 0
     pieces = []
     async for piece in request.stream():
@@ -192,7 +192,7 @@ def repository_app(
     folder: Path,
     tokens: UploadTokens | None = None,
     examine: Callable[[Path], list[str]] | None = None,
-    seal: IndexSigner | None = None,
+    index_signer: IndexSigner | None = None,
 ) -> Starlette:
     """Return the application that serves the repository in a folder.
 
@@ -200,12 +200,12 @@ def repository_app(
         folder: folder of the repository.
         tokens: upload tokens; None to refuse uploads.
         examine: checks uploads, see `urc.packages.submission.take`.
-        seal: signer of the maintainer, for the index with uploads.
+        index_signer: signer of the maintainer, for the index with uploads.
     """
     shop = _Shop(folder)
     routes = [Route("/{path:path}", shop.answer, methods=["GET", "HEAD"])]
     if tokens is not None and examine is not None:
-        door = UploadService(folder, tokens, examine, seal)
+        door = UploadService(folder, tokens, examine, index_signer)
         routes.append(Route("/{path:path}", door.answer, methods=["PUT"]))
     return Starlette(routes=routes)
 

@@ -67,13 +67,13 @@ class Store:
         """Return the lock that an update replaced by `lock`, or None."""
         return self.state().before.get(lock.digest)
 
-    def find(self, wish: PackageRequirement) -> Lock | None:
+    def find(self, required: PackageRequirement) -> Lock | None:
         """Return the newest installed version of a requirement, or None.
 
         Raises:
             PackageError: packages of several kinds have this name.
         """
-        found = _meant(wish, self.installed())
+        found = _meant(required, self.installed())
         return max(found, key=lambda lock: lock.number, default=None)
 
     def document(self, lock: Lock) -> Path:
@@ -239,7 +239,7 @@ class StoreTransaction:
         self._store.write_state(state)
         return old
 
-    def remove(self, wish: PackageRequirement) -> tuple[list[Lock], list[str]]:
+    def remove(self, required: PackageRequirement) -> tuple[list[Lock], list[str]]:
         """Remove an installed package, and the packages that only it needed.
 
         Returns:
@@ -249,9 +249,9 @@ class StoreTransaction:
             PackageError: it is not installed, or another package needs it.
         """
         state = self._store.state()
-        gone = _meant(wish, state.installed)
+        gone = _meant(required, state.installed)
         if not gone:
-            raise PackageError(_not_installed(wish, state.installed))
+            raise PackageError(_not_installed(required, state.installed))
         after = state.without(gone)
         self._store.write_state(after)
         return gone, sorted(_all(state.installed) - _all(after.installed))
@@ -281,19 +281,19 @@ def ecosystem_of(document: Path) -> Path | None:
     return None
 
 
-def _meant(wish: PackageRequirement, locks: tuple[Lock, ...]) -> list[Lock]:
+def _meant(required: PackageRequirement, locks: tuple[Lock, ...]) -> list[Lock]:
     """Return the locks of a requirement; without a range, any installed version counts."""
-    wanted = parse_range(wish.range)
+    wanted = parse_range(required.range)
     found = [
         lock
         for lock in locks
-        if lock.key.name == wish.name
-        and wish.kind in ("", lock.key.kind)
-        and (wish.range == "*" or wanted.allows(lock.number))
+        if lock.key.name == required.name
+        and required.kind in ("", lock.key.kind)
+        and (required.range == "*" or wanted.allows(lock.number))
     ]
     if len({lock.key for lock in found}) > 1:
         names = ", ".join(sorted({lock.root for lock in found}))
-        raise PackageError(f"{wish.name!r} is ambiguous; write one of {names}")
+        raise PackageError(f"{required.name!r} is ambiguous; write one of {names}")
     return found
 
 
@@ -301,19 +301,19 @@ def _all(locks: tuple[Lock, ...]) -> set[str]:
     return {f"{key} {pin.version}" for lock in locks for key, pin in lock.packages.items()}
 
 
-def _not_installed(wish: PackageRequirement, locks: tuple[Lock, ...]) -> str:
+def _not_installed(required: PackageRequirement, locks: tuple[Lock, ...]) -> str:
     needed = [
         f"{lock} needs {key} {pin.version}"
         for lock in locks
         for key, pin in lock.packages.items()
         if key != lock.root
-        and parse_key(key).name == wish.name
-        and wish.kind in ("", parse_key(key).kind)
+        and parse_key(key).name == required.name
+        and required.kind in ("", parse_key(key).kind)
     ]
     if needed:
-        return f"{wish} was not installed by itself: {'; '.join(needed)}"
+        return f"{required} was not installed by itself: {'; '.join(needed)}"
     names = ", ".join(map(str, locks))
-    return f"{wish} is not installed" + (f"; there is {names}" if names else "; nothing is")
+    return f"{required} is not installed" + (f"; there is {names}" if names else "; nothing is")
 
 
 def _holds(folder: Path, files: Mapping[str, bytes]) -> bool:

@@ -45,7 +45,7 @@ def take(
     signature: Signature | None,
     examine: Callable[[Path], list[str]],
     provenance: Provenance | None = None,
-    seal: IndexSigner | None = None,
+    index_signer: IndexSigner | None = None,
 ) -> SubmissionResult:
     """Check and list an untrusted package.
 
@@ -56,7 +56,7 @@ def take(
         signature: its signature, if any.
         examine: returns the errors of a document in a folder of packages.
         provenance: its origin, if declared.
-        seal: signer of the maintainer, for the index.
+        index_signer: signer of the maintainer, for the index.
 
     Raises:
         Refused: the upload is rejected.
@@ -66,7 +66,7 @@ def take(
     with changing(folder) as work:
         with open(folder / INDEX, "rb") as file:
             index = read_index(file.read(INDEX_BYTES + 1), INDEX)
-        check_key(head_in(folder), seal)  # before any write
+        check_key(head_in(folder), index_signer)  # before any write
         archive = folder / entry.file
         is_known = archive.is_file()
         if is_known and archive.read_bytes() != data:
@@ -86,7 +86,7 @@ def take(
         if not is_known:
             _look(package, entry, others, folder, work, examine)
         entry = keep(folder, package, signature or before, work, notes)
-        write_index(folder, index.name, [*others, entry], work, seal)
+        write_index(folder, index.name, [*others, entry], work, index_signer)
     return SubmissionResult(entry, True)
 
 

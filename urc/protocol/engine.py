@@ -124,7 +124,7 @@ class Engine:
         self._runners: list[SequenceRunner] = []
         self._verifications = Verifications(self.known)
         has_scripts = self.programs or self._greetings or self._good_byes
-        is_timed = any(line.inbox.is_timed for line in self._all_lines)
+        is_timed = any(line.receiver.is_timed for line in self._all_lines)
         self._calm_s = 0.0 if has_scripts or is_timed else calm_s(driver)
         self._is_begun = False
         self._is_timed = self._schedule.keeps_alive or self.readings.is_timed
@@ -336,8 +336,8 @@ class Engine:
             for one in exchange.owner.ended(exchange, outcome, now):
                 self._act(one, told, now)
         elif isinstance(event, Matched):
-            if event.ear.owner is not None:
-                event.ear.owner.matched(event.ear, event.offer, now)
+            if event.expectation.owner is not None:
+                event.expectation.owner.matched(event.expectation, event.offer, now)
         elif isinstance(event, ConnectionClosing):
             self._say_good_bye(self.lines[event.transport], now)
         else:

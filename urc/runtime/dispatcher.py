@@ -191,7 +191,7 @@ class Dispatcher:
         clock: Clock,
         commands: Mapping[str, Command],
         limit_s: Callable[[str], float],
-        reins: Mapping[str, SequenceControl] = NOTHING,
+        sequence_control: Mapping[str, SequenceControl] = NOTHING,
     ) -> None:
         """Take over an engine.
 
@@ -201,7 +201,7 @@ class Dispatcher:
             clock: source of time.
             commands: the driver's commands.
             limit_s: command → seconds after which its wait ends, regardless of the engine.
-            reins: sequence → its control.
+            sequence_control: sequence → its control.
         """
         self._engine = engine
         self._hub = hub
@@ -209,8 +209,8 @@ class Dispatcher:
         self._commands = commands
         self._ports: dict[str, LinkPort] = {}
         self._waiting = PendingCommands(clock, limit_s)
-        self._reins = dict(reins)
-        self._seen = dict.fromkeys(reins, 0)
+        self._sequence_control = dict(sequence_control)
+        self._seen = dict.fromkeys(sequence_control, 0)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._alarm: Timer | None = None
         self._alarm_s: float | None = None
@@ -267,9 +267,9 @@ class Dispatcher:
 
     def pull(self, sequence: str, what: Pull) -> None:
         """Pause, continue or end a sequence; do nothing if it does not run."""
-        reins = self._reins.get(sequence)
-        if reins is not None:
-            reins.pull(what)
+        sequence_control = self._sequence_control.get(sequence)
+        if sequence_control is not None:
+            sequence_control.pull(what)
             self._run(self._engine.tick)
 
     def latch(self, reason: str) -> None:
@@ -371,18 +371,24 @@ class Dispatcher:
 
     def _show_sequences(self) -> None:
         """Publish the progress of the sequences."""
-        for name, reins in self._reins.items():
-            if reins.count != self._seen[name]:
-                self._seen[name] = reins.count
+        for name, sequence_control in self._sequence_control.items():
+            if sequence_control.count != self._seen[name]:
+                self._seen[name] = sequence_control.count
                 state: Literal["idle", "running", "paused"] = "idle"
-                if reins.is_running:
-                    state = "paused" if reins.is_paused else "running"
+                if sequence_control.is_running:
+                    state = "paused" if sequence_control.is_paused else "running"
                 self._hub.set_progress(
-                    SequenceProgress(name, reins.place, reins.of, state, reins.reason)
+                    SequenceProgress(
+                        name,
+                        sequence_control.place,
+                        sequence_control.of,
+                        state,
+                        sequence_control.reason,
+                    )
                 )
 
     def _arm(self, soonest_s: float = 0.0) -> None:
-        if self._reins:
+        if self._sequence_control:
             self._show_sequences()
         due_s = self._engine.deadline
         if due_s is not None and soonest_s:

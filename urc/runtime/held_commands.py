@@ -91,7 +91,7 @@ class HeldControl:
     is_armed: bool = False
     is_lasting: bool = False
     """Whether its stop frame stays the same while it is armed."""
-    course: Literal["rest", "moving", "ending"] = "rest"
+    running_rule: Literal["rest", "moving", "ending"] = "rest"
     """``ending``: released, and its stop is not reported as written yet."""
     stop: Payload | FrameVariants | None = None
     """Its stop frame, as the movers have it."""
@@ -116,7 +116,7 @@ class HeldControl:
         if not self.needs_release:
             self.why = why
         self.rest()
-        self.course = "rest"
+        self.running_rule = "rest"
         self.is_armed = False
         self.needs_release = True
         self.closed_epoch = epoch

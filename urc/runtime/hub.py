@@ -233,18 +233,18 @@ class Hub:
     def __init__(
         self,
         signals: Mapping[str, Signal],
-        blanker: Redactor | None = None,
+        redactor: Redactor | None = None,
         streams: Iterable[str] = (),
     ) -> None:
         """Start without values.
 
         Args:
             signals: the driver's signals.
-            blanker: removes secrets from all input; None if the robot has none.
+            redactor: removes secrets from all input; None if the robot has none.
             streams: transports whose traffic may split a message over several pieces.
         """
         self.signals = signals
-        self._blanker = blanker if blanker is not None and blanker.is_needed else None
+        self._redactor = redactor if redactor is not None and redactor.is_needed else None
         self._stream_lines = frozenset(streams)
         self.names = tuple(signals)
         """Index → signal name, in the order of the driver, fixed for the session."""
@@ -275,8 +275,8 @@ class Hub:
     def publish(self, samples: Iterable[Sample]) -> None:
         """Store readings; a repeated value also counts as a change, because its age is new."""
         taken = samples if type(samples) is tuple else tuple(samples)
-        if self._blanker is not None:
-            value = self._blanker.value
+        if self._redactor is not None:
+            value = self._redactor.value
             taken = tuple(one._replace(value=value(one.value)) for one in taken)
         revision = self.revision = self.revision + 1
         for sample in taken:
@@ -290,8 +290,8 @@ class Hub:
 
     def set_link(self, status: LinkStatus) -> None:
         """Store the state of one transport."""
-        if self._blanker is not None:
-            text = self._blanker.text
+        if self._redactor is not None:
+            text = self._redactor.text
             status = replace(status, address=text(status.address), detail=text(status.detail))
         if self.links.get(status.transport) == status:
             return
@@ -304,8 +304,8 @@ class Hub:
 
     def set_progress(self, progress: SequenceProgress) -> None:
         """Store the progress of a sequence."""
-        if self._blanker is not None:
-            progress = replace(progress, reason=self._blanker.text(progress.reason))
+        if self._redactor is not None:
+            progress = replace(progress, reason=self._redactor.text(progress.reason))
         if self.progress.get(progress.command) == progress:
             return
         self.progress[progress.command] = progress
@@ -320,15 +320,15 @@ class Hub:
 
     def publish_record(self, done: MotionRecord | AuditRecord) -> None:
         """Report an operator's action; only taps receive it."""
-        if self._blanker is not None and isinstance(done, MotionRecord):
-            done = replace(done, arguments=self._blanker.value(done.arguments))
+        if self._redactor is not None and isinstance(done, MotionRecord):
+            done = replace(done, arguments=self._redactor.value(done.arguments))
         for tap in self._taps:
             tap.push((done,))
 
     def log(self, note: LogEntry) -> None:
         """Add a log entry."""
-        if self._blanker is not None:
-            note = replace(note, text=self._blanker.text(note.text))
+        if self._redactor is not None:
+            note = replace(note, text=self._redactor.text(note.text))
         self.notes.append(note)
         self.notes_count += 1
         self.revision += 1
@@ -338,27 +338,27 @@ class Hub:
 
     def saw(self, traffic: Traffic) -> None:
         """Add traffic; the possible beginning of a secret is delayed until more bytes arrive."""
-        if self._blanker is not None:
+        if self._redactor is not None:
             is_stream = traffic.envelope is None and traffic.transport in self._stream_lines
             if is_stream:
-                data = self._blanker.stream((traffic.transport, traffic.direction), traffic.data)
+                data = self._redactor.stream((traffic.transport, traffic.direction), traffic.data)
                 if not data and traffic.data:
                     return
             else:
-                data = self._blanker.whole(traffic.data)
-            envelope = traffic.envelope and self._blanker.envelope(traffic.envelope)
+                data = self._redactor.whole(traffic.data)
+            envelope = traffic.envelope and self._redactor.envelope(traffic.envelope)
             traffic = replace(traffic, data=data, envelope=envelope)
         self._show(traffic)
 
     @property
     def holds_back(self) -> bool:
         """Whether some traffic is delayed."""
-        return self._blanker is not None and self._blanker.is_holding
+        return self._redactor is not None and self._redactor.is_holding
 
     def tell_rest(self, now_s: float) -> None:
         """Publish the delayed traffic, because no more bytes arrived."""
-        if self._blanker is not None:
-            for (transport, direction), data in self._blanker.rest():
+        if self._redactor is not None:
+            for (transport, direction), data in self._redactor.rest():
                 went: Literal["sent", "received"] = "sent" if direction == "sent" else "received"
                 self._show(Traffic(now_s, transport, went, data))
 

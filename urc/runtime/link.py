@@ -270,7 +270,7 @@ class Link:
         alarms = self._set_alarms()
         try:
             async with asyncio.TaskGroup() as lanes:
-                tasks = [lanes.create_task(self._lane(work)) for work in (self._read, self._write)]
+                tasks = [lanes.create_task(self._queue(work)) for work in (self._read, self._write)]
                 reason = await self._ended
                 for task in tasks:
                     task.cancel()
@@ -336,7 +336,7 @@ class Link:
         except Exception as bug:  # supervisor, as in `_open`
             self._mistake(bug)
 
-    async def _lane(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    async def _queue(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         try:
             await work()
         except TransportError as fault:

@@ -63,7 +63,7 @@ class MotionController:
         """
         self.lease = Lease(kept)
         self._frames: MotionFrames | None = None
-        self._movers: MotionBackend | None = None
+        self._backend: MotionBackend | None = None
         self._holds = {name: one for name, one in driver.commands.items() if one.hold is not None}
         self._is_lossy = {
             name: is_lossy(driver, one.transport) for name, one in self._holds.items()
@@ -109,7 +109,7 @@ class MotionController:
 
     def rests(self, command: str) -> bool:
         """Return whether a held command is at rest and its last stop was reported."""
-        return self._controls[command].course == "rest"
+        return self._controls[command].running_rule == "rest"
 
     @property
     def is_confirmed(self) -> bool:
@@ -123,17 +123,17 @@ class MotionController:
 
     # -- the robot
 
-    def attach(self, frames: MotionFrames, movers: MotionBackend | None) -> None:
+    def attach(self, frames: MotionFrames, backend: MotionBackend | None) -> None:
         """Connect a session's engine and its movers, if any; send an outstanding stop."""
-        self._frames, self._movers = frames, movers
+        self._frames, self._backend = frames, backend
         frames.on_count, frames.on_ready = self._renew, self._ready
         frames.on_refused = self._refused
-        if movers is not None and not self._unconfirmed.isdisjoint(self._holds):
-            movers.stop(self._stop_frames(self._holds))
+        if backend is not None and not self._unconfirmed.isdisjoint(self._holds):
+            backend.stop(self._stop_frames(self._holds))
 
     def detach(self) -> None:
         """End the session: its movers stop all motion, and no control stays armed."""
-        self._frames = self._movers = None
+        self._frames = self._backend = None
         for control in self._controls.values():
             control.is_owed_again = False
             if control.is_armed:
@@ -152,7 +152,7 @@ class MotionController:
         self._screens.pop(client, None)
         self._settle(self.lease.leave(client))
 
-    def beat(self, client: str, now: float) -> int:
+    def heartbeat(self, client: str, now: float) -> int:
         """Return the current tick number for this page, which the page echoes."""
         return self._screens[client].freshness.issue(now)
 
@@ -183,8 +183,8 @@ class MotionController:
     def stop(self, by: str) -> None:
         """Stop the robot and latch, regardless of the lease."""
         self._unconfirmed = {*self._holds, *self._stops}
-        if self._movers is not None:
-            self._movers.stop(self._stop_frames(self._holds))
+        if self._backend is not None:
+            self._backend.stop(self._stop_frames(self._holds))
         self._settle(self.lease.stop(by), is_stopped=True)
 
     def halt(self) -> list[str]:
@@ -205,7 +205,7 @@ class MotionController:
     def _moving(self) -> list[str]:
         """Return the commands with ticks since their last reported stop."""
         controls = self._controls.items()
-        return [name for name, one in controls if one.is_armed and one.course != "rest"]
+        return [name for name, one in controls if one.is_armed and one.running_rule != "rest"]
 
     def expire(self, now: float) -> None:
         """Handle the timeouts of the lease."""
@@ -233,8 +233,8 @@ class MotionController:
             return refusal
         if control.needs_release or epoch <= control.closed_epoch:
             return control.why if control.needs_release else _TAKE_ANEW
-        frames, movers = self._frames, self._movers
-        if frames is None or movers is None:
+        frames, backend = self._frames, self._backend
+        if frames is None or backend is None:
             return _NO_ROBOT
         if control.slew is not None:
             arguments = control.limited(arguments, now)
@@ -242,28 +242,30 @@ class MotionController:
         try:
             data = frames.motion_frame(command, arguments, now)
             if not control.is_armed:
-                movers.arm(command, self._terms(command, frames))
+                backend.arm(command, self._terms(command, frames))
                 control.is_armed, control.is_lasting = True, frames.is_lasting(command)
             elif not control.is_lasting:
                 self._renew_stops(control.line)
         except UrcError as error:
-            self._abandon(command, control, movers, str(error))
+            self._abandon(command, control, backend, str(error))
             return str(error)
         finally:
             self._is_making = False
         self.lease.touch(now)
-        control.course = "moving"
-        movers.tick(command, data)
+        control.running_rule = "moving"
+        backend.tick(command, data)
         if data == b"":
             return ""  # it waits for a reply that the robot owes
         shown = data.numbered.data if isinstance(data, CountedFrame) else data
         self.on_moved(screen.client, epoch, command, arguments, shown, now)
         return ""
 
-    def _abandon(self, command: str, control: HeldControl, movers: MotionBackend, why: str) -> None:
+    def _abandon(
+        self, command: str, control: HeldControl, backend: MotionBackend, why: str
+    ) -> None:
         """End a motion for which no frame can be rendered."""
         if control.is_armed:
-            movers.release(command)
+            backend.release(command)
         self._close(control, why)
 
     def release(self, client: str, command: str) -> None:
@@ -273,22 +275,22 @@ class MotionController:
         if control is None or holder is None or holder.id != client:
             return
         control.needs_release = False
-        if control.course == "moving":
-            control.course = "ending"
+        if control.running_rule == "moving":
+            control.running_rule = "ending"
         self._let_go(command, control)
 
     def _let_go(self, command: str, control: HeldControl) -> None:
         control.rest()
-        if control.is_armed and self._movers is not None:
-            self._movers.release(command)
+        if control.is_armed and self._backend is not None:
+            self._backend.release(command)
             self._renew(control.line)  # the counter of this stop frame is used up
 
     def _refused(self, command: str, why: str) -> None:
         """Stop a motion that the robot refuses, and report its message."""
-        control, movers = self._controls.get(command), self._movers
-        if control is None or movers is None or control.course != "moving":
+        control, backend = self._controls.get(command), self._backend
+        if control is None or backend is None or control.running_rule != "moving":
             return
-        self._abandon(command, control, movers, why)
+        self._abandon(command, control, backend, why)
         self.on_refused(command, why)
 
     def stopped(self, command: str, reason: Reason) -> None:
@@ -296,8 +298,8 @@ class MotionController:
         control = self._controls.get(command)
         if control is None:
             return
-        if control.course == "ending":  # else it already moves again
-            control.course = "rest"
+        if control.running_rule == "ending":  # else it already moves again
+            control.running_rule = "rest"
         if reason not in ("released", "stopped"):
             self._close(control, _CUT if reason == "revoked" else LET_GO)
         if self._is_too_early(command, control):
@@ -310,12 +312,12 @@ class MotionController:
 
     def _is_too_early(self, command: str, control: HeldControl) -> bool:
         """Return whether a written stop may not count, because the robot was not ready for it."""
-        frames, movers = self._frames, self._movers
-        if frames is None or movers is None:
+        frames, backend = self._frames, self._backend
+        if frames is None or backend is None:
             return False
         if not control.is_greeted and frames.is_lasting(command):
             return False
-        return not (movers.is_open(command) and frames.is_ready(command))
+        return not (backend.is_open(command) and frames.is_ready(command))
 
     def _ready(self, line: str) -> None:
         """Repeat stops that were sent before the steps of connection `line` were done."""
@@ -326,8 +328,8 @@ class MotionController:
         ]
         for name in owed:
             self._controls[name].is_owed_again = False
-        if owed and self._movers is not None:
-            self._movers.stop(self._stop_frames(owed))
+        if owed and self._backend is not None:
+            self._backend.stop(self._stop_frames(owed))
 
     def _renew(self, line: str) -> None:
         """Render the stops of `line` again, with counters after the last sent frame."""
@@ -335,13 +337,13 @@ class MotionController:
             self._renew_stops(line)
 
     def _renew_stops(self, line: str) -> None:
-        frames, movers = self._frames, self._movers
-        if frames is None or movers is None:
+        frames, backend = self._frames, self._backend
+        if frames is None or backend is None:
             return
         for name, control in self._controls.items():
             if control.line != line or frames.is_lasting(name) or frames.has_stops(name):
                 continue
-            if not (control.is_armed or movers.is_stopping(name)):
+            if not (control.is_armed or backend.is_stopping(name)):
                 continue
             try:
                 stop = frames.stop_frame(name)
@@ -349,7 +351,7 @@ class MotionController:
                 continue  # the old stop is better than none
             if stop != control.stop:
                 control.stop = stop
-                movers.renew(name, stop)
+                backend.renew(name, stop)
 
     def _close(self, control: HeldControl, why: str = LET_GO) -> None:
         control.close(why, self.lease.state.epoch)
@@ -373,14 +375,14 @@ class MotionController:
                 self._stop_what_moves()
             for control in self._controls.values():
                 control.is_armed = control.needs_release = False
-                control.course = "rest"
+                control.running_rule = "rest"
                 control.rest()
         self.on_change(outcome.state)
 
     def _stop_what_moves(self) -> None:
         moving = self._moving()
-        if moving and self._movers is not None:
-            self._movers.stop(self._stop_frames(moving))
+        if moving and self._backend is not None:
+            self._backend.stop(self._stop_frames(moving))
 
     def _stop_frames(
         self, commands: Sequence[str] | Mapping[str, object]

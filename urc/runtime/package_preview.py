@@ -231,12 +231,12 @@ def look(document: Path, folder: Path, widgets: Sequence[str]) -> PackagePreview
         UrcError: it refers to a file outside.
     """
     allowed = permissions(document, folder, widgets)
-    shelf = shelf_of(document)
-    checked = check(document, built_in_catalog(), shelf)
+    registry = shelf_of(document)
+    checked = check(document, built_in_catalog(), registry)
     if checked.profile is None:
         return PackagePreview(allowed, {}, [])
     risks = risks_of(checked.profile)
-    text = resolve(str(document), shelf, checked.profile).text
+    text = resolve(str(document), registry, checked.profile).text
     data = parse_document(text.encode(), "resolved").data
     assert isinstance(data, dict)  # noqa: S101 (a document that was loaded is a mapping)
     wire = {key: value for key, value in data.items() if key not in _NOT_WIRE}

@@ -49,38 +49,38 @@ async def hold(
     Raises:
         CommandFailed: it was refused, or ended early; the robot got a stop.
     """
-    movers = session.movers
-    if movers is None:
+    backend = session.backend
+    if backend is None:
         raise CommandFailed("unknown-command", f"{name} is not a held command")
-    await _until_ready(session, movers, name)
-    desk = MotionController(session.profile.driver)
-    desk.join(_US)
-    desk.attach(session.frames, movers)
-    follower = asyncio.create_task(_follow(desk, movers))
+    await _until_ready(session, backend, name)
+    controller = MotionController(session.profile.driver)
+    controller.join(_US)
+    controller.attach(session.frames, backend)
+    follower = asyncio.create_task(_follow(controller, backend))
     try:
-        desk.drive(_US.id, "take", _now())
+        controller.drive(_US.id, "take", _now())
         try:
-            has_moved, why = await _ticks(desk, name, arguments, for_s, why_not)
+            has_moved, why = await _ticks(controller, name, arguments, for_s, why_not)
         finally:
-            desk.release(_US.id, name)
+            controller.release(_US.id, name)
         if has_moved:
-            await _stop_is_out(session, desk, movers, name)
+            await _stop_is_out(session, controller, backend, name)
         if why:
             raise CommandFailed("stopped" if has_moved else "refused", why)
     finally:
         follower.cancel()
-        desk.detach()
+        controller.detach()
 
 
 def _now() -> float:
     return asyncio.get_running_loop().time()
 
 
-async def _until_ready(session: Session, movers: MotionBackend, name: str) -> None:
+async def _until_ready(session: Session, backend: MotionBackend, name: str) -> None:
     """Wait until the transport is connected and its steps are done or failed."""
     line = session.profile.driver.commands[name].transport
     until = _now() + queue_limit_s(session.profile.driver.transports[line], None)
-    while not (movers.is_open(name) and session.frames.is_ready(name)):
+    while not (backend.is_open(name) and session.frames.is_ready(name)):
         status = session.hub.links[line]
         if status.attempts or _now() >= until:
             why = f": {status.detail}" if status.detail else ""
@@ -89,7 +89,7 @@ async def _until_ready(session: Session, movers: MotionBackend, name: str) -> No
 
 
 async def _ticks(
-    desk: MotionController,
+    controller: MotionController,
     name: str,
     arguments: Mapping[str, Reading],
     for_s: float,
@@ -100,8 +100,10 @@ async def _ticks(
     ends_s = next_s + for_s
     while (now := _now()) < ends_s:
         number += 1
-        given = ControlInput(desk.lease.state.epoch, number, desk.beat(_US.id, now))
-        why = why_not() or desk.tick(_US.id, name, arguments, given, now)
+        given = ControlInput(
+            controller.lease.state.epoch, number, controller.heartbeat(_US.id, now)
+        )
+        why = why_not() or controller.tick(_US.id, name, arguments, given, now)
         if why:
             return number > 1, why
         next_s = max(next_s + _TICK_S, now)
@@ -110,7 +112,7 @@ async def _ticks(
 
 
 async def _stop_is_out(
-    session: Session, desk: MotionController, movers: MotionBackend, name: str
+    session: Session, controller: MotionController, backend: MotionBackend, name: str
 ) -> None:
     """Wait until the transport has accepted the stop, and its repetitions on a lossy transport.
 
@@ -118,7 +120,7 @@ async def _stop_is_out(
     """
     driver = session.profile.driver
     until = _now() + _STOP_OUT_S
-    while not (desk.rests(name) and movers.is_open(name)):
+    while not (controller.rests(name) and backend.is_open(name)):
         if _now() >= until:
             text = f"the stop has not reached the robot: its line took none for {_STOP_OUT_S:g} s"
             raise CommandFailed("disconnected", text)
@@ -127,7 +129,7 @@ async def _stop_is_out(
         await asyncio.sleep(STOP_FOR_S + _WORKED_OFF_S)
 
 
-async def _follow(desk: MotionController, movers: MotionBackend) -> None:
+async def _follow(controller: MotionController, backend: MotionBackend) -> None:
     while True:
-        for command, reason in await movers.stops():
-            desk.stopped(command, reason)
+        for command, reason in await backend.stops():
+            controller.stopped(command, reason)

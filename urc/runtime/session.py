@@ -126,17 +126,17 @@ class Session:
         self.profile = profile
         self.settings = dict(settings)
         driver = profile.driver
-        self._blanker = Redactor.of(profile, self.settings)
+        self._redactor = Redactor.of(profile, self.settings)
         streams = (
             name for name, spec in driver.transports.items() if spec.framing.type != "datagram"
         )
-        self.hub = Hub(driver.signals, self._blanker, streams)
+        self.hub = Hub(driver.signals, self._redactor, streams)
         self._clock: Clock = clock or LoopClock()
         fresh = TimeAndNonce(time.time, secrets.token_bytes)
         engine = Engine(driver, self.settings, fresh=fresh, is_compiled=True)
         self.frames: MotionFrames = engine.motions
         """Renders the frames of held commands."""
-        self.movers = self._made_movers(engine, transports, motion)
+        self.backend = self._made_movers(engine, transports, motion)
         """Writer of the frames; None without motion."""
         self._dispatcher = Dispatcher(
             engine,
@@ -144,12 +144,12 @@ class Session:
             self._clock,
             driver.commands,
             partial(_limit_s, driver),
-            {name: program.reins for name, program in engine.programs.items()},
+            {name: program.sequence_control for name, program in engine.programs.items()},
         )
         self._links = self._made_links(
             make_transports(driver, self.settings, transports)
-            if self.movers is None
-            else self.movers.transports,
+            if self.backend is None
+            else self.backend.transports,
             random,
         )
         self._stops = 0
@@ -167,12 +167,12 @@ class Session:
             return None
         from urc.runtime.guarding import take_reins  # takes 20 ms, so only with motion
 
-        movers = take_reins(
+        backend = take_reins(
             driver, self.settings, transports, self._clock, is_guarded=motion == "guarded"
         )
         engine.motions.share([name for name in driver.transports if is_lossy(driver, name)])
-        movers.on_stand = engine.motions.set_counters
-        return movers
+        backend.on_stand = engine.motions.set_counters
+        return backend
 
     def _made_links(
         self, transports: "Mapping[str, Transport]", random: Callable[[], float]
@@ -196,8 +196,8 @@ class Session:
 
     async def __aenter__(self) -> "Session":
         await self._group.__aenter__()
-        if self.movers is not None:
-            self.movers.start()
+        if self.backend is not None:
+            self.backend.start()
         self._tasks = [self._group.create_task(link.run()) for link in self._links.values()]
         self._dispatcher.wind_up()
         return self
@@ -209,14 +209,14 @@ class Session:
         trace: TracebackType | None,
     ) -> None:
         try:
-            if self.movers is not None:
+            if self.backend is not None:
                 # Before the steps of on_close, which may take time.
-                self.movers.stop_all(self.frames.stop_frame)
+                self.backend.stop_all(self.frames.stop_frame)
             await self._say_goodbye()
             await self._end(kind, error, trace)
         finally:
-            if self.movers is not None:
-                await self.movers.finish()
+            if self.backend is not None:
+                await self.backend.finish()
 
     async def _end(
         self,
@@ -281,9 +281,9 @@ class Session:
             self._dispatcher.forget(request.id)
             raise
         if isinstance(outcome, Failed):
-            raise CommandFailed(outcome.code, self._blanker.text(outcome.message))
-        if outcome.values and self._blanker.is_needed:
-            return outcome._replace(values=self._blanker.value(outcome.values))
+            raise CommandFailed(outcome.code, self._redactor.text(outcome.message))
+        if outcome.values and self._redactor.is_needed:
+            return outcome._replace(values=self._redactor.value(outcome.values))
         return outcome
 
     async def settle(self) -> str:

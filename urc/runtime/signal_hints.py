@@ -72,7 +72,7 @@ class SignalHints:
             return asked
         if not line.is_open:
             return f"{transport} connects only for a request, and the test sent none"
-        waiting = line.inbox.decoder.pending
+        waiting = line.receiver.decoder.pending
         return self._waits(transport, fed[-waiting:]) if waiting else ""
 
     def _waits(self, transport: str, rest: bytes) -> str:

@@ -36,7 +36,7 @@ def first(failures: list[str]) -> list[str]:
 
 
 def check_values(
-    trial: TestEngine, expect: Mapping[str, Expected], remedy: SignalHints
+    trial: TestEngine, expect: Mapping[str, Expected], hints: SignalHints
 ) -> Iterator[str]:
     """Yield a complaint for each signal with an unexpected state."""
     for name, wanted in expect.items():
@@ -48,7 +48,7 @@ def check_values(
         sample = trial.samples.get(name)
         if sample is None:
             if state.age != "never":
-                yield f"{name}: expected {_wanted(state)}, but nothing set it{remedy.of(name)}"
+                yield f"{name}: expected {_wanted(state)}, but nothing set it{hints.of(name)}"
             continue
         if state.has_value and not is_same(sample.value, state.value):
             yield f"{name}: expected {shown(state.value)}, found {shown(sample.value)}"

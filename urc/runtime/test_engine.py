@@ -53,10 +53,10 @@ class _Watched(Engine):
         self.used: set[Exercised] = set()
         for name, line in self.lines.items():
             names = [one.name for one in driver.messages.values() if one.transport == name]
-            line.inbox.messages = Messages(
+            line.receiver.messages = Messages(
                 [
                     Matcher(one.reader, partial(self._decode, message, one.decode))
-                    for message, one in zip(names, line.inbox.messages.declared, strict=True)
+                    for message, one in zip(names, line.receiver.messages.declared, strict=True)
                 ]
             )
 
@@ -202,7 +202,7 @@ class TestEngine:
     def fall_silent(self) -> None:
         """Pass the time that ends a frame by silence."""
         for name in self.fed:
-            due = self.engine.lines[name].inbox.decoder.deadline
+            due = self.engine.lines[name].receiver.decoder.deadline
             if due is not None:
                 self.now = max(self.now, due)
                 self.perform(self.engine.tick(self.now))

@@ -30,8 +30,8 @@ def shelf_of(document: str | PathLike[str]) -> WidgetFolder:
 
 def hidden_beside(document: str | PathLike[str]) -> list[Path]:
     """Return the folders of a document's widgets that are never used."""
-    shelf = shelf_of(document)
-    return shelf.hidden() if isinstance(shelf, WidgetRegistry) else []
+    registry = shelf_of(document)
+    return registry.hidden() if isinstance(registry, WidgetRegistry) else []
 
 
 def hidden_widget(manifest: str, name: str) -> Problem:

@@ -16,19 +16,21 @@ __all__ = ["stand_in"]
 
 @asynccontextmanager
 async def stand_in(
-    profile: Profile, settings: Mapping[str, Value], twin: EmulatedRobot | None = None
+    profile: Profile, settings: Mapping[str, Value], emulated_robot: EmulatedRobot | None = None
 ) -> AsyncIterator[Profile]:
     """Emulate `profile` until the context ends; return the profile that connects to it.
 
     Args:
         profile: the profile of the robot.
         settings: values for its templates.
-        twin: the emulated robot, for observers; made from the profile by default.
+        emulated_robot: the emulated robot, for observers; made from the profile by default.
 
     Raises:
         UrcError: a transport cannot be emulated.
     """
-    async with serve(profile, settings, is_anywhere=True, twin=twin) as listening:
+    async with serve(
+        profile, settings, is_anywhere=True, emulated_robot=emulated_robot
+    ) as listening:
         places = {name: endpoint.options for name, endpoint in listening.items()}
         yield _redirected(profile, places)
 

@@ -219,7 +219,7 @@ class EmulatedConnection:
         self._decoder = framing.decoder()
         self._rules = rules
         self._setters = setters
-        self._courses: list[RunningRule] = []
+        self._running_rules: list[RunningRule] = []
         self._periodic = [
             _Periodic(rule, rule.what.every_s, rule.what.every_s)
             for rule in rules.periodic
@@ -240,7 +240,7 @@ class EmulatedConnection:
         if not self._is_greeted:
             return 0.0
         left = [one.left_s for one in self._periodic]
-        left += [one.left_s for one in self._courses]
+        left += [one.left_s for one in self._running_rules]
         if self.has_late:
             left.append(self._late.due_s - self._now_s)
         silence = self._decoder.deadline
@@ -330,11 +330,11 @@ class EmulatedConnection:
         if not self._is_greeted:
             self._is_greeted = True
             said += self._try(lambda: [*self._auto.greet(now_s)]) or []
-        for course in tuple(self._courses):
-            course.left_s -= dt_s
-            if course.left_s <= 0 and not self.is_over:
-                self._courses.remove(course)
-                said += self._resume(course, now_s)
+        for running_rule in tuple(self._running_rules):
+            running_rule.left_s -= dt_s
+            if running_rule.left_s <= 0 and not self.is_over:
+                self._running_rules.remove(running_rule)
+                said += self._resume(running_rule, now_s)
         for periodic in self._periodic:
             periodic.left_s -= dt_s
             if periodic.left_s <= 0 and not self.is_over:
@@ -358,7 +358,7 @@ class EmulatedConnection:
             if not self._rules.holds(rule.when, now_s):
                 return []
             sets = self._setters.sets(rule, self)
-            return self._resume(RunningRule(what.deeds, NOTHING, sets=sets), now_s)
+            return self._resume(RunningRule(what.ready_reactions, NOTHING, sets=sets), now_s)
 
         return self._try(go) or []
 
@@ -371,9 +371,9 @@ class EmulatedConnection:
             self._body.note_commands(self._auto.labels(asked), now_s)
 
         def answer() -> list[Payload] | None:
-            course = self._rules.match(asked, now_s)
-            if course is not None:
-                return self._resume(course, now_s)
+            running_rule = self._rules.match(asked, now_s)
+            if running_rule is not None:
+                return self._resume(running_rule, now_s)
             return self._auto.answer(asked, now_s)
 
         said = self._try(answer)
@@ -381,26 +381,26 @@ class EmulatedConnection:
             self._fault(not_taken(asked))
         return said or []
 
-    def _resume(self, course: RunningRule, now_s: float) -> list[Payload]:
+    def _resume(self, running_rule: RunningRule, now_s: float) -> list[Payload]:
         """Perform the due reactions, and keep the others for later."""
         said: list[Payload] = []
-        while course.deeds and not self.is_over:
-            deed = course.deeds[0]
-            if deed.what.after_s > 0 and not course.has_waited:
-                self._defer(course, deed.what.after_s)
+        while running_rule.ready_reactions and not self.is_over:
+            reaction = running_rule.ready_reactions[0]
+            if reaction.what.after_s > 0 and not running_rule.has_waited:
+                self._defer(running_rule, reaction.what.after_s)
                 break
-            course.has_waited = False
-            course.deeds = course.deeds[1:]
-            said += self._try(partial(self._rules.do, deed, course, now_s)) or []
-            self.is_over |= deed.what.closes
+            running_rule.has_waited = False
+            running_rule.ready_reactions = running_rule.ready_reactions[1:]
+            said += self._try(partial(self._rules.do, reaction, running_rule, now_s)) or []
+            self.is_over |= reaction.what.closes
         return said
 
-    def _defer(self, course: RunningRule, left_s: float) -> None:
-        if len(self._courses) >= MOST_COURSES:
+    def _defer(self, running_rule: RunningRule, left_s: float) -> None:
+        if len(self._running_rules) >= MOST_COURSES:
             self._fault(f"{MOST_COURSES} delayed replies wait already; this one is dropped")
             return
-        course.left_s, course.has_waited = left_s, True
-        self._courses.append(course)
+        running_rule.left_s, running_rule.has_waited = left_s, True
+        self._running_rules.append(running_rule)
 
     def _try(self, make: Callable[[], list[Payload] | None]) -> list[Payload] | None:
         """Return the result of `make`; count and log a frame without reply."""

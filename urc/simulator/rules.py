@@ -51,24 +51,24 @@ class ReadyRule(NamedTuple):
 
     what: SimulatorRule
     reader: PayloadReader | None
-    deeds: tuple[ReadyReaction, ...]
+    ready_reactions: tuple[ReadyReaction, ...]
 
 
 class RunningRule:
     """The pending reactions of one rule."""
 
-    __slots__ = ("asked", "deeds", "frame", "has_waited", "left_s", "names", "sets")
+    __slots__ = ("asked", "frame", "has_waited", "left_s", "names", "ready_reactions", "sets")
 
     def __init__(
         self,
-        deeds: tuple[ReadyReaction, ...],
+        ready_reactions: tuple[ReadyReaction, ...],
         names: Mapping[str, object],
         asked: ReceivedRequest | None = None,
         frame: Frame | None = None,
         *,
         sets: bool = True,
     ) -> None:
-        self.deeds = deeds
+        self.ready_reactions = ready_reactions
         """Pending reactions."""
         self.names = names
         """Names and values from the frame."""
@@ -79,7 +79,7 @@ class RunningRule:
         self.sets = sets
         """Whether this connection performs the changes to the robot."""
         self.left_s = 0.0
-        """Time until the first of `deeds` is due, in seconds."""
+        """Time until the first of `ready_reactions` is due, in seconds."""
         self.has_waited = False
 
 
@@ -116,9 +116,11 @@ class RuleSet:
         is_form = isinstance(rule.match, ReadSpec)
         reader = build_reader(rule.match, self._context) if is_form else None  # type: ignore[arg-type]  # as told
         framing = self._auto.framing_of(rule.request) if rule.request else self._framing
-        return ReadyRule(rule, reader, tuple(self._deed(one, framing) for one in rule.reactions))
+        return ReadyRule(
+            rule, reader, tuple(self._reaction(one, framing) for one in rule.reactions)
+        )
 
-    def _deed(self, what: Reaction, framing: Framing) -> ReadyReaction:
+    def _reaction(self, what: Reaction, framing: Framing) -> ReadyReaction:
         if what.framing is not None:
             framing = build_framing(what.framing).reversed()
         return ReadyReaction(
@@ -142,19 +144,19 @@ class RuleSet:
                 names = None if asked is None else asked.arguments
             else:
                 names = _names_in(rule, frame)
-            course = self._course(rule, names, asked, frame, now_s)
-            if course is not None:
-                return course
+            running_rule = self._running_rule(rule, names, asked, frame, now_s)
+            if running_rule is not None:
+                return running_rule
         # The first request with these bytes has no rule; another one with the same bytes may have.
         for rule in self.asked:
             asked = self._auto.asked_too(frame, rule.what.request) if rule.what.request else None
             names = None if asked is None else asked.arguments
-            course = self._course(rule, names, asked, frame, now_s)
-            if course is not None:
-                return course
+            running_rule = self._running_rule(rule, names, asked, frame, now_s)
+            if running_rule is not None:
+                return running_rule
         return None
 
-    def _course(
+    def _running_rule(
         self,
         rule: ReadyRule,
         names: Mapping[str, object] | None,
@@ -170,7 +172,7 @@ class RuleSet:
             return None
         if asked is not None:
             self._values.remember(asked.arguments)
-        return RunningRule(rule.deeds, names, asked, frame)
+        return RunningRule(rule.ready_reactions, names, asked, frame)
 
     def holds(
         self, condition: Template | None, now_s: float, names: Mapping[str, object] = NOTHING
@@ -183,24 +185,24 @@ class RuleSet:
         except ExpressionError as error:
             raise Unanswered(str(error)) from None
 
-    def do(self, deed: ReadyReaction, course: RunningRule, now_s: float) -> list[Payload]:
+    def do(self, reaction: ReadyReaction, running_rule: RunningRule, now_s: float) -> list[Payload]:
         """Perform one reaction and return its frames; raise `Unanswered` if that is impossible."""
-        what = deed.what
+        what = reaction.what
         said: list[Payload] = []
         try:
-            if course.sets:
-                self._set(what, course, now_s)
+            if running_rule.sets:
+                self._set(what, running_rule, now_s)
             if what.answers:
-                asked = course.asked
-                if asked is None and course.frame is not None:
-                    asked = self._auto.asked(course.frame)
+                asked = running_rule.asked
+                if asked is None and running_rule.frame is not None:
+                    asked = self._auto.asked(running_rule.frame)
                 if asked is None:
                     raise Unanswered("the driver never sends this, so it declares no reply")
                 said += self._auto.answers(asked, now_s)
-            if deed.message is not None:
-                said += self._auto.render(deed.message, now_s)
-            if deed.writer is not None and not self._is_dropped(what):
-                said.append(self._written(deed, deed.writer, course, now_s))
+            if reaction.message is not None:
+                said += self._auto.render(reaction.message, now_s)
+            if reaction.writer is not None and not self._is_dropped(what):
+                said.append(self._written(reaction, reaction.writer, running_rule, now_s))
         except (ExpressionError, FramingError, NotWritable, Unsettable) as problem:
             if self._wants_dropped(what):
                 return said
@@ -221,8 +223,8 @@ class RuleSet:
             names |= what.send.names
         return body is not None and bool(body.world.dropped) and "world" in names
 
-    def _set(self, what: Reaction, course: RunningRule, now_s: float) -> None:
-        names = Names(self._values, now_s, course.names)
+    def _set(self, what: Reaction, running_rule: RunningRule, now_s: float) -> None:
+        names = Names(self._values, now_s, running_rule.names)
         values = {
             name: one.evaluate(names) if isinstance(one, Template) else one
             for name, one in what.sets.items()
@@ -231,16 +233,20 @@ class RuleSet:
             self._values.set(name, value)
 
     def _written(
-        self, deed: ReadyReaction, writer: PayloadWriter, course: RunningRule, now_s: float
+        self,
+        reaction: ReadyReaction,
+        writer: PayloadWriter,
+        running_rule: RunningRule,
+        now_s: float,
     ) -> Payload:
         draw = self._counters.draw()
-        names = Names(self._values, now_s, {**course.names, COUNTERS: draw})
+        names = Names(self._values, now_s, {**running_rule.names, COUNTERS: draw})
         payload = writer.write(names)
         self._counters.count(draw)
-        said = deed.framing.encode(payload) if isinstance(payload, bytes) else payload
+        said = reaction.framing.encode(payload) if isinstance(payload, bytes) else payload
         if isinstance(said, Envelope) and said.verb == "publish":  # a message to subscribers
             said = Envelope("message", {"topic": said.attributes.get("topic")}, said.body)
-        return said if course.frame is None else numbered(said, course.frame)
+        return said if running_rule.frame is None else numbered(said, running_rule.frame)
 
 
 def _names_in(rule: ReadyRule, came: Frame) -> Mapping[str, object] | None:

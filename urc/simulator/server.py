@@ -41,7 +41,7 @@ async def serve(
     *,
     now: Callable[[], float] = time.time,
     is_anywhere: bool = False,
-    twin: EmulatedRobot | None = None,
+    emulated_robot: EmulatedRobot | None = None,
 ) -> AsyncIterator[Mapping[str, Endpoint]]:
     """Emulate the robot of `profile` until the context ends.
 
@@ -51,7 +51,7 @@ async def serve(
         host: address to listen on; the default is reachable from this machine only.
         now: returns seconds since the epoch, the templates' ``now``.
         is_anywhere: whether to listen on free ports, and ignore the profile's ports and paths.
-        twin: the emulated robot; made from the profile by default.
+        emulated_robot: the emulated robot; made from the profile by default.
 
     Returns:
         Transport → its endpoint.
@@ -59,7 +59,7 @@ async def serve(
     Raises:
         UrcError: a transport cannot be emulated, or an address is not available.
     """
-    robot = twin or EmulatedRobot(profile, settings)
+    robot = emulated_robot or EmulatedRobot(profile, settings)
     transports = profile.driver.transports
     inside: dict[str, dict[tuple[str, int], Endpoint]] = {name: {} for name in transports}
     last_peer = LastPeer()

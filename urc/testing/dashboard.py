@@ -135,7 +135,7 @@ class FakeRobot:
         self.latched: list[str] = []
         """Reasons of all latches."""
         self.frames = FakeFrames(profile.driver)
-        self.movers: MotionBackend | None = FakeMotionBackend(self.clock)
+        self.backend: MotionBackend | None = FakeMotionBackend(self.clock)
         self.on_command: Callable[[str, Mapping[str, Reading]], Mapping[str, Value]] | None = None
         """Returns the values of a command's reply, or raises an error; None: no values."""
 

@@ -86,7 +86,7 @@ class FakeMotionBackend:
         self.is_up = True
         self._clock = clock
         self._write = write
-        self._movers: dict[str, HoldToRun] = {}
+        self._backend: dict[str, HoldToRun] = {}
         self._alarm: Timer | None = None
         self._stops: asyncio.Queue[tuple[str, Reason]] = asyncio.Queue()
 
@@ -97,26 +97,26 @@ class FakeMotionBackend:
 
     def arm(self, command: str, terms: HoldTerms) -> None:
         """Accept ticks from now on."""
-        mover = self._movers.get(command)
-        if mover is None or mover.state == "idle":
-            mover = self._movers[command] = HoldToRun(terms)
-        mover.arm()
+        hold_to_run = self._backend.get(command)
+        if hold_to_run is None or hold_to_run.state == "idle":
+            hold_to_run = self._backend[command] = HoldToRun(terms)
+        hold_to_run.arm()
 
     def tick(self, command: str, data: Payload | CountedFrame) -> None:
         """Renew the lease."""
         assert not isinstance(data, CountedFrame)  # noqa: S101 - the fake has no shared counters
-        if self._movers[command].tick(data or None, self._clock.now()):
+        if self._backend[command].tick(data or None, self._clock.now()):
             self.ticked_s = self._clock.now()
         self.write_due()
 
     def renew(self, command: str, stop: Payload | FrameVariants) -> None:
         """Replace the stop frame."""
-        mover = self._movers[command]
-        mover.renew(mover.terms.stopped_by(stop))
+        hold_to_run = self._backend[command]
+        hold_to_run.renew(hold_to_run.terms.stopped_by(stop))
 
     def is_stopping(self, command: str) -> bool:
         """Return whether it moves."""
-        return command in self._movers and self._movers[command].state != "idle"
+        return command in self._backend and self._backend[command].state != "idle"
 
     def is_open(self, command: str) -> bool:
         """Return whether its transport is connected."""
@@ -124,16 +124,16 @@ class FakeMotionBackend:
 
     def release(self, command: str) -> None:
         """Release the control."""
-        if command in self._movers:
-            self._movers[command].stop("released", self._clock.now())
+        if command in self._backend:
+            self._backend[command].stop("released", self._clock.now())
         self.write_due()
 
     def stop(self, stops: Mapping[str, Payload | FrameVariants]) -> None:
         """Stop all motion."""
         for command, frame in stops.items():
             terms = HoldTerms(b"", period_s=0.05).stopped_by(frame)
-            mover = self._movers.setdefault(command, HoldToRun(terms))
-            mover.stop("stopped", self._clock.now())
+            hold_to_run = self._backend.setdefault(command, HoldToRun(terms))
+            hold_to_run.stop("stopped", self._clock.now())
         self.write_due()
 
     async def stops(self) -> Sequence[tuple[str, Reason]]:
@@ -143,15 +143,19 @@ class FakeMotionBackend:
     def write_due(self) -> None:
         """Write the due frames, also after the transport is up again."""
         now = self._clock.now()
-        for command, mover in self._movers.items():
-            while self.is_up and (data := mover.due(now, is_clear=True)) is not None:
+        for command, hold_to_run in self._backend.items():
+            while self.is_up and (data := hold_to_run.due(now, is_clear=True)) is not None:
                 self._send_now(data, now)
-                if data == mover.terms.stop and mover.reason is not None:
-                    self.reasons.append(mover.reason)
-                    self._stops.put_nowait((command, mover.reason))
+                if data == hold_to_run.terms.stop and hold_to_run.reason is not None:
+                    self.reasons.append(hold_to_run.reason)
+                    self._stops.put_nowait((command, hold_to_run.reason))
         if self._alarm is not None:
             self._alarm.cancel()
-        dues = [mover.deadline for mover in self._movers.values() if mover.deadline is not None]
+        dues = [
+            hold_to_run.deadline
+            for hold_to_run in self._backend.values()
+            if hold_to_run.deadline is not None
+        ]
         self._alarm = (
             self._clock.call_at(min(dues), self.write_due) if dues and self.is_up else None
         )

@@ -55,9 +55,9 @@ async def open_port(
     transport, _ = await create_serial_connection(
         loop, lambda: stream, port, transport_cls=kind, **cast("dict[str, Any]", arguments)
     )
-    carrier: asyncio.Transport | None = getattr(transport, "_tcp_transport", None)
-    if carrier is not None:  # the library offers no other access to its socket
-        stream.socket = carrier.get_extra_info("socket")
+    tunnel: asyncio.Transport | None = getattr(transport, "_tcp_transport", None)
+    if tunnel is not None:  # the library offers no other access to its socket
+        stream.socket = tunnel.get_extra_info("socket")
         tune(stream.socket)
     else:
         with suppress(*FAULTS):

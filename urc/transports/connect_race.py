@@ -37,16 +37,16 @@ async def connected(family: int, address: object) -> socket.socket:
     Raises:
         OSError: the robot or this machine refuses the connection.
     """
-    hurry = HURRY.get()
-    if hurry is None:
+    connect_race = HURRY.get()
+    if connect_race is None:
         return await _once(family, address)
-    hurry.is_used = True
+    connect_race.is_used = True
     tries: set[asyncio.Task[socket.socket]] = set()
     try:
         while True:
             tries.add(asyncio.create_task(_once(family, address)))
             done, tries = await asyncio.wait(
-                tries, timeout=hurry.every_s, return_when=asyncio.FIRST_COMPLETED
+                tries, timeout=connect_race.every_s, return_when=asyncio.FIRST_COMPLETED
             )
             if done:
                 first, *more = sorted(done, key=lambda one: one.exception() is not None)

@@ -83,7 +83,7 @@ class HttpTransport:
             await talk.close()
             raise
         for spec in self._streams:
-            talk.listen(HttpStream(spec, client, talk.inbox, talk.pulse, self._max_body))
+            talk.listen(HttpStream(spec, client, talk.queue, talk.pulse, self._max_body))
         self._talk = talk
 
     async def receive(self) -> Envelope:
@@ -141,7 +141,7 @@ class _Talk:
     """The state of one opening of the transport."""
 
     def __init__(self, client: HttpClient, most: int, answer_s: float, max_body_bytes: int) -> None:
-        self.inbox = HttpReceiveQueue()
+        self.queue = HttpReceiveQueue()
         self.pulse = LastActivity()
         self._client = client
         self.unsent, self.forget = client.unsent, client.forget
@@ -175,15 +175,15 @@ class _Talk:
             raise ConnectFailed(f"the probe of {path} failed: {reason}")
 
     async def receive(self) -> Envelope:
-        envelope, place = await self.inbox.pop()
+        envelope, place = await self.queue.pop()
         if place is not None:
             self._requests.pop(place, None)
             self._has_place.set()
         return envelope
 
     async def send(self, data: Envelope) -> None:
-        if self.inbox.ended is not None:
-            raise PeerClosed(self.inbox.ended)
+        if self.queue.ended is not None:
+            raise PeerClosed(self.queue.ended)
         await self._until_place()
         self._number += 1
         handed = asyncio.Event()
@@ -196,7 +196,7 @@ class _Talk:
             raise
 
     async def close(self) -> None:
-        self.inbox.end(CLOSED)
+        self.queue.end(CLOSED)
         tasks = list(self._tasks)
         for task in tasks:
             task.cancel()
@@ -214,7 +214,7 @@ class _Talk:
             while len(self._requests) >= self._most:
                 place = next(iter(self._requests))
                 self._requests.pop(place).cancel()
-                self.inbox.forget(place)
+                self.queue.forget(place)
 
     async def _request(self, place: int, data: Envelope, handed: asyncio.Event) -> None:
         """Send one request, and put its response into the queue."""
@@ -233,20 +233,20 @@ class _Talk:
         if fault is not None:
             answer = Envelope("response", {"ok": False, "reason": str(fault)})
         attributes = {"id": data.attributes.get("id"), **answer.attributes}
-        self.inbox.answer(place, answer._replace(attributes=attributes))
+        self.queue.answer(place, answer._replace(attributes=attributes))
         if fault is not None:
             await self._conclude(fault)
 
     async def _conclude(self, fault: HttpFault) -> None:
         """Check whether an unresponsive robot is still reachable, and report it if not."""
         if fault.is_unreachable:
-            self.inbox.end(str(fault))
+            self.queue.end(str(fault))
         elif fault.is_unanswered and not self._is_looking:
             self._is_looking = True
             try:
                 await self._client.reach()
             except ConnectFailed as gone:
-                self.inbox.end(str(gone))
+                self.queue.end(str(gone))
             finally:
                 self._is_looking = False
 
@@ -255,7 +255,7 @@ class _Talk:
         body = await request.aread()
         request.stream = _Handed(body, handed)
         async with self._client.answer(request) as response:
-            self.pulse.beat()
+            self.pulse.heartbeat()
             found = await body_of(response, self._max_bytes)
             reason = complaint(response, found)
             attributes: dict[str, object] = {

@@ -85,7 +85,7 @@ class LastActivity:
         self._clock = asyncio.get_running_loop().time
         self._beat_s = self._clock()
 
-    def beat(self) -> None:
+    def heartbeat(self) -> None:
         """Record received data."""
         self._beat_s = self._clock()
 
@@ -102,7 +102,7 @@ class HttpStream:
         self,
         spec: StreamSpec,
         client: HttpClient,
-        inbox: HttpReceiveQueue,
+        queue: HttpReceiveQueue,
         pulse: LastActivity,
         max_body_bytes: int,
     ) -> None:
@@ -111,13 +111,13 @@ class HttpStream:
         Args:
             spec: the requested stream.
             client: makes the requests.
-            inbox: receives the data.
+            queue: receives the data.
             pulse: last activity of the transport.
             max_body_bytes: size limit of one picture.
         """
         self._spec = spec
         self._client = client
-        self._inbox = inbox
+        self._queue = queue
         self._pulse = pulse
         self._max_bytes = max_body_bytes
         self._wait_s = _FIRST_WAIT_S
@@ -153,7 +153,7 @@ class HttpStream:
                     self._came()
                     patience.extend()
                 for part in parts:
-                    self._inbox.picture(self._topic, part)
+                    self._queue.picture(self._topic, part)
         raise HttpFault("the robot ended the stream")
 
     async def _still(self) -> None:
@@ -161,7 +161,7 @@ class HttpStream:
             body = await read_body(response, self._max_bytes)
             if body:
                 self._came()
-                self._inbox.picture(self._topic, body)
+                self._queue.picture(self._topic, body)
 
     async def _sse(self) -> None:
         headers = {"Accept": "text/event-stream", "Cache-Control": "no-store"}
@@ -195,7 +195,7 @@ class HttpStream:
     async def _line(self, line: bytes) -> None:
         if line:
             self._came()
-            await self._inbox.event({"topic": self._topic}, line)
+            await self._queue.event({"topic": self._topic}, line)
 
     async def _deliver(self, event: Event) -> None:
         """Pass an event to the topic of its name, or else to the topic of the path."""
@@ -203,7 +203,7 @@ class HttpStream:
         topic = named if named in self._spec.topics else self._spec.path
         if topic in self._spec.topics:
             attributes = {"topic": topic, "event": event.name, "id": event.id}
-            await self._inbox.event(attributes, event.data)
+            await self._queue.event(attributes, event.data)
 
     @asynccontextmanager
     async def _open(
@@ -214,7 +214,7 @@ class HttpStream:
         head = _Bound(SILENCE_S if silence_s is None else 2 * silence_s, "no answer")
         async with head, self._client.answer(request, silence_s) as response:
             head.lift()
-            self._pulse.beat()
+            self._pulse.heartbeat()
             if reason := await fault_of(response):
                 raise HttpFault(reason)
             yield response
@@ -237,7 +237,7 @@ class HttpStream:
 
     def _came(self) -> None:
         """Record valid data of the stream."""
-        self._pulse.beat()
+        self._pulse.heartbeat()
         self._wait_s = _FIRST_WAIT_S
         if self._failures:
             log.info("%s: here again after %d failures", self._shown, self._failures)
@@ -249,7 +249,7 @@ class HttpStream:
             log.warning("%s: %s; trying again", self._shown, fault)
         is_gone = isinstance(fault, HttpFault) and fault.is_unreachable
         if is_gone and self._pulse.silence_s > _GONE_S:
-            self._inbox.end(str(fault))
+            self._queue.end(str(fault))
 
 
 class _Bound:

@@ -82,7 +82,7 @@ class MqttTransport:
         """Return the next message; raise `PeerClosed` at the end of the connection."""
         if self._session is None:
             raise PeerClosed(CLOSED)
-        return await self._session.inbox.pop()
+        return await self._session.queue.pop()
 
     async def send(self, data: Payload) -> None:
         """Publish a message; return once the kernel has it.
@@ -137,7 +137,7 @@ class _Session:
     """One open connection and its paho client."""
 
     def __init__(self, options: MqttOptions, line: socket.socket) -> None:
-        self.inbox = TopicReceiveQueue()
+        self.queue = TopicReceiveQueue()
         self._options = options
         self.line = line
         self._loop = asyncio.get_running_loop()
@@ -203,9 +203,9 @@ class _Session:
         if done.rc == MQTTErrorCode.MQTT_ERR_QUEUE_SIZE:
             text = f"the broker has not acknowledged {MAX_UNACKNOWLEDGED} messages; dropped"
             raise TransportError(text)
-        while self._client.want_write() and self.inbox.ended is None:
+        while self._client.want_write() and self.queue.ended is None:
             await self._until_writable()
-            if self.inbox.ended is None:
+            if self.queue.ended is None:
                 self._client.loop_write()
         self._raise_if_ended()
 
@@ -215,8 +215,8 @@ class _Session:
         Args:
             has_farewell: whether to send DISCONNECT, which also sends all earlier data.
         """
-        is_open = self.inbox.ended is None
-        self.inbox.end(CLOSED)
+        is_open = self.queue.ended is None
+        self.queue.end(CLOSED)
         if self._check is not None:
             self._check.cancel()
         client = self._client
@@ -231,8 +231,8 @@ class _Session:
         client.drop()
 
     def _raise_if_ended(self) -> None:
-        if self.inbox.ended is not None:
-            raise PeerClosed(self.inbox.ended)
+        if self.queue.ended is not None:
+            raise PeerClosed(self.queue.ended)
 
     def _forget(self, line: Any) -> None:
         """Stop watching a socket that is about to be closed."""
@@ -300,7 +300,7 @@ class _Session:
         topic = message.topic
         attributes = {"topic": topic, "retain": message.retain, "qos": message.qos}
         envelope = Envelope("message", attributes, message.payload)
-        self.inbox.message(topic, envelope, len(topic) + len(message.payload))
+        self.queue.message(topic, envelope, len(topic) + len(message.payload))
 
     def _on_disconnect(
         self, client: Client, data: object, flags: Any, code: ReasonCode, properties: object
@@ -314,7 +314,7 @@ class _Session:
 
     def _lose(self, reason: str) -> None:
         """Wake all waiting tasks with the end of the connection."""
-        self.inbox.end(reason)
+        self.queue.end(reason)
         self._forget(self.line)
         if not self._answered.done():
             self._answered.set_result(reason)

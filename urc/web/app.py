@@ -74,7 +74,7 @@ def build_app(
     data: Path | None = None,
     tiles: Path | None = None,
     remake: Mapping[str, Remake] | None = None,
-    workshop: RobotOptions | None = None,
+    robot_options: RobotOptions | None = None,
     trusted: Iterable[str] = (),
 ) -> Starlette:
     """Return the application that serves `robots`.
@@ -87,7 +87,7 @@ def build_app(
         data: folder of the latches and the audit log, or None.
         tiles: folder of map tiles, ``z/x/y.png``, or None.
         remake: makes a robot from its saved document; None for a server without developer pages.
-        workshop: options of the robot factory; None for a server without managers and settings.
+        robot_options: options of the robot factory; None without managers and settings.
         trusted: third-party widgets that run in the page all the same.
 
     Raises:
@@ -97,22 +97,25 @@ def build_app(
     fleet = Fleet(
         robots,
         lambda name, robot: RobotService(
-            robot, linger_s=linger_s, latch=_latch(data, robot), trail=_trail(audit, name, robot)
+            robot,
+            linger_s=linger_s,
+            latch=_latch(data, robot),
+            recorder=_recorder(audit, name, robot),
         ),
     )
     routes = _Routes(
         fleet=fleet,
         modules=import_map(vendored()),
-        ways=NavigationLinks(has_managers=workshop is not None, has_dev=remake is not None),
+        ways=NavigationLinks(has_managers=robot_options is not None, has_dev=remake is not None),
         audit=audit,
-        border=WidgetTrust.of(trusted),
+        trust=WidgetTrust.of(trusted),
     )
 
     def renew(name: str, robot: Robot) -> None:
         routes.renew(name, robot, _latch(data, robot))
 
-    if workshop is not None:
-        routes.manager = Manager(RobotFactory(workshop), fleet, time.monotonic, renew)
+    if robot_options is not None:
+        routes.manager = Manager(RobotFactory(robot_options), fleet, time.monotonic, renew)
     dev = None
     if remake is not None:
         dev = Dev(fleet.stations, remake, renew, is_here)
@@ -128,7 +131,7 @@ def _latch(data: Path | None, robot: Robot) -> LatchStore | None:
     return LatchStore(folder / "emulated" if robot.is_emulated else folder, robot.profile.name)
 
 
-def _trail(audit: AuditLog | None, name: str, robot: Robot) -> AuditRecorder | None:
+def _recorder(audit: AuditLog | None, name: str, robot: Robot) -> AuditRecorder | None:
     if audit is None:
         return None
     secrets = secret_texts(robot.profile, robot.settings)
@@ -154,7 +157,7 @@ class _Dashboard(Starlette):
             routes.modules,
             routes.profiles,
             is_dev=dev is not None,
-            border=routes.border,
+            trust=routes.trust,
             ways=routes.ways,
         )
         frames = FrameDocuments(routes.modules, files.has_widget, access.frame_code)
@@ -198,7 +201,7 @@ class _Routes:
     modules: Mapping[str, object]
     ways: NavigationLinks
     audit: AuditLog | None = None
-    border: WidgetTrust = field(default_factory=WidgetTrust)
+    trust: WidgetTrust = field(default_factory=WidgetTrust)
     manager: Manager | None = None
     dev: Dev | None = None
     dev_start: DevStart | None = None
@@ -226,7 +229,7 @@ class _Routes:
         return [
             Stoppable(name, each.profile.title or name)
             for name, each in self.robots.items()
-            if each.tape is None and can_move(each.profile.driver)
+            if each.playback is None and can_move(each.profile.driver)
         ]
 
     def profiles(self) -> list[Profile]:
@@ -241,7 +244,7 @@ class _Routes:
         """Switch to another version of a robot; raise `UrcError` when its widgets clash."""
         robot = self.fleet.renew(name, robot)
         secrets = secret_texts(robot.profile, robot.settings)
-        self.stations[name].controls.trail.hide(secrets)
+        self.stations[name].controls.recorder.hide(secrets)
         self.stations[name].replace(robot, latch)
 
     @asynccontextmanager
@@ -295,12 +298,12 @@ class _Routes:
             robot.profile,
             interface,
             self.modules,
-            is_watching="watch" in query or robot.tape is not None,
-            tape=_tape_url(name) if robot.tape is not None else "",
+            is_watching="watch" in query or robot.playback is not None,
+            playback=_tape_url(name) if robot.playback is not None else "",
             tab=query.get("tab", ""),
             wire=dev_url(name) if is_dev else "",
             is_part="part" in query,
-            border=self.border,
+            trust=self.trust,
         )
         return HTMLResponse(html, headers=_PAGE)
 
@@ -309,22 +312,22 @@ class _Routes:
 
     async def stop(self, request: Request) -> Response:
         """Stop a robot and latch, for a page whose socket is down."""
-        station = self.stations.get(request.path_params["name"])
-        if station is None:
+        service = self.stations.get(request.path_params["name"])
+        if service is None:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
-        if not station.controls.desk.can_move or station.robot.tape is not None:
+        if not service.controls.controller.can_move or service.robot.playback is not None:
             return JSONResponse({"error": "this robot has no motion to stop"}, 409, _PAGE)
-        station.controls.stop(guest_of(request).place or "a screen of this machine")
-        is_confirmed = await station.deliver_stop()
-        by = station.controls.desk.lease.state.latched_by
+        service.controls.stop(guest_of(request).place or "a screen of this machine")
+        is_confirmed = await service.deliver_stop()
+        by = service.controls.controller.lease.state.latched_by
         return JSONResponse({"latched": by, "confirmed": is_confirmed}, headers=_PAGE)
 
     async def controls(self, request: Request) -> Response:
         """Return the lease of a robot and the state of its STOP."""
-        station = self.stations.get(request.path_params["name"])
-        if station is None:
+        service = self.stations.get(request.path_params["name"])
+        if service is None:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
-        return JSONResponse(station.who(), headers=_PAGE)
+        return JSONResponse(service.who(), headers=_PAGE)
 
     async def timeline(self, request: Request) -> Response:
         """Return the audit log of a robot's motion."""
@@ -335,40 +338,40 @@ class _Routes:
 
     async def recording(self, request: Request) -> Response:
         """Return the state of a playback."""
-        return tape_state(self._tape(request))
+        return tape_state(self._playback(request))
 
     async def move(self, request: Request) -> Response:
         """Change a playback."""
-        return await move_tape(request, self._tape(request))
+        return await move_tape(request, self._playback(request))
 
-    def _tape(self, request: Request) -> Playback | None:
+    def _playback(self, request: Request) -> Playback | None:
         robot = self.robots.get(request.path_params["name"])
-        return robot.tape if robot is not None else None
+        return robot.playback if robot is not None else None
 
     async def socket(self, websocket: WebSocket) -> None:
-        station = await self._accepted(websocket)
-        if station is not None:
+        service = await self._accepted(websocket)
+        if service is not None:
             flow = websocket.scope["state"]["flow"]
-            guest = guest_of(websocket)
-            if station.robot.tape is not None:
-                guest = guest._replace(role="viewer")
-            await BrowserClient(websocket, station, flow, guest).serve()
+            peer = guest_of(websocket)
+            if service.robot.playback is not None:
+                peer = peer._replace(role="viewer")
+            await BrowserClient(websocket, service, flow, peer).serve()
 
     async def spare(self, websocket: WebSocket) -> None:
         """Serve a redundant socket of a page that drives."""
-        station = await self._accepted(websocket)
-        if station is not None:
+        service = await self._accepted(websocket)
+        if service is not None:
             flow = websocket.scope["state"]["flow"]
-            await RedundantSocket(websocket, station.controls, station.clock, flow).serve()
+            await RedundantSocket(websocket, service.controls, service.clock, flow).serve()
 
     async def _accepted(self, websocket: WebSocket) -> RobotService | None:
         await websocket.accept()
         names = list(self.stations)
         default = names[0] if len(names) == 1 else ""
-        station = self.stations.get(websocket.query_params.get("robot", default))
-        if station is None:
+        service = self.stations.get(websocket.query_params.get("robot", default))
+        if service is None:
             await websocket.close(wire.CLOSE_NO_ROBOT, "no robot of that name is served here")
-        return station
+        return service
 
 
 def _tape_url(name: str) -> str:

@@ -50,15 +50,15 @@ class BrowserClient:
     def __init__(
         self,
         line: ClientSocket,
-        station: RobotService,
+        service: RobotService,
         flow: FlowControl,
-        guest: SocketPeer = SocketPeer(),  # noqa: B008 - it cannot be changed
+        peer: SocketPeer = SocketPeer(),  # noqa: B008 - it cannot be changed
     ) -> None:
         self._line = line
-        self._station = station
+        self._service = service
         self._flow = flow
-        self._guest = guest
-        self._seat: OperatorSession | None = None
+        self._peer = peer
+        self._operator: OperatorSession | None = None
         self._news = asyncio.Event()
         self._answers: deque[str] = deque()
         self._pong = ""
@@ -68,26 +68,26 @@ class BrowserClient:
         self._is_listening = False
         self._closing: tuple[int, str] | None = None
         self._commands: set[asyncio.Task[None]] = set()
-        self._allowance = TokenBucket(MESSAGES_PER_S, station.clock.now())
-        self._ticks = TokenBucket(TICKS_PER_S, station.clock.now())
+        self._allowance = TokenBucket(MESSAGES_PER_S, service.clock.now())
+        self._ticks = TokenBucket(TICKS_PER_S, service.clock.now())
         self.bad_messages = 0
 
     async def serve(self) -> None:
         """Serve this page from the accepted socket to its end."""
-        missing = missing_settings(self._station.robot)
+        missing = missing_settings(self._service.robot)
         if missing:
             names = ", ".join(setting.name for setting in missing)
             await self._refuse(wire.CLOSE_NOT_READY, f"not set yet: {names}")
-        elif self._station.is_full:
+        elif self._service.is_full:
             await self._refuse(wire.CLOSE_FULL, "too many clients watch this robot")
-        elif not self._station.has_seat_for(self._guest):
+        elif not self._service.has_seat_for(self._peer):
             await self._refuse(wire.CLOSE_FULL, "too many screens of yours watch this robot")
         else:
-            with self._station.visit(self._guest.who):
+            with self._service.visit(self._peer.who):
                 await self._visit()
 
     async def _visit(self) -> None:
-        opening = asyncio.ensure_future(self._station.live())
+        opening = asyncio.ensure_future(self._service.live())
         leaving = asyncio.ensure_future(self._line.receive())
         # A page that leaves while the session is still opening must not count as a client.
         try:
@@ -107,10 +107,10 @@ class BrowserClient:
 
     async def _converse(self, live: LiveSession, first: Message | None) -> None:
         self._place = live.fanout.join(self._flushed)
-        controls = self._station.controls
+        controls = self._service.controls
         try:
-            self._seat = controls.sit(self._guest.place, self._guest.role, self._news.set)
-            self._station.consent.welcome(self._seat)
+            self._operator = controls.sit(self._peer.place, self._peer.role, self._news.set)
+            self._service.consent.welcome(self._operator)
             async with asyncio.TaskGroup() as group:
                 writing = group.create_task(self._write(live))
                 reading = group.create_task(self._read(live, group, first))
@@ -125,8 +125,8 @@ class BrowserClient:
             log.warning("a client took nothing for %g s and was disconnected", STALL_S)
             self._flow.abort()
         finally:
-            if self._seat is not None:
-                controls.rise(self._seat)
+            if self._operator is not None:
+                controls.rise(self._operator)
             live.fanout.leave(self._flushed)
 
     async def _refuse(self, code: int, reason: str) -> None:
@@ -139,8 +139,8 @@ class BrowserClient:
     # Writing
 
     async def _write(self, live: LiveSession) -> None:
-        profile = self._station.robot.profile
-        hello = wire.encode_hello(profile, live.number, self._station.clock.now())
+        profile = self._service.robot.profile
+        hello = wire.encode_hello(profile, live.number, self._service.clock.now())
         await self._line.send_text(hello)
         self._live = live
         while True:
@@ -149,7 +149,7 @@ class BrowserClient:
                 await self._flow.drained()
                 self._news.clear()
                 self._send_shared(live)
-                told = self._station.controls.changes(self._seat) if self._seat else []
+                told = self._service.controls.changes(self._operator) if self._operator else []
                 for text in (*told, *self._take_answers()):
                     await self._line.send_text(text)
             if live.ended.is_set() and not self._closing:
@@ -175,8 +175,8 @@ class BrowserClient:
         """Send the data that all pages share, and images until the kernel's buffer is full."""
         if frames := live.fanout.frames_for(self._place):
             self._flow.write(frames)
-        while self._place.looks.names and self._flow.is_free():
-            picture = live.fanout.shelf.next_image(self._place.looks)
+        while self._place.subscription.names and self._flow.is_free():
+            picture = live.fanout.cache.next_image(self._place.subscription)
             if picture is None:
                 break
             self._flow.write(picture.frame)
@@ -196,8 +196,8 @@ class BrowserClient:
         self, live: LiveSession, group: asyncio.TaskGroup, first: Message | None
     ) -> None:
         self._flow.listen(self._offered)
-        if self._seat is not None:
-            self._seat.hold_back = self._flow.hold_back
+        if self._operator is not None:
+            self._operator.hold_back = self._flow.hold_back
         message = first or await self._listen()
         while message["type"] != "websocket.disconnect" and not self._closing:
             self._handle(message, live, group)
@@ -212,17 +212,17 @@ class BrowserClient:
 
     def _offered(self, data: bytes) -> bool:
         """Take a tick that just arrived with nothing before it; `_take` handles all else."""
-        seat = self._seat
-        if seat is None or not (self._is_listening and data.startswith(TICK)) or self._closing:
+        operator = self._operator
+        if operator is None or not (self._is_listening and data.startswith(TICK)) or self._closing:
             return False
-        how = self._station.controls.offer(seat, data)
+        how = self._service.controls.offer(operator, data)
         # Ticks within the rate are not counted: they are far fewer than the limit.
         return how == "in time" or (
-            how == "one more" and self._ticks.allow(self._station.clock.now())
+            how == "one more" and self._ticks.allow(self._service.clock.now())
         )
 
     def _handle(self, message: Message, live: LiveSession, group: asyncio.TaskGroup) -> None:
-        now_s = self._station.clock.now()
+        now_s = self._service.clock.now()
         if not self._ticks.allow(now_s):
             self._close(wire.CLOSE_TOO_FAST, f"more than {TICKS_PER_S} messages a second")
             return
@@ -242,7 +242,7 @@ class BrowserClient:
             self._drive(asked)
         elif isinstance(asked, ImageSelection):
             self._news.set()
-            self._place.looks.show(asked.signals)
+            self._place.subscription.show(asked.signals)
         elif isinstance(asked, (Approval, ApprovalRequest, SequenceAction)):
             self._advise(asked, live)
         elif isinstance(asked, wire.Ping):
@@ -253,24 +253,28 @@ class BrowserClient:
             self._start(asked, live, group)
 
     def _drive(self, said: Driving) -> None:
-        if isinstance(said, Stop) and self._station.robot.tape is not None:
+        if isinstance(said, Stop) and self._service.robot.playback is not None:
             return  # nothing moves in a recording, and no robot could acknowledge a stop
-        if self._seat is not None:
-            self._station.controls.handle(self._seat, said)
+        if self._operator is not None:
+            self._service.controls.handle(self._operator, said)
 
     def _advise(self, said: Approval | ApprovalRequest | SequenceAction, live: LiveSession) -> None:
-        if self._seat is None:
+        if self._operator is None:
             return
-        controls, consent, who = self._station.controls, self._station.consent, self._seat.client
+        controls, consent, who = (
+            self._service.controls,
+            self._service.consent,
+            self._operator.client,
+        )
         if isinstance(said, ApprovalRequest):
-            self._answer(encode_token(said.id, consent.prepare(self._seat, said)))
+            self._answer(encode_token(said.id, consent.prepare(self._operator, said)))
         elif isinstance(said, Approval):
-            consent.handle(self._seat, said)
+            consent.handle(self._operator, said)
         elif refused := controls.once.pull_refusal(who, said.command, said.verb):
-            controls.trail.refused(who, said.command, refused, self._station.clock.now())
+            controls.recorder.refused(who, said.command, refused, self._service.clock.now())
         else:
             live.session.pull(said.command, said.verb)
-            controls.trail.ran(who, said.command, {}, f"told to {said.verb}")
+            controls.recorder.ran(who, said.command, {}, f"told to {said.verb}")
 
     def _count_bad(self, reason: str) -> None:
         self.bad_messages += 1
@@ -311,10 +315,12 @@ class BrowserClient:
                     asked.command, asked.arguments, confirmed_by=people, on_sent=sent.append
                 )
         except asyncio.CancelledError:
-            if self._seat is not None:
+            if self._operator is not None:
                 text = "nobody waited for the answer"
-                trail = self._station.controls.trail
-                trail.ran(self._seat.client, asked.command, asked.arguments, text, _last(sent))
+                recorder = self._service.controls.recorder
+                recorder.ran(
+                    self._operator.client, asked.command, asked.arguments, text, _last(sent)
+                )
             raise
         except TimeoutError:
             text = f"no answer within {COMMAND_TIMEOUT_S:g} s"
@@ -328,20 +334,20 @@ class BrowserClient:
 
     def _limit_s(self, command: str) -> float | None:
         """Return the time limit of a command; a sequence has its own end."""
-        known = self._station.robot.profile.driver.commands.get(command)
+        known = self._service.robot.profile.driver.commands.get(command)
         return None if known is not None and known.steps else COMMAND_TIMEOUT_S
 
     async def _confirmed(self, asked: wire.CommandRequest) -> tuple[str, ...]:
         """Return who confirmed a command; raise `CommandFailed` if it is not allowed."""
-        if self._seat is None:
+        if self._operator is None:
             return ()
-        known = self._station.robot.profile.driver.commands.get(asked.command)
-        who, admit = self._seat.client, self._station.controls.once.admit
+        known = self._service.robot.profile.driver.commands.get(asked.command)
+        who, admit = self._operator.client, self._service.controls.once.admit
         admit(who, asked.command, asked.arguments, asked.stops)
         if known is None:
             return ()
-        people = await self._station.consent.people(
-            self._seat, asked.id, known, asked.arguments, asked.token
+        people = await self._service.consent.people(
+            self._operator, asked.id, known, asked.arguments, asked.token
         )
         admit(who, asked.command, asked.arguments, asked.stops)  # again: a confirmation takes time
         return people
@@ -359,16 +365,16 @@ class BrowserClient:
     ) -> None:
         """Reply to a command, and write its outcome to the audit log."""
         self._answer(wire.encode_reply(asked, values=values, code=code, message=message))
-        if self._seat is None:
+        if self._operator is None:
             return
-        trail, who = self._station.controls.trail, self._seat.client
+        recorder, who = self._service.controls.recorder, self._operator.client
         if code == "busy" or is_ours:
-            trail.refused(who, asked.command, message, self._station.clock.now())
+            recorder.refused(who, asked.command, message, self._service.clock.now())
         else:
             outcome = f"{code}: {message}" if code else "done"
             if people:
                 outcome += f"; confirmed by {', '.join(people)}"
-            trail.ran(who, asked.command, asked.arguments, outcome, sent, answer=values)
+            recorder.ran(who, asked.command, asked.arguments, outcome, sent, answer=values)
 
 
 def _last(sent: deque[Payload]) -> Payload:

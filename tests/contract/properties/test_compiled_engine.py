@@ -102,7 +102,7 @@ LINES = b"POS 1.5\n|POS 2\nBAT 30\n|BAT 12\n|BAT 99\n|POS nan\n|POS 1_0\n|ERR 3\
 LINES += b"|\n|POS 4\nPO|S 5\n"
 FRAMES = b"\1\5\6\2|\2\5\6\1|\3\7\0\4|\3\7\0\5|\1\xff\6\xf8|\1\5|\6\2|\1\5\6\2\2\5\6\1"
 chunks = st.sampled_from([*LINES.split(b"|"), *FRAMES.split(b"|")])
-deeds = st.lists(
+ready_reactions = st.lists(
     st.tuples(
         st.one_of(
             st.builds(commanded, names, arguments),
@@ -126,33 +126,33 @@ def connected(driver: Driver, *, is_compiled: bool) -> Engine:
 
 @pytest.mark.parametrize("name", DRIVERS)
 @settings(max_examples=examples(240), deadline=None)
-@given(deeds=deeds)
+@given(ready_reactions=ready_reactions)
 def test_compiled_engine_tells_what_the_other_tells(
-    name: str, deeds: Sequence[tuple[Deed, float]]
+    name: str, ready_reactions: Sequence[tuple[Deed, float]]
 ) -> None:
     """The same events, in the same order, and the same deadline after each of them."""
     compiled, other = (connected(DRIVERS[name], is_compiled=one) for one in (True, False))
     now = 1.0
-    for deed, wait_s in deeds:
+    for reaction, wait_s in ready_reactions:
         now += wait_s
-        assert [*deed(compiled, now)] == [*deed(other, now)]
+        assert [*reaction(compiled, now)] == [*reaction(other, now)]
         assert compiled.deadline == other.deadline
 
 
 @pytest.mark.parametrize("name", DRIVERS)
 @settings(max_examples=examples(120), deadline=None)
-@given(deeds=deeds)
+@given(ready_reactions=ready_reactions)
 def test_no_deadline_comes_nearer_than_the_calm(
-    name: str, deeds: Sequence[tuple[Deed, float]]
+    name: str, ready_reactions: Sequence[tuple[Deed, float]]
 ) -> None:
     """So whoever has set an alarm for before that need not look again after each frame."""
     engine, now = connected(DRIVERS[name], is_compiled=False), 1.0
-    for deed, wait_s in deeds:
+    for reaction, wait_s in ready_reactions:
         now += wait_s
         before = engine.deadline
-        deed(engine, now)
+        reaction(engine, now)
         after = engine.deadline
-        if deed in (ticked, closed) or after is None:
+        if reaction in (ticked, closed) or after is None:
             continue
         assert after >= min(now + engine.calm_s, float("inf") if before is None else before)
 

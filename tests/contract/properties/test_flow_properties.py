@@ -195,9 +195,9 @@ class Machine(RuleBasedStateMachine):
     def nothing_grows(self) -> None:
         for name, line in self.engine.lines.items():
             spec = DRIVER.transports[name]
-            assert len(list(line._outbox)) <= spec.queue.depth + 2
-            assert len(line._flights) <= 256
-            assert line.inbox.decoder.pending <= spec.framing.max_bytes + 1
+            assert len(list(line._request_queue)) <= spec.queue.depth + 2
+            assert len(line._pending_replies) <= 256
+            assert line.receiver.decoder.pending <= spec.framing.max_bytes + 1
         assert len(self.engine._runners) <= 2 * len(DRIVER.transports) + len(DRIVER.commands)
 
     def teardown(self) -> None:

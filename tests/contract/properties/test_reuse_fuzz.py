@@ -62,12 +62,12 @@ def test_no_change_of_the_documents_raises(data: st.DataObject, tmp_path_factory
     for name, document in changed.items():
         text = "".join(written(key, value) for key, value in document.items())  # type: ignore[union-attr]
         (folder / f"{name}.yaml").write_text(text, "utf-8")
-    shelf = WidgetFolder(EVERY_KEY / "shelf")
+    registry = WidgetFolder(EVERY_KEY / "shelf")
     for name in ("robot-of-parts", "driver-that-extends"):
         file = str(folder / f"{name}.yaml")
-        for problem in check(file, built_in_catalog(), shelf).problems:
+        for problem in check(file, built_in_catalog(), registry).problems:
             assert problem.line >= 1
             assert problem.column >= 1
             source = Path(problem.file).read_text("utf-8").splitlines() if problem.source else []
             assert not problem.source or source[problem.line - 1] == problem.source
-        assert json.dumps(resolve(file, shelf).text)
+        assert json.dumps(resolve(file, registry).text)

@@ -75,8 +75,8 @@ class Wire(FakeRobot):
     @property
     def line(self) -> FakeMotionBackend:
         """What was written."""
-        assert isinstance(self.movers, FakeMotionBackend)
-        return self.movers
+        assert isinstance(self.backend, FakeMotionBackend)
+        return self.backend
 
     def after(self, count: int) -> list[str]:
         """Return what was written after the first `count`."""

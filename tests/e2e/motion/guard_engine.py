@@ -56,8 +56,8 @@ class Engine:
     """Drives one robot."""
 
     def __init__(self, session: Session) -> None:
-        assert session.movers is not None
-        self.movers = session.movers
+        assert session.backend is not None
+        self.backend = session.backend
         self.frames = session.frames
         self.session = session
         self.is_driving = False
@@ -73,14 +73,14 @@ class Engine:
                 if self.is_big:
                     data = b"big %d %s\n" % (self.speed, b"x" * BIG)
                 now_ns = time.monotonic_ns()
-                self.movers.tick("drive", data)
+                self.backend.tick("drive", data)
                 tell("tick", now_ns)
             await asyncio.sleep(PERIOD_S)
 
     async def report(self) -> None:
         """Tell what stopped."""
         while True:
-            for _, reason in await self.movers.stops():
+            for _, reason in await self.backend.stops():
                 tell("stopped", reason, time.monotonic_ns())
                 if reason != "released":
                     self.is_driving = False
@@ -89,7 +89,7 @@ class Engine:
         """Tell of the guard and the line."""
         guard, state = 0, ""
         while True:
-            channel = self.movers.channel
+            channel = self.backend.channel
             if isinstance(channel, PipeChannel) and channel.pid not in (0, guard):
                 guard = channel.pid
                 tell("guard", guard)
@@ -103,15 +103,15 @@ class Engine:
         """Do as told."""
         if word in ("drive", "big"):
             self.is_driving, self.is_big = True, word == "big"
-            self.movers.arm("drive", HoldTerms(self.frames.stop_frame("drive"), period_s=0.02))
+            self.backend.arm("drive", HoldTerms(self.frames.stop_frame("drive"), period_s=0.02))
         elif word == "rest":
             self.is_driving = False
         elif word == "release":
             self.is_driving = False
-            self.movers.release("drive")
+            self.backend.release("drive")
         elif word == "stop":
             self.is_driving = False
-            self.movers.stop({"drive": self.frames.stop_frame("drive")})
+            self.backend.stop({"drive": self.frames.stop_frame("drive")})
         elif word == "files":
             tell("files", len(os.listdir("/proc/self/fd")))
         elif word == "backtrack":

@@ -64,19 +64,19 @@ def words(heard: Path) -> list[str]:
 
 async def hold(session: Session) -> None:
     """Hold the control as a hand does that notices nothing, for ever."""
-    assert session.movers is not None
+    assert session.backend is not None
     while True:
         with suppress(UrcError):
-            session.movers.tick("drive", session.frames.motion_frame("drive", {"v": 7}, 0.0))
+            session.backend.tick("drive", session.frames.motion_frame("drive", {"v": 7}, 0.0))
         await asyncio.sleep(0.05)
 
 
 def arm(session: Session) -> None:
     """Begin a gesture."""
-    assert session.movers is not None
+    assert session.backend is not None
     stop = session.frames.stop_frame("drive")
     assert isinstance(stop, Payload)
-    session.movers.arm("drive", HoldTerms(stop, period_s=0.05, is_lossy=True))
+    session.backend.arm("drive", HoldTerms(stop, period_s=0.05, is_lossy=True))
 
 
 async def test_port_that_comes_back_hears_the_stop_first_and_nothing_moves_by_itself(
@@ -87,8 +87,8 @@ async def test_port_that_comes_back_hears_the_stop_first_and_nothing_moves_by_it
     document.write_text(DOCUMENT.replace("PORT", str(port)), "utf-8")
     profile, transports = load_profile(document, built_in_catalog()), built_in_catalog().transports
     async with Session(profile, {}, transports, motion="guarded") as session:
-        movers = session.movers
-        assert movers is not None
+        backend = session.backend
+        assert backend is not None
         async with plugged(port, before):
             await until(lambda: session.frames.is_ready("drive"))
             arm(session)

@@ -55,7 +55,7 @@ class Overheard:
     def _since(self, transport: str, mark: Mapping[str, int]) -> Sequence[Payload]:
         return self._heard.get(transport, [])[mark.get(transport, 0) :]
 
-    def twin(self, settings: Mapping[str, Value]) -> EmulatedRobot:
+    def emulated_robot(self, settings: Mapping[str, Value]) -> EmulatedRobot:
         """Return the emulated robot, whose lines are overheard."""
         return _Overheard(self.profile, settings, self._heard)
 
@@ -103,7 +103,7 @@ async def alive(name: str, data: Path, patch: pytest.MonkeyPatch) -> AsyncIterat
     transports = built_in_catalog().transports
     overheard = Overheard(profile)
     patch.setenv("URC_DATA_DIR", str(data))
-    async with stand_in(profile, settings, overheard.twin(settings)) as redirected:
+    async with stand_in(profile, settings, overheard.emulated_robot(settings)) as redirected:
 
         @asynccontextmanager
         async def session() -> AsyncIterator[Session]:

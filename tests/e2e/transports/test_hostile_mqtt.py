@@ -62,7 +62,7 @@ async def line(port: int, within_s: float = 20.0) -> AsyncIterator[Transport]:
 
 async def ended_untaken(transport: Transport) -> str:
     """Wait for the end of the line, without taking anything before; return why."""
-    await until(lambda: transport._session.inbox.ended)  # type: ignore[attr-defined]
+    await until(lambda: transport._session.queue.ended)  # type: ignore[attr-defined]
     return await ended(transport)
 
 
@@ -121,7 +121,7 @@ async def test_long_names_of_topics_are_counted() -> None:
             async with asyncio.timeout(WAIT_S):
                 await sent.wait()
                 await asyncio.sleep(0.2)  # what is in the kernel is read, too
-        assert transport._session.inbox.dropped > 1000  # type: ignore[attr-defined]
+        assert transport._session.queue.dropped > 1000  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(

@@ -121,7 +121,7 @@ class Ears:
 
 
 @asynccontextmanager
-async def ears(port: int, *topics: str) -> AsyncIterator[Ears]:
+async def expectations(port: int, *topics: str) -> AsyncIterator[Ears]:
     """Run mosquitto_sub, subscribed when the context begins."""
     words = [word for topic in (*topics, READY) for word in ("-t", topic)]
     process = await asyncio.create_subprocess_exec(
@@ -159,7 +159,7 @@ async def test_other_clients_hear_and_are_heard(tmp_path: Path, version: object)
         assert fresh == Envelope(
             "message", {"topic": "log/a/b", "retain": False, "qos": 0}, "grüezi".encode()
         )
-        async with ears(port, "lamp/#") as reader:
+        async with expectations(port, "lamp/#") as reader:
             for qos in (0, 1, 2):
                 await transport.send(said(f"lamp/{qos}", {"level": qos}, qos=qos))
                 assert await reader.next() == f'lamp/{qos} {{"level":{qos}}}'
@@ -172,7 +172,7 @@ async def test_broker_publishes_the_will_however_the_line_ends(
     tmp_path: Path, version: object, end: str
 ) -> None:
     """Also when it is ended here: then nobody drives any more, either."""
-    async with nothing_left(), broker(tmp_path) as port, ears(port, "rover/stop") as reader:
+    async with nothing_left(), broker(tmp_path) as port, expectations(port, "rover/stop") as reader:
         will = {"topic": "rover/stop", "payload": "halt"}
         transport = line(port, version=version, will=will)
         await transport.open(20.0)
@@ -199,7 +199,7 @@ async def test_nothing_is_said_late(tmp_path: Path, version: object) -> None:
                 await transport.send(said("drive", b"1", qos=1))
         with pytest.raises(ConnectFailed, match="nothing listens"):
             await transport.open(1.0)
-        async with broker(tmp_path, port=port), ears(port, "#") as reader:
+        async with broker(tmp_path, port=port), expectations(port, "#") as reader:
             await transport.open(20.0)
             await transport.send(said("drive", b"stop", qos=1))
             assert await reader.next() == "drive stop"
@@ -213,7 +213,7 @@ async def test_late_subscriber_sees_nothing_of_what_was_driven(tmp_path: Path) -
         await transport.open(20.0)
         await transport.send(said("drive", b"1"))
         await transport.send(said("state", b"on", retain=True))
-        async with ears(port, "drive", "state") as reader:
+        async with expectations(port, "drive", "state") as reader:
             assert await reader.next() == "state on"
         await transport.close()
 
@@ -267,7 +267,7 @@ async def test_profile_drives_the_emulated_robot_through_the_broker(tmp_path: Pa
         async with (
             broker(tmp_path, port=port),
             serve_robot(profile, settings) as listening,
-            ears(port, "lamp/set") as reader,
+            expectations(port, "lamp/set") as reader,
         ):
             assert listening["broker"].text == f"mqtt through the broker 127.0.0.1:{port}"
             async with Session(profile, settings, built_in_catalog().transports) as session:

@@ -32,19 +32,19 @@ def robot() -> socket.socket:
 async def connected(door: socket.socket) -> tuple[TcpTransport, socket.socket]:
     transport = TcpTransport("127.0.0.1", door.getsockname()[1])
     await transport.open(WAIT_S)
-    ear, _ = await asyncio.to_thread(door.accept)
-    ear.settimeout(WAIT_S)
-    return transport, ear
+    expectation, _ = await asyncio.to_thread(door.accept)
+    expectation.settimeout(WAIT_S)
+    return transport, expectation
 
 
 @on_both_loops
 def test_what_is_offered_is_there_before_the_loop_turns(run: Run) -> None:
     async def offer() -> None:
         with robot() as door:
-            transport, ear = await connected(door)
-            with ear:
+            transport, expectation = await connected(door)
+            with expectation:
                 assert transport.offer(b"at once\n")
-                assert ear.recv(100) == b"at once\n", "nothing was awaited in between"
+                assert expectation.recv(100) == b"at once\n", "nothing was awaited in between"
             await transport.close()
 
     run(offer())
@@ -54,27 +54,27 @@ def test_what_is_offered_is_there_before_the_loop_turns(run: Run) -> None:
 def test_what_the_kernel_does_not_take_follows_in_order(run: Run) -> None:
     """The piece that goes in half is taken; the next is not, until there is room again."""
 
-    def hear(ear: socket.socket, size: int) -> bytes:
+    def hear(expectation: socket.socket, size: int) -> bytes:
         heard = bytearray()
         while len(heard) < size:
-            heard += ear.recv(65536)
+            heard += expectation.recv(65536)
         return bytes(heard)
 
     async def offer() -> None:
         with robot() as door:
-            transport, ear = await connected(door)
-            with ear:
+            transport, expectation = await connected(door)
+            with expectation:
                 pieces: list[bytes] = []
                 while transport.offer(piece := len(pieces).to_bytes(4, "big") * (PIECE // 4)):
                     pieces.append(piece)
                     assert len(pieces) < MOST_PIECES, "the kernel is never full"
                 assert transport.is_clogged
                 sent = b"".join(pieces)
-                assert await asyncio.to_thread(hear, ear, len(sent)) == sent
+                assert await asyncio.to_thread(hear, expectation, len(sent)) == sent
                 async with asyncio.timeout(WAIT_S):
                     await transport.send(b"then")
                 assert transport.offer(b" this")
-                assert await asyncio.to_thread(hear, ear, 9) == b"then this"
+                assert await asyncio.to_thread(hear, expectation, 9) == b"then this"
             await transport.close()
             assert not transport.offer(b"nobody hears it")
 
@@ -87,8 +87,8 @@ def test_what_is_offered_to_a_robot_that_is_gone_raises_nothing(run: Run) -> Non
 
     async def offer() -> None:
         with robot() as door:
-            transport, ear = await connected(door)
-            ear.close()
+            transport, expectation = await connected(door)
+            expectation.close()
             transport.offer(b"x")
             with pytest.raises(TransportError):
                 async with asyncio.timeout(WAIT_S):

@@ -373,9 +373,9 @@ async def test_twist_reaches_a_real_ros_master_and_odometry_comes_back(
         await listens(port)
         async with emulated(rover) as bridge_port, talking(*glue_command) as glue:
             assert json.loads(await answer(glue)) == {"ready": True}
-            async with connect(f"ws://127.0.0.1:{bridge_port}", compression=None) as ears:
-                await ears.send(json.dumps({"op": "subscribe", "topic": "/cmd_vel"}))
-                await ears.send(
+            async with connect(f"ws://127.0.0.1:{bridge_port}", compression=None) as expectations:
+                await expectations.send(json.dumps({"op": "subscribe", "topic": "/cmd_vel"}))
+                await expectations.send(
                     json.dumps({"op": "advertise", "topic": "/odom", "type": "nav_msgs/Odometry"})
                 )
                 topics = (TopicSubscription("/odom", {"type": "nav_msgs/Odometry"}),)
@@ -387,9 +387,9 @@ async def test_twist_reaches_a_real_ros_master_and_odometry_comes_back(
                     Envelope("publish", {"topic": "/cmd_vel", "type": kind}, twist)
                 )
 
-                said = json.loads(await asyncio.wait_for(ears.recv(), WAIT_S))
+                said = json.loads(await asyncio.wait_for(expectations.recv(), WAIT_S))
                 while said.get("topic") != "/cmd_vel":
-                    said = json.loads(await asyncio.wait_for(ears.recv(), WAIT_S))
+                    said = json.loads(await asyncio.wait_for(expectations.recv(), WAIT_S))
                 assert glue.stdin is not None
                 glue.stdin.write(json.dumps(said).encode() + b"\n")
                 seen = await output(*env, "rostopic", "echo", "-p", "-n", "1", "/cmd_vel")
@@ -401,7 +401,7 @@ async def test_twist_reaches_a_real_ros_master_and_odometry_comes_back(
                 say = ["rostopic", "pub", "-r", "20", "/odom", "nav_msgs/Odometry", odometry]
                 async with program(*env, *say):
                     told = json.loads(await answer(glue))
-                await ears.send(json.dumps({"op": "publish", **told}))
+                await expectations.send(json.dumps({"op": "publish", **told}))
                 while True:  # the emulated robot has an odometry of its own
                     message = await heard(transport)
                     assert isinstance(message.body, dict)

@@ -310,8 +310,8 @@ async def test_robot_of_five_lines_stands_in_for_itself(tmp_path: Path) -> None:
     settings: dict[str, Value] = {"ssh_port": 22, "telnet_port": 23, "password": "none"}
     async with (
         nothing_left(),
-        stand_in(profile, settings) as twin,
-        Session(twin, settings, built_in_catalog().transports) as session,
+        stand_in(profile, settings) as emulated_robot,
+        Session(emulated_robot, settings, built_in_catalog().transports) as session,
     ):
         await shows(session, {"depth": 12.5, "level": 3.0, "heading": 270.0, "roll": 4.5})
 
@@ -326,8 +326,8 @@ async def test_camera_behind_the_jump_host_is_emulated_as_well(tmp_path: Path, s
     settings: dict[str, Value] = {"password": PASSWORD, "ssh_port": free_port()}
     async with (
         nothing_left(),
-        stand_in(profile, settings) as twin,
-        Session(twin, settings, built_in_catalog().transports) as session,
+        stand_in(profile, settings) as emulated_robot,
+        Session(emulated_robot, settings, built_in_catalog().transports) as session,
     ):
         await shows(session, {"depth": 12.5})
 

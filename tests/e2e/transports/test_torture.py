@@ -206,7 +206,7 @@ async def test_server_that_dies_again_and_again_is_told_everything_once(
     head = "urc: 1\nkind: robot\nname: mortal\n"
     head += "settings: { port: { type: port }, key: { type: string } }\n"
     path.write_text(f"{head}transports:\n  wire:\n    type: {kind}\n    {OPTIONS[kind]}")
-    ear = Ear(monkeypatch)
+    expectation = Ear(monkeypatch)
     async with far_end(kind, tmp_path, path) as (port, key), nothing_left():
         way = Way(port)
         async with liar(way.talk) as front:
@@ -214,16 +214,16 @@ async def test_server_that_dies_again_and_again_is_told_everything_once(
             async with Session(
                 profile, {"port": front, "key": key}, built_in_catalog().transports
             ) as session:
-                await lives_through_it(session, way, ear)
-    told = [number for number, _ in ear.numbers]
+                await lives_through_it(session, way, expectation)
+    told = [number for number, _ in expectation.numbers]
     assert len(told) == len(set(told)), "something was said twice"
     if kind != "http":  # requests under way on several connections may overtake each other
         assert told == sorted(told), "something old was said late"
     if kind not in ("ros", "mqtt", "http"):
-        assert ear.greetings >= DEATHS
+        assert expectation.greetings >= DEATHS
 
 
-async def lives_through_it(session: Session, way: Way, ear: Ear) -> None:
+async def lives_through_it(session: Session, way: Way, expectation: Ear) -> None:
     """Say numbers all the time while the server dies again and again."""
     saying: set[asyncio.Task[None]] = set()
 
@@ -233,8 +233,8 @@ async def lives_through_it(session: Session, way: Way, ear: Ear) -> None:
 
     async def load() -> None:
         while True:
-            task = asyncio.create_task(say(ear.said))
-            ear.said += 1
+            task = asyncio.create_task(say(expectation.said))
+            expectation.said += 1
             saying.add(task)
             task.add_done_callback(saying.discard)
             await asyncio.sleep(0.005)
@@ -244,13 +244,13 @@ async def lives_through_it(session: Session, way: Way, ear: Ear) -> None:
     flat = 0
     async with asyncio.timeout(120):
         for death in range(DEATHS):
-            await ear.hears_more()
+            await expectation.hears_more()
             if death == DEATHS // 4:
                 flat = descriptors()
             await way.cut(chance.random() * 0.1)
-        await ear.hears_more()
+        await expectation.hears_more()
         loading.cancel()
         await asyncio.gather(loading, *saying, return_exceptions=True)
     assert descriptors() <= flat + 8
     # Told in numbers, not in seconds: a pause of this machine makes nothing old.
-    assert max(said - number for number, said in ear.numbers) < OLDEST
+    assert max(said - number for number, said in expectation.numbers) < OLDEST

@@ -68,7 +68,9 @@ class Desk(NamedTuple):
 
 
 @pytest.fixture
-async def desk(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Desk]:
+async def controller(
+    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> AsyncIterator[Desk]:
     """Run a server for one test."""
     folder = tmp_path_factory.mktemp("sshd")
     sshd = Sshd(folder)
@@ -79,66 +81,66 @@ async def desk(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Asyn
     sshd.kill()
 
 
-async def test_key_is_kept_when_a_person_says_yes(desk: Desk) -> None:
+async def test_key_is_kept_when_a_person_says_yes(controller: Desk) -> None:
     """Nobody logs in for that, so no password is asked for; the second time nothing is asked."""
-    code, said = await desk.trusts(answer="no")
-    assert (code, desk.kept) == (1, "")
-    assert f"shows the host key {desk.sshd.fingerprint} (ssh-ed25519)" in said
+    code, said = await controller.trusts(answer="no")
+    assert (code, controller.kept) == (1, "")
+    assert f"shows the host key {controller.sshd.fingerprint} (ssh-ed25519)" in said
     assert "nothing is kept" in said
 
-    code, said = await desk.trusts("jump", answer="yes")
+    code, said = await controller.trusts("jump", answer="yes")
     assert code == 0, said
-    public = desk.sshd.host_key.with_suffix(".pub").read_text("ascii").split()
-    assert desk.kept == f"[127.0.0.1]:{desk.sshd.port} {public[0]} {public[1]}\n"
-    assert (desk.data / "known_hosts").stat().st_mode & 0o777 == 0o600
+    public = controller.sshd.host_key.with_suffix(".pub").read_text("ascii").split()
+    assert controller.kept == f"[127.0.0.1]:{controller.sshd.port} {public[0]} {public[1]}\n"
+    assert (controller.data / "known_hosts").stat().st_mode & 0o777 == 0o600
 
-    code, said = await desk.trusts()
+    code, said = await controller.trusts()
     assert code == 0
     assert "this key is already trusted" in said
-    assert "Accepted" not in desk.sshd.said
-    assert "Failed password" not in desk.sshd.said
+    assert "Accepted" not in controller.sshd.said
+    assert "Failed password" not in controller.sshd.said
 
 
-async def test_script_must_name_the_fingerprint(desk: Desk, tmp_path: Path) -> None:
+async def test_script_must_name_the_fingerprint(controller: Desk, tmp_path: Path) -> None:
     """Whatever the server shows is not good enough."""
-    code, said = await desk.trusts()
+    code, said = await controller.trusts()
     assert code == 2
     assert "there is no terminal to ask; --yes SHA256:… trusts that fingerprint" in said
     other = fingerprint_of(new_key(tmp_path / "other"))
-    code, said = await desk.trusts("--yes", other)
+    code, said = await controller.trusts("--yes", other)
     assert code == 1
     assert f"this is not the key to trust ({other}); nothing is stored" in said
-    assert desk.kept == ""
-    code, said = await desk.trusts("--yes", desk.sshd.fingerprint)
+    assert controller.kept == ""
+    code, said = await controller.trusts("--yes", controller.sshd.fingerprint)
     assert code == 0, said
-    assert desk.kept.count("\n") == 1
+    assert controller.kept.count("\n") == 1
 
 
-async def test_changed_key_is_shown_with_the_old_one_and_takes_its_place(desk: Desk) -> None:
+async def test_changed_key_is_shown_with_the_old_one_and_takes_its_place(controller: Desk) -> None:
     """One server has one key; those of others stay."""
-    before = desk.sshd.fingerprint
-    assert (await desk.trusts("--yes", before))[0] == 0
-    file = desk.data / "known_hosts"
-    elsewhere = desk.kept.replace("127.0.0.1", "10.0.0.9")
-    file.write_text(desk.kept + elsewhere, "ascii")
-    desk.sshd.kill()
-    desk.sshd.change_host_key()
-    await desk.sshd.start()
-    code, said = await desk.trusts(answer="no")
+    before = controller.sshd.fingerprint
+    assert (await controller.trusts("--yes", before))[0] == 0
+    file = controller.data / "known_hosts"
+    elsewhere = controller.kept.replace("127.0.0.1", "10.0.0.9")
+    file.write_text(controller.kept + elsewhere, "ascii")
+    controller.sshd.kill()
+    controller.sshd.change_host_key()
+    await controller.sshd.start()
+    code, said = await controller.trusts(answer="no")
     assert code == 1
     assert f"it was {before} before" in said
-    assert f"shows the host key {desk.sshd.fingerprint}" in said
-    assert (await desk.trusts(answer="yes"))[0] == 0
-    assert elsewhere in desk.kept
-    assert desk.kept.count("\n") == 2
+    assert f"shows the host key {controller.sshd.fingerprint}" in said
+    assert (await controller.trusts(answer="yes"))[0] == 0
+    assert elsewhere in controller.kept
+    assert controller.kept.count("\n") == 2
 
 
-async def test_wrong_use_is_told(desk: Desk) -> None:
+async def test_wrong_use_is_told(controller: Desk) -> None:
     """Names that are no ssh transport, and servers that are not there."""
-    code, said = await desk.trusts("console")
+    code, said = await controller.trusts("console")
     assert code == 2
     assert "there is no ssh transport 'console'" in said
-    desk.sshd.kill()
-    code, said = await desk.trusts()
+    controller.sshd.kill()
+    code, said = await controller.trusts()
     assert code == 1
     assert "(connection refused)" in said

@@ -15,10 +15,10 @@ def test_a_new_widget_validates_and_shows_all_its_states(tmp_path: Path) -> None
     """Manifest, template and demo fit each other."""
     assert main(["new", "widget", "twin-lamp", "--into", str(tmp_path)]) == 0
     assert main(["validate", str(tmp_path / "twin-lamp" / "widget.yaml")]) == 0
-    shelf = WidgetFolder(tmp_path)
-    widget = shelf.get("twin-lamp")
-    assert widget is not None, shelf.problems
-    assert (widget.title, shelf.problems) == ("Twin lamp", [])
+    registry = WidgetFolder(tmp_path)
+    widget = registry.get("twin-lamp")
+    assert widget is not None, registry.problems
+    assert (widget.title, registry.problems) == ("Twin lamp", [])
     states = demo_states(widget)
     assert {"normal", "stale", "gone", "none", "hostile"} <= {state.name for state in states}
     for state in states:

@@ -45,7 +45,7 @@ WIDGETS = {
 }
 
 
-def shelf(folder: Path, *names: str) -> WidgetFolder:
+def registry(folder: Path, *names: str) -> WidgetFolder:
     """Return a shelf with these of the widgets; all of them by default."""
     for name in names or WIDGETS:
         place = folder / name
@@ -59,7 +59,7 @@ def made(folder: Path, *signals: Signal, names: tuple[str, ...] = ()) -> dict[st
     """Return slot → widget for these signals."""
     driver = Driver(signals={one.name: one for one in signals})
     return {
-        slot: use.widget for slot, use in automatic_slots(driver, shelf(folder, *names)).items()
+        slot: use.widget for slot, use in automatic_slots(driver, registry(folder, *names)).items()
     }
 
 
@@ -77,7 +77,7 @@ def command(name: str, *arguments: Argument, hold: bool = False) -> Command:
 
 def given(folder: Path, one: Command, names: tuple[str, ...] = ()) -> WidgetUse | None:
     """Return what gives a command; None where nothing does."""
-    slots = automatic_slots(Driver(commands={one.name: one}), shelf(folder, *names))
+    slots = automatic_slots(Driver(commands={one.name: one}), registry(folder, *names))
     return next(iter(slots.values()), None)
 
 
@@ -128,7 +128,7 @@ def test_hundreds_of_signals_are_rows_of_a_table(tmp_path: Path) -> None:
     """Beyond those that have a cell of their own."""
     signals = [Signal(f"s{number}") for number in range(200)]
     driver = Driver(signals={one.name: one for one in signals})
-    slots = automatic_slots(driver, shelf(tmp_path))
+    slots = automatic_slots(driver, registry(tmp_path))
     assert len(slots) == MOST_PLAIN + 1
     assert len(slots["more"].lists["rows"]) == 200 - MOST_PLAIN
 
@@ -188,7 +188,7 @@ def test_a_control_shows_what_the_robot_says_of_it(tmp_path: Path) -> None:
     driver = Driver(
         signals={"mode": Signal("mode", "string")}, commands={"mode": command("mode", CHOICE)}
     )
-    slots = automatic_slots(driver, shelf(tmp_path))
+    slots = automatic_slots(driver, registry(tmp_path))
     assert {slot: use.widget for slot, use in slots.items()} == {
         "mode": "value",
         "mode-2": "select",
@@ -257,7 +257,7 @@ DOCUMENT = (
 
 def loaded(file: Path, folder: Path) -> CheckResult:
     """Return the document as checked with the widgets of the tests."""
-    return check(file, built_in_catalog(), shelf(folder / "shelf"))
+    return check(file, built_in_catalog(), registry(folder / "shelf"))
 
 
 def test_resolve_writes_the_made_look_and_it_loads_as_the_same(tmp_path: Path) -> None:
@@ -266,7 +266,7 @@ def test_resolve_writes_the_made_look_and_it_loads_as_the_same(tmp_path: Path) -
     file.write_text(DOCUMENT, "utf-8")
     profile = loaded(file, tmp_path).profile
     assert profile is not None
-    text = resolve(str(file), shelf(tmp_path / "shelf"), profile).text
+    text = resolve(str(file), registry(tmp_path / "shelf"), profile).text
     assert "URC made 'widgets' and 'interfaces'" in text
     file.write_text(text, "utf-8")
     again = loaded(file, tmp_path).profile
@@ -291,5 +291,5 @@ def test_what_the_robot_says_is_shown_beside_only_in_the_same_unit(
     argument = Argument("volts", unit="V", min=0, max=24)
     command = Command("set_volts", "wire", WriteSpec("text"), {"volts": argument})
     driver = Driver({}, {"volts": Signal("volts", unit=unit)}, commands={"set_volts": command})
-    slots = automatic_slots(driver, shelf(tmp_path))
+    slots = automatic_slots(driver, registry(tmp_path))
     assert slots["set_volts"].inputs == inputs

@@ -202,11 +202,11 @@ class World:
 
     def __init__(self, session: Session, robot: Robot, clock: FakeClock) -> None:
         self.session, self.robot, self.clock = session, robot, clock
-        self.desk = MotionController(session.profile.driver)
-        self.desk.join(Operator("ann", "ann", "engineer"))
-        assert session.movers is not None
-        self.guard = session.movers
-        self.desk.attach(session.frames, session.movers)
+        self.controller = MotionController(session.profile.driver)
+        self.controller.join(Operator("ann", "ann", "engineer"))
+        assert session.backend is not None
+        self.guard = session.backend
+        self.controller.attach(session.frames, session.backend)
         self._ticks = 0
         self._asking: list[asyncio.Task[object]] = []
         self.failures: list[str] = []
@@ -218,16 +218,18 @@ class World:
 
     def take(self) -> None:
         """Take the controls."""
-        self.desk.drive("ann", "reset", self.clock.now())
-        self.desk.drive("ann", "leave", self.clock.now())
-        self.desk.drive("ann", "take", self.clock.now())
+        self.controller.drive("ann", "reset", self.clock.now())
+        self.controller.drive("ann", "leave", self.clock.now())
+        self.controller.drive("ann", "take", self.clock.now())
 
     def tick(self, command: str, value: int) -> str:
         """Hold a control."""
         self._ticks += 1
         now = self.clock.now()
-        given = ControlInput(self.desk.lease.state.epoch, self._ticks, self.desk.beat("ann", now))
-        return self.desk.tick("ann", command, {"v": value}, given, now)
+        given = ControlInput(
+            self.controller.lease.state.epoch, self._ticks, self.controller.heartbeat("ann", now)
+        )
+        return self.controller.tick("ann", command, {"v": value}, given, now)
 
     def ask(self, command: str) -> None:
         """Give a command, and note how it fails, if it does."""
@@ -241,11 +243,11 @@ class World:
 
     async def follow(self) -> None:
         """Tell the desk of stops, for ever."""
-        assert self.session.movers is not None
+        assert self.session.backend is not None
         while True:
-            stops: list[tuple[str, Reason]] = list(await self.session.movers.stops())
+            stops: list[tuple[str, Reason]] = list(await self.session.backend.stops())
             for command, reason in stops:
-                self.desk.stopped(command, reason)
+                self.controller.stopped(command, reason)
 
 
 @asynccontextmanager
@@ -286,7 +288,7 @@ async def _served(session: Session, robot: Robot, clock: FakeClock) -> AsyncIter
     try:
         yield world
     finally:
-        world.desk.detach()
+        world.controller.detach()
         following.cancel()
         done.set()
         for _ in range(2000):

@@ -40,7 +40,7 @@ async def test_numbers_of_held_motion_are_gapless_beside_polls() -> None:
         it.take()
         it.delay(0.003)
         await hold(it, "drive", 2.0)
-        it.desk.release("ann", "drive")
+        it.controller.release("ann", "drive")
         await it.clock.advance(0.3)
         _, words = parted(it.robot.heard[0])
     judge(it.robot)
@@ -117,7 +117,7 @@ async def test_requests_that_are_made_again_keep_their_order_and_find_their_answ
             it.ask("ping")
             it.ask("beep")
             await it.clock.advance(0.05)
-        it.desk.release("ann", "drive")
+        it.controller.release("ann", "drive")
         await it.clock.advance(1.0)
         assert it.failures == []
     judge(it.robot)
@@ -152,13 +152,13 @@ async def do(it: World, step: Sequence[object]) -> None:
         case ("pipe", float(seconds)):
             it.delay(seconds)
         case ("release", str(command)):
-            it.desk.release("ann", command)
+            it.controller.release("ann", command)
         case ("freeze", bool(is_frozen)):
             it.robot.freeze(is_frozen)
         case ("take",):
             it.take()
         case ("stop",):
-            it.desk.stop("ann")
+            it.controller.stop("ann")
         case ("cut",):
             it.robot.cut()
         case (str(command),):
@@ -199,18 +199,18 @@ def test_whatever_happens_numbers_are_gapless_and_the_stop_is_last(
 
 
 def test_counters_change_only_when_numbers_have_left() -> None:
-    tally = SentCounters()
-    assert not tally.is_changed
-    tally.left(Count({}, {"n": 7}))
-    assert tally.is_changed
-    tally.reset()
-    assert not tally.is_changed
+    sent_counters = SentCounters()
+    assert not sent_counters.is_changed
+    sent_counters.left(Count({}, {"n": 7}))
+    assert sent_counters.is_changed
+    sent_counters.reset()
+    assert not sent_counters.is_changed
 
 
 def test_stop_with_a_wrong_number_is_better_than_none() -> None:
     """The last one is of the newest numbers."""
-    tally = SentCounters()
+    sent_counters = SentCounters()
     stops = [Numbered(b"%d" % at, Count({"n": at - 1}, {"n": at})) for at in (5, 6, 7)]
-    assert tally.choose(stops).data == b"7"
-    tally.left(stops[0].takes)
-    assert tally.choose(stops).data == b"6"
+    assert sent_counters.choose(stops).data == b"7"
+    sent_counters.left(stops[0].takes)
+    assert sent_counters.choose(stops).data == b"6"

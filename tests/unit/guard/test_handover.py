@@ -184,18 +184,18 @@ async def test_frames_may_be_refused_more_than_once(benches: list[Bench]) -> Non
 
 
 async def test_next_frame_of_a_lane_has_its_own_time() -> None:
-    lane = SendQueue[int](robot := GatedWire(), clock := FakeClock(), lambda tag, fault: None)
-    lane.push(lambda: b"first", 1)
-    lane.push(lambda: b"second", 2)
-    assert lane.busy_since_s == clock.now()
+    queue = SendQueue[int](robot := GatedWire(), clock := FakeClock(), lambda tag, fault: None)
+    queue.push(lambda: b"first", 1)
+    queue.push(lambda: b"second", 2)
+    assert queue.busy_since_s == clock.now()
     await clock.advance(1.0)
     robot.let_through(1)
     await settle()
-    assert lane.busy_since_s == clock.now()
+    assert queue.busy_since_s == clock.now()
     robot.let_through(1)
     await settle()
-    assert lane.busy_since_s is None
-    lane.end()
+    assert queue.busy_since_s is None
+    queue.end()
 
 
 class Tried(CountedWire):

@@ -156,8 +156,9 @@ async def test_what_arrives_is_passed_on(bench: Bench) -> None:
     robot.arriving.put_nowait(b"in turn")
     await settle()
     assert bench.heard() == [
-        messages.BytesReceived("wire", 1, b"at once"), messages.BytesReceived("wire", 1, b"in turn"),
-    ]  # fmt: skip
+        messages.BytesReceived("wire", 1, b"at once"),
+        messages.BytesReceived("wire", 1, b"in turn"),
+    ]
 
 
 async def test_robot_is_not_read_while_the_engine_takes_nothing(bench: Bench) -> None:

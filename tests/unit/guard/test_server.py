@@ -145,7 +145,7 @@ class Ran:
         self.task = asyncio.ensure_future(program._guard(theirs, self))  # type: ignore[arg-type]
         self.server = Server(ours)
 
-    def look(self) -> None:
+    def retry(self) -> None:
         self.looks += 1
 
     async def over(self) -> None:
@@ -172,7 +172,7 @@ async def test_guard_beats_and_looks_at_its_precedence(ran: Ran) -> None:
     beats = await ran.server.hears(messages.Heartbeat, 5)
     assert asyncio.get_running_loop().time() - began_s >= 3 * program.BEAT_S
     assert beats[0].late_s < 1.0
-    assert all(-0.001 <= beat.late_s < BOUND_S for beat in beats)
+    assert all(-0.001 <= heartbeat.late_s < BOUND_S for heartbeat in beats)
     assert ran.looks >= 5
 
 
@@ -280,12 +280,12 @@ def test_process_is_prepared_before_it_guards(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(signal, "signal", lambda *told: done.append(told))
     monkeypatch.setattr(logging, "basicConfig", lambda **told: done.append(told["level"]))
     monkeypatch.setattr(gc, "freeze", lambda: done.append("freeze"))
-    monkeypatch.setattr(RealTimePriority, "ask", lambda self: done.append("ask"))
+    monkeypatch.setattr(RealTimePriority, "request", lambda self: done.append("ask"))
 
-    async def guard(line: socket.socket, precedence: RealTimePriority) -> None:
+    async def guard(line: socket.socket, priority: RealTimePriority) -> None:
         line.sendall(b"here")
         line.close()
-        done.append(type(precedence))
+        done.append(type(priority))
 
     monkeypatch.setattr(program, "_guard", guard)
     monkeypatch.setattr(program, "run", lambda work: [*work.__await__()])

@@ -13,27 +13,27 @@ from urc.motion.hold_to_run import SHORTEST_LEASE_S, STOP_EVERY_S, STOP_FOR_S, H
 STOP = b"STOP"
 
 
-def mover(**terms: Any) -> HoldToRun:
+def hold_to_run(**terms: Any) -> HoldToRun:
     made = HoldToRun(HoldTerms(STOP, period_s=0.05)._replace(**terms))
     made.arm()
     return made
 
 
 def test_nothing_is_written_before_a_tick() -> None:
-    idle = mover()
+    idle = hold_to_run()
     assert idle.due(10.0, is_clear=True) is None
     assert idle.deadline is None
 
 
 def test_a_tick_is_written_at_once() -> None:
-    held = mover()
+    held = hold_to_run()
     assert held.tick(b"go 1", 1.0)
     assert held.due(1.0, is_clear=True) == b"go 1"
     assert held.due(1.0, is_clear=True) is None
 
 
 def test_the_newest_value_wins_while_the_line_is_not_clear() -> None:
-    held = mover()
+    held = hold_to_run()
     held.tick(b"go 1", 1.0)
     held.tick(b"go 2", 1.05)
     assert held.due(1.05, is_clear=False) is None
@@ -43,7 +43,7 @@ def test_the_newest_value_wins_while_the_line_is_not_clear() -> None:
 
 
 def test_it_stops_when_the_lease_runs_out() -> None:
-    held = mover(lease_s=0.25)
+    held = hold_to_run(lease_s=0.25)
     held.tick(b"go", 1.0)
     held.due(1.0, is_clear=True)
     assert held.deadline == 1.25
@@ -53,7 +53,7 @@ def test_it_stops_when_the_lease_runs_out() -> None:
 
 
 def test_a_stop_does_not_wait_for_a_clear_line_nor_for_the_rate() -> None:
-    held = mover()
+    held = hold_to_run()
     for number in range(3):
         held.tick(b"go %d" % number, 1.0)
         held.due(1.0, is_clear=True)
@@ -62,7 +62,7 @@ def test_a_stop_does_not_wait_for_a_clear_line_nor_for_the_rate() -> None:
 
 
 def test_after_the_stop_there_is_silence() -> None:
-    held = mover()
+    held = hold_to_run()
     held.tick(b"go", 1.0)
     held.stop("released", 1.1)
     assert held.due(1.1, is_clear=True) == STOP
@@ -71,7 +71,7 @@ def test_after_the_stop_there_is_silence() -> None:
 
 
 def test_where_writes_are_lost_the_stop_is_repeated_for_half_a_second() -> None:
-    held = mover(is_lossy=True)
+    held = hold_to_run(is_lossy=True)
     held.tick(b"go", 1.0)
     held.stop("released", 2.0)
     written = []
@@ -86,7 +86,7 @@ def test_where_writes_are_lost_the_stop_is_repeated_for_half_a_second() -> None:
 
 
 def test_ticks_after_the_lease_do_not_resume_the_motion() -> None:
-    held = mover()
+    held = hold_to_run()
     held.tick(b"go", 1.0)
     held.due(1.0, is_clear=True)
     assert not held.tick(b"go", 1.3)
@@ -98,7 +98,7 @@ def test_ticks_after_the_lease_do_not_resume_the_motion() -> None:
 
 
 def test_after_a_release_the_next_gesture_moves_at_once() -> None:
-    held = mover(is_lossy=True)
+    held = hold_to_run(is_lossy=True)
     held.tick(b"go", 1.0)
     held.stop("released", 1.1)
     assert held.due(1.1, is_clear=True) == STOP
@@ -107,7 +107,7 @@ def test_after_a_release_the_next_gesture_moves_at_once() -> None:
 
 
 def test_a_cut_line_gets_the_stop_first_and_nothing_old() -> None:
-    held = mover()
+    held = hold_to_run()
     held.tick(b"go", 1.0)
     held.cut()
     assert held.due(1.1, is_clear=True) is None
@@ -118,20 +118,20 @@ def test_a_cut_line_gets_the_stop_first_and_nothing_old() -> None:
 
 
 def test_a_line_that_is_cut_while_idle_gets_nothing() -> None:
-    held = mover()
+    held = hold_to_run()
     held.cut()
     held.restored(9.0)
     assert held.due(9.0, is_clear=True) is None
 
 
 def test_a_release_of_what_does_not_move_is_silent() -> None:
-    idle = mover()
+    idle = hold_to_run()
     idle.stop("released", 5.0)
     assert idle.due(5.0, is_clear=True) is None
 
 
 def test_stop_is_not_refused_when_nothing_moves() -> None:
-    idle = mover()
+    idle = hold_to_run()
     idle.stop("stopped", 5.0)
     assert idle.due(5.0, is_clear=False) == STOP
 
@@ -156,7 +156,7 @@ _STEPS = st.lists(
 def test_whatever_happens_the_last_thing_written_is_the_stop(
     steps: list[tuple[str, float]], *, is_lossy: bool
 ) -> None:
-    held, now = mover(is_lossy=is_lossy), 0.0
+    held, now = hold_to_run(is_lossy=is_lossy), 0.0
     written: list[tuple[float, bytes]] = []
     ticked_at = float("-inf")
 
@@ -203,7 +203,7 @@ def test_whatever_happens_the_last_thing_written_is_the_stop(
 
 
 def test_a_stop_that_may_be_lost_with_the_line_is_owed() -> None:
-    held = mover()
+    held = hold_to_run()
     held.tick(b"go", 1.0)
     held.stop("released", 1.1)
     assert held.due(1.1, is_clear=True) == STOP
@@ -214,7 +214,7 @@ def test_a_stop_that_may_be_lost_with_the_line_is_owed() -> None:
 
 
 def test_other_terms_keep_what_is_owed() -> None:
-    held = mover()
+    held = hold_to_run()
     held.tick(b"go", 1.0)
     held.cut()
     held.renew(HoldTerms(b"HALT", period_s=0.1))
@@ -226,11 +226,11 @@ def test_other_terms_keep_what_is_owed() -> None:
 
 def test_terms_without_an_end_are_refused_when_renewed() -> None:
     with pytest.raises(ValueError, match="lease"):
-        mover().renew(HoldTerms(STOP, period_s=0.05, lease_s=5.0))
+        hold_to_run().renew(HoldTerms(STOP, period_s=0.05, lease_s=5.0))
 
 
 def test_each_stop_is_to_be_told_once() -> None:
-    held = mover()
+    held = hold_to_run()
     held.tick(b"go", 1.0)
     assert held.is_told
     held.stop("released", 1.1)
@@ -238,7 +238,7 @@ def test_each_stop_is_to_be_told_once() -> None:
 
 
 def test_it_must_stop_when_its_lease_is_over() -> None:
-    held = mover(lease_s=0.25)
+    held = hold_to_run(lease_s=0.25)
     assert not held.must_stop(0.0)
     held.tick(b"go", 1.0)
     assert held.is_waiting
@@ -248,7 +248,7 @@ def test_it_must_stop_when_its_lease_is_over() -> None:
 
 def test_other_terms_with_the_same_rate_do_not_let_it_go_faster() -> None:
     """A gesture right after another one is one more write of the same control."""
-    held = mover()
+    held = hold_to_run()
     for _ in range(2):
         held.tick(b"go", 1.0)
         held.due(1.0, is_clear=True)
@@ -259,7 +259,7 @@ def test_other_terms_with_the_same_rate_do_not_let_it_go_faster() -> None:
 
 
 def test_other_rate_counts_from_now_on() -> None:
-    held = mover()
+    held = hold_to_run()
     for _ in range(2):
         held.tick(b"go", 1.0)
         held.due(1.0, is_clear=True)
@@ -273,7 +273,7 @@ def test_other_rate_counts_from_now_on() -> None:
 
 
 def test_a_value_that_is_forgotten_is_not_written_and_the_lease_goes_on() -> None:
-    held = mover()
+    held = hold_to_run()
     held.tick(b"go", 1.0)
     held.forget()
     assert not held.is_waiting
@@ -297,14 +297,14 @@ def test_it_is_not_armed_at_first_and_has_never_stopped() -> None:
 
 
 def test_a_tick_just_when_the_lease_is_over_comes_too_late_and_is_told_why() -> None:
-    held = mover(lease_s=0.25)
+    held = hold_to_run(lease_s=0.25)
     held.tick(b"go", 1.0)
     assert not held.tick(b"go", 1.25)
     assert (held.state, held.reason) == ("stopping", "expired")
 
 
 def test_the_last_repeat_of_a_stop_comes_when_its_time_is_over() -> None:
-    held = mover(is_lossy=True)
+    held = hold_to_run(is_lossy=True)
     held.tick(b"go", 0.0)
     held.stop("released", 0.0)
     assert held.due(STOP_FOR_S - STOP_EVERY_S, is_clear=True) == STOP
@@ -313,7 +313,7 @@ def test_the_last_repeat_of_a_stop_comes_when_its_time_is_over() -> None:
 
 
 def test_a_cut_disarms_also_what_did_not_move() -> None:
-    held = mover()
+    held = hold_to_run()
     held.cut()
     held.restored(2.0)
     assert not held.tick(b"go", 2.0)
@@ -321,7 +321,7 @@ def test_a_cut_disarms_also_what_did_not_move() -> None:
 
 def test_the_end_of_a_step_is_told_once_also_on_a_line_that_may_lose_it() -> None:
     """There is nothing to write, so nothing to repeat."""
-    held = mover(stop=b"", is_lossy=True)
+    held = hold_to_run(stop=b"", is_lossy=True)
     held.tick(b"step", 1.0)
     held.stop("released", 1.1)
     assert held.due(1.1, is_clear=True) == b""

@@ -150,13 +150,13 @@ def test_what_was_wished_before_a_stop_is_refused_also_when_it_was_reset() -> No
     """By whoever; what is wished after it is not."""
     lease = Lease()
     before = lease.state.stops
-    assert lease.hindrance(ANNA, before) == ""
+    assert lease.interlock(ANNA, before) == ""
     lease.stop("ben")
     lease.reset(ANNA)
     lease.acquire(ANNA, 1.0)
-    assert lease.hindrance(ANNA, before) == "STOP was pressed meanwhile: give it anew"
-    assert lease.hindrance(ANNA, lease.state.stops) == ""
-    assert lease.hindrance(ANNA) == ""
+    assert lease.interlock(ANNA, before) == "STOP was pressed meanwhile: give it anew"
+    assert lease.interlock(ANNA, lease.state.stops) == ""
+    assert lease.interlock(ANNA) == ""
 
 
 def test_a_latch_survives_a_restart_and_a_holder_does_not() -> None:

@@ -9,15 +9,15 @@ from urc.motion.rate_limiter import RateLimiter
 
 
 def test_values_at_the_rate_pass_at_once_even_with_jitter() -> None:
-    pace = RateLimiter(0.02)
+    rate_limiter = RateLimiter(0.02)
     times = [0.02 * n + (0.009 if n % 2 else 0.0) for n in range(200)]
-    assert all(pace.allow(now) for now in times)
+    assert all(rate_limiter.allow(now) for now in times)
 
 
 def test_two_may_follow_each_other_and_no_third() -> None:
-    pace = RateLimiter(0.1)
-    assert [pace.allow(1.0) for _ in range(3)] == [True, True, False]
-    assert pace.free_at == pytest.approx(1.1)
+    rate_limiter = RateLimiter(0.1)
+    assert [rate_limiter.allow(1.0) for _ in range(3)] == [True, True, False]
+    assert rate_limiter.free_at == pytest.approx(1.1)
 
 
 @settings(max_examples=examples(100))
@@ -26,10 +26,10 @@ def test_two_may_follow_each_other_and_no_third() -> None:
     waits=st.lists(st.floats(0.0, 0.05), min_size=50, max_size=400),
 )
 def test_no_second_has_more_than_one_beyond_the_rate(rate: int, waits: list[float]) -> None:
-    pace, now, taken = RateLimiter(1 / rate), 0.0, []
+    rate_limiter, now, taken = RateLimiter(1 / rate), 0.0, []
     for wait in waits:
         now += wait
-        if pace.allow(now):
+        if rate_limiter.allow(now):
             taken.append(now)
     for start in taken:
         assert sum(1 for at in taken if start <= at < start + 0.999) <= rate + 1

@@ -133,11 +133,11 @@ def keep_settings(data: Path, name: str, settings: Mapping[str, str]) -> None:
     def unused(*_: object) -> Any:
         raise AssertionError("no robot is made or tried here")
 
-    garage = RobotFactory(RobotOptions(data, unused, unused, lambda _: {}))
-    lock = garage.parked()[name][-1]
+    factory = RobotFactory(RobotOptions(data, unused, unused, lambda _: {}))
+    lock = factory.parked()[name][-1]
     kept = StoredSettings(settings=dict(settings), package=lock.root)
-    place = garage.filled(garage.profile(lock), kept).destination
-    garage.kept(name).save(msgspec.structs.replace(kept, destination=place))
+    place = factory.filled(factory.profile(lock), kept).destination
+    factory.kept(name).save(msgspec.structs.replace(kept, destination=place))
 
 
 def assert_whole(store: Store) -> list[str]:

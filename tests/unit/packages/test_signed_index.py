@@ -35,8 +35,8 @@ class Signed:
 
     def write(self, count: int, signer: Signer | None = None) -> None:
         """List some packages, signed with the keeper's key or another one."""
-        seal = IndexSigner(signer or self.key, VALID_S, lambda: self.now)
-        write_index(self.folder, "Lab", entries(count), self.folder / ".work", seal)
+        index_signer = IndexSigner(signer or self.key, VALID_S, lambda: self.now)
+        write_index(self.folder, "Lab", entries(count), self.folder / ".work", index_signer)
 
     def head(self) -> IndexHead:
         return read_head((self.folder / HEAD).read_bytes(), HEAD)
@@ -133,9 +133,9 @@ def test_who_has_not_the_key_changes_no_signed_index(lab: Signed, signs: bool) -
     """Clients would not believe it; nothing is written."""
     lab.write(1)
     before = {file: file.read_bytes() for file in lab.folder.rglob("*.json")}
-    seal = IndexSigner(lab.other, VALID_S, lambda: lab.now) if signs else None
+    index_signer = IndexSigner(lab.other, VALID_S, lambda: lab.now) if signs else None
     with pytest.raises(PackageError, match=r"the index is signed by Keeper .*: name that key"):
-        write_index(lab.folder, "Lab", entries(2), lab.folder / ".work", seal)
+        write_index(lab.folder, "Lab", entries(2), lab.folder / ".work", index_signer)
     assert {file: file.read_bytes() for file in lab.folder.rglob("*.json")} == before
     write_index(lab.folder, "Lab", entries(1), lab.folder / ".work")  # the same: nothing to sign
     assert {file: file.read_bytes() for file in lab.folder.rglob("*.json")} == before
@@ -158,25 +158,25 @@ def test_a_head_that_says_nonsense_is_none(head: bytes) -> None:
 def test_a_server_gives_out_the_signed_head(lab: Signed) -> None:
     """Also of a version that is withdrawn: signed anew, and still there for who has a lock."""
     write_package(lab.folder, "widget", "dial")
-    seal = IndexSigner(lab.key, VALID_S, lambda: lab.now)
-    listed = make_index(lab.folder, "Lab", lambda document: [], seal).listed
+    index_signer = IndexSigner(lab.key, VALID_S, lambda: lab.now)
+    listed = make_index(lab.folder, "Lab", lambda document: [], index_signer).listed
     client = TestClient(repository_app(lab.folder))
     assert client.get(f"/{HEAD}").content == (lab.folder / HEAD).read_bytes()
     assert lab.head().signed
     (dial,) = listed.packages
     with pytest.raises(PackageError, match="the index is signed by Keeper"):
         withdraw(lab.folder, dial.key, "1.0.0", "It sticks.", None)
-    assert make_index(lab.folder, "Lab", lambda document: [], seal).listed == listed
-    withdraw(lab.folder, dial.key, "1.0.0", "It sticks.", seal)
+    assert make_index(lab.folder, "Lab", lambda document: [], index_signer).listed == listed
+    withdraw(lab.folder, dial.key, "1.0.0", "It sticks.", index_signer)
     assert client.get(f"/{HEAD}").content == (lab.folder / HEAD).read_bytes()
     assert lab.head().number == 2
     assert client.get("/widgets").json() == []
     assert client.get(f"/{dial.file}").status_code == 200
-    (again,) = make_index(lab.folder, "Lab", lambda document: [], seal).listed.packages
+    (again,) = make_index(lab.folder, "Lab", lambda document: [], index_signer).listed.packages
     assert again.why_withdrawn == "It sticks."
     with pytest.raises(PackageError, match=r"widgets/dial 2.0.0 is not listed; .* 1.0.0"):
-        withdraw(lab.folder, PackageId("widget", "dial"), "2.0.0", "", seal)
-    assert withdraw(lab.folder, dial.key, "1.0.0", "", seal) == dial
+        withdraw(lab.folder, PackageId("widget", "dial"), "2.0.0", "", index_signer)
+    assert withdraw(lab.folder, dial.key, "1.0.0", "", index_signer) == dial
     assert client.get("/widgets").json() == ["/widgets/dial/"]
 
 

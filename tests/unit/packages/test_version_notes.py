@@ -42,9 +42,9 @@ class Noted:
         return self._packages[entry.sha256].data
 
 
-def planned(store: Store, wish: str, there: Noted, *, takes: bool = False) -> InstallPlan:
+def planned(store: Store, required: str, there: Noted, *, takes: bool = False) -> InstallPlan:
     """Return what a wish comes to."""
-    return plan_wish(parse_wish(wish), [there], store, lambda line: None, takes_withdrawn=takes)
+    return plan_wish(parse_wish(required), [there], store, lambda line: None, takes_withdrawn=takes)
 
 
 @pytest.fixture

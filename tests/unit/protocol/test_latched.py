@@ -109,7 +109,7 @@ def test_a_running_sequence_ends_with_the_reason_and_sends_nothing_more() -> Non
     assert talk.sent == ["A"]
     latch(talk)
     assert talk.outcomes == {1: "stopped"}
-    assert talk.engine.programs["show"].reins.reason == WHY
+    assert talk.engine.programs["show"].sequence_control.reason == WHY
     talk.at(5)
     assert talk.sent == []
 

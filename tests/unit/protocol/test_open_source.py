@@ -39,18 +39,18 @@ def test_generated_and_general_agree(
     layout: FrameLayout, payload: bytes, noise: bytes, data: st.DataObject
 ) -> None:
     """Of whole frames, of frames with a changed byte, of short ones and of noise."""
-    seal = FrameCodec(layout)
-    frame = seal.close(payload)
-    assert seal.open(frame) == payload
+    codec = FrameCodec(layout)
+    frame = codec.close(payload)
+    assert codec.open(frame) == payload
     place = data.draw(st.integers(0, len(frame) - 1))
     changed = frame[:place] + bytes((frame[place] ^ 1,)) + frame[place + 1 :]
     for one in (frame, changed, frame[:place], noise):
-        assert outcome(seal, one, is_general=False) == outcome(seal, one, is_general=True)
+        assert outcome(codec, one, is_general=False) == outcome(codec, one, is_general=True)
 
 
-def outcome(seal: FrameCodec, frame: bytes, *, is_general: bool) -> bytes | str:
+def outcome(codec: FrameCodec, frame: bytes, *, is_general: bool) -> bytes | str:
     """Return the payload, or the words of the refusal."""
     try:
-        return seal._open(frame) if is_general else seal.open(frame)
+        return codec._open(frame) if is_general else codec.open(frame)
     except BadFrame as error:
         return str(error)

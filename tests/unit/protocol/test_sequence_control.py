@@ -18,7 +18,7 @@ sequences:
 
 def pull(talk: Dialogue, what: Pull) -> None:
     """Want something of the sequence, and let the engine see it."""
-    talk.engine.programs["show"].reins.pull(what)
+    talk.engine.programs["show"].sequence_control.pull(what)
     talk.take(talk.engine.tick(talk.now))
 
 
@@ -30,8 +30,8 @@ def begun(talk: Dialogue) -> Dialogue:
 
 def where(talk: Dialogue) -> tuple[int, bool, bool]:
     """Return how many steps were begun, whether it runs, and whether it is paused."""
-    reins = talk.engine.programs["show"].reins
-    return reins.place, reins.is_running, reins.is_paused
+    sequence_control = talk.engine.programs["show"].sequence_control
+    return sequence_control.place, sequence_control.is_running, sequence_control.is_paused
 
 
 def test_a_sequence_that_nobody_steers_runs_through() -> None:
@@ -79,7 +79,7 @@ def test_it_can_be_ended_while_it_waits_and_while_it_is_paused() -> None:
     talk = begun(Dialogue(DRIVER).connect())
     pull(talk, "abort")
     assert talk.outcomes == {1: "aborted"}
-    assert talk.engine.programs["show"].reins.reason == "somebody ended it"
+    assert talk.engine.programs["show"].sequence_control.reason == "somebody ended it"
     talk = Dialogue(DRIVER).connect()
     pull(talk, "step")
     begun(talk)

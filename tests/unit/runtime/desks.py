@@ -83,14 +83,14 @@ class Scene:
         is_attached: bool = True,
         driver: Driver = DRIVER,
     ) -> None:
-        self.desk = MotionController(driver, kept=kept, is_owed=is_owed)
-        self.movers = Movers()
+        self.controller = MotionController(driver, kept=kept, is_owed=is_owed)
+        self.backend = Movers()
         self.frames = FakeFrames(driver)
         if is_attached:
-            self.desk.attach(self.frames, self.movers)
+            self.controller.attach(self.frames, self.backend)
         for name, role in {"ann": "driver", "bob": "driver", "eve": "engineer"}.items():
-            self.desk.join(Operator(name, name, role))  # type: ignore[arg-type]
-        self.desk.join(Operator("vic", "vic", "viewer"))
+            self.controller.join(Operator(name, name, role))  # type: ignore[arg-type]
+        self.controller.join(Operator("vic", "vic", "viewer"))
         self.now = 100.0
         self._number = 0
 
@@ -98,15 +98,15 @@ class Scene:
         """Tick as a page does that has just heard the beat."""
         self._number += 1
         self.now += 0.05
-        echo = self.desk.beat(who, self.now)
-        given = ControlInput(self.desk.lease.state.epoch, self._number, echo)
-        return self.desk.tick(who, command, arguments, given, self.now)
+        echo = self.controller.heartbeat(who, self.now)
+        given = ControlInput(self.controller.lease.state.epoch, self._number, echo)
+        return self.controller.tick(who, command, arguments, given, self.now)
 
     def drive(self, who: str, verb: str, **more: Any) -> str:
         """Say something about the controls."""
-        return self.desk.drive(who, verb, self.now, **more)
+        return self.controller.drive(who, verb, self.now, **more)
 
     def heard(self) -> list[str]:
         """Return what the movers were told since the last call."""
-        told, self.movers.told = self.movers.told, []
+        told, self.backend.told = self.backend.told, []
         return told

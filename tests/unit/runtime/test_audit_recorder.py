@@ -14,7 +14,9 @@ BEN = Operator("s2", "screen 2", "engineer")
 class Book:
     def __init__(self, *secrets: str) -> None:
         self.entries: list[AuditEntry] = []
-        self.trail = AuditRecorder("rover", self.entries.append, utc=lambda: 99.0, secrets=secrets)
+        self.recorder = AuditRecorder(
+            "rover", self.entries.append, utc=lambda: 99.0, secrets=secrets
+        )
 
     @property
     def lines(self) -> list[str]:
@@ -27,8 +29,8 @@ class Book:
 def test_a_motion_leaves_its_begin_and_its_end() -> None:
     book = Book()
     for number in range(20):
-        book.trail.moved(ANN, 7, "go", {"v": number}, b"V %d\n" % number, 10 + number / 20)
-    book.trail.stopped("go", "expired", 11.2)
+        book.recorder.moved(ANN, 7, "go", {"v": number}, b"V %d\n" % number, 10 + number / 20)
+    book.recorder.stopped("go", "expired", 11.2)
     begin, end = book.entries
     assert begin == AuditEntry(
         99.0, "rover", "moved", "screen 1", "driver", "s1", 7, "go", '{"v": 0}', "5620300a",
@@ -43,15 +45,15 @@ def test_a_motion_leaves_its_begin_and_its_end() -> None:
 def test_who_keeps_all_that_happens_hears_of_each_tick_while_it_is_connected() -> None:
     """By the session's clock, whatever the time of day is."""
     book, hub = Book(), Hub({})
-    book.trail.attend(hub, lambda: 7.0)
-    book.trail.moved(ANN, 7, "go", {"v": 0}, b"", 1.0)
+    book.recorder.attend(hub, lambda: 7.0)
+    book.recorder.moved(ANN, 7, "go", {"v": 0}, b"", 1.0)
     with hub.tap() as tap:
         for number in (1, 2):
-            book.trail.moved(ANN, 7, "go", {"v": number}, b"", number)
-        book.trail.stopped("go", "expired", 3.0)
+            book.recorder.moved(ANN, 7, "go", {"v": number}, b"", number)
+        book.recorder.stopped("go", "expired", 3.0)
         *ticks, end = tap.drain()
-        book.trail.attend(None, lambda: 8.0)
-        book.trail.moved(ANN, 7, "go", {"v": 3}, b"", 9.0)
+        book.recorder.attend(None, lambda: 8.0)
+        book.recorder.moved(ANN, 7, "go", {"v": 3}, b"", 9.0)
         assert tap.drain() == []
     assert ticks == [MotionRecord(1, "go", {"v": 1}), MotionRecord(2, "go", {"v": 2})]
     assert end == AuditRecord(7.0, book.entries[1])
@@ -59,14 +61,14 @@ def test_who_keeps_all_that_happens_hears_of_each_tick_while_it_is_connected() -
 
 def test_a_stop_of_what_stands_still_leaves_nothing() -> None:
     book = Book()
-    book.trail.stopped("go", "stopped", 1.0)
+    book.recorder.stopped("go", "stopped", 1.0)
     assert book.entries == []
 
 
 def test_another_hand_at_the_stick_is_another_motion() -> None:
     book = Book()
-    book.trail.moved(ANN, 7, "go", {}, b"", 1.0)
-    book.trail.moved(BEN, 8, "go", {}, b"", 1.5)
+    book.recorder.moved(ANN, 7, "go", {}, b"", 1.0)
+    book.recorder.moved(BEN, 8, "go", {}, b"", 1.5)
     assert book.lines == [
         "moved screen 1 go x1 begins",
         "stopped screen 1 go x1 taken over",
@@ -77,7 +79,7 @@ def test_another_hand_at_the_stick_is_another_motion() -> None:
 def test_a_refusal_at_50_hz_is_told_once_a_second() -> None:
     book = Book()
     for number in range(101):
-        book.trail.refused(ANN, "go", "screen 2 has the controls", number / 50)
+        book.recorder.refused(ANN, "go", "screen 2 has the controls", number / 50)
     assert book.lines == [
         "refused screen 1 go x1 screen 2 has the controls",
         "refused screen 1 go x50 screen 2 has the controls",
@@ -88,16 +90,16 @@ def test_a_refusal_at_50_hz_is_told_once_a_second() -> None:
 def test_refusals_of_many_kinds_are_forgotten_one_by_one_and_told_sixteen_a_second() -> None:
     book = Book()
     for number in range(1000):
-        book.trail.refused(ANN, "go", f"reason {number}", 1.0)
+        book.recorder.refused(ANN, "go", f"reason {number}", 1.0)
     assert len(book.entries) == 16
-    assert len(book.trail._refusals) == 64
-    book.trail.refused(ANN, "go", "reason 1000", 2.0)
+    assert len(book.recorder._refusals) == 64
+    book.recorder.refused(ANN, "go", "reason 1000", 2.0)
     assert len(book.entries) == 17
 
 
 def test_a_refusal_holds_a_bounded_text() -> None:
     book = Book()
-    book.trail.refused(ANN, "x" * 60_000, "y" * 60_000, 1.0)
+    book.recorder.refused(ANN, "x" * 60_000, "y" * 60_000, 1.0)
     (found,) = book.entries
     assert (len(found.command), len(found.outcome)) == (100, 1000)
 
@@ -108,24 +110,24 @@ def test_a_mistake_in_here_reaches_nobody_and_is_told_once(
     def broken(_: AuditEntry) -> None:
         raise RuntimeError("no")
 
-    trail = AuditRecorder("rover", broken, utc=lambda: 99.0)
-    trail.moved(ANN, 7, "go", {}, b"", 1.0)
-    trail.stopped("go", "released", 2.0)
-    trail.leased(LeaseState(1, ANN), 3.0)
-    assert trail.is_faulty
+    recorder = AuditRecorder("rover", broken, utc=lambda: 99.0)
+    recorder.moved(ANN, 7, "go", {}, b"", 1.0)
+    recorder.stopped("go", "released", 2.0)
+    recorder.leased(LeaseState(1, ANN), 3.0)
+    assert recorder.is_faulty
     assert [one.getMessage() for one in caplog.records] == ["the audit log lacks an event of rover"]
 
 
 def test_secrets_that_come_later_are_hidden_too_and_the_longest_first() -> None:
     book = Book("hunter")
-    book.trail.hide(["hunter2"])
-    book.trail.ran(ANN, "say", {"text": "hunter2 hunter"}, "done")
+    book.recorder.hide(["hunter2"])
+    book.recorder.ran(ANN, "say", {"text": "hunter2 hunter"}, "done")
     assert book.entries[0].arguments == f'{{"text": "{HIDDEN} {HIDDEN}"}}'
 
 
 def test_an_answer_is_told_and_bytes_of_it_by_their_size() -> None:
     book = Book()
-    book.trail.ran(ANN, "look", {}, "done", answer={"picture": b"\x00" * 9, "angle": 2})
+    book.recorder.ran(ANN, "look", {}, "done", answer={"picture": b"\x00" * 9, "angle": 2})
     assert book.entries[0].outcome == 'done: {"picture": "9 bytes", "angle": 2}'
 
 
@@ -139,7 +141,7 @@ def test_the_lease_and_the_latch_leave_a_line_each() -> None:
         LeaseState(3, None, latched_by="screen 1"),
         LeaseState(4),
     ):
-        book.trail.leased(state, 1.0)
+        book.recorder.leased(state, 1.0)
     assert book.lines == [
         "lease screen 1 x1 has the controls",
         "lease screen 2 x1 asks for the controls",
@@ -152,7 +154,9 @@ def test_the_lease_and_the_latch_leave_a_line_each() -> None:
 
 def test_secrets_stay_out_of_arguments_bytes_and_messages() -> None:
     book = Book('pass"word', "")
-    book.trail.ran(ANN, "login", {"key": 'pass"word'}, 'pass"word is wrong', b'LOGIN pass"word\n')
+    book.recorder.ran(
+        ANN, "login", {"key": 'pass"word'}, 'pass"word is wrong', b'LOGIN pass"word\n'
+    )
     (found,) = book.entries
     assert found.arguments == f'{{"key": "{HIDDEN}"}}'
     assert found.data == HIDDEN
@@ -161,6 +165,6 @@ def test_secrets_stay_out_of_arguments_bytes_and_messages() -> None:
 
 def test_a_command_leaves_what_it_came_to() -> None:
     book = Book()
-    book.trail.ran(ANN, "arm", {}, "done", b"ARM\n")
+    book.recorder.ran(ANN, "arm", {}, "done", b"ARM\n")
     assert book.lines == ["ran screen 1 arm x1 done"]
     assert book.entries[0].data == "41524d0a"

@@ -51,69 +51,73 @@ class Line:
     """Real movers, and what they write."""
 
     def __init__(self) -> None:
-        self.movers: dict[str, HoldToRun] = {}
+        self.backend: dict[str, HoldToRun] = {}
         self.written: list[str] = []
         self.reported: list[tuple[str, Reason]] = []
         self.is_up = True
         self.now = 0.0
 
     def arm(self, command: str, terms: HoldTerms) -> None:
-        self._mover(command, terms).arm()
+        self._hold_to_run(command, terms).arm()
 
     def tick(self, command: str, data: Payload) -> None:
-        self.movers[command].tick(data, self.now)
+        self.backend[command].tick(data, self.now)
 
     def renew(self, command: str, stop: Payload) -> None:
-        if command in self.movers:
-            self.movers[command].renew(self.movers[command].terms._replace(stop=stop))
+        if command in self.backend:
+            self.backend[command].renew(self.backend[command].terms._replace(stop=stop))
 
     def is_stopping(self, command: str) -> bool:
-        return command in self.movers and self.movers[command].state != "idle"
+        return command in self.backend and self.backend[command].state != "idle"
 
     def is_open(self, command: str) -> bool:
         return self.is_up
 
     def release(self, command: str) -> None:
-        if command in self.movers:
-            self.movers[command].stop("released", self.now)
+        if command in self.backend:
+            self.backend[command].stop("released", self.now)
 
     def stop(self, stops: Mapping[str, Payload]) -> None:
         for command, frame in stops.items():
-            mover = self._mover(command, HoldTerms(frame, period_s=0.05))
-            mover.stop("stopped", self.now)
+            hold_to_run = self._hold_to_run(command, HoldTerms(frame, period_s=0.05))
+            hold_to_run.stop("stopped", self.now)
             if not self.is_up:
-                mover.cut()
+                hold_to_run.cut()
 
     async def stops(self) -> Sequence[tuple[str, Reason]]:
         raise NotImplementedError
 
-    def _mover(self, command: str, terms: HoldTerms) -> HoldToRun:
-        mover = self.movers.get(command)
-        if mover is None:
-            mover = self.movers[command] = HoldToRun(terms)
+    def _hold_to_run(self, command: str, terms: HoldTerms) -> HoldToRun:
+        hold_to_run = self.backend.get(command)
+        if hold_to_run is None:
+            hold_to_run = self.backend[command] = HoldToRun(terms)
         else:
-            mover.renew(terms)
-        return mover
+            hold_to_run.renew(terms)
+        return hold_to_run
 
     def switch(self) -> None:
         """Cut the line, or bring it back."""
         self.is_up = not self.is_up
-        for mover in self.movers.values():
+        for hold_to_run in self.backend.values():
             if self.is_up:
-                mover.restored(self.now)
+                hold_to_run.restored(self.now)
             else:
-                mover.cut()
+                hold_to_run.cut()
 
     def step(self) -> list[str]:
         """Return what is written now."""
         texts: list[str] = []
-        for command, mover in self.movers.items():
-            while self.is_up and (data := mover.due(self.now, is_clear=True)) is not None:
+        for command, hold_to_run in self.backend.items():
+            while self.is_up and (data := hold_to_run.due(self.now, is_clear=True)) is not None:
                 assert isinstance(data, bytes)
                 texts.append(data.decode())
-                if data == mover.terms.stop and mover.reason is not None and not mover.is_told:
-                    mover.is_told = True
-                    self.reported.append((command, mover.reason))
+                if (
+                    data == hold_to_run.terms.stop
+                    and hold_to_run.reason is not None
+                    and not hold_to_run.is_told
+                ):
+                    hold_to_run.is_told = True
+                    self.reported.append((command, hold_to_run.reason))
         return texts
 
 
@@ -123,34 +127,34 @@ class World:
     def __init__(self) -> None:
         self.line = Line()
         self.frames = FakeFrames(DRIVER)
-        self.desk = MotionController(DRIVER)
-        self.desk.attach(self.frames, self.line)
+        self.controller = MotionController(DRIVER)
+        self.controller.attach(self.frames, self.line)
         self.is_attached = True
         for screen in SCREENS:
-            self.desk.join(screen)
+            self.controller.join(screen)
         self.echoes = dict.fromkeys((screen.id for screen in SCREENS), 0)
         self.numbers = 0
         self.moving: dict[str, str] = {}
         """Command → whose motion the robot obeys."""
         self.moved = dict.fromkeys((screen.id for screen in SCREENS), 0)
 
-    def do(self, deed: str, who: int, command: str, wait_s: float) -> None:
+    def do(self, reaction: str, who: int, command: str, wait_s: float) -> None:
         """Let one screen do something; then time passes, and the line is looked at."""
-        screen, desk, now = SCREENS[who], self.desk, self.line.now
-        match deed:
+        screen, controller, now = SCREENS[who], self.controller, self.line.now
+        match reaction:
             case "tick":
                 self.tick(screen, who, command, now)
             case "hold":
                 self.hold(screen, who, command)
             case "release":
-                desk.release(screen.id, command)
+                controller.release(screen.id, command)
             case "beat":
-                self.echoes[screen.id] = desk.beat(screen.id, now)
+                self.echoes[screen.id] = controller.heartbeat(screen.id, now)
             case "stop":
-                desk.stop(screen.name)
+                controller.stop(screen.name)
             case "part":
-                desk.part(screen.id)
-                desk.join(screen)
+                controller.part(screen.id)
+                controller.join(screen)
             case "line":
                 self.line.switch()
             case "engine":
@@ -163,25 +167,25 @@ class World:
             case "wait":
                 self.line.now += 10 * wait_s
             case verb:
-                desk.drive(screen.id, verb, now)
+                controller.drive(screen.id, verb, now)
         self.look()
         self.line.now += wait_s
         self.look()
-        desk.expire(self.line.now)
+        controller.expire(self.line.now)
         self.look()
 
     def tick(self, screen: Operator, who: int, command: str, now: float) -> None:
         """Send sampled input, as a page does that believes it has the controls."""
         self.numbers += 1
-        epoch = self.desk.lease.state.epoch
+        epoch = self.controller.lease.state.epoch
         given = ControlInput(epoch, self.numbers, self.echoes[screen.id])
-        self.desk.tick(screen.id, command, {"speed": (who + 1) / 10}, given, now)
+        self.controller.tick(screen.id, command, {"speed": (who + 1) / 10}, given, now)
 
     def hold(self, screen: Operator, who: int, command: str) -> None:
         """Do as a page does whose hand is on a control: a sample every 50 ms, each answering."""
         for _ in range(4):
             now = self.line.now
-            self.echoes[screen.id] = self.desk.beat(screen.id, now)
+            self.echoes[screen.id] = self.controller.heartbeat(screen.id, now)
             self.tick(screen, who, command, now)
             self.look()
             self.line.now += 0.05
@@ -190,12 +194,12 @@ class World:
         """End the session, or begin another one; what moves is stopped by its movers."""
         self.is_attached = not self.is_attached
         if self.is_attached:
-            self.desk.attach(self.frames, self.line)
+            self.controller.attach(self.frames, self.line)
             return
-        self.desk.detach()
-        for mover in self.line.movers.values():
-            if mover.state == "moving":
-                mover.stop("revoked", self.line.now)
+        self.controller.detach()
+        for hold_to_run in self.line.backend.values():
+            if hold_to_run.state == "moving":
+                hold_to_run.stop("revoked", self.line.now)
 
     def look(self) -> None:
         """See what is written, and whose it is."""
@@ -208,21 +212,21 @@ class World:
             self.moving[command] = who.id
             self.moved[who.id] += 1
             assert len(set(self.moving.values())) == 1, f"two drive: {self.moving}"
-            state = self.desk.lease.state
+            state = self.controller.lease.state
             assert state.holder is not None
             assert state.holder.id == who.id, "motion of somebody without the lease"
             assert not state.latched_by, "motion while a stop is latched"
         reported, self.line.reported = self.line.reported, []
         for command, reason in reported:
-            self.desk.stopped(command, reason)
+            self.controller.stopped(command, reason)
 
 
 def test_ten_thousand_steps_never_have_two_holders_on_the_wire() -> None:
     """Whatever three screens do, and whatever becomes of the line and the session."""
     dice, world = Random(7), World()  # noqa: S311 - the same steps in every run
     for _ in range(STEPS):
-        deed, command = dice.choice(DEEDS), dice.choice(COMMANDS)
-        world.do(deed, dice.randrange(3), command, dice.choice((0.0, 0.02, 0.05, 0.3)))
+        reaction, command = dice.choice(DEEDS), dice.choice(COMMANDS)
+        world.do(reaction, dice.randrange(3), command, dice.choice((0.0, 0.02, 0.05, 0.3)))
     assert sum(world.moved.values()) > STEPS / 20, "hardly anything moved: nothing is shown"
     assert all(world.moved.values()), "somebody never moved"
 
@@ -235,13 +239,13 @@ class Machine(RuleBasedStateMachine):
         self.world = World()
 
     @rule(
-        deed=st.sampled_from(sorted(set(DEEDS))),
+        reaction=st.sampled_from(sorted(set(DEEDS))),
         who=st.integers(0, 2),
         command=st.sampled_from(COMMANDS),
         wait_s=st.sampled_from((0.0, 0.02, 0.05, 0.3)),
     )
-    def do(self, deed: str, who: int, command: str, wait_s: float) -> None:
-        self.world.do(deed, who, command, wait_s)
+    def do(self, reaction: str, who: int, command: str, wait_s: float) -> None:
+        self.world.do(reaction, who, command, wait_s)
 
 
 TestMachine = Machine.TestCase

@@ -35,7 +35,7 @@ KINDS = ("tcp", "udp", "serial", "mqtt", "ros", "ssh")
 TABLE = Table("urc.transports", dict.fromkeys(KINDS, f"{__name__}:Stub"))
 
 
-def reins(driver: Driver, *, is_guarded: bool = False) -> GuardClient:
+def scheduler(driver: Driver, *, is_guarded: bool = False) -> GuardClient:
     return take_reins(driver, {}, TABLE, FakeClock(), is_guarded=is_guarded)
 
 
@@ -58,7 +58,7 @@ def robot(kind: str, *on_stall: str, tunnel: str = "") -> Driver:
 
 def test_guard_is_told_the_terms_of_each_held_command() -> None:
     """For a stop before anything is armed."""
-    assert reins(DRIVER)._held == HELD
+    assert scheduler(DRIVER)._held == HELD
 
 
 @pytest.mark.parametrize(
@@ -74,14 +74,14 @@ def test_guard_is_told_the_terms_of_each_held_command() -> None:
 )
 def test_line_that_is_dear_to_open_is_waited_for(driver: Driver, is_dear: bool) -> None:
     """Unless a control says otherwise; of two that differ, the more careful counts."""
-    make = reins(driver).lines[-1].make
+    make = scheduler(driver).lines[-1].make
     assert make.is_strict is is_dear
     assert make.stalled_s == (WAITED_S if is_dear else STALLED_S)
 
 
 def test_guard_is_told_how_to_make_each_line() -> None:
     """As it is made here, in the order in which they carry each other."""
-    other, line = reins(robot("ssh", tunnel="other")).lines
+    other, line = scheduler(robot("ssh", tunnel="other")).lines
     assert other.make.line == "other"
     assert (other.make.tunnel, line.make.tunnel) == ("", "other")
     assert line.make.line == "wire"
@@ -99,29 +99,29 @@ def test_guard_is_told_the_settings_and_what_is_listened_to() -> None:
         {"wire": TransportSpec("wire", "ros", options={"port": port})},
         messages={"odom": Message("odom", "wire", read)},
     )
-    movers = take_reins(driver, {"port": 9090}, TABLE, FakeClock(), is_guarded=False)
-    make = movers.lines[0].make
+    backend = take_reins(driver, {"port": 9090}, TABLE, FakeClock(), is_guarded=False)
+    make = backend.lines[0].make
     assert make.options == {"port": 9090}
     assert make.subscriptions == [("/odom", {"type": "Odometry"})]
 
 
 def test_guard_in_this_process_goes_by_the_clock_of_the_session() -> None:
     clock = FakeClock()
-    movers = take_reins(robot("tcp"), {}, TABLE, clock, is_guarded=False)
-    assert movers.channel.now() == clock.now()
+    backend = take_reins(robot("tcp"), {}, TABLE, clock, is_guarded=False)
+    assert backend.channel.now() == clock.now()
 
 
 def test_guard_is_a_process_where_the_system_can(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     driver = robot("tcp")
-    assert isinstance(reins(driver).channel, LocalChannel)
-    guarded = reins(driver, is_guarded=True)
+    assert isinstance(scheduler(driver).channel, LocalChannel)
+    guarded = scheduler(driver, is_guarded=True)
     assert isinstance(guarded.channel, PipeChannel)
     assert not guarded.is_open("away")
     assert not caplog.records
     monkeypatch.setattr(guarding, "CAN_GUARD", False)
-    assert isinstance(reins(driver, is_guarded=True).channel, LocalChannel)
+    assert isinstance(scheduler(driver, is_guarded=True).channel, LocalChannel)
     assert "this system has no guard" in caplog.text
 
 
@@ -132,7 +132,7 @@ def test_connection_is_reset_a_little_before_its_robot_counts_as_silent(kind: st
         "wire": TransportSpec("wire", kind, stale_after_s=2.0),
         "talker": TransportSpec("talker", kind),
     }
-    line, talker = reins(Driver(specs)).lines
+    line, talker = scheduler(Driver(specs)).lines
     assert talker.make.silent_s is None
     if kind in ("udp", "serial"):
         assert line.make.silent_s is None

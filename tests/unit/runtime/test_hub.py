@@ -35,9 +35,9 @@ def test_signals_keep_the_order_of_the_driver(hub: Hub) -> None:
 @pytest.mark.parametrize(
     "change",
     [
-        lambda hub: hub.put([sample("a")]),
+        lambda hub: hub.publish([sample("a")]),
         lambda hub: hub.set_link(LinkStatus("wire", "live", "tcp x:1", 0.0)),
-        lambda hub: hub.note(NOTE),
+        lambda hub: hub.log(NOTE),
         lambda hub: hub.saw(TRAFFIC),
     ],
     ids=["sample", "link", "note", "traffic"],

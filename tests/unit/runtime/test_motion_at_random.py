@@ -19,16 +19,16 @@ def test_over_ten_thousand_random_steps_no_two_screens_move_the_robot() -> None:
         elif step < 9:
             it.drive(who, dice.choice(("take", "ask", "yes", "no", "force", "leave", "reset")))
         elif step == 9:
-            it.desk.release(who, "drive")
-            it.desk.stopped("drive", "released")
+            it.controller.release(who, "drive")
+            it.controller.stopped("drive", "released")
         elif step == 10:
-            it.desk.stopped("drive", dice.choice(("expired", "revoked")))
+            it.controller.stopped("drive", dice.choice(("expired", "revoked")))
             moving = ""
         else:
             it.now += dice.choice((0.1, 1.0, 70.0))
-            it.desk.expire(it.now)
+            it.controller.expire(it.now)
             if dice.random() < 0.1:
-                it.desk.stop(who)
+                it.controller.stop(who)
         for told in it.heard():
             if told.startswith(("stop", "release")):
                 moving = ""

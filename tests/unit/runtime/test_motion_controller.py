@@ -26,8 +26,8 @@ def test_the_first_tick_arms_with_the_stop_and_each_tick_is_a_frame() -> None:
         *("arm drive", "drive speed=0.5", "drive speed=0.6"),
         *("arm lift", "lift speed=0.0"),
     ]
-    assert it.movers.terms["drive"] == HoldTerms(b"drive stop", 0.05, 0.3, is_lossy=False)
-    assert it.movers.terms["lift"].is_lossy
+    assert it.backend.terms["drive"] == HoldTerms(b"drive stop", 0.05, 0.3, is_lossy=False)
+    assert it.backend.terms["lift"].is_lossy
 
 
 def test_who_has_not_the_controls_moves_nothing() -> None:
@@ -64,9 +64,9 @@ def test_a_gesture_that_was_refused_is_told_why_for_as_long_as_it_goes_on() -> N
     assert it.tick(speed=0.5) == "the robot has said nothing for 2 s"
     it.frames.refusal = ""
     assert it.tick(speed=0.5) == "the robot has said nothing for 2 s"
-    it.desk.stopped("drive", "released")
+    it.controller.stopped("drive", "released")
     assert it.tick(speed=0.5) == "the robot has said nothing for 2 s"
-    it.desk.release("ann", "drive")
+    it.controller.release("ann", "drive")
     it.drive("ann", "take")
     assert it.tick(speed=0.5) == ""
 
@@ -76,14 +76,14 @@ def test_after_a_stop_that_nobody_made_it_takes_a_release_and_a_new_lease() -> N
     it = Scene()
     it.drive("ann", "take")
     it.tick(speed=0.5)
-    it.desk.stopped("drive", "expired")
+    it.controller.stopped("drive", "expired")
     it.heard()
     assert it.tick(speed=0.5) == LET_GO
-    it.desk.release("ann", "drive")
+    it.controller.release("ann", "drive")
     assert it.tick(speed=0.5) == "it was stopped: take the controls anew"
-    before = it.desk.lease.state.epoch
+    before = it.controller.lease.state.epoch
     assert it.drive("ann", "take") == ""
-    assert it.desk.lease.state.epoch == before + 1
+    assert it.controller.lease.state.epoch == before + 1
     assert it.tick(speed=0.5) == ""
     assert it.heard() == ["arm drive", "drive speed=0.5"]
 
@@ -93,9 +93,9 @@ def test_a_release_goes_on_in_the_same_lease() -> None:
     it = Scene()
     it.drive("ann", "take")
     it.tick(speed=0.5)
-    it.desk.release("bob", "drive")
-    it.desk.release("ann", "drive")
-    it.desk.stopped("drive", "released")
+    it.controller.release("bob", "drive")
+    it.controller.release("ann", "drive")
+    it.controller.stopped("drive", "released")
     assert it.tick(speed=0.2) == ""
     assert it.heard() == ["arm drive", "drive speed=0.5", "release drive", "drive speed=0.2"]
 
@@ -105,13 +105,13 @@ def test_every_change_of_the_holder_goes_through_a_stop() -> None:
     it = Scene()
     it.drive("ann", "take")
     it.tick(speed=0.5)
-    old = it.desk.lease.state.epoch
+    old = it.controller.lease.state.epoch
     assert it.drive("bob", "ask") == ""
     assert it.heard() == ["arm drive", "drive speed=0.5"], "asking stops nothing"
     assert it.drive("ann", "yes") == ""
     assert it.heard() == ["stop drive"]
-    assert it.desk.tick(
-        "bob", "drive", {}, ControlInput(old, 99, it.desk.beat("bob", 100)), 100
+    assert it.controller.tick(
+        "bob", "drive", {}, ControlInput(old, 99, it.controller.heartbeat("bob", 100)), 100
     ) == ("the controls were taken anew meanwhile")
     it.tick("bob", speed=0.1)
     assert it.drive("ann", "force") == "taking the controls by force needs an engineer"
@@ -120,9 +120,9 @@ def test_every_change_of_the_holder_goes_through_a_stop() -> None:
     it.drive("eve", "leave")
     it.drive("ann", "take")
     it.tick("ann", speed=0.1)
-    it.desk.part("ann")
+    it.controller.part("ann")
     assert it.heard().count("stop drive") == 3
-    assert it.desk.lease.state.holder is None
+    assert it.controller.lease.state.holder is None
 
 
 def test_a_request_without_an_answer_is_granted_in_time() -> None:
@@ -131,9 +131,9 @@ def test_a_request_without_an_answer_is_granted_in_time() -> None:
     it.drive("ann", "take")
     it.drive("bob", "ask", for_s=5)
     it.tick("ann", speed=0.5)
-    assert it.desk.deadline is not None
-    it.desk.expire(it.desk.deadline)
-    assert it.desk.lease.state.holder == Operator("bob", "bob", "driver")
+    assert it.controller.deadline is not None
+    it.controller.expire(it.controller.deadline)
+    assert it.controller.lease.state.holder == Operator("bob", "bob", "driver")
     assert it.heard()[-1] == "stop drive"
 
 
@@ -143,13 +143,13 @@ def test_stop_needs_no_lease_stops_all_and_latches() -> None:
     it.drive("ann", "take")
     it.tick(speed=0.5)
     it.heard()
-    it.desk.stop("vic")
+    it.controller.stop("vic")
     assert it.heard() == ["stop drive lift"]
     assert it.tick(speed=0.5) == "stopped by vic: reset it first"
     assert it.drive("ann", "take") == "stopped by vic: reset it first"
     assert it.drive("vic", "reset") == "viewers can stop the robot, and cannot reset it"
     assert it.drive("bob", "reset") == ""
-    assert it.desk.lease.state.holder is None
+    assert it.controller.lease.state.holder is None
     assert it.heard() == []
 
 
@@ -157,29 +157,29 @@ def test_a_stop_is_confirmed_when_every_line_has_taken_it() -> None:
     """And whoever looks is told of that moment."""
     it = Scene()
     seen: list[bool] = []
-    it.desk.on_change = lambda state: seen.append(it.desk.is_confirmed)
-    it.desk.stop("ann")
-    it.desk.stopped("drive", "stopped")
-    assert not it.desk.is_confirmed
-    it.desk.stopped("lift", "stopped")
-    assert it.desk.is_confirmed
+    it.controller.on_change = lambda state: seen.append(it.controller.is_confirmed)
+    it.controller.stop("ann")
+    it.controller.stopped("drive", "stopped")
+    assert not it.controller.is_confirmed
+    it.controller.stopped("lift", "stopped")
+    assert it.controller.is_confirmed
     assert seen == [False, True]
 
 
 def test_a_stop_without_a_robot_goes_out_when_there_is_one() -> None:
     """It was latched before anybody was connected: that is the first thing the robot hears."""
     it = Scene(is_attached=False)
-    it.desk.stop("ann")
+    it.controller.stop("ann")
     it.drive("ann", "reset")
     assert it.heard() == []
-    it.desk.attach(it.frames, it.movers)
+    it.controller.attach(it.frames, it.backend)
     assert it.heard() == ["stop drive lift"]
 
 
 def test_a_latch_that_was_kept_holds_and_is_no_news_to_the_robot() -> None:
     """After a restart: higher epoch, nobody drives, nothing is written."""
     it = Scene(LeaseState(epoch=41, latched_by="ann"))
-    state = it.desk.lease.state
+    state = it.controller.lease.state
     assert (state.epoch, state.holder, state.latched_by) == (42, None, "ann")
     assert it.drive("bob", "take") == "stopped by ann: reset it first"
     assert it.heard() == []
@@ -188,12 +188,12 @@ def test_a_latch_that_was_kept_holds_and_is_no_news_to_the_robot() -> None:
 def test_a_stop_that_the_robot_did_not_hear_of_before_a_restart_is_its_first_news() -> None:
     """Nobody was told that it had: it is confirmed when the line has taken it."""
     it = Scene(LeaseState(epoch=41, latched_by="ann"), is_attached=False, is_owed=True)
-    assert not it.desk.is_confirmed
-    it.desk.attach(it.frames, it.movers)
+    assert not it.controller.is_confirmed
+    it.controller.attach(it.frames, it.backend)
     assert it.heard() == ["stop drive lift"]
     for command in ("drive", "lift"):
-        it.desk.stopped(command, "stopped")
-    assert it.desk.is_confirmed
+        it.controller.stopped(command, "stopped")
+    assert it.controller.is_confirmed
 
 
 def test_a_session_that_ends_leaves_nothing_armed() -> None:
@@ -201,10 +201,10 @@ def test_a_session_that_ends_leaves_nothing_armed() -> None:
     it = Scene()
     it.drive("ann", "take")
     it.tick(speed=0.5)
-    it.desk.detach()
+    it.controller.detach()
     assert it.tick(speed=0.5) == LET_GO
-    it.desk.release("ann", "drive")
-    it.desk.attach(it.frames, it.movers)
+    it.controller.release("ann", "drive")
+    it.controller.attach(it.frames, it.backend)
     it.heard()
     assert it.tick(speed=0.5) == "it was stopped: take the controls anew"
     it.drive("ann", "take")
@@ -216,10 +216,10 @@ def test_the_two_controls_of_one_screen_count_for_themselves() -> None:
     """A tick of one that was held up is not overtaken by the other's."""
     it = Scene()
     it.drive("ann", "take")
-    epoch, echo = it.desk.lease.state.epoch, it.desk.beat("ann", it.now)
-    assert it.desk.tick("ann", "lift", {}, ControlInput(epoch, 6, echo), it.now) == ""
-    assert it.desk.tick("ann", "drive", {}, ControlInput(epoch, 5, echo), it.now) == ""
-    assert it.desk.tick("ann", "drive", {}, ControlInput(epoch, 5, echo), it.now) == (
+    epoch, echo = it.controller.lease.state.epoch, it.controller.heartbeat("ann", it.now)
+    assert it.controller.tick("ann", "lift", {}, ControlInput(epoch, 6, echo), it.now) == ""
+    assert it.controller.tick("ann", "drive", {}, ControlInput(epoch, 5, echo), it.now) == ""
+    assert it.controller.tick("ann", "drive", {}, ControlInput(epoch, 5, echo), it.now) == (
         "it is not newer than the last one"
     )
 
@@ -228,13 +228,15 @@ def test_recorded_ticks_are_refused_by_the_next_connection() -> None:
     """The server's numbers begin anywhere: nobody echoes one that was not told to it."""
     it = Scene()
     it.drive("ann", "take")
-    echo = it.desk.beat("ann", it.now)
-    it.desk.part("ann")
-    it.desk.join(Operator("ann", "ann", "driver"))
+    echo = it.controller.heartbeat("ann", it.now)
+    it.controller.part("ann")
+    it.controller.join(Operator("ann", "ann", "driver"))
     it.drive("ann", "take")
-    it.desk.beat("ann", it.now)
-    given = ControlInput(it.desk.lease.state.epoch, 1, echo)
-    assert it.desk.tick("ann", "drive", {}, given, it.now) == "it answers no tick of this server"
+    it.controller.heartbeat("ann", it.now)
+    given = ControlInput(it.controller.lease.state.epoch, 1, echo)
+    assert (
+        it.controller.tick("ann", "drive", {}, given, it.now) == "it answers no tick of this server"
+    )
 
 
 def test_a_stop_frame_that_cannot_be_made_keeps_back_no_other() -> None:
@@ -250,7 +252,7 @@ def test_a_stop_frame_that_cannot_be_made_keeps_back_no_other() -> None:
     it.frames.stop_frame = broken  # type: ignore[method-assign]
     it.drive("ann", "take")
     assert it.tick(speed=0.5) == "no such setting"
-    it.desk.stop("ann")
+    it.controller.stop("ann")
     assert it.heard() == ["stop lift"]
 
 
@@ -265,7 +267,7 @@ def test_a_stop_that_cannot_be_made_any_more_goes_out_as_it_was_armed() -> None:
 
     it.frames.stop_frame = broken  # type: ignore[method-assign]
     it.heard()
-    it.desk.stop("ann")
+    it.controller.stop("ann")
     assert it.heard() == ["stop drive"]
 
 
@@ -276,16 +278,16 @@ def test_a_stop_with_a_number_is_made_anew_whenever_one_is_used_up() -> None:
     it.drive("ann", "take")
     it.tick(speed=0.5)
     assert it.heard() == ["arm drive", "11 drive speed=0.5"]
-    assert it.movers.terms["drive"].stop == b"12 drive stop"
+    assert it.backend.terms["drive"].stop == b"12 drive stop"
     it.tick(speed=0.6)
     assert it.heard() == ["stop is 13 drive stop", "12 drive speed=0.6"]
     assert it.frames.send() == 13
     assert it.heard() == ["stop is 14 drive stop"]
     it.frames.send("air")
     assert it.heard() == [], "that was another line"
-    it.desk.release("ann", "drive")
+    it.controller.release("ann", "drive")
     assert it.heard() == ["release drive", "stop is 15 drive stop"]
-    it.desk.stopped("drive", "expired")
+    it.controller.stopped("drive", "expired")
     it.frames.send()
     assert it.heard() == [], "nothing is armed: a stop is made when somebody wants it"
 
@@ -299,20 +301,20 @@ def greeted(name: str) -> Driver:
 def test_a_stop_before_the_login_is_repeated_after_it() -> None:
     """The robot may have taken it for a part of the login. It is not confirmed until then."""
     it = Scene(driver=greeted("wire"))
-    it.desk.stop("ann")
+    it.controller.stop("ann")
     it.frames.is_greeted = False
     it.heard()
-    it.desk.stopped("drive", "revoked")
-    it.desk.stopped("lift", "revoked")
+    it.controller.stopped("drive", "revoked")
+    it.controller.stopped("lift", "revoked")
     assert it.heard() == []
-    assert not it.desk.is_confirmed
+    assert not it.controller.is_confirmed
     it.frames.is_greeted = True
     it.frames.on_ready("air")
     assert it.heard() == []
     it.frames.on_ready("wire")
     assert it.heard() == ["stop drive"]
-    it.desk.stopped("drive", "stopped")
-    assert it.desk.is_confirmed
+    it.controller.stopped("drive", "stopped")
+    assert it.controller.is_confirmed
     it.frames.on_ready("wire")
     assert it.heard() == [], "once is enough"
 
@@ -323,9 +325,9 @@ def test_a_line_that_the_guard_lost_is_not_ready_whatever_the_engine_knows() -> 
     it.drive("ann", "take")
     it.tick(speed=0.5)
     it.heard()
-    it.movers.is_up = False
-    it.desk.stopped("drive", "revoked")
-    it.movers.is_up = True
+    it.backend.is_up = False
+    it.controller.stopped("drive", "revoked")
+    it.backend.is_up = True
     it.frames.on_ready("wire")
     assert it.heard() == ["stop drive"]
 
@@ -334,7 +336,7 @@ def test_a_stop_on_a_line_that_is_ready_is_not_repeated() -> None:
     it = Scene(driver=greeted("wire"))
     it.drive("ann", "take")
     it.tick(speed=0.5)
-    it.desk.stopped("drive", "expired")
+    it.controller.stopped("drive", "expired")
     it.heard()
     it.frames.on_ready("wire")
     assert it.heard() == []
@@ -347,7 +349,9 @@ def test_speed_grows_as_fast_as_the_driver_lets_it_and_falls_at_once() -> None:
     slow = slow._replace(hold=slow.hold._replace(slew={"speed": 2.0}))
     it = Scene(driver=DRIVER._replace(commands={**DRIVER.commands, "drive": slow}))
     moved: list[Any] = []
-    it.desk.on_moved = lambda who, epoch, command, arguments, data, now: moved.append(arguments)
+    it.controller.on_moved = lambda who, epoch, command, arguments, data, now: moved.append(
+        arguments
+    )
     it.drive("ann", "take")
     for _ in range(3):
         it.tick(speed=1.0)
@@ -358,7 +362,7 @@ def test_speed_grows_as_fast_as_the_driver_lets_it_and_falls_at_once() -> None:
     it.tick(speed=0.05)
     assert it.heard()[-1] == "drive speed=0.05"
     it.tick(speed=1.0)
-    it.desk.release("ann", "drive")
+    it.controller.release("ann", "drive")
     it.heard()
     it.tick(speed=1.0)
     assert it.heard() == ["drive speed=0.1"]
@@ -370,9 +374,9 @@ def test_too_many_screens_are_turned_away() -> None:
     """Each costs memory; the bound is the server's own."""
     it = Scene()
     for number in range(MOST_SCREENS - 4):
-        it.desk.join(Operator(str(number)))
+        it.controller.join(Operator(str(number)))
     with pytest.raises(UrcError, match="256 pages"):
-        it.desk.join(Operator("one-too-many"))
+        it.controller.join(Operator("one-too-many"))
 
 
 def test_an_unknown_verb_is_told() -> None:
@@ -384,17 +388,17 @@ def test_a_robot_of_which_only_something_moves_by_itself_can_be_stopped_without_
     """The stop is latched; nobody writes anything for it."""
     fold = Command("fold", "wire", WriteSpec("text", {}), moves=True)
     it = Scene(is_attached=False, driver=DRIVER._replace(commands={"fold": fold}))
-    it.desk.attach(it.frames, None)
-    assert it.desk.can_move
-    it.desk.stop("ann")
-    assert it.desk.lease.hindrance(Operator("bob")) == "stopped by ann: reset it first"
-    assert not it.desk.has_own_stop
+    it.controller.attach(it.frames, None)
+    assert it.controller.can_move
+    it.controller.stop("ann")
+    assert it.controller.lease.interlock(Operator("bob")) == "stopped by ann: reset it first"
+    assert not it.controller.has_own_stop
     assert it.drive("bob", "reset") == ""
-    assert it.desk.lease.hindrance(Operator("bob")) == ""
+    assert it.controller.lease.interlock(Operator("bob")) == ""
     assert it.drive("ann", "take") == ""
-    assert it.desk.lease.hindrance(Operator("bob")) == "ann has the controls"
-    assert it.desk.lease.hindrance(Operator("ann")) == ""
-    assert it.desk.lease.hindrance(Operator("vic", role="viewer")) == "this page only watches"
+    assert it.controller.lease.interlock(Operator("bob")) == "ann has the controls"
+    assert it.controller.lease.interlock(Operator("ann")) == ""
+    assert it.controller.lease.interlock(Operator("vic", role="viewer")) == "this page only watches"
 
 
 def test_a_robot_that_refuses_ends_the_motion_in_its_own_words() -> None:
@@ -403,13 +407,13 @@ def test_a_robot_that_refuses_ends_the_motion_in_its_own_words() -> None:
     it.drive("ann", "take")
     assert it.tick(speed=0.5) == ""
     told: list[tuple[str, str]] = []
-    it.desk.on_refused = lambda command, why: told.append((command, why))
+    it.controller.on_refused = lambda command, why: told.append((command, why))
     it.heard()
     it.frames.on_refused("drive", "the guard is open")
     assert it.heard() == ["release drive"]
     assert told == [("drive", "the guard is open")]
     assert it.tick(speed=0.5) == "the guard is open"
-    it.desk.release("ann", "drive")
+    it.controller.release("ann", "drive")
     assert "take the controls" in it.tick(speed=0.5)
     it.drive("ann", "take")
     assert it.tick(speed=0.5) == ""
@@ -420,7 +424,7 @@ def test_a_refusal_of_what_does_not_move_changes_nothing() -> None:
     it = Scene()
     it.drive("ann", "take")
     it.tick(speed=0.5)
-    it.desk.release("ann", "drive")
+    it.controller.release("ann", "drive")
     it.heard()
     it.frames.on_refused("drive", "too late")
     it.frames.on_refused("lift", "it never moved")
@@ -434,7 +438,7 @@ def test_motion_that_waits_for_an_answer_holds_its_lease() -> None:
     it = Scene()
     it.drive("ann", "take")
     told: list[object] = []
-    it.desk.on_moved = lambda *what: told.append(what)
+    it.controller.on_moved = lambda *what: told.append(what)
     assert it.tick(speed=0.5) == ""
     frame, it.frames.motion_frame = it.frames.motion_frame, lambda *_: b""  # type: ignore[method-assign,misc,assignment]
     it.heard()

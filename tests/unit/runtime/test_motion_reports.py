@@ -28,7 +28,7 @@ def test_a_robot_hears_a_stop_by_its_controls_or_by_a_command() -> None:
     told = [
         (one.can_move, one.has_own_stop)
         for one in (
-            Scene(driver=driver(*commands)).desk
+            Scene(driver=driver(*commands)).controller
             for commands in ([held("drive")], [HALT], [fold], [beep], [held("drive"), HALT])
         )
     ]
@@ -38,16 +38,16 @@ def test_a_robot_hears_a_stop_by_its_controls_or_by_a_command() -> None:
 def test_a_command_of_a_stop_is_owed_until_it_was_given() -> None:
     it = Scene(driver=driver(held("drive"), HALT))
     changes: list[bool] = []
-    it.desk.on_change = lambda state: changes.append(it.desk.is_confirmed)
-    assert it.desk.owed == []
-    it.desk.stop("ann")
-    assert it.desk.owed == ["halt"]
-    it.desk.given("halt")
-    assert (it.desk.owed, it.desk.is_confirmed) == ([], False)
-    it.desk.stopped("drive", "stopped")
-    assert it.desk.is_confirmed
-    it.desk.given("halt")
-    it.desk.stopped("drive", "stopped")
+    it.controller.on_change = lambda state: changes.append(it.controller.is_confirmed)
+    assert it.controller.owed == []
+    it.controller.stop("ann")
+    assert it.controller.owed == ["halt"]
+    it.controller.given("halt")
+    assert (it.controller.owed, it.controller.is_confirmed) == ([], False)
+    it.controller.stopped("drive", "stopped")
+    assert it.controller.is_confirmed
+    it.controller.given("halt")
+    it.controller.stopped("drive", "stopped")
     assert changes == [False, True], "it is told once"
 
 
@@ -55,21 +55,21 @@ def test_a_screen_that_is_gone_is_no_screen_any_more() -> None:
     """Others have room, and what it still says is nobody's."""
     it = Scene()
     moving(it)
-    it.desk.part("ann")
+    it.controller.part("ann")
     assert it.heard() == ["stop drive"]
-    assert "ann" not in it.desk._screens
+    assert "ann" not in it.controller._screens
     for number in range(MOST_SCREENS - 3):
-        it.desk.join(Operator(f"more {number}"))
+        it.controller.join(Operator(f"more {number}"))
 
 
 def test_the_report_of_a_stop_that_was_pressed_closes_no_later_gesture() -> None:
     """It may come when it was reset, and somebody drives again."""
     it = Scene()
     moving(it)
-    it.desk.stop("bob")
+    it.controller.stop("bob")
     it.drive("ann", "reset")
     it.drive("ann", "take")
-    it.desk.stopped("drive", "stopped")
+    it.controller.stopped("drive", "stopped")
     assert it.tick(speed=0.5) == ""
 
 
@@ -77,7 +77,7 @@ def test_whoever_holds_on_is_told_whether_the_line_or_the_lease_ended() -> None:
     for reason, why in (("revoked", "the line to the robot was cut"), ("expired", LET_GO)):
         it = Scene()
         moving(it)
-        it.desk.stopped("drive", reason)  # type: ignore[arg-type]
+        it.controller.stopped("drive", reason)  # type: ignore[arg-type]
         assert it.tick(speed=0.5) == why
 
 
@@ -85,21 +85,21 @@ def test_a_release_confirms_no_stop() -> None:
     """It was written before STOP was pressed, and told after it."""
     it = Scene(driver=driver(held("drive")))
     moving(it)
-    it.desk.release("ann", "drive")
-    it.desk.stop("ann")
-    it.desk.stopped("drive", "released")
-    assert not it.desk.is_confirmed
-    it.desk.stopped("drive", "stopped")
-    assert it.desk.is_confirmed
+    it.controller.release("ann", "drive")
+    it.controller.stop("ann")
+    it.controller.stopped("drive", "released")
+    assert not it.controller.is_confirmed
+    it.controller.stopped("drive", "stopped")
+    assert it.controller.is_confirmed
 
 
 def test_a_stop_that_is_told_after_the_session_counts() -> None:
     """There is no line any more that it could have come too early for."""
     it = Scene(driver=driver(held("drive")))
-    it.desk.stop("ann")
-    it.desk.detach()
-    it.desk.stopped("drive", "stopped")
-    assert it.desk.is_confirmed
+    it.controller.stop("ann")
+    it.controller.detach()
+    it.controller.stopped("drive", "stopped")
+    assert it.controller.is_confirmed
 
 
 def numbered() -> Scene:
@@ -141,7 +141,7 @@ def test_a_stop_that_was_armed_once_is_not_kept_for_ever() -> None:
     """What can't be made when nothing is armed is told by `urc validate`, and is not made up."""
     it = Scene(driver=driver(held("drive"), held("lift", "air")))
     moving(it)
-    it.desk.stop("ann")
+    it.controller.stop("ann")
     whole = it.frames.stop_frame
 
     def broken(command: str) -> Payload:
@@ -151,7 +151,7 @@ def test_a_stop_that_was_armed_once_is_not_kept_for_ever() -> None:
 
     it.frames.stop_frame = broken  # type: ignore[method-assign]
     it.heard()
-    it.desk.stop("ann")
+    it.controller.stop("ann")
     assert it.heard() == ["stop lift"]
 
 
@@ -159,7 +159,7 @@ def test_a_control_that_a_stop_closed_says_so_until_it_was_let_go() -> None:
     """And stands: what the movers told of it before changes nothing."""
     it = Scene()
     moving(it)
-    it.desk.stopped("drive", "expired")
-    assert it.desk.rests("drive")
-    assert it.desk.halt() == []
+    it.controller.stopped("drive", "expired")
+    assert it.controller.rests("drive")
+    assert it.controller.halt() == []
     assert it.heard() == []

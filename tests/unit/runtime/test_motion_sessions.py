@@ -13,16 +13,16 @@ def test_a_request_lasts_as_long_as_it_says_and_may_be_declined() -> None:
     it = Scene()
     it.drive("ann", "take")
     assert it.drive("bob", "ask", for_s=5) == ""
-    assert it.desk.lease.state.asked_until == it.now + 5
+    assert it.controller.lease.state.asked_until == it.now + 5
     assert it.drive("ann", "no") == ""
-    state = it.desk.lease.state
+    state = it.controller.lease.state
     assert (state.holder, state.asked_by) == (Operator("ann", "ann", "driver"), None)
 
 
 def test_a_new_session_owes_no_stop_to_what_rests() -> None:
     it = Scene()
-    it.desk.detach()
-    it.desk.attach(it.frames, it.movers)
+    it.controller.detach()
+    it.controller.attach(it.frames, it.backend)
     it.frames.on_ready("wire")
     assert it.heard() == []
 
@@ -35,11 +35,11 @@ def test_a_session_without_movers_moves_nothing_and_goes_on() -> None:
         driver=DRIVER._replace(transports={**DRIVER.transports, "wire": wire}),
     )
     it.frames.number = 10
-    it.desk.attach(it.frames, None)
+    it.controller.attach(it.frames, None)
     it.drive("ann", "take")
     assert it.tick(speed=0.5) == "the robot is not connected"
     it.frames.send()
-    it.desk.stopped("drive", "stopped")
+    it.controller.stopped("drive", "stopped")
     assert it.heard() == []
 
 
@@ -64,8 +64,8 @@ def test_the_audit_has_a_frame_as_it_was_made_also_where_it_carries_a_number() -
     audited: list[object] = []
     frame = CountedFrame(Numbered(b"7 left", Count({}, {"n": 7})), lambda: None)
     it.frames.motion_frame = lambda *_: frame  # type: ignore[method-assign,misc,assignment]
-    it.movers.tick = lambda *what: ticked.append(what)  # type: ignore[method-assign,misc,assignment]
-    it.desk.on_moved = lambda *what: audited.append(what[4])
+    it.backend.tick = lambda *what: ticked.append(what)  # type: ignore[method-assign,misc,assignment]
+    it.controller.on_moved = lambda *what: audited.append(what[4])
     it.drive("ann", "take")
     assert it.tick(speed=0.5) == ""
     assert ticked == [("drive", frame)]

@@ -24,7 +24,7 @@ def test_stop_of_the_second_control_of_a_robot_is_made_anew_as_well() -> None:
 def test_stop_that_may_still_be_repeated_is_made_anew() -> None:
     """Its control is not armed any more, and that of the other one never was."""
     it = Scene()
-    it.movers.is_stopping = lambda command: command == "drive"  # type: ignore[method-assign]
+    it.backend.is_stopping = lambda command: command == "drive"  # type: ignore[method-assign]
     it.frames.number = 10
     it.frames.send()
     assert it.heard() == ["stop is 12 drive stop"]
@@ -46,15 +46,15 @@ def test_newest_stop_goes_out_when_none_can_be_made_any_more() -> None:
     def broken(command: str) -> Payload:
         raise UrcError("no such setting")
 
-    it.movers.stop = keep  # type: ignore[method-assign]
+    it.backend.stop = keep  # type: ignore[method-assign]
     it.frames.stop_frame = broken  # type: ignore[method-assign]
-    it.desk.stop("ann")
+    it.controller.stop("ann")
     assert stops == {"drive": b"14 drive stop"}
 
 
 def test_frame_of_a_robot_without_movers_renews_no_stop() -> None:
     it = Scene(is_attached=False)
-    it.desk.attach(it.frames, None)
+    it.controller.attach(it.frames, None)
     assert it.frames.send() == 1
     assert it.heard() == []
 
@@ -80,9 +80,9 @@ def test_stopped_control_rests() -> None:
     it = Scene()
     it.drive("ann", "take")
     it.tick(speed=0.5)
-    assert not it.desk.rests("drive")
-    it.desk.stop("vic")
-    assert it.desk.rests("drive")
+    assert not it.controller.rests("drive")
+    it.controller.stop("vic")
+    assert it.controller.rests("drive")
 
 
 def test_refusal_ends_the_motion_also_without_a_listener() -> None:

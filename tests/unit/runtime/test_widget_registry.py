@@ -29,10 +29,10 @@ def test_a_document_finds_the_widgets_beside_it_and_they_are_foreign(tmp_path: P
     """They come after those that ship, and never take their place."""
     write(tmp_path, "lamp")
     write(tmp_path, "battery")
-    shelf = shelf_of(tmp_path / "robot.yaml")
-    lamp, battery = shelf.get("lamp"), shelf.get("battery")
-    assert lamp is not None, shelf.problems
-    assert battery is not None, shelf.problems
+    registry = shelf_of(tmp_path / "robot.yaml")
+    lamp, battery = registry.get("lamp"), registry.get("battery")
+    assert lamp is not None, registry.problems
+    assert battery is not None, registry.problems
     assert lamp.folder.resolve() == (tmp_path / "widgets" / "lamp").resolve()
     assert battery.folder.resolve() == (shipped("widgets") / "battery").resolve()
     assert [WidgetTrust().is_foreign(one) for one in (lamp, battery)] == [True, False]

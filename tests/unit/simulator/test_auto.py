@@ -37,8 +37,8 @@ class Dialogue:
     def __init__(self, profile: Profile, start_s: float = 0.0) -> None:
         self.now = start_s
         self.engine = Engine(profile.driver, {})
-        self.twin = EmulatedRobot(profile, {})
-        self.line: EmulatedConnection = self.twin.line("wire")
+        self.emulated_robot = EmulatedRobot(profile, {})
+        self.line: EmulatedConnection = self.emulated_robot.line("wire")
         self.values: dict[str, object] = {}
         self.replies: list[Event] = []
         self.faults: list[str] = []
@@ -55,7 +55,7 @@ class Dialogue:
                     for answer in self.line.receive(event.data, self.now):
                         self.perform(self.engine.receive("wire", answer, self.now))
                 case Open():
-                    self.line = self.twin.line("wire")
+                    self.line = self.emulated_robot.line("wire")
                     self.perform(self.engine.start("wire", self.now))
                 case Samples():
                     self.values.update((one.signal, one.value) for one in event.samples)
@@ -166,7 +166,7 @@ commands:
     talk.run("drive", speed=-0.25, mode="1")
     found = talk.run("state")
     assert found == Replied(3, "state", {"level": 200, "speed": -0.25, "mode": "auto"})
-    talk.line = talk.twin.line("wire")
+    talk.line = talk.emulated_robot.line("wire")
     talk.run("drive", speed=7, mode="2")  # neither is a value of its signal
     assert talk.run("state") == found._replace(id=5)  # type: ignore[union-attr]
 
@@ -263,7 +263,7 @@ polls:
     talk = Dialogue(profile_of(tmp_path, body), 5.0)
     talk.wait(1.0)
     assert set(talk.values) == {"volts"}
-    assert talk.twin.line("wire").due_in_s is None
+    assert talk.emulated_robot.line("wire").due_in_s is None
 
 
 def test_what_cannot_be_answered_is_told(tmp_path: Path) -> None:

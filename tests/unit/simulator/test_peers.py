@@ -26,10 +26,10 @@ messages:
 
 def drive(folder: Path, body: object) -> tuple[int, object]:
     """Return the faults of a message, and the speed after it."""
-    twin = EmulatedRobot(profile_of(folder, ROS), {})
-    line = twin.line("ros")
+    emulated_robot = EmulatedRobot(profile_of(folder, ROS), {})
+    line = emulated_robot.line("ros")
     line.receive(Envelope("publish", {"topic": "/cmd_vel"}, body), 0.0)
-    return line.faults, twin.readings(0.0)["v"]
+    return line.faults, emulated_robot.readings(0.0)["v"]
 
 
 def test_what_a_message_of_ros_leaves_out_is_zero(tmp_path: Path) -> None:

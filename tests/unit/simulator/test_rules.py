@@ -50,7 +50,7 @@ MORE = {
 """Rule → command that would take the frames of other dialogues."""
 
 
-def twin(tmp_path: Path, rules: str) -> EmulatedRobot:
+def emulated_robot(tmp_path: Path, rules: str) -> EmulatedRobot:
     """Return the emulated robot with `rules` under ``simulator:``."""
     file = tmp_path / "cart.yaml"
     text = DRIVER
@@ -191,7 +191,7 @@ DIALOGUES: dict[str, tuple[str, list[tuple[object, list[bytes]]]]] = {
 def test_rules_do_what_they_say(name: str, tmp_path: Path) -> None:
     """Spoken to, and as time goes by."""
     rules, dialogue = DIALOGUES[name]
-    line = twin(tmp_path, rules.lstrip("\n")).line("pad" if "  pad:" in rules else "wire")
+    line = emulated_robot(tmp_path, rules.lstrip("\n")).line("pad" if "  pad:" in rules else "wire")
     talk(line, dialogue)
 
 
@@ -213,7 +213,7 @@ FAULTS = [
 def test_what_a_rule_cannot_do_is_counted_and_told(rule: str, fault: str, tmp_path: Path) -> None:
     """One fault, one line, and the robot goes on."""
     rules = f"  state: {{ word: fast }}\n  wire: [{rule}]\n"
-    line = twin(tmp_path, rules).line("wire")
+    line = emulated_robot(tmp_path, rules).line("wire")
     assert line.receive(b"X\n", 0.0) == []
     assert line.faults == 1
     assert fault in line.last_fault
@@ -223,7 +223,7 @@ def test_what_a_rule_cannot_do_is_counted_and_told(rule: str, fault: str, tmp_pa
 def test_a_closing_rule_ends_the_connection(tmp_path: Path) -> None:
     """What comes after it is not looked at, and nothing more is said."""
     rules = "  wire: [{ match: '^QUIT$', send: BYE, close: true, then: [{ send: no }] }]\n"
-    line = twin(tmp_path, rules).line("wire")
+    line = emulated_robot(tmp_path, rules).line("wire")
     assert not line.is_over
     assert line.receive(b"QUIT\nB?\n", 0.0) == [b"BYE\n"]
     assert line.is_over
@@ -235,7 +235,7 @@ def test_time_changes_the_robot_once_however_many_look(tmp_path: Path) -> None:
     """Each connection has its own messages; the battery is one, until nobody is there."""
     rule = "{ every: 1s, set: { battery: '{{ battery - 1 }}' } }"
     rules = f"  signals: {{ battery: 50 }}\n  wire: [{rule}]\n"
-    robot = twin(tmp_path, rules)
+    robot = emulated_robot(tmp_path, rules)
     first, second = robot.line("wire"), robot.line("wire")
     for now_s in (1.0, 2.0):
         for line in (first, second):
@@ -248,7 +248,7 @@ def test_time_changes_the_robot_once_however_many_look(tmp_path: Path) -> None:
 
 def test_answers_that_wait_are_bounded(tmp_path: Path) -> None:
     """A client that asks for more than that is told, and the oldest stay."""
-    line = twin(tmp_path, "  wire: [{ match: '^W$', after: 1s, send: w }]\n").line("wire")
+    line = emulated_robot(tmp_path, "  wire: [{ match: '^W$', after: 1s, send: w }]\n").line("wire")
     line.receive(b"W\n" * (MOST_COURSES + 3), 0.0)
     assert line.faults == 3
     assert "delayed replies wait already" in line.last_fault
@@ -288,7 +288,7 @@ FRAMES = st.sampled_from(
 
 @pytest.fixture(scope="module")
 def robot_of_all_forms(tmp_path_factory: pytest.TempPathFactory) -> EmulatedRobot:
-    return twin(tmp_path_factory.mktemp("rules"), ALL_FORMS.lstrip("\n"))
+    return emulated_robot(tmp_path_factory.mktemp("rules"), ALL_FORMS.lstrip("\n"))
 
 
 @given(

@@ -19,9 +19,11 @@ ASK = f"{QUESTION}\n".encode()
 
 def context(*, is_per_request: bool = False, **options: object) -> ServerContext:
     profile = line_profile(is_per_request=is_per_request)
-    twin = EmulatedRobot(profile, {})
+    emulated_robot = EmulatedRobot(profile, {})
     spec = profile.driver.transports["wire"]
-    return ServerContext("wire", spec, options, "127.0.0.1", lambda: twin.line("wire"), lambda: 7.0)
+    return ServerContext(
+        "wire", spec, options, "127.0.0.1", lambda: emulated_robot.line("wire"), lambda: 7.0
+    )
 
 
 class Client:

@@ -17,70 +17,70 @@ def message(topic: str, number: int) -> Envelope:
     return Envelope("message", {"topic": topic}, number)
 
 
-def taken(inbox: TopicReceiveQueue, count: int) -> list[object]:
+def taken(queue: TopicReceiveQueue, count: int) -> list[object]:
     async def take() -> list[object]:
-        return [(await inbox.pop()).body for _ in range(count)]
+        return [(await queue.pop()).body for _ in range(count)]
 
     return asyncio.run(take())
 
 
 def filled(*arrivals: tuple[str, int, int]) -> TopicReceiveQueue:
-    inbox = TopicReceiveQueue()
+    queue = TopicReceiveQueue()
     for topic, number, size in arrivals:
-        inbox.message(topic, message(topic, number), size)
-    return inbox
+        queue.message(topic, message(topic, number), size)
+    return queue
 
 
 def test_messages_come_in_the_order_of_their_arrival() -> None:
     """Across topics, and answers among them."""
-    inbox = filled(("a", 1, 10), ("b", 2, 10))
-    inbox.answer(Envelope("response", {"id": 1}, 3))
-    inbox.message("a", message("a", 4), 10)
-    assert taken(inbox, 4) == [1, 2, 3, 4]
-    assert inbox.dropped == 0
+    queue = filled(("a", 1, 10), ("b", 2, 10))
+    queue.answer(Envelope("response", {"id": 1}, 3))
+    queue.message("a", message("a", 4), 10)
+    assert taken(queue, 4) == [1, 2, 3, 4]
+    assert queue.dropped == 0
 
 
 def test_oldest_of_a_busy_topic_go_and_a_quiet_one_keeps_its_own() -> None:
     """The newest always is there."""
     many = TOPIC_MESSAGES + 10
-    inbox = filled(("quiet", -1, 10), *(("busy", number, 10) for number in range(many)))
-    assert inbox.dropped == 10
-    assert taken(inbox, TOPIC_MESSAGES + 1) == [-1, *range(10, many)]
+    queue = filled(("quiet", -1, 10), *(("busy", number, 10) for number in range(many)))
+    assert queue.dropped == 10
+    assert taken(queue, TOPIC_MESSAGES + 1) == [-1, *range(10, many)]
 
 
 def test_answers_count_by_their_size() -> None:
     """Feedback that nobody takes does not fill the memory; a single large answer is let in."""
-    inbox = TopicReceiveQueue()
+    queue = TopicReceiveQueue()
     for number in range(10):
-        inbox.answer(Envelope("feedback", {"id": 1}, number), ALL_BYTES // 4)
-    assert inbox.dropped == 6
-    assert taken(inbox, 4) == [0, 1, 2, 3]
-    inbox.answer(Envelope("response", {"id": 1}, "all"), ALL_BYTES * 2)
-    assert taken(inbox, 1) == ["all"]
+        queue.answer(Envelope("feedback", {"id": 1}, number), ALL_BYTES // 4)
+    assert queue.dropped == 6
+    assert taken(queue, 4) == [0, 1, 2, 3]
+    queue.answer(Envelope("response", {"id": 1}, "all"), ALL_BYTES * 2)
+    assert taken(queue, 1) == ["all"]
 
 
 def test_large_messages_count_by_their_size() -> None:
     """An image larger than all that a topic may hold waits alone."""
-    inbox = filled(*(("camera", number, TOPIC_BYTES * 2) for number in range(5)))
-    assert taken(inbox, 1) == [4]
-    assert inbox.dropped == 4
+    queue = filled(*(("camera", number, TOPIC_BYTES * 2) for number in range(5)))
+    assert taken(queue, 1) == [4]
+    assert queue.dropped == 4
 
 
 def test_any_number_of_topics_is_bounded() -> None:
     """Behind a wildcard there may be topics without end."""
-    inbox = filled(*((f"t/{number}", number, 1) for number in range(MESSAGES + 5)))
-    assert inbox.dropped == 5
-    assert taken(inbox, 1) == [5]
+    queue = filled(*((f"t/{number}", number, 1) for number in range(MESSAGES + 5)))
+    assert queue.dropped == 5
+    assert taken(queue, 1) == [5]
     large = ALL_BYTES // 4
-    inbox = filled(*((f"t/{number}", number, large) for number in range(10)))
-    assert taken(inbox, 4) == [6, 7, 8, 9]
+    queue = filled(*((f"t/{number}", number, large) for number in range(10)))
+    assert taken(queue, 4) == [6, 7, 8, 9]
 
 
 def test_answers_are_never_given_up_for_messages() -> None:
     """Nobody says them twice; beyond their bound the newest is lost."""
-    inbox = TopicReceiveQueue()
+    queue = TopicReceiveQueue()
     for number in range(ANSWERS + 1):
-        inbox.answer(Envelope("response", {"id": number}, number))
-    inbox.message("a", message("a", -1), 1)
-    assert inbox.dropped == 1
-    assert taken(inbox, ANSWERS + 1) == [*range(ANSWERS), -1]
+        queue.answer(Envelope("response", {"id": number}, number))
+    queue.message("a", message("a", -1), 1)
+    assert queue.dropped == 1
+    assert taken(queue, ANSWERS + 1) == [*range(ANSWERS), -1]

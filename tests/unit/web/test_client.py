@@ -51,7 +51,7 @@ class FakeLine:
     """A WebSocket whose other side is the test."""
 
     def __init__(self) -> None:
-        self.inbox: asyncio.Queue[Message] = asyncio.Queue()
+        self.receiver: asyncio.Queue[Message] = asyncio.Queue()
         self.sent: list[dict[str, Any]] = []
         self.closed: tuple[int, str | None] | None = None
         self.free = asyncio.Event()
@@ -61,7 +61,7 @@ class FakeLine:
         self.is_held_back = False
 
     async def receive(self) -> Message:
-        return await self.inbox.get()
+        return await self.receiver.get()
 
     async def send_text(self, data: str) -> None:
         self.sent.append(json.loads(data))
@@ -97,10 +97,10 @@ class FakeLine:
 
     def say(self, message: object) -> None:
         text = message if isinstance(message, str) else json.dumps(message)
-        self.inbox.put_nowait({"type": "websocket.receive", "text": text})
+        self.receiver.put_nowait({"type": "websocket.receive", "text": text})
 
     def leave(self) -> None:
-        self.inbox.put_nowait({"type": "websocket.disconnect", "code": 1001})
+        self.receiver.put_nowait({"type": "websocket.disconnect", "code": 1001})
 
     def of_type(self, kind: str) -> list[dict[str, Any]]:
         return [message for message in self.sent if message["t"] == kind]
@@ -110,14 +110,14 @@ class Scene:
     """A client that is connected to a fake robot."""
 
     def __init__(
-        self, station: RobotService, robot: FakeRobot, clock: FakeClock, role: Role = "driver"
+        self, service: RobotService, robot: FakeRobot, clock: FakeClock, role: Role = "driver"
     ) -> None:
         self.robot = robot
         self.clock = clock
-        self.station = station
+        self.service = service
         self.audit: list[AuditEntry] = []
         self.line = FakeLine()
-        self.client = BrowserClient(self.line, station, self.line, SocketPeer("", role))
+        self.client = BrowserClient(self.line, service, self.line, SocketPeer("", role))
         self.task = asyncio.create_task(self.client.serve())
 
 
@@ -132,10 +132,10 @@ async def scene(
     clock = FakeClock()
     robot = FakeRobot(dashboard_profile(settings=settings, commands=commands), clock)
     audit: list[AuditEntry] = []
-    trail = AuditRecorder("puppet", audit.append, utc=lambda: 99.0)
-    station = RobotService(Robot(robot.profile, {}, robot.open), clock=clock, trail=trail)
-    running = asyncio.create_task(station.run())
-    made = Scene(station, robot, clock, role)
+    recorder = AuditRecorder("puppet", audit.append, utc=lambda: 99.0)
+    service = RobotService(Robot(robot.profile, {}, robot.open), clock=clock, recorder=recorder)
+    running = asyncio.create_task(service.run())
+    made = Scene(service, robot, clock, role)
     made.audit = audit
     await settle()
     try:
@@ -282,7 +282,7 @@ async def test_a_page_that_leaves_ends_its_client() -> None:
 async def test_the_end_of_the_session_is_told_to_the_page() -> None:
     """The line is closed with a code, so that the page comes back by itself."""
     async with scene() as it:
-        live = await it.station.live()
+        live = await it.service.live()
         live.ended.set()
         live.fanout.flush()
         await settle()
@@ -334,7 +334,7 @@ async def test_a_stop_is_taken_however_much_else_was_said() -> None:
         it.line.say({"t": "stop"})
         await settle()
         assert it.line.closed is None
-        assert it.station.controls.desk.lease.state.latched_by == "screen 1"
+        assert it.service.controls.controller.lease.state.latched_by == "screen 1"
 
 
 @pytest.mark.parametrize(

@@ -35,8 +35,8 @@ BEAM = Command(
 class Screens:
     """Some screens that look at one robot."""
 
-    def __init__(self, station: RobotService, robot: FakeRobot, clock: FakeClock) -> None:
-        self.station, self.robot, self.clock = station, robot, clock
+    def __init__(self, service: RobotService, robot: FakeRobot, clock: FakeClock) -> None:
+        self.service, self.robot, self.clock = service, robot, clock
         self.audit: list[AuditEntry] = []
         self.lines: list[FakeLine] = []
         self._tasks: list[asyncio.Task[None]] = []
@@ -45,7 +45,7 @@ class Screens:
         """Let one more look."""
         line = FakeLine()
         self.lines.append(line)
-        client = BrowserClient(line, self.station, line, SocketPeer("", role))
+        client = BrowserClient(line, self.service, line, SocketPeer("", role))
         self._tasks.append(asyncio.create_task(client.serve()))
         await settle()
         return line
@@ -66,10 +66,10 @@ async def screens() -> AsyncIterator[Screens]:
     commands = {"dock": DOCK, "beam": BEAM, "erase": ERASE}
     robot = FakeRobot(dashboard_profile(commands=commands), clock)
     audit: list[AuditEntry] = []
-    trail = AuditRecorder("puppet", audit.append, utc=lambda: 99.0)
-    station = RobotService(Robot(robot.profile, {}, robot.open), clock=clock, trail=trail)
-    running = asyncio.create_task(station.run())
-    made = Screens(station, robot, clock)
+    recorder = AuditRecorder("puppet", audit.append, utc=lambda: 99.0)
+    service = RobotService(Robot(robot.profile, {}, robot.open), clock=clock, recorder=recorder)
+    running = asyncio.create_task(service.run())
+    made = Screens(service, robot, clock)
     made.audit = audit
     try:
         yield made
@@ -126,7 +126,7 @@ async def test_stop_ends_questions_and_takes_back_what_was_agreed_to() -> None:
         await run(asker, "beam")
         await settle()
         (asked,) = other.of_type("ask")
-        it.station.controls.stop("screen 2")
+        it.service.controls.stop("screen 2")
         await settle()
         assert other.of_type("asked")[0]["n"] == asked["n"]
         other.say({"t": "agree", "n": asked["n"], "yes": True})

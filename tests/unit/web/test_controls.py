@@ -29,10 +29,10 @@ class Scene:
     def __init__(self, file: LatchStore | None = None) -> None:
         self.clock = FakeClock()
         self.audit: list[AuditEntry] = []
-        trail = AuditRecorder("rover", self.audit.append, utc=lambda: 99.0)
-        self.controls = ControlService(DRIVER, self.clock, file, trail)
+        recorder = AuditRecorder("rover", self.audit.append, utc=lambda: 99.0)
+        self.controls = ControlService(DRIVER, self.clock, file, recorder)
         self.frames = FakeFrames(DRIVER)
-        self.movers = FakeMotionBackend(self.clock)
+        self.backend = FakeMotionBackend(self.clock)
         self.hub = Hub({})
         self.told: dict[str, list[dict[str, Any]]] = {}
         self.beats: dict[str, int] = {}
@@ -43,31 +43,34 @@ class Scene:
 
     def sit(self, place: str = "", role: Role = "driver") -> OperatorSession:
         """Sit down, and read what is told at once."""
-        seat = self.controls.sit(place, role, lambda: None)
-        self.told[seat.client.id] = []
-        self.read(seat)
-        return seat
+        operator = self.controls.sit(place, role, lambda: None)
+        self.told[operator.client.id] = []
+        self.read(operator)
+        return operator
 
-    def read(self, seat: OperatorSession) -> list[dict[str, Any]]:
+    def read(self, operator: OperatorSession) -> list[dict[str, Any]]:
         """Return what a screen is told now, beats apart."""
-        messages = [json.loads(text) for text in self.controls.changes(seat)]
+        messages = [json.loads(text) for text in self.controls.changes(operator)]
         for message in messages:
             if message["t"] == "beat":
-                self.beats[seat.client.id] = message["n"]
+                self.beats[operator.client.id] = message["n"]
         return [message for message in messages if message["t"] != "beat"]
 
-    def say(self, seat: OperatorSession, verb: wire.Verb) -> None:
+    def say(self, operator: OperatorSession, verb: wire.Verb) -> None:
         """Want something of the controls."""
-        self.controls.handle(seat, wire.Drive(verb))
-        self.read(seat)
+        self.controls.handle(operator, wire.Drive(verb))
+        self.read(operator)
 
-    def tick(self, seat: OperatorSession, speed: Any = 0.5, command: str = "drive") -> None:
+    def tick(self, operator: OperatorSession, speed: Any = 0.5, command: str = "drive") -> None:
         """Tick as a page does."""
-        self.read(seat)
+        self.read(operator)
         self._numbers += 1
-        epoch, echo = self.controls.desk.lease.state.epoch, self.beats.get(seat.client.id, 0)
+        epoch, echo = (
+            self.controls.controller.lease.state.epoch,
+            self.beats.get(operator.client.id, 0),
+        )
         said = wire.Tick(command, epoch, self._numbers, echo, {"speed": speed})
-        self.controls.handle(seat, said)
+        self.controls.handle(operator, said)
 
 
 @asynccontextmanager
@@ -108,21 +111,21 @@ async def test_a_flood_is_thinned_and_its_last_value_arrives() -> None:
         ann = it.sit()
         it.say(ann, "take")
         looked: list[float] = []
-        tick: Callable[..., str] = it.controls.desk.tick
+        tick: Callable[..., str] = it.controls.controller.tick
 
         def counted(*words: Any) -> str:
             looked.append(words[2]["speed"])
             return tick(*words)
 
-        it.controls.desk.tick = counted  # type: ignore[method-assign]
+        it.controls.controller.tick = counted  # type: ignore[method-assign]
         for step in range(1000):
             it.tick(ann, step / 1000)
             await it.clock.advance(0.001)
         await it.clock.advance(0.1)
         assert len(looked) <= 1.0 / THINNED_S + 2
         assert looked[-1] == 0.999
-        assert it.movers.texts[-1] == "drive speed=0.999"
-        assert len(it.movers.texts) <= 1.1 / 0.05 + 2, "the declared rate, on the wire"
+        assert it.backend.texts[-1] == "drive speed=0.999"
+        assert len(it.backend.texts) <= 1.1 / 0.05 + 2, "the declared rate, on the wire"
 
 
 async def test_a_flood_is_neither_read_nor_received_until_its_turn() -> None:
@@ -135,7 +138,7 @@ async def test_a_flood_is_neither_read_nor_received_until_its_turn() -> None:
 
         def offered(number: int, speed: float) -> str:
             it.read(ann)
-            epoch, echo = it.controls.desk.lease.state.epoch, it.beats["s1"]
+            epoch, echo = it.controls.controller.lease.state.epoch, it.beats["s1"]
             tick = (
                 f'"epoch":{epoch},"number":{number},"echo":{echo},"arguments":{{"speed":{speed}}}'
             )
@@ -153,7 +156,7 @@ async def test_a_flood_is_neither_read_nor_received_until_its_turn() -> None:
         await it.clock.advance(THINNED_S)
         assert held == [True, False]
         await it.clock.advance(0.05)
-        assert it.movers.texts[-1] == "drive speed=0.9"
+        assert it.backend.texts[-1] == "drive speed=0.9"
 
 
 async def test_a_tick_that_waits_unread_and_is_none_is_told() -> None:
@@ -187,9 +190,9 @@ async def test_what_waits_is_forgotten_by_a_release_a_stop_and_a_page_that_goes(
                 it.controls.handle(ann, wire.Stop())
             else:
                 it.controls.rise(ann)
-            count = len(it.movers.texts)
+            count = len(it.backend.texts)
             await it.clock.advance(1)
-            assert [text for text in it.movers.texts[count:] if "stop" not in text] == []
+            assert [text for text in it.backend.texts[count:] if "stop" not in text] == []
             it.controls.rise(ann)
 
 
@@ -203,7 +206,7 @@ async def test_a_stop_that_nobody_made_is_told_once_to_all() -> None:
         told = {"t": "stopped", "command": "drive", "reason": "expired"}
         assert told in it.read(ann)
         assert told in it.read(bob)
-        assert it.movers.texts[-1] == "drive stop"
+        assert it.backend.texts[-1] == "drive stop"
 
 
 async def test_a_refused_tick_is_told_unless_the_control_moves_all_the_same() -> None:
@@ -213,7 +216,7 @@ async def test_a_refused_tick_is_told_unless_the_control_moves_all_the_same() ->
         it.say(ann, "take")
         it.tick(ann)
         await it.clock.advance(0.02)
-        epoch = it.controls.desk.lease.state.epoch
+        epoch = it.controls.controller.lease.state.epoch
         old = wire.Tick("drive", epoch, 0, it.beats["s1"])
         it.controls.handle(ann, old)
         assert [message for message in it.read(ann) if message["t"] == "refused"] == []
@@ -246,9 +249,9 @@ async def test_a_silent_holder_loses_the_controls_and_a_request_is_granted() -> 
         it.say(ann, "take")
         it.controls.handle(bob, wire.Drive("ask", 3))
         await it.clock.advance(3.1)
-        assert it.controls.desk.lease.state.holder == bob.client
+        assert it.controls.controller.lease.state.holder == bob.client
         await it.clock.advance(61)
-        assert it.controls.desk.lease.state.holder is None
+        assert it.controls.controller.lease.state.holder is None
 
 
 def audited(it: Scene) -> list[str]:
@@ -273,7 +276,7 @@ async def test_the_audit_says_who_moved_what_and_why_it_stopped() -> None:
         ]
         moved, stopped = it.audit[1:]
         assert (moved.robot, moved.role, moved.client) == ("rover", "engineer", "s1")
-        assert moved.epoch == it.controls.desk.lease.state.epoch
+        assert moved.epoch == it.controls.controller.lease.state.epoch
         assert moved.arguments == '{"speed": 0.5}'
         assert bytes.fromhex(moved.data) == b"drive speed=0.5"
         assert bytes.fromhex(stopped.data) == b"drive speed=0.25"
@@ -312,14 +315,14 @@ async def test_an_audit_that_breaks_keeps_nobody_from_driving_and_stopping() -> 
         def broken(entry: AuditEntry) -> None:
             raise OSError("the disk is on fire")
 
-        it.controls.trail._note = broken
+        it.controls.recorder._note = broken
         ann = it.sit()
         it.say(ann, "take")
         it.tick(ann, 0.5)
-        assert it.movers.texts[-1] == "drive speed=0.5"
+        assert it.backend.texts[-1] == "drive speed=0.5"
         it.controls.stop("ann")
-        assert it.movers.texts[-1].endswith("stop")
-        assert it.controls.desk.lease.state.latched_by == "ann"
+        assert it.backend.texts[-1].endswith("stop")
+        assert it.controls.controller.lease.state.latched_by == "ann"
 
 
 async def test_a_latch_that_cannot_be_written_is_told_and_stops_all_the_same(
@@ -336,8 +339,8 @@ async def test_a_latch_that_cannot_be_written_is_told_and_stops_all_the_same(
         it.controls.stop("bob")
         await file.settle()
         await settle()
-        assert it.movers.texts[-2:] == ["drive stop", "lift stop"]
-        assert it.controls.desk.is_confirmed
+        assert it.backend.texts[-2:] == ["drive stop", "lift stop"]
+        assert it.controls.controller.is_confirmed
         (note,) = it.hub.notes
         assert (note.level, note.source) == ("error", "URC")
         assert note.text.startswith("STOP works, but would not survive a restart")
@@ -358,10 +361,10 @@ async def test_a_stop_that_is_owed_stays_so_with_another_driver_and_after_a_rest
     controls.stop("ann")
     controls.renew(DRIVER, file)
     await file.settle()
-    assert not controls.desk.is_confirmed
+    assert not controls.controller.is_confirmed
     async with scene(LatchStore(tmp_path, "rover")) as it:
-        assert it.movers.texts == ["drive stop", "lift stop"]
-        assert it.controls.desk.is_confirmed
+        assert it.backend.texts == ["drive stop", "lift stop"]
+        assert it.controls.controller.is_confirmed
     await file.settle()
 
 
@@ -394,8 +397,8 @@ async def test_the_words_of_a_robot_that_refuses_to_move_are_told_at_its_control
         it.tick(ann)
         it.read(bob)
         it.frames.on_refused("drive", "the guard is open")
-        for seat in (ann, bob):
-            (told,) = [one for one in it.read(seat) if one["t"] == "refused"]
+        for operator in (ann, bob):
+            (told,) = [one for one in it.read(operator) if one["t"] == "refused"]
             assert (told["command"], told["message"]) == ("drive", "the guard is open")
-        assert it.movers.texts[-1] == "drive stop"
+        assert it.backend.texts[-1] == "drive stop"
         assert [one.outcome for one in it.audit if one.what == "stopped"] == ["the guard is open"]

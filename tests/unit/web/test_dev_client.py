@@ -29,13 +29,13 @@ pytestmark = pytest.mark.anyio
 class Scene:
     """A dev page on a fake robot."""
 
-    def __init__(self, station: RobotService, robot: FakeRobot, clock: FakeClock) -> None:
-        self.station = station
+    def __init__(self, service: RobotService, robot: FakeRobot, clock: FakeClock) -> None:
+        self.service = service
         self.robot = robot
         self.clock = clock
         self.line = FakeLine()
         self.watch = ProfileWatch(
-            station, lambda profile: Robot(profile, {}, robot.open), station.replace
+            service, lambda profile: Robot(profile, {}, robot.open), service.replace
         )
         self.client = DevClient(self.line, self.watch, self.line)
         self.task = asyncio.create_task(self.client.serve())
@@ -57,9 +57,9 @@ async def scene(profile: Profile | None = None, secret: str = "") -> AsyncIterat
     """Serve one dev page; it and the station are gone after the test."""
     clock = FakeClock()
     robot = FakeRobot(profile or dashboard_profile(), clock)
-    station = RobotService(Robot(robot.profile, {"password": secret}, robot.open), clock=clock)
-    running = asyncio.create_task(station.run())
-    made = Scene(station, robot, clock)
+    service = RobotService(Robot(robot.profile, {"password": secret}, robot.open), clock=clock)
+    running = asyncio.create_task(service.run())
+    made = Scene(service, robot, clock)
     await settle()
     try:
         yield made
@@ -190,14 +190,14 @@ def with_commands(*names: str, is_held: bool = False) -> Profile:
 async def test_an_open_session_ends_and_the_next_is_of_the_new_version() -> None:
     """Who visits needs not come again."""
     async with scene(with_commands("old")) as it:
-        first = await it.station.live()
+        first = await it.service.live()
         other = FakeRobot(with_commands("new"), it.clock)
-        it.station.replace(Robot(other.profile, {}, other.open))
+        it.service.replace(Robot(other.profile, {}, other.open))
         await settle()
         assert first.ended.is_set()
         assert not it.robot.is_open
         assert other.is_open
-        assert list(it.station.robot.profile.driver.commands) == ["new"]
+        assert list(it.service.robot.profile.driver.commands) == ["new"]
         other.hub.saw(Traffic(it.clock.now(), "wire", "received", b"hello\n"))
         assert (await it.rows())[-1]["data"] == b"hello\n"
 
@@ -205,34 +205,34 @@ async def test_an_open_session_ends_and_the_next_is_of_the_new_version() -> None
 async def test_a_latched_stop_holds_over_a_new_version() -> None:
     """Nothing moves because somebody saved a file; the screens are still known."""
     async with scene(with_commands("go", is_held=True)) as it:
-        controls = it.station.controls
-        seat = controls.sit("", "engineer", lambda: None)
+        controls = it.service.controls
+        operator = controls.sit("", "engineer", lambda: None)
         controls.stop("screen 1")
         await settle()
-        assert it.station.is_at_rest
+        assert it.service.is_at_rest
         other = FakeRobot(with_commands("go", "turn", is_held=True), it.clock)
-        it.station.replace(Robot(other.profile, {}, other.open))
+        it.service.replace(Robot(other.profile, {}, other.open))
         await settle()
-        assert controls.desk.lease.state.latched_by == "screen 1"
+        assert controls.controller.lease.state.latched_by == "screen 1"
         assert controls.commands == ("go", "turn")
-        assert controls.desk.drive(seat.client.id, "reset", it.clock.now()) == ""
+        assert controls.controller.drive(operator.client.id, "reset", it.clock.now()) == ""
 
 
 async def test_a_version_waits_while_somebody_drives(tmp_path: Path) -> None:
     """It is good, and not yet running; it runs when the controls are free."""
     async with scene(with_commands("go", is_held=True)) as it:
-        watch, desk = it.watch, it.station.controls.desk
+        watch, controller = it.watch, it.service.controls.controller
         screen = Screen("s9", "screen 9", "engineer")
-        desk.join(screen)
-        assert desk.drive("s9", "take", it.clock.now()) == ""
+        controller.join(screen)
+        assert controller.drive("s9", "take", it.clock.now()) == ""
         await settle()
         watch._next = with_commands("new")
         assert not watch._try_switch()
-        desk.drive("s9", "leave", it.clock.now())
+        controller.drive("s9", "leave", it.clock.now())
         await settle()
         assert watch._try_switch()
         await settle()
-        assert list(it.station.robot.profile.driver.commands) == ["new"]
+        assert list(it.service.robot.profile.driver.commands) == ["new"]
         assert (watch.state, watch.told) == ("running", "was saved and is running now")
 
 
@@ -243,12 +243,12 @@ async def test_a_version_that_cannot_be_made_changes_nothing() -> None:
         def refuse(_: Profile) -> Robot:
             raise UrcError("--set speed: 'x' is no number")
 
-        watch = ProfileWatch(it.station, refuse, it.station.replace)
+        watch = ProfileWatch(it.service, refuse, it.service.replace)
         watch._next = with_commands("new")
         assert watch._try_switch()
         assert watch.state == "broken"
         assert "'x' is no number" in watch.told
-        assert list(it.station.robot.profile.driver.commands) == ["old"]
+        assert list(it.service.robot.profile.driver.commands) == ["old"]
 
 
 async def test_a_broken_version_is_told_in_the_terminal(caplog: pytest.LogCaptureFixture) -> None:

@@ -31,9 +31,9 @@ async def test_a_robot_that_is_added_can_be_looked_at_and_one_that_is_removed_is
     ships = fleet(first)
     async with asyncio.timeout(10), ships.running():
         ships.add("rover", served(second))
-        station = ships.stations["rover"]
-        with station.visit(), ships.stations["puppet"].visit():
-            live = await station.live()
+        service = ships.stations["rover"]
+        with service.visit(), ships.stations["puppet"].visit():
+            live = await service.live()
             await ships.stations["puppet"].live()
             assert (first.is_open, second.is_open) == (True, True)
             await ships.remove("rover")

@@ -139,8 +139,8 @@ def client() -> TestClient:
 def test_the_gallery_lists_every_widget_and_the_menu_leads_there(client: TestClient) -> None:
     """With its title and what it is for."""
     page = client.get("/widgets").text
-    shelf = WidgetFolder(shipped("widgets"))
-    for name in shelf.names():
+    registry = WidgetFolder(shipped("widgets"))
+    for name in registry.names():
         assert f'href="/widgets/{name}/"' in page
     assert 'href="/widgets"' in client.get("/").text
 

@@ -19,12 +19,12 @@ async def test_a_server_that_was_held_up_stops_what_moves() -> None:
         await it.clock.hold_up(0.2)
         assert [note.text for note in it.hub.notes] == ["the server was blocked for 150 ms"]
         it.tick(ann)
-        assert it.movers.texts[-1] == "drive speed=0.5"
+        assert it.backend.texts[-1] == "drive speed=0.5"
         await it.clock.hold_up(0.7)
-        assert it.movers.texts[-1] == "drive stop"
+        assert it.backend.texts[-1] == "drive stop"
         assert {"t": "stopped", "command": "drive", "reason": "expired"} in it.read(ann)
         it.tick(ann)
-        assert it.movers.texts[-1] == "drive stop"
+        assert it.backend.texts[-1] == "drive stop"
         assert it.controls.watch.count == 2
         assert len(it.hub.notes) == 1
 
@@ -36,7 +36,7 @@ async def test_a_server_that_was_held_up_says_no_stop_twice() -> None:
         it.say(ann, "take")
         it.tick(ann)
         await it.clock.hold_up(0.9)
-        assert it.movers.texts == ["drive speed=0.5", "drive stop"]
+        assert it.backend.texts == ["drive speed=0.5", "drive stop"]
         it.controls.handle(ann, wire.Release("drive"))
         it.say(ann, "take")
         it.tick(ann)
@@ -44,4 +44,4 @@ async def test_a_server_that_was_held_up_says_no_stop_twice() -> None:
         await settle()
         for _ in range(3):
             await it.clock.hold_up(0.9)
-        assert it.movers.texts == ["drive speed=0.5", "drive stop"] * 2
+        assert it.backend.texts == ["drive speed=0.5", "drive stop"] * 2

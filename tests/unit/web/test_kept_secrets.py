@@ -52,7 +52,7 @@ def served(
     data: Path, wire: Wire, given: Mapping[str, Value] | None = None
 ) -> Iterator[TestClient]:
     """Serve what is installed to a browser at this machine."""
-    workshop = RobotOptions(
+    robot_options = RobotOptions(
         data,
         make=wire.robot,
         tried=wire.session,
@@ -62,7 +62,7 @@ def served(
         shows_installed=True,
     )
     with TestClient(
-        build_app({}, access=ACCESS, data=data, workshop=workshop),
+        build_app({}, access=ACCESS, data=data, robot_options=robot_options),
         base_url=ADDRESS,
         headers={"origin": ADDRESS},
         cookies=HERE,

@@ -25,7 +25,7 @@ from urc.web.manage.upload_source import given_source
 ADDRESS = "http://localhost:8080"
 
 
-def workshop(data: Path, **more: Any) -> RobotOptions:
+def robot_options(data: Path, **more: Any) -> RobotOptions:
     """Return what makes robots that are not there."""
 
     def untried(*_: object) -> Any:
@@ -47,7 +47,7 @@ def served(
 ) -> Iterator[TestClient]:
     """Give a browser, with a key or without, at a dashboard with its managers."""
     robots = {one.name: Robot(one, {}, FakeRobot(one).open) for one in profiles}
-    app = build_app(robots, access=OPEN, data=data, workshop=workshop(data, **more))
+    app = build_app(robots, access=OPEN, data=data, robot_options=robot_options(data, **more))
     with TestClient(
         app,
         base_url=ADDRESS,
@@ -121,7 +121,7 @@ def test_only_pages_of_ours_have_repositories_asked(
 ) -> None:
     """A picture in a foreign page is a GET, and a GET sends nothing to anybody."""
     asked: list[bool] = []
-    monkeypatch.setattr(PackageCatalog, "ask", lambda self, force=False: asked.append(force))
+    monkeypatch.setattr(PackageCatalog, "refresh", lambda self, force=False: asked.append(force))
     with served(tmp_path) as client:
         for query in ("", "?anew", "?force=true"):
             assert client.get(f"/api/v1/packages{query}").status_code == 200
@@ -192,8 +192,8 @@ def test_a_damaged_package_costs_its_own_card(tmp_path: Path) -> None:
         page = client.get("/").text
         assert "It cannot be used" in page
         assert "Connect to Puppet" in page
-        shelf = client.get("/api/v1/packages?kinds=driver").json()
-        assert "damaged" in shelf["installed"][0]["fault"]
+        cache = client.get("/api/v1/packages?kinds=driver").json()
+        assert "damaged" in cache["installed"][0]["fault"]
 
 
 def test_a_store_that_cannot_be_read_costs_no_robot(tmp_path: Path) -> None:

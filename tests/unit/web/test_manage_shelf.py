@@ -32,10 +32,10 @@ def test_a_page_that_was_told_too_little_is_told_to_ask_once_more() -> None:
     nothing = SimpleNamespace(installed=list)
     manager: Any = SimpleNamespace(
         catalogue=Catalogue(),
-        garage=SimpleNamespace(store=nothing),
+        factory=SimpleNamespace(store=nothing),
         jobs=SimpleNamespace(newest=None),
     )
-    first = Manager.shelf(manager, "", ("driver",), may_manage=True)
+    first = Manager.cache(manager, "", ("driver",), may_manage=True)
     assert (first.repositories, first.is_asking) == ((), True)
-    second = Manager.shelf(manager, "", ("driver",), may_manage=True)
+    second = Manager.cache(manager, "", ("driver",), may_manage=True)
     assert (second.repositories, second.is_asking) == ((LAB,), False)

@@ -23,7 +23,10 @@ WELL = ("<b>{{ title }}</b>", {"title": "A & B"})
 def _bare(monkeypatch: pytest.MonkeyPatch) -> None:
     """Render everything anew, with less time than there is, so that no test waits long."""
     monkeypatch.setattr(isolated_markup, "_made", {})
-    less = "from urc.web.show import isolated_markup; isolated_markup.PROCESSOR_S = 1; isolated_markup._main()"
+    less = (
+        "from urc.web.show import isolated_markup; "
+        "isolated_markup.PROCESSOR_S = 1; isolated_markup._main()"
+    )
     monkeypatch.setattr(isolated_markup, "_COMMAND", ("-P", "-c", less))
 
 
@@ -67,10 +70,10 @@ def test_a_cell_of_a_foreign_widget_is_rendered_apart(
     signal = next(iter(profile.driver.signals))
     use = WidgetUse("dial", "dial", inputs={"level": signal})
     profile = profile._replace(widgets={**profile.widgets, "dial": widget})
-    border = WidgetTrust()
-    render_foreign([(use, profile)], border)
+    trust = WidgetTrust()
+    render_foreign([(use, profile)], trust)
     monkeypatch.setattr(isolated_markup, "_COMMAND", ("-c", "raise SystemExit(1)"))
-    there = widget_cell(0, use, profile, border)
+    there = widget_cell(0, use, profile, trust)
     here = widget_cell(0, use, profile, WidgetTrust.of(["dial"]))
     assert (there.html, there.error) == (here.html, "")
     assert here.html

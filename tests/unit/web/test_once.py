@@ -43,7 +43,7 @@ async def test_a_page_that_only_watches_gives_no_command_and_may_stop() -> None:
         assert {(one.what, one.outcome) for one in it.audit} == {("refused", WATCHES)}
         it.line.say({"t": "stop"})
         await settle()
-        assert it.station.controls.desk.lease.state.latched_by == "screen 1"
+        assert it.service.controls.controller.lease.state.latched_by == "screen 1"
 
 
 async def test_what_moves_by_itself_needs_no_lease_and_is_refused_after_a_stop() -> None:
@@ -69,14 +69,14 @@ async def test_what_moves_by_itself_needs_no_lease_and_is_refused_after_a_stop()
 async def test_what_moves_by_itself_is_refused_while_somebody_else_drives() -> None:
     """Whoever has the controls may give it."""
     async with scene(commands=FOLD) as it:
-        other = it.station.controls.sit("10.0.0.7", "driver", lambda: None)
-        it.station.controls.handle(other, Drive("take"))
+        other = it.service.controls.sit("10.0.0.7", "driver", lambda: None)
+        it.service.controls.handle(other, Drive("take"))
         it.line.say({"t": "run", "id": 1, "command": "fold"})
         it.line.say({"t": "run", "id": 2, "command": "ask"})
         await settle()
         assert refusals(it.line) == ["screen 2 at 10.0.0.7 has the controls"]
         assert [name for name, _ in it.robot.commands] == ["ask"]
-        it.station.controls.handle(other, Drive("leave"))
+        it.service.controls.handle(other, Drive("leave"))
         it.line.say({"t": "drive", "verb": "take"})
         it.line.say({"t": "run", "id": 3, "command": "fold"})
         await settle()
@@ -107,8 +107,8 @@ async def test_what_moves_for_some_values_is_refused_for_those_while_somebody_el
     text = WriteSpec("text", {})
     command = Command("steer", "wire", text, {"mode": mode}, moves=True, moves_if=moves_if)
     async with scene(commands={"steer": command}) as it:
-        other = it.station.controls.sit("10.0.0.7", "driver", lambda: None)
-        it.station.controls.handle(other, Drive("take"))
+        other = it.service.controls.sit("10.0.0.7", "driver", lambda: None)
+        it.service.controls.handle(other, Drive("take"))
         for number, given in enumerate((4, 10, 10.0, "fast")):
             it.line.say(
                 {"t": "run", "id": number, "command": "steer", "arguments": {"mode": given}}
@@ -138,7 +138,7 @@ async def test_a_stop_that_is_latched_holds_in_the_next_session() -> None:
         assert not it.robot.is_open
         it.robot.latched.clear()
         line = FakeLine()
-        task = asyncio.create_task(BrowserClient(line, it.station, line).serve())
+        task = asyncio.create_task(BrowserClient(line, it.service, line).serve())
         await settle()
         assert it.robot.latched == ["stopped by screen 1: reset it first"]
         line.leave()
@@ -184,7 +184,7 @@ async def test_a_stop_that_did_not_reach_the_robot_is_given_until_it_does() -> N
         it.robot.command = known  # type: ignore[method-assign]
         await it.clock.advance(2)
         assert it.robot.commands == [("halt", {})]
-        assert it.station.controls.desk.is_confirmed
+        assert it.service.controls.controller.is_confirmed
 
 
 async def test_a_stop_that_the_robot_refuses_has_reached_it() -> None:

@@ -39,9 +39,9 @@ def robot() -> tuple[Hub, ImageCache, FakeClock]:
 
 def looking_at(*names: str) -> ImageSubscription:
     """Return a client that shows these."""
-    looks = ImageSubscription()
-    looks.show(names)
-    return looks
+    subscription = ImageSubscription()
+    subscription.show(names)
+    return subscription
 
 
 def header(index: int, age_ms: int, now_ms: int) -> bytes:
@@ -93,29 +93,29 @@ def test_a_frame_has_the_length_that_the_protocol_wants(size: int) -> None:
 
 def test_who_was_away_gets_the_newest_and_no_other() -> None:
     """Three came, one is sent; then there is nothing until the next."""
-    hub, shelf, clock = robot()
-    looks = looking_at("left")
+    hub, cache, clock = robot()
+    subscription = looking_at("left")
     for data in (b"one", b"two", b"three"):
         hub.publish([Sample("left", data, clock.now())])
-    made = shelf.next_image(looks)
+    made = cache.next_image(subscription)
     assert made is not None
     assert made.frame.endswith(b"three")
-    assert shelf.next_image(looks) is None
+    assert cache.next_image(subscription) is None
     hub.publish(
         [Sample("left", b"three", clock.now())]
     )  # the same bytes are news: they are younger
-    assert shelf.next_image(looks) is not None
+    assert cache.next_image(subscription) is not None
 
 
 async def test_an_image_is_encoded_once_for_all_who_take_it_soon() -> None:
     """Later ones get its age of then."""
-    hub, shelf, clock = robot()
+    hub, cache, clock = robot()
     hub.publish([Sample("left", JPEG, clock.now())])
-    one, two = shelf.next_image(looking_at("left")), shelf.next_image(looking_at("left"))
+    one, two = cache.next_image(looking_at("left")), cache.next_image(looking_at("left"))
     assert one is not None
     assert one is two
     await clock.advance(SHARED_FOR_S + 0.01)
-    three = shelf.next_image(looking_at("left"))
+    three = cache.next_image(looking_at("left"))
     assert three is not None
     assert three.number == one.number
     assert three.frame != one.frame
@@ -123,12 +123,12 @@ async def test_an_image_is_encoded_once_for_all_who_take_it_soon() -> None:
 
 def test_two_cameras_take_turns_however_fast_one_is() -> None:
     """A client that can take one image at a time gets both."""
-    hub, shelf, clock = robot()
-    looks = looking_at("left", "right")
+    hub, cache, clock = robot()
+    subscription = looking_at("left", "right")
     order = []
     for _ in range(4):
         hub.publish([Sample("left", b"L", clock.now()), Sample("right", b"R", clock.now())])
-        made = shelf.next_image(looks)
+        made = cache.next_image(subscription)
         assert made is not None
         order.append(made.sample.signal)
     assert order == ["left", "right", "left", "right"]
@@ -136,21 +136,21 @@ def test_two_cameras_take_turns_however_fast_one_is() -> None:
 
 def test_nobody_gets_what_is_no_image_or_is_not_there() -> None:
     """Names come from a page: any text may be among them."""
-    hub, shelf, clock = robot()
+    hub, cache, clock = robot()
     hub.publish([Sample("a", 1.0, clock.now()), Sample("right", None, clock.now())])
-    assert shelf.next_image(looking_at("a", "left", "right", "__proto__", "")) is None
+    assert cache.next_image(looking_at("a", "left", "right", "__proto__", "")) is None
 
 
 def test_a_camera_that_is_shown_again_is_sent_again() -> None:
     """The page may have thrown its image away meanwhile."""
-    hub, shelf, clock = robot()
+    hub, cache, clock = robot()
     hub.publish([Sample("left", JPEG, clock.now())])
-    looks = looking_at("left")
-    assert shelf.next_image(looks) is not None
-    looks.show(())
-    assert shelf.next_image(looks) is None
-    looks.show(("left",))
-    assert shelf.next_image(looks) is not None
+    subscription = looking_at("left")
+    assert cache.next_image(subscription) is not None
+    subscription.show(())
+    assert cache.next_image(subscription) is None
+    subscription.show(("left",))
+    assert cache.next_image(subscription) is not None
 
 
 def test_images_are_no_part_of_the_frames_of_values() -> None:
@@ -174,11 +174,11 @@ async def test_a_slow_line_drops_images_and_costs_nobody_else_any() -> None:
     clock = FakeClock()
     profile = dashboard_profile(signals={"cam": Signal("cam", "image")}, uses=[USE])
     robot = FakeRobot(profile, clock)
-    station = RobotService(Robot(profile, {}, robot.open), clock=clock)
-    running = asyncio.create_task(station.run())
+    service = RobotService(Robot(profile, {}, robot.open), clock=clock)
+    running = asyncio.create_task(service.run())
     quick, slow = FakeLine(), FakeLine()
     tasks = [
-        asyncio.create_task(BrowserClient(line, station, line).serve()) for line in (quick, slow)
+        asyncio.create_task(BrowserClient(line, service, line).serve()) for line in (quick, slow)
     ]
     try:
         await settle()

@@ -41,24 +41,24 @@ def test_who_has_a_key_is_counted_by_it_and_not_by_the_address() -> None:
 
 
 @pytest.mark.parametrize(
-    ("guest", "seats"),
+    ("peer", "operators"),
     [
         (SocketPeer("192.0.2.7", "driver", "at 192.0.2.7"), SEATS),
         (SocketPeer("", "engineer", "here browser 1", True), KNOWN_SEATS),
     ],
 )
 def test_one_visitor_has_a_bounded_number_of_seats_at_a_robot(
-    guest: SocketPeer, seats: int
+    peer: SocketPeer, operators: int
 ) -> None:
     profile = dashboard_profile()
-    station = RobotService(Robot(profile, {}, FakeRobot(profile).open), clock=FakeClock())
+    service = RobotService(Robot(profile, {}, FakeRobot(profile).open), clock=FakeClock())
     with ExitStack() as open_ones:
-        for _ in range(seats):
-            assert station.has_seat_for(guest)
-            open_ones.enter_context(station.visit(guest.who))
-        assert not station.has_seat_for(guest)
-        assert station.has_seat_for(guest._replace(who="at 192.0.2.8", is_known=False))
-    assert station.has_seat_for(guest)
+        for _ in range(operators):
+            assert service.has_seat_for(peer)
+            open_ones.enter_context(service.visit(peer.who))
+        assert not service.has_seat_for(peer)
+        assert service.has_seat_for(peer._replace(who="at 192.0.2.8", is_known=False))
+    assert service.has_seat_for(peer)
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,7 @@ class Doubled(Scene):
         return {
             "t": "tick",
             "command": "drive",
-            "epoch": self.controls.desk.lease.state.epoch,
+            "epoch": self.controls.controller.lease.state.epoch,
             "number": number,
             "echo": self.beats["s1"],
             "arguments": {"speed": speed},
@@ -89,7 +89,7 @@ async def test_what_comes_on_both_lines_counts_once_whichever_is_first() -> None
         await it.on_main(it.tick_of(2, 0.2))
         await it.on_main(it.tick_of(3, 0.3))
         await it.clock.advance(0.05)
-        assert it.movers.texts == [f"drive speed={value}" for value in (0.1, 0.2, 0.3)]
+        assert it.backend.texts == [f"drive speed={value}" for value in (0.1, 0.2, 0.3)]
         assert [one for one in it.audit if one.what == "refused"] == []
 
 
@@ -102,11 +102,11 @@ async def test_a_tick_that_was_held_up_moves_nothing_that_was_let_go_since() -> 
         await it.on_spare(let_go)
         await it.on_main(late)
         await it.clock.advance(0.1)
-        assert it.movers.texts == ["drive speed=0.5", "drive stop"]
+        assert it.backend.texts == ["drive speed=0.5", "drive stop"]
         await it.on_spare(it.tick_of(4, 0.25))
         await it.on_main(let_go)
         await it.clock.advance(0.1)
-        assert it.movers.texts[2:] == ["drive speed=0.25"]
+        assert it.backend.texts[2:] == ["drive speed=0.25"]
 
 
 async def test_a_stop_counts_once_so_that_it_does_not_come_back_after_a_reset() -> None:
@@ -114,12 +114,12 @@ async def test_a_stop_counts_once_so_that_it_does_not_come_back_after_a_reset() 
     async with doubled() as it:
         stop = {"t": "stop", "number": 7}
         await it.on_spare(stop)
-        assert it.controls.desk.lease.state.latched_by == "screen 1"
+        assert it.controls.controller.lease.state.latched_by == "screen 1"
         it.say(it.ann, "reset")
         await it.on_main(stop)
-        assert it.controls.desk.lease.state.latched_by == ""
+        assert it.controls.controller.lease.state.latched_by == ""
         await it.on_main({"t": "stop"})
-        assert it.controls.desk.lease.state.latched_by == "screen 1"
+        assert it.controls.controller.lease.state.latched_by == "screen 1"
 
 
 async def test_both_lines_are_told_the_beats() -> None:
@@ -142,7 +142,7 @@ async def test_a_second_line_ends_with_its_page_and_with_the_next_one() -> None:
         await settle()
         assert it.line.was_aborted
         await it.on_spare(it.tick_of(1))
-        assert it.movers.texts == []
+        assert it.backend.texts == []
         it.controls.rise(it.ann)
         assert other.was_aborted
 
@@ -184,7 +184,7 @@ async def test_it_takes_nothing_but_numbered_words_of_held_controls(said: dict[s
         assert it.line.closed[0] == CLOSE_NOT_TAKEN
         assert it.ann.spare is None
         await it.on_main(it.tick_of(5))
-        assert it.movers.texts == ["drive speed=0.5"]
+        assert it.backend.texts == ["drive speed=0.5"]
 
 
 async def test_a_flood_closes_it() -> None:
@@ -200,6 +200,6 @@ async def test_a_flood_closes_it() -> None:
 async def test_viewers_are_told_no_key() -> None:
     """They drive nothing."""
     async with scene() as it:
-        seat = it.controls.sit("", "viewer", lambda: None)
-        (lease,) = it.read(seat)
+        operator = it.controls.sit("", "viewer", lambda: None)
+        (lease,) = it.read(operator)
         assert lease["spare"] == ""

@@ -22,13 +22,13 @@ async def stationed(
 ) -> AsyncIterator[RobotService]:
     """Run a station for the fake robot."""
     open_session = opener or robot.open
-    station = RobotService(
+    service = RobotService(
         Robot(robot.profile, {"host": "127.0.0.1"}, open_session),  # type: ignore[arg-type]
         clock=clock,
     )
-    task = asyncio.create_task(station.run())
+    task = asyncio.create_task(service.run())
     try:
-        yield station
+        yield service
     finally:
         task.cancel()
         await settle()
@@ -38,14 +38,14 @@ async def test_the_session_lives_from_the_first_client_to_the_last() -> None:
     """Two clients share one session; two seconds after they have gone it is closed."""
     clock = FakeClock()
     robot = FakeRobot(dashboard_profile(), clock)
-    async with stationed(robot, clock) as station:
+    async with stationed(robot, clock) as service:
         await settle()
         assert robot.opened == 0
         with ExitStack() as both:
-            both.enter_context(station.visit())
-            first = await station.live()
-            both.enter_context(station.visit())
-            assert await station.live() is first
+            both.enter_context(service.visit())
+            first = await service.live()
+            both.enter_context(service.visit())
+            assert await service.live() is first
             assert (robot.opened, robot.is_open) == (1, True)
         await clock.advance(1.9)
         assert robot.is_open
@@ -58,13 +58,13 @@ async def test_a_reload_keeps_the_session() -> None:
     """A client that is back within the time finds the same session."""
     clock = FakeClock()
     robot = FakeRobot(dashboard_profile(), clock)
-    async with stationed(robot, clock) as station:
-        with station.visit():
-            first = await station.live()
+    async with stationed(robot, clock) as service:
+        with service.visit():
+            first = await service.live()
         await clock.advance(1.0)
-        with station.visit():
+        with service.visit():
             await clock.advance(10.0)
-            assert await station.live() is first
+            assert await service.live() is first
             assert robot.is_open
         assert robot.opened == 1
 
@@ -73,12 +73,12 @@ async def test_a_client_that_comes_too_late_gets_a_new_session() -> None:
     """After the session was closed, the next client opens another."""
     clock = FakeClock()
     robot = FakeRobot(dashboard_profile(), clock)
-    async with stationed(robot, clock) as station:
-        with station.visit():
-            first = await station.live()
+    async with stationed(robot, clock) as service:
+        with service.visit():
+            first = await service.live()
         await clock.advance(3.0)
-        with station.visit():
-            assert await station.live() is not first
+        with service.visit():
+            assert await service.live() is not first
         assert robot.opened == 2
 
 
@@ -95,19 +95,19 @@ async def test_a_session_that_cannot_be_opened_is_told_and_tried_again() -> None
         async with robot.open() as session:
             yield session
 
-    async with stationed(robot, clock, opener) as station:
-        with station.visit():
+    async with stationed(robot, clock, opener) as service:
+        with service.visit():
             with pytest.raises(SessionFailed) as caught:
-                await station.live()
+                await service.live()
             assert str(caught.value) == "no such host"
-            waiting = asyncio.ensure_future(station.live())
+            waiting = asyncio.ensure_future(service.live())
             await settle()
             await clock.advance(1.1)
             with pytest.raises(SessionFailed) as caught:
                 await waiting
             assert "failed" in str(caught.value)
             assert "a bug" not in str(caught.value)
-            waiting = asyncio.ensure_future(station.live())
+            waiting = asyncio.ensure_future(service.live())
             await settle()
             await clock.advance(1.1)
             assert (await waiting).session is robot
@@ -131,29 +131,29 @@ async def test_a_robot_that_is_held_off_is_let_go_of_and_comes_back() -> None:
     """Whoever looks on waits for the next session; without anybody nothing is opened."""
     clock = FakeClock()
     robot = FakeRobot(dashboard_profile(), clock)
-    async with stationed(robot, clock) as station:
-        with station.visit():
-            first = await station.live()
+    async with stationed(robot, clock) as service:
+        with service.visit():
+            first = await service.live()
             release = asyncio.Event()
-            holding = asyncio.create_task(_hold(station, release))
+            holding = asyncio.create_task(_hold(service, release))
             await clock.advance(0.1)
             assert (robot.is_open, first.ended.is_set()) == (False, True)
-            with station.visit():
+            with service.visit():
                 await clock.advance(0.1)
                 assert not robot.is_open
             release.set()
             await holding
-            assert await station.live() is not first
+            assert await service.live() is not first
             assert robot.opened == 2
         await clock.advance(2.1)
-        async with station.held_off():
-            assert not station.is_open
+        async with service.held_off():
+            assert not service.is_open
         await settle()
         assert robot.opened == 2
 
 
-async def _hold(station: RobotService, release: asyncio.Event) -> None:
-    async with station.held_off():
+async def _hold(service: RobotService, release: asyncio.Event) -> None:
+    async with service.held_off():
         await release.wait()
 
 
@@ -169,8 +169,8 @@ async def test_an_alarm_that_rings_early_ends_the_session_all_the_same() -> None
     """Else a robot would stay connected for ever after Back."""
     clock = HastyClock()
     robot = FakeRobot(dashboard_profile(), clock)
-    async with stationed(robot, clock) as station:
-        with station.visit():
-            await station.live()
+    async with stationed(robot, clock) as service:
+        with service.visit():
+            await service.live()
         await clock.advance(2.1)
         assert not robot.is_open

@@ -23,14 +23,14 @@ _T = TypeVar("_T")
 
 
 def link_slots(
-    sources: Sources, driver: Driver, shelf: WidgetFolder, findings: Problems
+    sources: Sources, driver: Driver, registry: WidgetFolder, findings: Problems
 ) -> dict[str, WidgetUse]:
     """Return the widget of each slot, before the changes of an interface."""
     slots: dict[str, WidgetUse] = {}
     for slot, parts in sources.slots.items():
         use: WidgetUse | None = None
         for part in parts:
-            use = _use(part, use, driver, shelf, findings) or use
+            use = _use(part, use, driver, registry, findings) or use
         if use is not None:
             slots[slot] = use
     return slots
@@ -41,7 +41,7 @@ def link_interface(
     interface: Interface,
     slots: Mapping[str, WidgetUse],
     driver: Driver | None,
-    shelf: WidgetFolder,
+    registry: WidgetFolder,
     findings: Problems,
 ) -> Interface:
     """Return the interface with its own changes to the slots.
@@ -59,7 +59,7 @@ def link_interface(
                 key=True,
                 hint=did_you_mean(slot, shown, "slots"),
             )
-        use = _use(inner, slots.get(slot), driver, shelf, findings)
+        use = _use(inner, slots.get(slot), driver, registry, findings)
         if use is not None:
             uses[slot] = use
     if interface.background and driver is not None:
@@ -85,7 +85,7 @@ def _use(
     part: Node,
     base: WidgetUse | None,
     driver: Driver | None,
-    shelf: WidgetFolder,
+    registry: WidgetFolder,
     findings: Problems,
 ) -> WidgetUse | None:
     """Return the slot `base` with the changes at `part`; None when they were reported."""
@@ -97,18 +97,18 @@ def _use(
                 "missing-key",
                 f"'use' is missing: no widget fills {part.name!r}",
                 key=True,
-                hint=shelf.hint(""),
+                hint=registry.hint(""),
             )
         return None
-    widget = shelf.get(name)
+    widget = registry.get(name)
     if widget is None:
-        if not shelf.has(name):
+        if not registry.has(name):
             findings.error(
                 part,
                 "unknown-widget",
                 f"there is no widget {name!r}",
                 at="use",
-                hint=shelf.hint(name),
+                hint=registry.hint(name),
             )
         return None  # a broken manifest is reported in its own file
     bound = _bindings(part, widget, base, driver, findings)

@@ -55,7 +55,7 @@ class DeclaredChecksum(NamedTuple):
     is_from_hex: bool
     closes: bool
     before: bytes
-    trail: "DeclaredTrailer | None" = None
+    trailer: "DeclaredTrailer | None" = None
     """Place after a text; `at` is then None."""
 
     @property
@@ -77,7 +77,7 @@ def parse_checksum(part: Node, encoding: str, findings: Problems) -> DeclaredChe
     is_from_hex = part.flag("from_hex", default=False)
     closes = part.text("on_error", "drop") == "close"
     before = parse_bytes(part.get("before"), encoding, findings)
-    trail = _trail(part, encoding, findings) if _TRAIL_KEYS & part.data.keys() else None
+    trailer = _trailer(part, encoding, findings) if _TRAIL_KEYS & part.data.keys() else None
     if algorithm is None or salt is None:
         return None
     place = None if at is None or isinstance(at.data, str) else int(at.data)
@@ -93,7 +93,7 @@ def parse_checksum(part: Node, encoding: str, findings: Problems) -> DeclaredChe
         is_from_hex,
         closes,
         before or b"",
-        trail,
+        trailer,
     )
 
 
@@ -106,7 +106,7 @@ def values_of(algorithm: CrcSpec | FoldSpec | str) -> frozenset[int]:
     return frozenset((one & mask) + algorithm.added & 0xFF | algorithm.ored for one in every)
 
 
-def _trail(part: Node, encoding: str, findings: Problems) -> DeclaredTrailer | None:
+def _trailer(part: Node, encoding: str, findings: Problems) -> DeclaredTrailer | None:
     """Return the place of the checksum at `part` after a text; None for a fixed place."""
     mark = parse_bytes(part.get("after"), encoding, findings) or b""
     each = parse_bytes(part.get("each"), encoding, findings) or b""

@@ -53,11 +53,13 @@ def parse_layout(part: Node, encoding: str, findings: Problems, longest: int) ->
             _check_loose(part, findings)
     found = [parse_checksum(one, encoding, findings) for one in checksums_of(part)]
     written = [one for one in found if one is not None]
-    trailing = [one for one in written if one.trail is not None]
+    trailing = [one for one in written if one.trailer is not None]
     digits = _digits(part, findings)
     if trailing:
         _check_trail(part, trailing[0], len(written), findings)
-        layout = FrameLayout(start, end, len(start), len(end), trail=_trail_of(trailing[0], start))
+        layout = FrameLayout(
+            start, end, len(start), len(end), trailer=_trail_of(trailing[0], start)
+        )
     else:
         layout = _placed(part, frame, written, findings)
     _check_size(part, layout, longest, findings)
@@ -91,15 +93,15 @@ def _check_trail(part: Node, written: DeclaredChecksum, count: int, findings: Pr
 
 
 def _trail_of(written: DeclaredChecksum, start: bytes) -> TrailerSpec:
-    trail = written.trail
-    if trail is None:
+    trailer = written.trailer
+    if trailer is None:
         raise AssertionError("a checksum in a fixed place is not a trailer")
     over = written.over
     if not isinstance(over, ByteRange):
-        over = ByteRange(len(start) if over == "payload" and not trail.each else 0)
+        over = ByteRange(len(start) if over == "payload" and not trailer.each else 0)
     checksum = _spec_of(written, over, -written.size)
     return TrailerSpec(
-        checksum, trail.mark, trail.is_padded, trail.is_optional, trail.each, trail.skip
+        checksum, trailer.mark, trailer.is_padded, trailer.is_optional, trailer.each, trailer.skip
     )
 
 

@@ -84,7 +84,7 @@ def _check_raw(
 ) -> None:
     """Warn of a binary checksum that may contain a delimiter."""
     specs = () if layout.digits else (*layout.checksums, layout.checksum)
-    trailing = layout.trail.checksum if layout.trail else None
+    trailing = layout.trailer.checksum if layout.trailer else None
     ends = options["tx"] + options["rx"]
     for spec in (*specs, trailing):
         if spec is not None and spec.spelling == "raw" and values_of(spec.algorithm) & {*ends}:

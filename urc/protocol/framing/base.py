@@ -6,7 +6,7 @@ Pure. Each framing works in both directions, so that the emulated robot uses the
 Theory of operation. A decoder removes frames from the front of a `ReceiveBuffer`, one per call. The
 rest stays there, so that another decoder can continue when a reply has its own framing. Memory is
 bounded: the buffer never exceeds the longest frame. Time is linear: bytes are scanned once, or
-again only within the budget of `Credit`. After invalid bytes the decoder reports one violation, and
+again only within a `RescanBudget`. After invalid bytes the decoder reports one violation, and
 continues where the next frame may begin.
 """
 
@@ -172,10 +172,10 @@ def seal_of(spec: FramingSpec) -> FrameCodec | None:
     return None if layout is None or layout == FrameLayout() else FrameCodec(layout)
 
 
-def sealed(seal: FrameCodec | None, payload: bytes, max_bytes: int) -> bytes:
+def sealed(codec: FrameCodec | None, payload: bytes, max_bytes: int) -> bytes:
     """Return the frame around `payload`; raise `FramingError` if it cannot be framed."""
     try:
-        frame = payload if seal is None else seal.close(payload)
+        frame = payload if codec is None else codec.close(payload)
     except BadFrame as error:
         raise FramingError(str(error)) from None
     if len(frame) > max_bytes:

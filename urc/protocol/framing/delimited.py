@@ -24,7 +24,7 @@ class DelimiterFraming(NamedTuple):
     tx: bytes
     rx: bytes
     max_bytes: int
-    seal: FrameCodec | None = None
+    codec: FrameCodec | None = None
 
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> "DelimiterFraming":
@@ -34,7 +34,7 @@ class DelimiterFraming(NamedTuple):
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        frame = payload if self.seal is None else sealed(self.seal, payload, self.max_bytes)
+        frame = payload if self.codec is None else sealed(self.codec, payload, self.max_bytes)
         if self.tx and self.tx in frame:
             raise FramingError(
                 f"{payload!r} contains the delimiter {self.tx!r}: it would be two frames"
@@ -44,7 +44,7 @@ class DelimiterFraming(NamedTuple):
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder."""
         return DelimiterDecoder(
-            stream, self.rx, self.max_bytes, None if self.seal is None else self.seal.open
+            stream, self.rx, self.max_bytes, None if self.codec is None else self.codec.open
         )
 
     def reversed(self) -> "DelimiterFraming":

@@ -33,7 +33,7 @@ __all__ = ["EscapedFraming"]
 class EscapedFraming(NamedTuple):
     """Start, stuffed content, end; a delimited frame may have another end in each direction."""
 
-    seal: FrameCodec
+    codec: FrameCodec
     stuffing: Stuffing
     tx: bytes
     rx: bytes
@@ -50,13 +50,13 @@ class EscapedFraming(NamedTuple):
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        frame = sealed(self.seal, payload, self.max_bytes)
-        start, end = self.seal.layout.start, self.seal.layout.end
+        frame = sealed(self.codec, payload, self.max_bytes)
+        start, end = self.codec.layout.start, self.codec.layout.end
         inner = frame[len(start) : len(frame) - len(end)]
         if not inner:
             raise FramingError("an empty frame cannot be sent between two markers")
         content = self.stuffing.stuff(inner)
-        if self.stuffing.spec.after and self.seal.length is None and self.tx in content:
+        if self.stuffing.spec.after and self.codec.length is None and self.tx in content:
             raise FramingError(f"{payload!r} contains the end of a frame, {self.tx!r}")
         is_bare = self.stuffing.is_doubled and start == self.stuffing.escape
         if is_bare and inner[:1] in (start, end[1:]):
@@ -65,9 +65,9 @@ class EscapedFraming(NamedTuple):
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder."""
-        layout = self.seal.layout
-        if isinstance(self.seal.length, LengthField):
-            return _LengthDecoder(stream, self, self.seal.length)
+        layout = self.codec.layout
+        if isinstance(self.codec.length, LengthField):
+            return _LengthDecoder(stream, self, self.codec.length)
         if self.stuffing.is_doubled and self.stuffing.escape in layout.start[:1] + self.rx[:1]:
             return _DoubledDecoder(stream, self)
         most = 2 * self.max_bytes
@@ -83,12 +83,12 @@ class EscapedFraming(NamedTuple):
 
     def opened(self, content: bytes) -> bytes:
         """Return the payload of the content between the markers; raise `BadFrame`."""
-        layout = self.seal.layout
+        layout = self.codec.layout
         frame = layout.start + self.stuffing.unstuff(content) + layout.end
         if len(frame) > self.max_bytes:
             text = f"a frame has more than {self.max_bytes} bytes; dropped"
             raise BadFrame("frame-too-long", text)
-        return self.seal.open(frame)
+        return self.codec.open(frame)
 
     def opened_between(self, start: bytes, end: bytes, frame: bytes) -> bytes:
         """Return the payload of a frame with its markers; raise `BadFrame`."""
@@ -101,7 +101,7 @@ class _DoubledDecoder(StreamDecoder):
     def __init__(self, stream: ReceiveBuffer | None, framing: EscapedFraming) -> None:
         super().__init__(stream, 2 * framing.max_bytes)
         self._open: Open = framing.opened
-        self._start, self._end = framing.seal.layout.start, framing.rx
+        self._start, self._end = framing.codec.layout.start, framing.rx
         self._escape = framing.stuffing.escape
         self._searched = -1
         """Number of frame bytes without a marker; -1 before a frame has begun."""
@@ -191,8 +191,8 @@ class _LengthDecoder(StreamDecoder):
         self, stream: ReceiveBuffer | None, framing: EscapedFraming, length: LengthField
     ) -> None:
         super().__init__(stream, framing.max_bytes)
-        self._seal, self._stuffing, self._length = framing.seal, framing.stuffing, length
-        layout = framing.seal.layout
+        self._codec, self._stuffing, self._length = framing.codec, framing.stuffing, length
+        layout = framing.codec.layout
         self._start, self._end = layout.start, layout.end
         self._least = max(layout.head + layout.tail, length.end + layout.tail, 1)
         self._credit = RescanBudget()
@@ -266,7 +266,7 @@ class _LengthDecoder(StreamDecoder):
         """Decode the complete frame."""
         size = self._taken + len(self._end)
         try:
-            payload = self._seal.open(self._start + bytes(self._plain.plain) + self._end)
+            payload = self._codec.open(self._start + bytes(self._plain.plain) + self._end)
         except BadFrame as error:
             if error.code == SKIPPED:
                 self._move(size)

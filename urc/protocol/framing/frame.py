@@ -85,8 +85,8 @@ class FrameCodec:
         specs = (*layout.checksums, *((layout.checksum,) if layout.checksum else ()))
         self._checksums = tuple(Checksum(one) for one in specs)
         self._stuffing = Stuffing(layout.escape) if layout.escape else None
-        self._trail = ChecksumTrailer(layout.trail, layout.start) if layout.trail else None
-        self._is_text = layout.trail is not None or layout.digits != ""
+        self._trailer = ChecksumTrailer(layout.trailer, layout.start) if layout.trailer else None
+        self._is_text = layout.trailer is not None or layout.digits != ""
         is_plain = (
             not layout.checksums
             and layout.escape is None
@@ -144,16 +144,16 @@ class FrameCodec:
         if len(frame) < len(start) + len(end):
             raise BadFrame("short-frame", f"{len(frame)} bytes are too few for this kind of frame")
         content = frame[len(start) : len(frame) - len(end)]
-        if self._trail is not None:
-            content = self._trail.take_off(content)
+        if self._trailer is not None:
+            content = self._trailer.take_off(content)
         return start + _bytes_of(content, self.layout.digits) + end
 
     def _spelt(self, frame: bytes) -> bytes:
         """Return the frame in its wire form; the inverse of `_read`."""
         start, end = self.layout.start, self.layout.end
         content = _digits_of(frame[len(start) : len(frame) - len(end)], self.layout.digits)
-        if self._trail is not None:
-            content = self._trail.put_on(content)
+        if self._trailer is not None:
+            content = self._trailer.put_on(content)
         return start + content + end
 
 

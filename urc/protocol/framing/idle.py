@@ -14,7 +14,7 @@ class IdleFraming(NamedTuple):
     """A frame ends after `gap_s` seconds of silence."""
 
     gap_s: float
-    seal: FrameCodec | None
+    codec: FrameCodec | None
     max_bytes: int
 
     @classmethod
@@ -24,7 +24,7 @@ class IdleFraming(NamedTuple):
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        return sealed(self.seal, payload, self.max_bytes)
+        return sealed(self.codec, payload, self.max_bytes)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder."""
@@ -38,7 +38,7 @@ class IdleFraming(NamedTuple):
 class DatagramFraming(NamedTuple):
     """Each receive gives one frame."""
 
-    seal: FrameCodec | None
+    codec: FrameCodec | None
     max_bytes: int
 
     @classmethod
@@ -48,11 +48,11 @@ class DatagramFraming(NamedTuple):
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        return sealed(self.seal, payload, self.max_bytes)
+        return sealed(self.codec, payload, self.max_bytes)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder."""
-        return _WholeDecoder(stream, self.seal, self.max_bytes)
+        return _WholeDecoder(stream, self.codec, self.max_bytes)
 
     def reversed(self) -> "DatagramFraming":
         """Return the same framing for the other end of the connection."""
@@ -63,10 +63,10 @@ class _WholeDecoder(StreamDecoder):
     """Takes all received bytes as one frame."""
 
     def __init__(
-        self, stream: ReceiveBuffer | None, seal: FrameCodec | None, max_bytes: int
+        self, stream: ReceiveBuffer | None, codec: FrameCodec | None, max_bytes: int
     ) -> None:
         super().__init__(stream, max_bytes)
-        self._seal = seal
+        self._codec = codec
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
         stream = self._stream
@@ -78,7 +78,7 @@ class _WholeDecoder(StreamDecoder):
             text = f"a frame has {len(frame)} bytes, more than {self._max_bytes}; dropped"
             return FrameFault("frame-too-long", text)
         try:
-            return frame if self._seal is None else self._seal.open(frame)
+            return frame if self._codec is None else self._codec.open(frame)
         except BadFrame as error:
             return self._refused(error)
 
@@ -90,7 +90,7 @@ class _IdleDecoder(_WholeDecoder):
     """
 
     def __init__(self, stream: ReceiveBuffer | None, framing: IdleFraming) -> None:
-        super().__init__(stream, framing.seal, framing.max_bytes)
+        super().__init__(stream, framing.codec, framing.max_bytes)
         self._gap_s = framing.gap_s
         self._newest: float | None = None
         """Time of the newest byte; None for an empty buffer."""

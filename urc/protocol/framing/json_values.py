@@ -36,7 +36,7 @@ class JsonFraming(NamedTuple):
     """One JSON object or array is one frame; `tx` follows each sent frame."""
 
     tx: bytes
-    seal: FrameCodec | None
+    codec: FrameCodec | None
     max_bytes: int
     is_reversed: bool = False
 
@@ -47,7 +47,7 @@ class JsonFraming(NamedTuple):
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        frame = sealed(self.seal, payload, self.max_bytes)
+        frame = sealed(self.codec, payload, self.max_bytes)
         if _JsonDecoder(None, b"", None, self.max_bytes).feed(frame) != [frame.strip(_BETWEEN)]:
             raise FramingError(f"{payload[:80]!r} is not one JSON object or array")
         return frame if self.is_reversed else frame + self.tx
@@ -55,7 +55,7 @@ class JsonFraming(NamedTuple):
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder."""
         between = self.tx if self.is_reversed else b""
-        return _JsonDecoder(stream, between, self.seal, self.max_bytes)
+        return _JsonDecoder(stream, between, self.codec, self.max_bytes)
 
     def reversed(self) -> "JsonFraming":
         """Return the same framing for the other end of the connection."""
@@ -64,10 +64,10 @@ class JsonFraming(NamedTuple):
 
 class _JsonDecoder(StreamDecoder):
     def __init__(
-        self, stream: ReceiveBuffer | None, between: bytes, seal: FrameCodec | None, max_bytes: int
+        self, stream: ReceiveBuffer | None, between: bytes, codec: FrameCodec | None, max_bytes: int
     ) -> None:
         super().__init__(stream, max_bytes)
-        self._seal = seal
+        self._codec = codec
         self._blank = re.compile(b"[" + re.escape(_BETWEEN + between) + b"]*")
         self.restart()
 
@@ -147,7 +147,7 @@ class _JsonDecoder(StreamDecoder):
             text = f"a JSON value has {size} bytes, more than {self._max_bytes}; dropped"
             return FrameFault("frame-too-long", text)
         try:
-            return frame if self._seal is None else self._seal.open(frame)
+            return frame if self._codec is None else self._codec.open(frame)
         except BadFrame as error:
             return FrameFault(error.code, str(error), error.closes)
 

@@ -29,7 +29,7 @@ __all__ = ["LengthFraming"]
 class LengthFraming(NamedTuple):
     """Frames of a fixed size, or with a length field; the same in both directions."""
 
-    seal: FrameCodec
+    codec: FrameCodec
     max_bytes: int
 
     @classmethod
@@ -39,11 +39,11 @@ class LengthFraming(NamedTuple):
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        return sealed(self.seal, payload, self.max_bytes)
+        return sealed(self.codec, payload, self.max_bytes)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder."""
-        return _MeasuredDecoder(stream, self.seal, self.max_bytes)
+        return _MeasuredDecoder(stream, self.codec, self.max_bytes)
 
     def reversed(self) -> "LengthFraming":
         """Return the same framing for the other end of the connection."""
@@ -51,12 +51,12 @@ class LengthFraming(NamedTuple):
 
 
 class _MeasuredDecoder(StreamDecoder):
-    def __init__(self, stream: ReceiveBuffer | None, seal: FrameCodec, max_bytes: int) -> None:
+    def __init__(self, stream: ReceiveBuffer | None, codec: FrameCodec, max_bytes: int) -> None:
         super().__init__(stream, max_bytes)
-        layout = seal.layout
-        self._seal = seal
+        layout = codec.layout
+        self._codec = codec
         self._start, self._end = layout.start, layout.end
-        self._size, self._length = layout.size, seal.length
+        self._size, self._length = layout.size, codec.length
         self._header = self._length.end if self._length else 0
         parts = (layout.head + layout.tail, self._header + layout.tail, len(layout.start))
         self._least = max(*parts, 1)
@@ -74,7 +74,7 @@ class _MeasuredDecoder(StreamDecoder):
             if len(data) < end:
                 return None
             try:
-                payload = self._seal.open(bytes(data[stream.at : end]))
+                payload = self._codec.open(bytes(data[stream.at : end]))
             except BadFrame:
                 pass  # reported below
             else:
@@ -115,7 +115,7 @@ class _MeasuredDecoder(StreamDecoder):
     def _frame(self, frame: bytes) -> bytes | FrameFault | None:
         """Return the payload, a violation, or None for a violation that was already reported."""
         try:
-            payload = self._seal.open(frame)
+            payload = self._codec.open(frame)
         except BadFrame as error:
             if error.code == SKIPPED:
                 self._move(len(frame))

@@ -40,7 +40,7 @@ class RegexFraming(NamedTuple):
 
     search: Search
     tx: bytes
-    seal: FrameCodec | None
+    codec: FrameCodec | None
     max_bytes: int
     is_reversed: bool = False
 
@@ -53,7 +53,7 @@ class RegexFraming(NamedTuple):
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        frame = sealed(self.seal, payload, self.max_bytes)
+        frame = sealed(self.codec, payload, self.max_bytes)
         if self.tx and not self.is_reversed:
             if self.tx in frame:
                 raise FramingError(f"{payload!r} contains {self.tx!r}: it would be two frames")
@@ -66,9 +66,9 @@ class RegexFraming(NamedTuple):
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder."""
         if self.tx and self.is_reversed:
-            opened = None if self.seal is None else self.seal.open
+            opened = None if self.codec is None else self.codec.open
             return DelimiterDecoder(stream, self.tx, self.max_bytes, opened)
-        return _RegexDecoder(stream, self.search, self.seal, self.max_bytes)
+        return _RegexDecoder(stream, self.search, self.codec, self.max_bytes)
 
     def reversed(self) -> "RegexFraming":
         """Return the same framing for the other end of the connection."""
@@ -94,11 +94,11 @@ def _searcher(pattern: str) -> Search:
 
 class _RegexDecoder(StreamDecoder):
     def __init__(
-        self, stream: ReceiveBuffer | None, search: Search, seal: FrameCodec | None, max_bytes: int
+        self, stream: ReceiveBuffer | None, search: Search, codec: FrameCodec | None, max_bytes: int
     ) -> None:
         super().__init__(stream, max_bytes)
         self._search = search
-        self._seal = seal
+        self._codec = codec
         self._tried = 0
         """Number of searched bytes without a match."""
         self._newest = 0.0
@@ -149,7 +149,7 @@ class _RegexDecoder(StreamDecoder):
                 return FrameFault("frame-too-long", text)
             self._is_lost = False
             try:
-                return frame if self._seal is None else self._seal.open(frame)
+                return frame if self._codec is None else self._codec.open(frame)
             except BadFrame as error:
                 fault = self._refused(error)
             if fault is not None:
@@ -172,7 +172,7 @@ class BracketsFraming(NamedTuple):
     Frames are not nested: at a second opening marker, the frame begins again.
     """
 
-    seal: FrameCodec
+    codec: FrameCodec
     max_bytes: int
 
     @classmethod
@@ -182,8 +182,8 @@ class BracketsFraming(NamedTuple):
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        frame = sealed(self.seal, payload, self.max_bytes)
-        layout = self.seal.layout
+        frame = sealed(self.codec, payload, self.max_bytes)
+        layout = self.codec.layout
         inner = frame[len(layout.start) : len(frame) - len(layout.end)]
         for mark in (layout.start, layout.end):
             if mark in inner:
@@ -194,8 +194,8 @@ class BracketsFraming(NamedTuple):
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder."""
-        layout = self.seal.layout
-        return BracketsDecoder(stream, layout.start, layout.end, self.seal.open, self.max_bytes)
+        layout = self.codec.layout
+        return BracketsDecoder(stream, layout.start, layout.end, self.codec.open, self.max_bytes)
 
     def reversed(self) -> "BracketsFraming":
         """Return the same framing for the other end of the connection."""

@@ -25,7 +25,7 @@ _BLOCK: Final = 254
 class SlipFraming(NamedTuple):
     """Frames that end with END (0xC0), which is escaped inside."""
 
-    seal: FrameCodec | None
+    codec: FrameCodec | None
     max_bytes: int
 
     @classmethod
@@ -35,7 +35,7 @@ class SlipFraming(NamedTuple):
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        frame = sealed(self.seal, payload, self.max_bytes)
+        frame = sealed(self.codec, payload, self.max_bytes)
         if not frame:
             raise FramingError("SLIP cannot send an empty frame")
         return frame.replace(_ESCAPE, _ESCAPED_ESCAPE).replace(_END, _ESCAPED_END) + _END
@@ -43,7 +43,7 @@ class SlipFraming(NamedTuple):
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder."""
         most = 2 * self.max_bytes
-        opened = _opener(_from_slip, self.seal, self.max_bytes)
+        opened = _opener(_from_slip, self.codec, self.max_bytes)
         return DelimiterDecoder(stream, _END, most, opened, skips_empty=True)
 
     def reversed(self) -> "SlipFraming":
@@ -54,7 +54,7 @@ class SlipFraming(NamedTuple):
 class CobsFraming(NamedTuple):
     """Frames that end with a zero byte and contain no other zero."""
 
-    seal: FrameCodec | None
+    codec: FrameCodec | None
     max_bytes: int
 
     @classmethod
@@ -64,12 +64,12 @@ class CobsFraming(NamedTuple):
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        return _to_cobs(sealed(self.seal, payload, self.max_bytes)) + b"\0"
+        return _to_cobs(sealed(self.codec, payload, self.max_bytes)) + b"\0"
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder."""
         most = self.max_bytes + self.max_bytes // _BLOCK + 1
-        opened = _opener(_from_cobs, self.seal, self.max_bytes)
+        opened = _opener(_from_cobs, self.codec, self.max_bytes)
         return DelimiterDecoder(stream, b"\0", most, opened, skips_empty=True)
 
     def reversed(self) -> "CobsFraming":
@@ -78,13 +78,13 @@ class CobsFraming(NamedTuple):
 
 
 def _opener(
-    unstuffed: Callable[[bytes], bytes], seal: FrameCodec | None, max_bytes: int
+    unstuffed: Callable[[bytes], bytes], codec: FrameCodec | None, max_bytes: int
 ) -> Callable[[bytes], bytes]:
     def opened(stuffed: bytes) -> bytes:
         frame = unstuffed(stuffed)
         if len(frame) > max_bytes:
             raise BadFrame("frame-too-long", f"a frame has more than {max_bytes} bytes; dropped")
-        return frame if seal is None else seal.open(frame)
+        return frame if codec is None else codec.open(frame)
 
     return opened
 

@@ -94,7 +94,7 @@ def value_of(signal: Signal, kind: str, is_plain: bool) -> Value | None:
 
 
 def _scaled(coefficients: tuple[float, ...], number: str) -> str | None:
-    """Return the source of the arithmetic of `urc.protocol.values.convert` for a scale and an offset."""
+    """Return the source of the arithmetic of `values.convert` for a scale and an offset."""
     if len(coefficients) != 2:
         return None
     offset, scale = coefficients

@@ -50,7 +50,7 @@ class Readings:
             for name, one in signals.items()
             if one.limits != AlarmLimits()
         }
-        self._steady = {
+        self._change_filter = {
             name: DataChangeFilter(one)
             for name, one in signals.items()
             if one.deadband or one.debounce_s
@@ -83,7 +83,7 @@ class Readings:
                     refused.append(f"{name}: {error}")
                 else:
                     sample = Sample(name, value, now, self.alarm(name, value, now))
-                    told = self._report(sample, now) if self._steady else sample
+                    told = self._report(sample, now) if self._change_filter else sample
                     if told is not None:
                         samples.append(told)
             if self._kept:
@@ -100,8 +100,8 @@ class Readings:
 
     def alarm(self, name: str, value: Reading, now: float) -> Alarm:
         """Update the alarm state of a signal, and return it."""
-        judge = self._judges.get(name)
-        return "" if judge is None else judge.judge(value, now)
+        alarm_monitor = self._judges.get(name)
+        return "" if alarm_monitor is None else alarm_monitor.alarm_monitor(value, now)
 
     def judges(self, name: str) -> bool:
         """Return whether the signal has limits."""
@@ -114,15 +114,15 @@ class Readings:
     @property
     def is_timed(self) -> bool:
         """Whether time alone can change a sample."""
-        return bool(self._timed or self._steady)
+        return bool(self._timed or self._change_filter)
 
     @property
     def deadline(self) -> float | None:
         """Time at which `tick` may have samples; None when only a frame can change them."""
-        if not self._timed and not self._steady:
+        if not self._timed and not self._change_filter:
             return None
         times = [self._judges[name].deadline for name in self._timed]
-        times += [one.deadline for one in self._steady.values()]
+        times += [one.deadline for one in self._change_filter.values()]
         return min((time for time in times if time is not None), default=None)
 
     def tick(self, now: float) -> list[Sample]:
@@ -131,8 +131,8 @@ class Readings:
         The list has the newest samples of signals with a new alarm, and debounced values.
         """
         samples: list[Sample] = []
-        if self._steady:
-            settled = (one.tick(now) for one in self._steady.values())
+        if self._change_filter:
+            settled = (one.tick(now) for one in self._change_filter.values())
             samples += [sample for sample in settled if sample is not None]
             self.follow(samples, [], now)
         for name in self._timed:
@@ -158,7 +158,7 @@ class Readings:
             except (BadValue, ExpressionError) as error:
                 refused.append(f"{computed.name}: {error}")
                 continue
-            if sample is not None and self._steady:
+            if sample is not None and self._change_filter:
                 sample = self._report(sample, now)
             if sample is not None:
                 samples.append(sample)
@@ -167,8 +167,8 @@ class Readings:
 
     def _report(self, sample: Sample, now: float) -> Sample | None:
         """Return the sample to report; None while dead band or debounce suppress it."""
-        steady = self._steady.get(sample.signal)
-        return sample if steady is None else steady.filter(sample, now)
+        change_filter = self._change_filter.get(sample.signal)
+        return sample if change_filter is None else change_filter.filter(sample, now)
 
     def _store(self, sample: Sample) -> None:
         if sample.signal in self._kept:

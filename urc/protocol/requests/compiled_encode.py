@@ -46,7 +46,7 @@ def build_fast_encode(
     slow: Encode,
 ) -> Encode | None:
     """Return the function from namespace to bytes, or None for an unsupported template."""
-    if type(framing) is not DelimiterFraming or framing.seal is not None:
+    if type(framing) is not DelimiterFraming or framing.codec is not None:
         return None
     names = sorted(template.names)
     kinds = {name: arguments[name].type for name in names if name in arguments}

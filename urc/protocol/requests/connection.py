@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Literal
 
 from urc.model.driver import TransportSpec
+from urc.model.payload import Envelope, Payload, traffic_of
 from urc.protocol.events import Close, Ready, Violation
 from urc.protocol.framing.base import Framing
 from urc.protocol.framing.table import build_framing
@@ -22,7 +23,7 @@ from urc.protocol.requests.hold_replies import HoldReplies
 from urc.protocol.requests.pending_replies import PendingReplies
 from urc.protocol.requests.rate import Counters
 from urc.protocol.requests.reply_match import Matcher
-from urc.protocol.requests.request_queue import RequestQueue
+from urc.protocol.requests.request_queue import RequestQueue, rendered_size
 
 __all__ = ["Connection"]
 
@@ -50,9 +51,9 @@ class Connection:
         self.on_refused: Callable[[str, str], None] | None = None
         """Called with a held command and the refusal of the robot; must not call the conversation
         back."""
-        self._flights = PendingReplies()
-        self._outbox = RequestQueue(spec, self._flights, self._size_of)
-        self.inbox = FrameReceiver(spec, self.framing, messages)
+        self._pending_replies = PendingReplies()
+        self._request_queue = RequestQueue(spec, self._pending_replies, self._size_of)
+        self.receiver = FrameReceiver(spec, self.framing, messages)
         self.held = HoldReplies()
         """Replies to hold-to-run commands."""
         self.is_behind = False
@@ -102,7 +103,7 @@ class Connection:
         if self.state == "closed":
             return []
         events: list[LineEvent] = []
-        was_open, pending = self.state == "open", self.inbox.decoder.pending
+        was_open, pending = self.state == "open", self.receiver.decoder.pending
         if was_open and pending:
             text = f"the connection ended in the middle of a frame ({pending} bytes)"
             events.append(Violation(self.spec.name, "cut-frame", text))
@@ -113,7 +114,7 @@ class Connection:
         """Close the connection for a reason; its requests fail."""
         if self.state == "closed":
             return []
-        reason = self.inbox.secrets.hide(reason)
+        reason = self.receiver.secrets.hide(reason)
         events = self._lose(reason)
         events.append(Close(self.spec.name, reason))
         return events + self._pump(now)
@@ -139,29 +140,29 @@ class Connection:
     def _lose(self, reason: str) -> list[LineEvent]:
         """Discard the connection, and fail its requests."""
         lost = self._lost()
-        for exchange in tuple(self._outbox):
+        for exchange in tuple(self._request_queue):
             if exchange.is_privileged:
-                self._outbox.remove(exchange)
+                self._request_queue.remove(exchange)
         self._reset("closed")
-        return _disconnected(lost, self.inbox.secrets.hide(reason))
+        return _disconnected(lost, self.receiver.secrets.hide(reason))
 
     def _lost(self) -> list[Exchange]:
         """Remove the requests that end with this connection, and return them."""
-        lost = self._flights.drain()
+        lost = self._pending_replies.drain()
         if not self.is_per_request:
-            return lost + self._outbox.drain()
+            return lost + self._request_queue.drain()
         if not (self.is_ready or self._is_leaving):
-            for exchange in list(self._outbox)[:1]:  # its connection did not become ready
-                self._outbox.remove(exchange)
+            for exchange in list(self._request_queue)[:1]:  # its connection did not become ready
+                self._request_queue.remove(exchange)
                 lost.append(exchange)
         return lost
 
     def _reset(self, state: Literal["closed", "open"]) -> None:
         self.state = state
         self.is_ready = self._is_leaving = False
-        self._flights.clear()
+        self._pending_replies.clear()
         self.held.forget()
-        self.inbox.reset(is_new=state == "open")
+        self.receiver.reset(is_new=state == "open")
         self._misses = 0
         self._silent_at = None
         self.is_behind = False
@@ -175,8 +176,17 @@ class Connection:
             self._silent_at = now + self.spec.stale_after_s
 
     def _size_of(self, exchange: Exchange) -> int:
-        """Return the size of a request on the wire, in bytes."""
-        raise NotImplementedError
+        return rendered_size(exchange, self.counters, self.learnt)
+
+    def _as_sent(self, exchange: Exchange, number: int | None) -> Payload:
+        """Return the payload of a request, and register its secrets for redaction."""
+        data = exchange.data
+        assert data is not None  # noqa: S101 - it was made just before
+        if exchange.is_secret:
+            self.receiver.secrets.add(traffic_of(data), self.spec.encoding)
+        if isinstance(data, Envelope) and number is not None:
+            data = data._replace(attributes={**data.attributes, "id": number})
+        return data
 
     def _pump(self, now: float) -> list[LineEvent]:
         """Send queued requests, as far as the state of the connection allows."""

@@ -18,12 +18,10 @@ replies in a row the connection is closed and opened again.
 """
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from functools import partial
 
-from urc.expressions import COUNTERS
 from urc.model.driver import TransportSpec
-from urc.model.payload import CountedFrame, Envelope, Numbered, Payload, size_of, traffic_of
+from urc.model.payload import CountedFrame, Envelope, Numbered, Payload, size_of
 from urc.model.values import Sample
 from urc.protocol.events import Open, Send, Violation
 from urc.protocol.forms.http_head import is_redirect
@@ -45,7 +43,7 @@ from urc.protocol.requests.exchange import (
 from urc.protocol.requests.hold_replies import HoldRejected
 from urc.protocol.requests.pending_replies import PendingReply
 from urc.protocol.requests.reply_match import Expectation, Matched, Matcher, MatchResult
-from urc.protocol.requests.request_queue import written
+from urc.protocol.requests.request_queue import render_retry, written
 from urc.protocol.times import soonest
 from urc.protocol.values.payload import Frame
 
@@ -77,23 +75,29 @@ class Conversation(Connection):
     @property
     def deadline(self) -> float | None:
         """Time at which `tick` has work, or None."""
-        flights = self._flights
-        due = None if not flights else flights[0].due if len(flights) == 1 else flights.deadline
-        if not (self._outbox or self._silent_at or self.inbox.is_timed):
+        pending_replies = self._pending_replies
+        due = (
+            None
+            if not pending_replies
+            else pending_replies[0].due
+            if len(pending_replies) == 1
+            else pending_replies.deadline
+        )
+        if not (self._request_queue or self._silent_at or self.receiver.is_timed):
             return due
-        times = [due, self.inbox.decoder.deadline, self._silent_at]
-        if self._outbox:
-            times += [exchange.gives_up_at for exchange in self._outbox]
+        times = [due, self.receiver.decoder.deadline, self._silent_at]
+        if self._request_queue:
+            times += [exchange.gives_up_at for exchange in self._request_queue]
             if self.state != "opening":
                 is_ready = self.is_ready or self.state == "closed"
-                times.append(self._outbox.may_send_at(is_ready=is_ready))
+                times.append(self._request_queue.may_send_at(is_ready=is_ready))
         return soonest(times)
 
     def has(self, label: str) -> bool:
         """Return whether a request with that label is queued or in flight."""
-        if not (self._flights or self._outbox):
+        if not (self._pending_replies or self._request_queue):
             return False
-        return self._flights.has(label) or self._outbox.has(label)
+        return self._pending_replies.has(label) or self._request_queue.has(label)
 
     # -- motion, whose frames bypass the queue
 
@@ -101,7 +105,7 @@ class Conversation(Connection):
         """Return whether a frame of motion has to wait for an outstanding reply."""
         if not self.spec.is_half_duplex:
             return False
-        is_owed = any(not one.is_late for one in self._flights)
+        is_owed = any(not one.is_late for one in self._pending_replies)
         return self.held.must_wait(now, is_owed=is_owed)
 
     def gave_motion(self, command: str, names: Mapping[str, object], now: float) -> None:
@@ -109,21 +113,23 @@ class Conversation(Connection):
         self.held.gave(command, names, now)
         if self.spec.is_half_duplex and now < self.held.owed_until_s:
             self._free_at = now + self._gap_s
-            self._outbox.next_send = max(self._outbox.next_send, self.held.owed_until_s)
+            self._request_queue.next_send = max(
+                self._request_queue.next_send, self.held.owed_until_s
+            )
 
     # -- sending
 
     def submit(self, exchange: Exchange, now: float) -> list[LineEvent]:
         """Queue a request, or send it at once if possible."""
         is_shared = self.is_ready and not self.is_per_request
-        if is_shared and self._outbox.is_free(exchange, now):
+        if is_shared and self._request_queue.is_free(exchange, now):
             return self._send(exchange, now)
         refusal = self._refusal(exchange)
         if refusal:
             return [ExchangeEnded(exchange, ExchangeOutcome("disconnected", refusal))]
         may_pass = self.is_ready or exchange.is_privileged
         if exchange.is_realtime and may_pass and not self.is_per_request:
-            if len(self._flights) >= MOST_IN_FLIGHT:
+            if len(self._pending_replies) >= MOST_IN_FLIGHT:
                 text = f"{MOST_IN_FLIGHT} requests already wait for their replies"
                 return [ExchangeEnded(exchange, ExchangeOutcome("queue-full", text))]
             return self._send(exchange, now) + self._pump(now)
@@ -133,7 +139,7 @@ class Conversation(Connection):
             return [
                 ExchangeEnded(exchange, ExchangeOutcome("bad-argument", f"{text} (queue.bytes)"))
             ]
-        gone = self._outbox.submit(exchange)
+        gone = self._request_queue.submit(exchange)
         events: list[LineEvent] = [] if gone is None else [ExchangeEnded(*gone)]
         return events + self._pump(now)
 
@@ -155,17 +161,22 @@ class Conversation(Connection):
         events: list[LineEvent] = []
         if self.is_behind:
             return events
-        while self._outbox and self.state == "open":
-            exchange = self._outbox.next(now, is_ready=self.is_ready)
+        while self._request_queue and self.state == "open":
+            exchange = self._request_queue.next(now, is_ready=self.is_ready)
             if exchange is None:
                 break
-            self._outbox.remove(exchange)
+            self._request_queue.remove(exchange)
             events += self._send(exchange, now)
         if not self.is_per_request:
             return events
-        if self.state == "open" and self.is_ready and not self._flights and not self._outbox:
+        if (
+            self.state == "open"
+            and self.is_ready
+            and not self._pending_replies
+            and not self._request_queue
+        ):
             events += self.leave(now)
-        if self.state == "closed" and self._outbox.wants_line(now):
+        if self.state == "closed" and self._request_queue.wants_line(now):
             self.state = "opening"
             events.append(Open(self.spec.name))
         return events
@@ -187,14 +198,14 @@ class Conversation(Connection):
                 why = untold(error) if exchange.is_secret else str(error)
                 return [ExchangeEnded(exchange, ExchangeOutcome("bad-argument", why))]
         elif ask.is_fresh:
-            self._freshen(exchange)
+            render_retry(exchange, self.counters, self.learnt)
         data = self._as_sent(exchange, number)
         if exchange.on_sent is not None and not exchange.is_secret:
             exchange.on_sent(data)
         exchange.sent_at = now
         if self.counting is None or ask.label in self.counting:
             self.last_sent = now
-        self._outbox.sent(exchange, now)
+        self._request_queue.sent(exchange, now)
         shared = None
         if count is not None and count.after and self.counters.is_shared:
             again = partial(self._count_again, exchange, number)
@@ -209,37 +220,10 @@ class Conversation(Connection):
             return sent
         if ask.framing is not None:
             self._may_recut = True
-        flight = PendingReply(exchange, now)
-        flight.number, flight.size = number, size_of(data)
-        self._flights.append(flight)
+        pending = PendingReply(exchange, now)
+        pending.number, pending.size = number, size_of(data)
+        self._pending_replies.append(pending)
         return sent
-
-    def _freshen(self, exchange: Exchange) -> None:
-        """Render a repeated request again, with the same numbers but new nonces and times."""
-        draw = self.counters.draw()
-        draw.values.update(exchange.numbers)
-        names = {**self.learnt, **exchange.namespace, COUNTERS: draw}
-        with suppress(BadArgument):  # the earlier rendering succeeded, and remains usable
-            exchange.data = exchange.ask.encode(names)
-
-    def _size_of(self, exchange: Exchange) -> int:
-        if exchange.data is not None:
-            return size_of(exchange.data)
-        names = {**self.learnt, **exchange.namespace, COUNTERS: self.counters.draw()}
-        try:
-            return size_of(exchange.ask.encode(names))
-        except BadArgument:
-            return 0  # the error is reported when the request is sent
-
-    def _as_sent(self, exchange: Exchange, number: int | None) -> Payload:
-        """Return the payload of a request, and register its secrets for redaction."""
-        data = exchange.data
-        assert data is not None  # noqa: S101 - it was made just before
-        if exchange.is_secret:
-            self.inbox.secrets.add(traffic_of(data), self.spec.encoding)
-        if isinstance(data, Envelope) and number is not None:
-            data = data._replace(attributes={**data.attributes, "id": number})
-        return data
 
     def _count_again(self, exchange: Exchange, number: int | None) -> Numbered | None:
         """Render the frame of a request again: another frame has used up its numbers."""
@@ -251,16 +235,16 @@ class Conversation(Connection):
 
     # -- receiving
 
-    def listen(self, ear: Expectation, now: float) -> list[LineEvent]:
+    def listen(self, expectation: Expectation, now: float) -> list[LineEvent]:
         """Add an expectation for frames that are no replies, with its own framing if it has one.
 
         Remaining bytes of the connection may be whole frames in that framing.
         """
-        self.inbox.listen(ear)
-        if ear.answer.framing is None:
+        self.receiver.listen(expectation)
+        if expectation.answer.framing is None:
             return []
         self._may_recut = True
-        return self.process_frames(now) if self.inbox.has_more else []
+        return self.process_frames(now) if self.receiver.has_more else []
 
     def receive(self, data: Payload, now: float) -> list[LineEvent]:
         """Process bytes or an envelope from the transport."""
@@ -274,7 +258,7 @@ class Conversation(Connection):
             return told
         if self._may_recut:
             self._recut()
-        self.inbox.decoder.push(data, now)
+        self.receiver.decoder.push(data, now)
         return self.process_frames(now)
 
     def process_frames(self, now: float) -> list[LineEvent]:
@@ -282,12 +266,12 @@ class Conversation(Connection):
 
         Later frames may belong to the next step, which has to register its expectation first.
         """
-        inbox = self.inbox
+        receiver = self.receiver
         events: list[LineEvent] = []
         while self.state == "open":
             if self._may_recut:
                 self._recut()
-            frame = inbox.decoder.next(now)
+            frame = receiver.decoder.next(now)
             if frame is None:
                 break
             told = self._frame(frame, now)
@@ -297,13 +281,13 @@ class Conversation(Connection):
             ):
                 self.is_behind = self.state == "open"
                 return events
-            if inbox.has_more:
+            if receiver.has_more:
                 events += self._ahead(now)
         # Queued requests may depend on the new samples, so process these first.
-        self.is_behind = bool(events) and bool(self._outbox)
-        if inbox.is_prompted:
-            events += inbox.find_prompt()
-        return events + self._pump(now) if self._outbox or self.is_per_request else events
+        self.is_behind = bool(events) and bool(self._request_queue)
+        if receiver.is_prompted:
+            events += receiver.find_prompt()
+        return events + self._pump(now) if self._request_queue or self.is_per_request else events
 
     def _ahead(self, now: float) -> list[LineEvent]:
         """Process messages at the front of the stream, and report their samples together.
@@ -311,14 +295,18 @@ class Conversation(Connection):
         Frame by frame, a flood of short frames costs almost twice as much (decision 27). The batch
         ends with the expected reply, with a refused value, or before a frame that is no message.
         """
-        inbox, decoder, flight = self.inbox, self.inbox.decoder, self._flights.plain()
-        if self.is_scripted or self._may_recut or inbox.is_listening:
+        receiver, decoder, pending = (
+            self.receiver,
+            self.receiver.decoder,
+            self._pending_replies.plain(),
+        )
+        if self.is_scripted or self._may_recut or receiver.is_listening:
             return []
-        if (self._flights and flight is None) or self.held.is_listening(now):
+        if (self._pending_replies and pending is None) or self.held.is_listening(now):
             return []
         if not isinstance(decoder, DelimiterDecoder):
             return []
-        reply = None if flight is None else flight.exchange.ask.plain
+        reply = None if pending is None else pending.exchange.ask.plain
         samples: list[Sample] = []
         refused: Sequence[str] = ()
         answer: Taken | None = None
@@ -326,7 +314,7 @@ class Conversation(Connection):
         for payload in decoder.ahead():
             frame = Frame(payload, self.spec.encoding)
             answer = None if reply is None else reply.take(frame, now)
-            taken = answer or inbox.messages.decode(frame, now)
+            taken = answer or receiver.messages.decode(frame, now)
             if taken is None:
                 break
             count, size = count + 1, size + len(payload)
@@ -337,34 +325,36 @@ class Conversation(Connection):
             if refused:
                 break
         decoder.skip(count, size)
-        events = inbox.events_of(samples, refused) if count > (answer is not None) else []
-        if flight is not None and answer is not None:
-            events += self._answered(flight, answer, now)
+        events = receiver.events_of(samples, refused) if count > (answer is not None) else []
+        if pending is not None and answer is not None:
+            events += self._answered(pending, answer, now)
         return events
 
     def _recut(self) -> None:
         """Choose the framing: a pending reply or a step may have its own."""
-        framing = (self._flights.framing() if self._flights else None) or self.inbox.framing
+        framing = (
+            self._pending_replies.framing() if self._pending_replies else None
+        ) or self.receiver.framing
         self._may_recut = framing is not None
-        self.inbox.cut_by(framing or self.framing)
+        self.receiver.cut_by(framing or self.framing)
 
     def tick(self, now: float) -> list[LineEvent]:
         """Process every deadline up to `now`."""
         events: list[LineEvent] = []
         if self.state == "open":
-            for frame in self.inbox.decoder.tick(now):
+            for frame in self.receiver.decoder.tick(now):
                 events += self._frame(frame, now)
-        for exchange in tuple(self._outbox):
+        for exchange in tuple(self._request_queue):
             if exchange.gives_up_at <= now:
-                self._outbox.remove(exchange)
+                self._request_queue.remove(exchange)
                 events.append(
                     ExchangeEnded(
                         exchange, ExchangeOutcome("timed-out", "it could not be sent in time")
                     )
                 )
-        if self._flights:
-            for flight in self._flights.overdue(now):
-                events += self._overdue(flight, now)
+        if self._pending_replies:
+            for pending in self._pending_replies.overdue(now):
+                events += self._overdue(pending, now)
         if self._silent_at is not None and self._silent_at <= now:
             self._silent_at = None
             text = f"nothing received for {self.spec.stale_after_s:g} s"
@@ -377,39 +367,45 @@ class Conversation(Connection):
             return [fault, *self.fail(cut.message, now)] if cut.closes else [fault]
         frame = Frame(cut, self.spec.encoding)
         is_motion = self.held.is_listening(now)
-        plain = self._flights.plain() if self._flights and not is_motion else None
+        plain = self._pending_replies.plain() if self._pending_replies and not is_motion else None
         if plain is not None:
             return self._plain(plain, frame, now)
-        if self._flights:
+        if self._pending_replies:
             # Any frame may be a line of a reply, so messages have precedence.
-            message = self.inbox.message(frame, now) if self._flights.collects_lines() else None
-            answered = self._flights.offer(frame, is_message=message is not None)
+            message = (
+                self.receiver.message(frame, now)
+                if self._pending_replies.collects_lines()
+                else None
+            )
+            answered = self._pending_replies.offer(frame, is_message=message is not None)
             if answered is not None:
                 told = self._answer(*answered, frame if message is None else None, now)
                 return told if message is None else message + told
             if message is not None:
                 return message
         of_motion = self._of_motion(frame, now) if is_motion else None
-        return self.inbox.publish(frame, now) if of_motion is None else of_motion
+        return self.receiver.publish(frame, now) if of_motion is None else of_motion
 
-    def _plain(self, flight: PendingReply, frame: Frame, now: float) -> list[LineEvent]:
+    def _plain(self, pending: PendingReply, frame: Frame, now: float) -> list[LineEvent]:
         """Process a frame while the only pending reply consists of samples.
 
         Most requests are of this kind. `_answer` processes the replies of all others.
         """
-        matcher = flight.exchange.ask.plain
+        matcher = pending.exchange.ask.plain
         taken = None if matcher is None else matcher.take(frame, now)
         if taken is None:
-            return self.inbox.publish(frame, now)
-        return self._answered(flight, taken, now)
+            return self.receiver.publish(frame, now)
+        return self._answered(pending, taken, now)
 
-    def _answered(self, flight: PendingReply, taken: Taken, now: float) -> list[LineEvent]:
+    def _answered(self, pending: PendingReply, taken: Taken, now: float) -> list[LineEvent]:
         self._misses = 0
-        self._flights.clear()
+        self._pending_replies.clear()
         samples, refused = taken
-        events = self.inbox.events_of(samples, refused)
+        events = self.receiver.events_of(samples, refused)
         values = {sample.signal: sample.value for sample in samples}
-        events.append(new(ExchangeEnded, (flight.exchange, new(ExchangeOutcome, ("", "", values)))))
+        events.append(
+            new(ExchangeEnded, (pending.exchange, new(ExchangeOutcome, ("", "", values))))
+        )
         return events + self.leave(now) if self.is_per_request and self.is_ready else events
 
     # -- replies: in time, late, or missing
@@ -418,28 +414,28 @@ class Conversation(Connection):
         frame = frame_of(envelope, self.spec.encoding)
         if envelope.verb == "response":
             return self._response(envelope, frame, now)
-        answered = self._flights.offer(frame) if self._flights else None
+        answered = self._pending_replies.offer(frame) if self._pending_replies else None
         if answered:
             return self._answer(*answered, frame, now)
         told = self._of_motion(frame, now) if self.held.is_listening(now) else None
-        return self.inbox.publish(frame, now) if told is None else told
+        return self.receiver.publish(frame, now) if told is None else told
 
     def _response(self, envelope: Envelope, frame: Frame, now: float) -> list[LineEvent]:
         attributes = envelope.attributes
         number, reason = attributes.get("id"), ""
         if not attributes.get("ok", True):
             reason = str(attributes.get("reason") or "the robot refused")
-        flight = self._flights.numbered(number)
-        if flight is None:
+        pending = self._pending_replies.numbered(number)
+        if pending is None:
             if number is None and self.held.is_listening(now):
                 return self._motion_response(frame, attributes, now)
             # The reply belongs to a step, or its request has already timed out.
             asker = self._askers.pop(number, None)
-            return [] if asker is None else self.inbox.answered(asker, frame, reason, now)
-        if reason and flight.ear.answer.takes_redirects and is_redirect(frame):
+            return [] if asker is None else self.receiver.answered(asker, frame, reason, now)
+        if reason and pending.expectation.answer.takes_redirects and is_redirect(frame):
             reason = ""
-        offer = flight.refused(frame, reason) if reason else flight.answer(frame)
-        return self._answer(flight, offer, frame, now)
+        offer = pending.refused(frame, reason) if reason else pending.answer(frame)
+        return self._answer(pending, offer, frame, now)
 
     def _motion_response(
         self, frame: Frame, attributes: Mapping[str, object], now: float
@@ -455,74 +451,76 @@ class Conversation(Connection):
         owed_until_s = self.held.owed_until_s
         told = self._told_of_motion(frame, now)
         if self.held.owed_until_s < owed_until_s and self.spec.is_half_duplex:
-            self._outbox.next_send = self._free_at
+            self._request_queue.next_send = self._free_at
         return told
 
     def _told_of_motion(self, frame: Frame, now: float) -> list[LineEvent] | None:
         refused = self.held.refusals(frame, now)
         if refused:
             return self._motion_refused(refused, frame, now)
-        if self.inbox.is_listening:
+        if self.receiver.is_listening:
             return None  # a sequence waits for a frame, and may match this one
-        message = self.inbox.message(frame, now)
+        message = self.receiver.message(frame, now)
         accepted = self.held.accepted(frame, now) if message is None else None
         if accepted is None:
             return message
         answer, offer = accepted
-        events = self.inbox.dropped(offer) if offer.dropped else []
+        events = self.receiver.dropped(offer) if offer.dropped else []
         if offer.fields is not None:
-            events += self.inbox.samples(answer.matcher, offer.fields, now)[0]
+            events += self.receiver.samples(answer.matcher, offer.fields, now)[0]
         return events
 
     def _motion_refused(
         self, refused: Sequence[HoldRejected], frame: Frame, now: float
     ) -> list[LineEvent]:
-        events: list[LineEvent] = [*(self.inbox.message(frame, now) or ())]
+        events: list[LineEvent] = [*(self.receiver.message(frame, now) or ())]
         for command, offer in refused:
             if offer.told is not None:
-                events += self.inbox.samples(*offer.told, now)[0]
-            why = self.inbox.secrets.hide(offer.refusal)
+                events += self.receiver.samples(*offer.told, now)[0]
+            why = self.receiver.secrets.hide(offer.refusal)
             events.append(Violation(self.spec.name, "motion-refused", f"{command}: {why}"))
             if self.on_refused is not None:
                 self.on_refused(command, why)
         return events
 
     def _answer(
-        self, flight: PendingReply, offer: MatchResult, frame: Frame | None, now: float
+        self, pending: PendingReply, offer: MatchResult, frame: Frame | None, now: float
     ) -> list[LineEvent]:
         """Return the events of a frame with the match result `offer` for a request.
 
         A provisional reply may be a message as well. Without a `frame`, the message has already
         been reported.
         """
-        exchange = flight.exchange
-        events: list[LineEvent] = self.inbox.dropped(offer) if offer.dropped else []
+        exchange = pending.exchange
+        events: list[LineEvent] = self.receiver.dropped(offer) if offer.dropped else []
         if offer.fields is None and not (offer.refusal or offer.aside):
             return events  # more lines follow
         if offer.fields is None and frame is not None:
-            events += self.inbox.message(frame, now) or ()
-        if flight.is_late:
+            events += self.receiver.message(frame, now) or ()
+        if pending.is_late:
             # It also answers a retransmission of the same request.
-            again = self._flights.again(exchange)
+            again = self._pending_replies.again(exchange)
             if again is not None:
                 again.is_late = True
-            elif exchange in self._outbox:
-                self._outbox.remove(exchange)
+            elif exchange in self._request_queue:
+                self._request_queue.remove(exchange)
             elif offer.aside == "extend":
-                flight.extend(now)  # its reply is still pending, and still matches no other request
+                pending.extend(
+                    now
+                )  # its reply is still pending, and still matches no other request
                 return events
             else:
-                return [*events, self._late(flight)]
-            flight.is_late = False
+                return [*events, self._late(pending)]
+            pending.is_late = False
         self._misses = 0
         if offer.told is not None:
-            events += self.inbox.samples(*offer.told, now)[0]
+            events += self.receiver.samples(*offer.told, now)[0]
         if offer.aside == "extend":
-            flight.extend(now)
+            pending.extend(now)
             return events
         if offer.aside == "resend" and exchange.tries_left:
             exchange.tries_left -= 1
-            self._flights.remove(flight)
+            self._pending_replies.remove(pending)
             text = f"the robot asked for {exchange.ask.label} again"
             return [
                 *events,
@@ -534,59 +532,61 @@ class Conversation(Connection):
             text = f"the robot asks for {exchange.ask.label} again after {times} transmissions"
             outcome = ExchangeOutcome("refused", text)
         elif offer.fields is None:
-            outcome = ExchangeOutcome("refused", self.inbox.secrets.hide(offer.refusal))
+            outcome = ExchangeOutcome("refused", self.receiver.secrets.hide(offer.refusal))
         else:
-            told, samples = self.inbox.samples(flight.ear.answer.matcher, offer.fields, now)
+            told, samples = self.receiver.samples(
+                pending.expectation.answer.matcher, offer.fields, now
+            )
             events += told
-            flight.add(offer.fields, samples)
-            if flight.next_stage(now):
+            pending.add(offer.fields, samples)
+            if pending.next_stage(now):
                 return events
-            outcome = ExchangeOutcome(values=flight.values)
-        self._flights.remove(flight)
+            outcome = ExchangeOutcome(values=pending.values)
+        self._pending_replies.remove(pending)
         events.append(ExchangeEnded(exchange, outcome))
         # Each request has its own connection: close after the reply.
         return events + self.leave(now) if self.is_per_request and self.is_ready else events
 
-    def _late(self, flight: PendingReply) -> Violation:
-        self._flights.remove(flight)
-        text = f"the answer to {flight.exchange.ask.label} was late and has been dropped"
+    def _late(self, pending: PendingReply) -> Violation:
+        self._pending_replies.remove(pending)
+        text = f"the answer to {pending.exchange.ask.label} was late and has been dropped"
         return Violation(self.spec.name, "late-reply", text)
 
-    def _silent(self, flight: PendingReply, now: float) -> list[LineEvent]:
+    def _silent(self, pending: PendingReply, now: float) -> list[LineEvent]:
         """Treat the silence of the robot as success."""
-        if flight.next_stage(now):
+        if pending.next_stage(now):
             return []
-        self._flights.remove(flight)
+        self._pending_replies.remove(pending)
         done: list[LineEvent] = [
-            ExchangeEnded(flight.exchange, ExchangeOutcome(values=flight.values))
+            ExchangeEnded(pending.exchange, ExchangeOutcome(values=pending.values))
         ]
         return done + self.leave(now) if self.is_per_request and self.is_ready else done
 
-    def _overdue(self, flight: PendingReply, now: float) -> list[LineEvent]:
-        if flight not in self._flights:
+    def _overdue(self, pending: PendingReply, now: float) -> list[LineEvent]:
+        if pending not in self._pending_replies:
             return []  # the connection was closed because of another request
-        if flight.is_late:
-            self._flights.remove(flight)
+        if pending.is_late:
+            self._pending_replies.remove(pending)
             return []
-        if flight.ear.answer.is_silence:
-            return self._silent(flight, now)
-        exchange, reply_s = flight.exchange, flight.ear.answer.timeout_s
-        text = f"no answer to {exchange.ask.label} {flight.waited(now)}"
-        came = self.inbox.came_since(exchange.sent_at, f"no answer to {exchange.ask.label}")
+        if pending.expectation.answer.is_silence:
+            return self._silent(pending, now)
+        exchange, reply_s = pending.exchange, pending.expectation.answer.timeout_s
+        text = f"no answer to {exchange.ask.label} {pending.waited(now)}"
+        came = self.receiver.came_since(exchange.sent_at, f"no answer to {exchange.ask.label}")
         text += came
-        if came and exchange.ask.match is None and len(self._flights) > 1:
+        if came and exchange.ask.match is None and len(self._pending_replies) > 1:
             text += "; replies in another order than their requests need 'match'"
         events: list[LineEvent] = [Violation(self.spec.name, "reply-timeout", text)]
-        flight.is_late = True
-        flight.due = now + reply_s
-        if exchange.ask.is_repeated and exchange.tries_left and flight.stage == 0:
+        pending.is_late = True
+        pending.due = now + reply_s
+        if exchange.ask.is_repeated and exchange.tries_left and pending.stage == 0:
             exchange.tries_left -= 1
             wait_s = exchange.ask.retry.wait_s(exchange.ask.retries - exchange.tries_left)
             exchange.waits_until = now + wait_s
             exchange.gives_up_at = expires_at(exchange.ask, now + wait_s)
             if self.is_per_request and exchange.ask.learnt:
                 exchange.data = None  # the next connection has a login of its own
-            self._outbox.put_back(exchange)
+            self._request_queue.put_back(exchange)
             return events + self.fail(text, now) if self.is_per_request else events
         events.append(ExchangeEnded(exchange, ExchangeOutcome("timed-out", text)))
         self._misses += not exchange.ask.is_miss_harmless

@@ -82,7 +82,7 @@ class FrameReceiver:
         """Acknowledgements of messages that wait to be sent."""
         self.collectors: list[Collector] = []
         """Collectors of messages, cleared with the connection."""
-        self._ears: list[Expectation] = []
+        self._expectations: list[Expectation] = []
         self._prompt: tuple[Pattern, Expectation] | None = None
         self.is_listening = False
         """Whether an expectation waits for a frame or a prompt."""
@@ -95,7 +95,7 @@ class FrameReceiver:
         """
         self._stream = ReceiveBuffer()
         self._cut(self._framing)
-        self._ears.clear()
+        self._expectations.clear()
         self._prompt = None
         self.is_listening = False
         self.replies.clear()
@@ -122,7 +122,7 @@ class FrameReceiver:
 
     def publish(self, frame: Frame, now: float) -> list[LineEvent]:
         """Return the events of a frame that is no reply."""
-        heard = self._listeners(frame, now) if self._ears else None
+        heard = self._listeners(frame, now) if self._expectations else None
         told = self.message(frame, now)
         if heard is None and told is None:
             fault = self._unknown(frame)
@@ -143,28 +143,35 @@ class FrameReceiver:
         shown = text.removeprefix(_NO_MATCH)
         return f"; {shown} came, which is {instead}" if shown != text else f"; {text}"
 
-    def listen(self, ear: Expectation) -> None:
+    def listen(self, expectation: Expectation) -> None:
         """Add an expectation for frames that are no replies."""
-        self._ears.append(ear)
+        self._expectations.append(expectation)
         self.is_listening = True
 
     @property
     def framing(self) -> Framing | None:
         """Framing of the expectations; None: that of the connection."""
-        return next((ear.answer.framing for ear in self._ears if ear.answer.framing), None)
+        return next(
+            (
+                expectation.answer.framing
+                for expectation in self._expectations
+                if expectation.answer.framing
+            ),
+            None,
+        )
 
-    def look_for(self, pattern: Pattern, ear: Expectation) -> list[LineEvent]:
-        """Look for `pattern` in the text after the last whole frame, for `ear`."""
-        self._prompt = (pattern, ear)
+    def look_for(self, pattern: Pattern, expectation: Expectation) -> list[LineEvent]:
+        """Look for `pattern` in the text after the last whole frame, for `expectation`."""
+        self._prompt = (pattern, expectation)
         self.is_listening = True
         return self.find_prompt()
 
-    def unlisten(self, ear: Expectation) -> None:
+    def unlisten(self, expectation: Expectation) -> None:
         """Remove an expectation."""
-        self._ears = [one for one in self._ears if one is not ear]
-        if self._prompt is not None and self._prompt[1] is ear:
+        self._expectations = [one for one in self._expectations if one is not expectation]
+        if self._prompt is not None and self._prompt[1] is expectation:
             self._prompt = None
-        self.is_listening = bool(self._ears) or self._prompt is not None
+        self.is_listening = bool(self._expectations) or self._prompt is not None
 
     @property
     def is_prompted(self) -> bool:
@@ -175,7 +182,7 @@ class FrameReceiver:
         """Look for the expected prompt."""
         if self._prompt is None:
             return []
-        pattern, ear = self._prompt
+        pattern, expectation = self._prompt
         stream = self._stream
         text = stream.data[stream.at :].decode(self._spec.encoding, "replace")
         if not text or pattern.search(text) is None:
@@ -183,8 +190,8 @@ class FrameReceiver:
         stream.at = len(stream.data)
         self._cut(self._cut_by)
         self._prompt = None
-        self.is_listening = bool(self._ears)
-        return [Matched(ear, MatchResult({}))]
+        self.is_listening = bool(self._expectations)
+        return [Matched(expectation, MatchResult({}))]
 
     def message(self, frame: Frame, now: float) -> list[LineEvent] | None:
         """Return the events of a declared message, or None for other frames."""
@@ -192,22 +199,22 @@ class FrameReceiver:
         return None if taken is None else self.events_of(*taken)
 
     def _listeners(self, frame: Frame, now: float) -> list[LineEvent] | None:
-        for ear in self._ears:
-            offer = ear.offer(frame)
+        for expectation in self._expectations:
+            offer = expectation.offer(frame)
             if offer is not None:
-                return self._match(ear, offer, now)
+                return self._match(expectation, offer, now)
         return None
 
-    def _match(self, ear: Expectation, offer: MatchResult, now: float) -> list[LineEvent]:
+    def _match(self, expectation: Expectation, offer: MatchResult, now: float) -> list[LineEvent]:
         """Return the events of a frame that matches an expectation."""
         events: list[LineEvent] = self.dropped(offer)
         if offer.fields is not None:
-            events += self.samples(ear.answer.matcher, offer.fields, now)[0]
+            events += self.samples(expectation.answer.matcher, offer.fields, now)[0]
         elif offer.told is not None:
             events += self.samples(*offer.told, now)[0]
         if offer.fields is not None or offer.refusal:
-            self.unlisten(ear)
-            events.append(Matched(ear, offer))
+            self.unlisten(expectation)
+            events.append(Matched(expectation, offer))
         return events
 
     def answered(self, asker: object, frame: Frame, refusal: str, now: float) -> list[LineEvent]:
@@ -219,16 +226,16 @@ class FrameReceiver:
             refusal: the refusal of the robot; "" for none.
             now: the time.
         """
-        ear = next((one for one in self._ears if one.owner is asker), None)
-        if ear is None:
+        expectation = next((one for one in self._expectations if one.owner is asker), None)
+        if expectation is None:
             return []
-        offer = ear.offer(frame)
-        is_redirected = ear.answer.takes_redirects and is_redirect(frame)
+        offer = expectation.offer(frame)
+        is_redirected = expectation.answer.takes_redirects and is_redirect(frame)
         if refusal and not is_redirected and (offer is None or not offer.refusal):
             offer = MatchResult(refusal=refusal)
         if offer is None:
             offer = MatchResult(refusal=f"its reply does not match the declaration: {shown(frame)}")
-        return self._match(ear, offer, now)
+        return self._match(expectation, offer, now)
 
     def dropped(self, offer: MatchResult) -> list[LineEvent]:
         """Return the events for collected lines that were no reply."""

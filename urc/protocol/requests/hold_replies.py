@@ -36,10 +36,10 @@ class HoldRejected(NamedTuple):
 class _Listening:
     """The newest frame of one held command."""
 
-    __slots__ = ("_match", "ear", "names", "until_s")
+    __slots__ = ("_match", "expectation", "names", "until_s")
 
     def __init__(self, answer: CompiledReply, match: Template | None) -> None:
-        self.ear = Expectation(answer)
+        self.expectation = Expectation(answer)
         # Many frames are pending, so a number cannot be assigned to one of them: any number
         # matches.
         self._match = None if match is None or "seq" in match.names else match
@@ -78,9 +78,9 @@ class HoldReplies:
         """Record that a frame of a command is sent, with its `names`."""
         one = self._all.get(command)
         if one is not None:
-            self.owed_until_s = now + min(one.ear.answer.timeout_s, LONGEST_WAIT_S)
+            self.owed_until_s = now + min(one.expectation.answer.timeout_s, LONGEST_WAIT_S)
             one.names = names
-            one.until_s = now + one.ear.answer.timeout_s
+            one.until_s = now + one.expectation.answer.timeout_s
             self._until_s = max(self._until_s, one.until_s)
 
     def forget(self) -> None:
@@ -116,7 +116,7 @@ class HoldReplies:
         found = [
             HoldRejected(name, offer)
             for name, one in self._listening(now)
-            if (offer := one.ear.beside(frame, one.is_mine)) is not None and offer.refusal
+            if (offer := one.expectation.beside(frame, one.is_mine)) is not None and offer.refusal
         ]
         if found:
             self.owed_until_s = float("-inf")
@@ -132,10 +132,10 @@ class HoldReplies:
     def accepted(self, frame: Frame, now: float) -> tuple[CompiledReply, MatchResult] | None:
         """Return the match result of an acknowledgement, or None for other frames."""
         for _, one in self._listening(now):
-            offer = one.ear.offer(frame, one.is_mine)
+            offer = one.expectation.offer(frame, one.is_mine)
             if offer is not None:
                 self.owed_until_s = float("-inf")
-                return one.ear.answer, offer
+                return one.expectation.answer, offer
         return None
 
     def _listening(self, now: float) -> list[tuple[str, _Listening]]:

@@ -21,7 +21,7 @@ class PendingReply:
     """One transmission of a request, until its last reply arrives or times out."""
 
     __slots__ = (
-        "_ear",
+        "_expectation",
         "due",
         "exchange",
         "is_extended",
@@ -37,7 +37,7 @@ class PendingReply:
         self.exchange = exchange
         ask = exchange.ask
         self.stage = 0
-        self._ear: Expectation | None = None
+        self._expectation: Expectation | None = None
         self.due = now + ask.answers[0].timeout_s
         """Time at which its reply is overdue. For a late transmission, time at which it is
         removed."""
@@ -55,22 +55,22 @@ class PendingReply:
         """Number that its reply repeats; None: its reply has no number."""
 
     @property
-    def ear(self) -> Expectation:
+    def expectation(self) -> Expectation:
         """Expectation of the present reply, created on demand, since a plain reply needs none."""
-        if self._ear is None:
-            self._ear = Expectation(self.exchange.ask.answers[self.stage])
-        return self._ear
+        if self._expectation is None:
+            self._expectation = Expectation(self.exchange.ask.answers[self.stage])
+        return self._expectation
 
     def answer(self, frame: Frame) -> MatchResult:
         """Return the match result of a frame with the number of this request."""
-        offer = self.ear.offer(frame)
+        offer = self.expectation.offer(frame)
         if offer is None:
             return MatchResult(refusal=f"its reply does not match the declaration: {shown(frame)}")
         return offer
 
     def refused(self, frame: Frame, reason: str) -> MatchResult:
         """Return the refusal of the robot, with the text of the driver if it declares one."""
-        offer = self.ear.offer(frame)
+        offer = self.expectation.offer(frame)
         return offer if offer is not None and offer.refusal else MatchResult(refusal=reason)
 
     def offer(self, frame: Frame, *, is_message: bool = False) -> MatchResult | None:
@@ -81,18 +81,22 @@ class PendingReply:
         if self.number is not None:
             return None  # its reply would carry the number, see `answer`
         is_mine = None if self.exchange.ask.match is None else self._is_mine
-        return self.ear.beside(frame, is_mine) if is_message else self.ear.offer(frame, is_mine)
+        return (
+            self.expectation.beside(frame, is_mine)
+            if is_message
+            else self.expectation.offer(frame, is_mine)
+        )
 
     def extend(self, now: float) -> None:
         """Extend the timeout by one reply time, within the limit of the driver."""
-        answer = self.ear.answer
+        answer = self.expectation.answer
         self.is_extended = True
         late_s = answer.timeout_s if self.is_late else 0.0
         self.due = min(now + answer.timeout_s, self.since + answer.extend_s + late_s)
 
     def waited(self, now: float) -> str:
         """Return the elapsed timeout as text for people."""
-        answer = self.ear.answer
+        answer = self.expectation.answer
         if not self.is_extended:
             return f"within {answer.timeout_s:g} s"
         if now >= self.since + answer.extend_s:
@@ -105,7 +109,7 @@ class PendingReply:
         self.stage += 1
         if self.stage == len(answers):
             return False
-        self._ear, self.since, self.is_extended = None, now, False
+        self._expectation, self.since, self.is_extended = None, now, False
         self.due = now + answers[self.stage].timeout_s
         return True
 
@@ -137,26 +141,28 @@ class PendingReplies(list[PendingReply]):
 
     def drain(self) -> list[Exchange]:
         """Remove all; return the requests that still waited for a reply."""
-        waited = [flight.exchange for flight in self if not flight.is_late]
+        waited = [pending.exchange for pending in self if not pending.is_late]
         self.clear()
         return waited
 
     @property
     def waiting(self) -> int:
         """Number of pending replies, without real-time requests."""
-        return sum(1 for flight in self if not flight.is_late and not flight.exchange.is_realtime)
+        return sum(
+            1 for pending in self if not pending.is_late and not pending.exchange.is_realtime
+        )
 
     @property
     def size(self) -> int:
         """Unacknowledged bytes, which may still be in the receive buffer of the robot."""
-        return sum(flight.size for flight in self if not flight.exchange.is_realtime)
+        return sum(pending.size for pending in self if not pending.exchange.is_realtime)
 
     @property
     def deadline(self) -> float | None:
         """Time of the first timeout."""
         if len(self) == 1:
             return self[0].due
-        return min((flight.due for flight in self), default=None)
+        return min((pending.due for pending in self), default=None)
 
     def may_confuse(self, exchange: Exchange) -> bool:
         """Return whether a late reply could be taken for the reply to this request.
@@ -166,11 +172,11 @@ class PendingReplies(list[PendingReply]):
         if not (exchange.ask.answers and exchange.ask.is_in_order):
             return False
         return any(
-            flight.is_late
-            and flight.exchange is not exchange
-            and flight.exchange.ask.is_in_order
-            and not flight.exchange.is_realtime
-            for flight in self
+            pending.is_late
+            and pending.exchange is not exchange
+            and pending.exchange.ask.is_in_order
+            and not pending.exchange.is_realtime
+            for pending in self
         )
 
     def again(self, exchange: Exchange) -> PendingReply | None:
@@ -179,22 +185,22 @@ class PendingReplies(list[PendingReply]):
 
     def has(self, label: str) -> bool:
         """Return whether a request with that label awaits its reply."""
-        return any(flight.exchange.ask.label == label and not flight.is_late for flight in self)
+        return any(pending.exchange.ask.label == label and not pending.is_late for pending in self)
 
     def overdue(self, now: float) -> list[PendingReply]:
         """Return the transmissions whose timeout has passed."""
-        return [flight for flight in self if flight.due <= now] if self else []
+        return [pending for pending in self if pending.due <= now] if self else []
 
     def framing(self) -> Framing | None:
         """Return the framing of a pending reply that declares its own, or None."""
-        for flight in self:
-            if flight.exchange.ask.framing is not None:
-                return flight.exchange.ask.framing
+        for pending in self:
+            if pending.exchange.ask.framing is not None:
+                return pending.exchange.ask.framing
         return None
 
     def collects_lines(self) -> bool:
         """Return whether any frame at all may be part of a reply."""
-        return any(flight.ear.answer.lines is not None for flight in self)
+        return any(pending.expectation.answer.lines is not None for pending in self)
 
     def plain(self) -> PendingReply | None:
         """Return the only transmission, if its reply is pending and consists of samples alone."""
@@ -215,26 +221,26 @@ class PendingReplies(list[PendingReply]):
             return None if only is None else (self[0], only)
         has_first, has_first_realtime = False, False
         collecting: list[PendingReply] = []
-        for flight in self:
-            if flight.exchange.ask.is_in_order:
-                is_realtime = flight.exchange.is_realtime
+        for pending in self:
+            if pending.exchange.ask.is_in_order:
+                is_realtime = pending.exchange.is_realtime
                 if has_first_realtime if is_realtime else has_first:
                     continue
                 # Late replies may never arrive, and silence never does: neither blocks other
                 # replies.
-                if not (flight.is_late or flight.ear.answer.is_silence):
+                if not (pending.is_late or pending.expectation.answer.is_silence):
                     has_first_realtime |= is_realtime
                     has_first |= not is_realtime
-            if flight.ear.answer.lines is not None:
-                collecting.append(flight)
+            if pending.expectation.answer.lines is not None:
+                collecting.append(pending)
                 continue
-            offer = flight.offer(frame, is_message=is_message)
+            offer = pending.offer(frame, is_message=is_message)
             if offer is not None:
-                return flight, offer
-        for flight in collecting:  # last: any frame could be one of its lines
-            offer = flight.offer(frame, is_message=is_message)
+                return pending, offer
+        for pending in collecting:  # last: any frame could be one of its lines
+            offer = pending.offer(frame, is_message=is_message)
             if offer is not None:
-                return flight, offer
+                return pending, offer
         return None
 
 

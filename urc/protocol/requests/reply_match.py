@@ -198,14 +198,14 @@ class Expectation:
 class ExpectationOwner(Protocol):
     """The owner of an expectation."""
 
-    def matched(self, ear: Expectation, offer: MatchResult, now: float) -> None:
+    def matched(self, expectation: Expectation, offer: MatchResult, now: float) -> None:
         """Process the match result."""
 
 
 class Matched(NamedTuple):
     """Internal event of the engine: an expected frame has arrived."""
 
-    ear: "Expectation"
+    expectation: "Expectation"
     offer: "MatchResult"
 
 

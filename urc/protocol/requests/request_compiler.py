@@ -84,7 +84,7 @@ class RequestCompiler:
             if decode is not matcher.decode:
                 matchers[place] = Matcher(matcher.reader, decode)
         line = self.lines[name] = Conversation(spec, matchers)
-        line.inbox.replies, line.inbox.collectors = replies, kept
+        line.receiver.replies, line.receiver.collectors = replies, kept
 
     def _view(self, line: str, now: float, found: Mapping[str, object]) -> Mapping[str, object]:
         """Return the namespace of an acknowledgement: fields, signals and names of the login."""

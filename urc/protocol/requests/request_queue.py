@@ -4,28 +4,33 @@ Pure. See `urc.protocol.requests.conversation` for the theory of operation.
 """
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 
 from urc.expressions import COUNTERS
 from urc.model.driver import TransportSpec
-from urc.model.payload import Count, Numbered
+from urc.model.payload import Count, Numbered, size_of
+from urc.protocol.requests.encode import BadArgument
 from urc.protocol.requests.exchange import Exchange, ExchangeOutcome
 from urc.protocol.requests.pending_replies import PendingReplies
 from urc.protocol.requests.rate import Counters, PriorityQueue
 
-__all__ = ["RequestQueue", "written"]
+__all__ = ["RequestQueue", "render_retry", "rendered_size", "written"]
 
 
 class RequestQueue(PriorityQueue[Exchange]):
     """The queue of one connection, with its shortest gap and its limit of requests in flight."""
 
-    __slots__ = ("_flights", "_limit", "_spec", "next_send", "size_of")
+    __slots__ = ("_limit", "_pending_replies", "_spec", "next_send", "size_of")
 
     def __init__(
-        self, spec: TransportSpec, flights: PendingReplies, size_of: Callable[[Exchange], int]
+        self,
+        spec: TransportSpec,
+        pending_replies: PendingReplies,
+        size_of: Callable[[Exchange], int],
     ) -> None:
         super().__init__(spec.queue.depth)
         self._spec = spec
-        self._flights = flights
+        self._pending_replies = pending_replies
         self.size_of = size_of
         """Function that returns the size of a request on the wire, in bytes."""
         self._limit = spec.queue.in_flight if spec.connection == "persistent" else 1
@@ -63,11 +68,11 @@ class RequestQueue(PriorityQueue[Exchange]):
         """
         if not self:
             return None
-        is_full = self._flights.waiting >= self._limit
+        is_full = self._pending_replies.waiting >= self._limit
         for exchange in self:
             if not (is_ready or exchange.is_privileged) or _free_at(exchange) > now:
                 continue
-            if self._flights.may_confuse(exchange):
+            if self._pending_replies.may_confuse(exchange):
                 continue
             is_full = is_full or not self._has_room(exchange)
             return None if is_full or now < self.next_send else exchange
@@ -76,11 +81,11 @@ class RequestQueue(PriorityQueue[Exchange]):
     def _has_room(self, exchange: Exchange) -> bool:
         """Return whether the request fits into the buffer of the robot."""
         most = self._spec.queue.most_bytes
-        return most is None or self._flights.size + self.size_of(exchange) <= most
+        return most is None or self._pending_replies.size + self.size_of(exchange) <= most
 
     def is_free(self, exchange: Exchange, now: float) -> bool:
         """Return whether `exchange` may bypass the empty queue."""
-        if self or self._flights or now < self.next_send:
+        if self or self._pending_replies or now < self.next_send:
             return False
         return self._has_room(exchange) and _free_at(exchange) <= now
 
@@ -90,13 +95,15 @@ class RequestQueue(PriorityQueue[Exchange]):
 
     def may_send_at(self, *, is_ready: bool) -> float | None:
         """Return the time at which a request may be sent; None when it waits for a reply."""
-        if not self or self._flights.waiting >= self._limit:
+        if not self or self._pending_replies.waiting >= self._limit:
             return None
         first: float | None = None
         barred_from = float("inf")
         """A request without room in the buffer blocks those behind it once it is due."""
         for exchange in self:
-            if not (is_ready or exchange.is_privileged) or self._flights.may_confuse(exchange):
+            if not (is_ready or exchange.is_privileged) or self._pending_replies.may_confuse(
+                exchange
+            ):
                 continue
             time = max(self.next_send, _free_at(exchange))
             if not self._has_room(exchange):
@@ -132,3 +139,22 @@ def written(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]
         counters.count(draw)
     exchange.data, exchange.numbers = data, draw.values
     return Numbered(data, count)
+
+
+def render_retry(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]) -> None:
+    """Render a repeated request again, with the same numbers but new nonces and times."""
+    draw = counters.draw()
+    draw.values.update(exchange.numbers)
+    with suppress(BadArgument):  # the earlier rendering succeeded, and remains usable
+        exchange.data = exchange.ask.encode({**learnt, **exchange.namespace, COUNTERS: draw})
+
+
+def rendered_size(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]) -> int:
+    """Return the size of a request in bytes, without using up a number of a counter."""
+    if exchange.data is not None:
+        return size_of(exchange.data)
+    try:
+        names = {**learnt, **exchange.namespace, COUNTERS: counters.draw()}
+        return size_of(exchange.ask.encode(names))
+    except BadArgument:
+        return 0  # the error is reported when the request is sent

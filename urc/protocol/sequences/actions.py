@@ -199,11 +199,11 @@ def _expecting(
         if not line.is_open:
             runner.stop("disconnected", "the robot is not connected")
             return []
-        ear = Expectation(answer, runner)
-        runner.listen(line, ear, now, now + answer.timeout_s, otherwise, text)
+        expectation = Expectation(answer, runner)
+        runner.listen(line, expectation, now, now + answer.timeout_s, otherwise, text)
         if isinstance(step, sequence.PromptStep):
-            return line.inbox.look_for(step.pattern, ear)
-        return line.listen(ear, now)
+            return line.receiver.look_for(step.pattern, expectation)
+        return line.listen(expectation, now)
 
     return expect
 

@@ -58,7 +58,7 @@ class CompiledSequence(NamedTuple):
     actions: tuple[Action, ...]
     transports: frozenset[str]
     """Transports that the sequence uses directly."""
-    reins: SequenceControl
+    sequence_control: SequenceControl
     """Control state; only one run at a time uses it."""
 
 
@@ -104,7 +104,7 @@ class SequenceRunner:
         self._late_text = ""
         self._logins: list[Conversation] = []
         """Connections whose logins must complete before the first step."""
-        program.reins.start()
+        program.sequence_control.start()
 
     @property
     def is_over(self) -> bool:
@@ -134,13 +134,13 @@ class SequenceRunner:
         self._obey()
         while self._outcome is None and not self.is_waiting:
             is_outermost = len(self._stack) == 1
-            if self.program.reins.halts(is_outermost=is_outermost):
+            if self.program.sequence_control.halts(is_outermost=is_outermost):
                 self.sleep(now + PAUSE_S)
                 break
             action = next(self._stack[-1], None) if self._stack else None
             if action is not None:
                 if is_outermost:
-                    self.program.reins.begin_step()
+                    self.program.sequence_control.begin_step()
                 events += action(self, now)
             elif self._stack:
                 self._stack.pop()
@@ -148,7 +148,7 @@ class SequenceRunner:
                 self._outcome = DONE
         if self._outcome is not None and self._sink is not None:
             sink, self._sink = self._sink, None
-            self.program.reins.end(self._outcome.message if self._outcome.code else "")
+            self.program.sequence_control.end(self._outcome.message if self._outcome.code else "")
             events += sink(self._outcome, now)
         return events
 
@@ -168,10 +168,10 @@ class SequenceRunner:
 
     def _obey(self) -> None:
         """Apply the requests of the operator."""
-        reins = self.program.reins
-        if reins.is_aborted:
+        sequence_control = self.program.sequence_control
+        if sequence_control.is_aborted:
             self.stop("aborted", "somebody ended it")
-        elif reins.goes_on():
+        elif sequence_control.goes_on():
             self._resume()
 
     def expire(self, now: float) -> None:
@@ -179,7 +179,7 @@ class SequenceRunner:
         if self.ends_at is not None and self.ends_at <= now:
             self.stop("timed-out", "it took too long")
             return
-        if self.program.reins.is_paused:
+        if self.program.sequence_control.is_paused:
             self.stop("timed-out", f"it was paused for {PAUSE_S:g} s")
             return
         if self._logins:
@@ -188,8 +188,10 @@ class SequenceRunner:
         if self._listening is None and self._awaited is None:
             self._resume()
             return
-        inbox = self._listening[0].inbox if self._listening else None
-        came = "" if inbox is None else inbox.came_since(self._began_at, "not what it expects")
+        receiver = self._listening[0].receiver if self._listening else None
+        came = (
+            "" if receiver is None else receiver.came_since(self._began_at, "not what it expects")
+        )
         self._stop_listening()
         if self._otherwise is None:
             self.stop("timed-out", self._late_text + came)
@@ -227,7 +229,7 @@ class SequenceRunner:
         self._resume()
         return []
 
-    def matched(self, ear: Expectation, offer: MatchResult, now: float) -> None:
+    def matched(self, expectation: Expectation, offer: MatchResult, now: float) -> None:
         """Process the match result of the expected frame."""
         self._listening = None
         if offer.refusal:
@@ -258,14 +260,14 @@ class SequenceRunner:
     def listen(
         self,
         line: Conversation,
-        ear: Expectation,
+        expectation: Expectation,
         now: float,
         due: float,
         otherwise: tuple[Action, ...] | None,
         text: str,
     ) -> None:
-        """Wait from `now` until `due` for a match of `ear`."""
-        self._listening = (line, ear)
+        """Wait from `now` until `due` for a match of `expectation`."""
+        self._listening = (line, expectation)
         self._began_at = now
         self._otherwise, self._late_text = otherwise, text
         self.sleep(due)
@@ -284,6 +286,6 @@ class SequenceRunner:
     def _stop_listening(self) -> None:
         self._awaited = None
         if self._listening is not None:
-            line, ear = self._listening
-            line.inbox.unlisten(ear)
+            line, expectation = self._listening
+            line.receiver.unlisten(expectation)
             self._listening = None

@@ -4,7 +4,8 @@ Pure. The module is the readable version of `urc.protocol.struct.read_source`, w
 runs of fixed items. Tests compare the two. Theory of operation: every item becomes a step ``(data,
 at, end, out) -> after``. A step reads its bytes from `at`, never at or behind `end`, and puts its
 value into `out`. A step raises `OtherFrame` for another kind of frame. An invalid value is recorded
-under the name "", and the rest is still read: only a frame that matches to its end counts as invalid.
+under the name "", and the rest is still read: only a frame that matches to its end counts as
+invalid.
 """
 
 from collections.abc import Callable, Mapping

@@ -72,15 +72,15 @@ def build_write_steps(
 
 def write_frame(steps: tuple[WriteStep, ...], namespace: Mapping[str, object]) -> bytes:
     """Return the frame with the values of `namespace`; raise `NotWritable` if impossible."""
-    pen = FrameBuilder()
+    builder = FrameBuilder()
     scope: Scope = dict(namespace)
     for step in steps:
-        step(pen, scope)
-    size = len(pen.bytes)
-    for gap, template, known in pen.late:
+        step(builder, scope)
+    size = len(builder.bytes)
+    for gap, template, known in builder.late:
         frame = {"_size": size, "_left": size - gap.at}
-        pen.fill(gap, evaluate(template, {**known, **frame}))
-    return bytes(pen.bytes)
+        builder.fill(gap, evaluate(template, {**known, **frame}))
+    return bytes(builder.bytes)
 
 
 def _build(item: Item, rules: StructWriteScope) -> WriteStep:
@@ -99,13 +99,13 @@ def _conditional(
     is_known = not condition.names & (FRAME_NAMES | rules.derived.keys())
     names = tuple(names_of((item,)))
 
-    def conditional(pen: FrameBuilder, scope: Scope) -> None:
+    def conditional(builder: FrameBuilder, scope: Scope) -> None:
         if is_known:
             is_there = evaluate(condition, scope)
         else:
             is_there = any(scope.get(name) is not None for name in names)
         if is_there:
-            step(pen, scope)
+            step(builder, scope)
 
     return conditional
 
@@ -143,9 +143,9 @@ def _deferral(
     """Return the handler for the gap of a number that is known only later, or None."""
     value = item.value
     if value is None and item.id in rules.derived:
-        return lambda pen, scope, gap: scope.__setitem__(GAP + item.id, gap)
+        return lambda builder, scope, gap: scope.__setitem__(GAP + item.id, gap)
     if value is not None and value.names & (FRAME_NAMES | rules.derived.keys()):
-        return lambda pen, scope, gap: pen.late.append((gap, value, scope))
+        return lambda builder, scope, gap: builder.late.append((gap, value, scope))
     return None
 
 
@@ -153,26 +153,26 @@ def _number_step(item: Item, rules: StructWriteScope) -> WriteStep:
     write = number_writer(item.number, item.id)
     if item.const is not None:
         constant = write(const_of(item))
-        return lambda pen, scope: pen.append(constant)
+        return lambda builder, scope: builder.append(constant)
     defer, blank = _deferral(item, rules), bytes(item.number.size)
     if defer is not None:
 
-        def leave_gap(pen: FrameBuilder, scope: Scope) -> None:
-            defer(pen, scope, Backpatch(len(pen.bytes), item, item.number))
-            pen.append(blank)
+        def leave_gap(builder: FrameBuilder, scope: Scope) -> None:
+            defer(builder, scope, Backpatch(len(builder.bytes), item, item.number))
+            builder.append(blank)
 
         return leave_gap
     raw_number = _raw_number(item, rules)
-    return lambda pen, scope: pen.append(write(raw_number(scope)))
+    return lambda builder, scope: builder.append(write(raw_number(scope)))
 
 
 def _coded_step(item: Item, rules: StructWriteScope) -> WriteStep:
     write = coded_writer(item.number, item.id)
     if item.const is not None:
         constant = write(int(item.const))
-        return lambda pen, scope: pen.append(constant)
+        return lambda builder, scope: builder.append(constant)
     raw_number = _raw_number(item, rules)
-    return lambda pen, scope: pen.append(write(raw_number(scope)))
+    return lambda builder, scope: builder.append(write(raw_number(scope)))
 
 
 def _zero_of(item: Item) -> float:
@@ -191,16 +191,16 @@ def _bits_step(item: Item, rules: StructWriteScope) -> WriteStep:
         for part, shift, mask, _, _ in bit_parts(item)
     ]
 
-    def step(pen: FrameBuilder, scope: Scope) -> None:
+    def step(builder: FrameBuilder, scope: Scope) -> None:
         whole = 0
         for part, shift, mask, defer, raw_number in parts:
             if part.const is not None:
                 whole |= (int(part.const) & mask) << shift
             elif defer is not None:
-                defer(pen, scope, Backpatch(len(pen.bytes), part, container, shift))
+                defer(builder, scope, Backpatch(len(builder.bytes), part, container, shift))
             else:
                 whole |= (raw_number(scope) & mask) << shift
-        pen.append(write(whole))
+        builder.append(write(whole))
 
     return step
 
@@ -209,14 +209,14 @@ def _text_step(item: Item, rules: StructWriteScope) -> WriteStep:
     encode, zero = bytes_of_text(item, rules.encoding), b"" if item.kind == "bytes" else ""
     finish = _finisher(item, rules)
 
-    def step(pen: FrameBuilder, scope: Scope) -> None:
+    def step(builder: FrameBuilder, scope: Scope) -> None:
         if item.const is not None:
-            finish(pen, scope, item.const)
+            finish(builder, scope, item.const)
             return
         value = _given(item, scope, rules, zero)
         if item.id:
             scope[item.id] = value
-        finish(pen, scope, encode(value))
+        finish(builder, scope, encode(value))
 
     return step
 
@@ -225,24 +225,29 @@ def _finisher(item: Item, rules: StructWriteScope) -> Callable[[FrameBuilder, Sc
     """Return the function that writes bytes in their size: padded, counted or terminated."""
     name, size = item.id or item.kind, item.size
     if size is None or item.const is not None:
-        return lambda pen, scope, raw: pen.append(raw + item.until)
+        return lambda builder, scope, raw: builder.append(raw + item.until)
     if size.kind == "fixed":
         padded = fixed_bytes(item)
-        return lambda pen, scope, raw: pen.append(padded(raw))
+        return lambda builder, scope, raw: builder.append(padded(raw))
 
-    def finish(pen: FrameBuilder, scope: Scope, raw: bytes) -> None:
-        _put_size(pen, scope, size, len(raw), name, rules)
-        pen.append(raw)
+    def finish(builder: FrameBuilder, scope: Scope, raw: bytes) -> None:
+        _put_size(builder, scope, size, len(raw), name, rules)
+        builder.append(raw)
 
     return finish
 
 
 def _put_size(
-    pen: FrameBuilder, scope: Scope, extent: Extent, number: int, name: str, rules: StructWriteScope
+    builder: FrameBuilder,
+    scope: Scope,
+    extent: Extent,
+    number: int,
+    name: str,
+    rules: StructWriteScope,
 ) -> None:
     """Write `number` where the reader expects it, or check a constant size."""
     if extent.prefix is not None:
-        pen.append(coded_writer(extent.prefix, name)(int(fitting(extent.prefix, number, name))))
+        builder.append(coded_writer(extent.prefix, name)(int(fitting(extent.prefix, number, name))))
     elif extent.kind == "fixed":
         if number != extent.number:
             raise NotWritable(f"{name}: expected {extent.number} items, found {number}")
@@ -251,7 +256,7 @@ def _put_size(
         gap = scope.pop(GAP + only, None)
         if gap is not None and not others:
             scope[only] = solved(extent.expression, only, number, name)
-            pen.fill(gap, scope[only])
+            builder.fill(gap, scope[only])
         elif evaluate(extent.expression, scope) != number:
             wanted = f"{extent.expression.source.strip()!r} says otherwise"
             raise NotWritable(f"{name}: it is {number} long, but {wanted}")
@@ -259,17 +264,17 @@ def _put_size(
 
 def _padding_step(item: Item, rules: StructWriteScope) -> WriteStep:
     if item.size is None or item.size.kind == "rest":
-        return lambda pen, scope: None
+        return lambda builder, scope: None
     if item.size.kind == "fixed":
         padding = bytes((item.pad,)) * item.size.number
-        return lambda pen, scope: pen.append(padding)
+        return lambda builder, scope: builder.append(padding)
     expression = item.size.expression
 
-    def pad(pen: FrameBuilder, scope: Scope) -> None:
+    def pad(builder: FrameBuilder, scope: Scope) -> None:
         number = 0 if expression is None else evaluate(expression, scope)
         if not isinstance(number, int) or not 0 <= number <= LARGEST_FRAME:
             raise NotWritable(f"padding: {quoted(number)} is not a size")
-        pen.append(bytes((item.pad,)) * number)
+        builder.append(bytes((item.pad,)) * number)
 
     return pad
 
@@ -277,7 +282,7 @@ def _padding_step(item: Item, rules: StructWriteScope) -> WriteStep:
 def _array_step(item: Item, count: Extent, rules: StructWriteScope) -> WriteStep:
     if item.kind == "packed":
         pack = packed_writer(item._replace(times=None), count)
-        return lambda pen, scope: pen.append(pack(scope, rules.is_lenient))
+        return lambda builder, scope: builder.append(pack(scope, rules.is_lenient))
     if item.kind == "struct" and not item.id:
         return _records_step(item, count, rules)
     name, single = item.id or "an array", item._replace(times=None, value=None)
@@ -288,18 +293,18 @@ def _array_step(item: Item, count: Extent, rules: StructWriteScope) -> WriteStep
         steps = (_STEPS[item.kind](single, rules),)
     missing: list[Any] = [_ZEROS.get(item.kind, _zero_of(item))]
 
-    def array(pen: FrameBuilder, scope: Scope) -> None:
+    def array(builder: FrameBuilder, scope: Scope) -> None:
         zeros = missing * (count.number if count.kind == "fixed" else 0)
         values = _given(item, scope, rules, zeros)
         if not isinstance(values, (list, tuple)):
             raise NotWritable(f"{name}: expected a list, found {quoted(values)}")
-        _put_size(pen, scope, count, len(values), name, rules)
+        _put_size(builder, scope, count, len(values), name, rules)
         for value in values:
             if is_struct and not isinstance(value, Mapping):
                 raise NotWritable(f"{name}: expected a mapping, found {quoted(value)}")
             inner: Scope = {**value, **_outer(scope)} if is_struct else {item.id: value}
             for step in steps:
-                step(pen, inner)
+                step(builder, inner)
 
     return array
 
@@ -317,13 +322,13 @@ def _records_step(item: Item, count: Extent, rules: StructWriteScope) -> WriteSt
     cases = [(key, frozenset(names_of(inner))) for key, inner in switch.cases] if switch else []
     by = switch.by.source.strip() if switch else ""
 
-    def records(pen: FrameBuilder, scope: Scope) -> None:
+    def records(builder: FrameBuilder, scope: Scope) -> None:
         chosen = [{by: key} for key, names in cases if names and _has_all(scope, names)]
         if not switch:
             chosen = [{}] if _has_all(scope, frozenset(names_of(item.items))) else []
-        _put_size(pen, scope, count, len(chosen), "the records", rules)
+        _put_size(builder, scope, count, len(chosen), "the records", rules)
         for choice in chosen:
-            body(pen, {**scope, **choice})
+            body(builder, {**scope, **choice})
 
     return records
 
@@ -339,13 +344,13 @@ def _struct_step(item: Item, rules: StructWriteScope) -> WriteStep:
         steps = tuple(_build(inner, rules) for inner in item.items)
     names = {name: joined_name(item.id, name) for name in names_of(item.items)}
 
-    def struct(pen: FrameBuilder, scope: Scope) -> None:
+    def struct(builder: FrameBuilder, scope: Scope) -> None:
         inner = scope
         if item.id:
             inner = {name: scope[full] for name, full in names.items() if full in scope}
             inner |= _outer(scope)
         for step in steps:
-            step(pen, inner)
+            step(builder, inner)
 
     return struct if item.size is None else _windowed(struct, item, item.size, rules)
 
@@ -361,23 +366,23 @@ def _windowed(body: WriteStep, item: Item, size: Extent, rules: StructWriteScope
     is_variable = size.prefix is not None and size.prefix.is_variable
     gap = bytes(size.prefix.size) if size.prefix and not is_variable else b""
 
-    def windowed(pen: FrameBuilder, scope: Scope) -> None:
-        pen.append(gap)
-        start = len(pen.bytes)
-        body(pen, scope)
+    def windowed(builder: FrameBuilder, scope: Scope) -> None:
+        builder.append(gap)
+        start = len(builder.bytes)
+        body(builder, scope)
         if item.trim is not None and size.kind != "fixed":
-            kept = len(pen.bytes[start : start + full].rstrip(bytes((item.trim,))))
-            del pen.bytes[start + max(kept, 1) :]
-        number = len(pen.bytes) - start
+            kept = len(builder.bytes[start : start + full].rstrip(bytes((item.trim,))))
+            del builder.bytes[start + max(kept, 1) :]
+        number = len(builder.bytes) - start
         if size.kind == "fixed":
             if number != size.number:
                 raise NotWritable(f"{name}: it has {number} bytes, expected {size.number}")
         elif size.prefix is not None and is_variable:
-            pen.insert(start, coded_writer(size.prefix, name)(number), scope)
+            builder.insert(start, coded_writer(size.prefix, name)(number), scope)
         elif size.prefix is not None:
-            pen.fill(_prefix_gap(start, size.prefix, name), number)
+            builder.fill(_prefix_gap(start, size.prefix, name), number)
         else:
-            _put_size(pen, scope, size, number, name, rules)
+            _put_size(builder, scope, size, number, name, rules)
 
     return windowed
 
@@ -394,13 +399,13 @@ def _switch_step(item: Item, rules: StructWriteScope) -> WriteStep:
     default = switch.default
     otherwise = None if default is None else tuple(_build(one, rules) for one in default)
 
-    def step(pen: FrameBuilder, scope: Scope) -> None:
+    def step(builder: FrameBuilder, scope: Scope) -> None:
         key = evaluate(switch.by, scope)
         steps = cases.get(key, otherwise) if isinstance(key, (int, float, str)) else otherwise
         if steps is None:
             raise NotWritable(f"no case for {switch.by.source.strip()} = {quoted(key)}")
         for one in steps:
-            one(pen, scope)
+            one(builder, scope)
 
     return step
 

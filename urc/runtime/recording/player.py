@@ -273,7 +273,7 @@ class PlaybackSession:
         """Start without values."""
         self.hub = Hub(profile.driver.signals)
         self.frames: MotionFrames = Engine(profile.driver, settings).motions
-        self.movers: MotionBackend | None = None
+        self.backend: MotionBackend | None = None
 
     async def command(
         self,

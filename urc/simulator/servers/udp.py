@@ -87,17 +87,17 @@ class UdpServer(asyncio.DatagramProtocol):
             self._inboxes[address].put_nowait(data)
 
     def _meet(self, address: _Address) -> None:
-        inbox: asyncio.Queue[bytes] = asyncio.Queue(_WAITING)
-        self._inboxes[address] = inbox
+        receiver: asyncio.Queue[bytes] = asyncio.Queue(_WAITING)
+        self._inboxes[address] = receiver
 
         def forget() -> None:
-            if self._inboxes.get(address) is inbox:
+            if self._inboxes.get(address) is receiver:
                 del self._inboxes[address]
 
-        self._clients.admit(lambda client: self._talk(client, address, inbox), forget)
+        self._clients.admit(lambda client: self._talk(client, address, receiver), forget)
 
     async def _talk(
-        self, client: ClientConnection, address: _Address, inbox: "asyncio.Queue[bytes]"
+        self, client: ClientConnection, address: _Address, receiver: "asyncio.Queue[bytes]"
     ) -> None:
         loop = asyncio.get_running_loop()
 
@@ -108,7 +108,7 @@ class UdpServer(asyncio.DatagramProtocol):
                 if self._line is not None and isinstance(datagram, bytes):
                     self._line.sendto(datagram, self._now_at(address))
 
-        await converse(self._context, client, inbox.get, put)
+        await converse(self._context, client, receiver.get, put)
 
     def _now_at(self, address: _Address) -> _Address:
         """Return the address for unsolicited datagrams: the robot sends to its last peer."""

@@ -49,26 +49,26 @@ class CameraPose(NamedTuple):
 
 
 def camera_picture(
-    plan: WorldMap, faces: EdgeArrays, eye: CameraPose, size: tuple[int, int], view: float
+    plan: WorldMap, faces: EdgeArrays, pose: CameraPose, size: tuple[int, int], view: float
 ) -> NDArray[np.uint8]:
     """Return the image ahead, as rows by columns by red, green and blue.
 
     Args:
         plan: the obstacles.
         faces: edges of the plan.
-        eye: pose of the camera.
+        pose: pose of the camera.
         size: columns and rows.
         view: horizontal field of view, below pi.
     """
     ahead = _straight(*size, view)
-    rotated = ahead @ _rotation(eye.pitch, eye.roll).T
+    rotated = ahead @ _rotation(pose.pitch, pose.roll).T
     azimuth = np.arctan2(rotated[..., 1], rotated[..., 0])
     slope = rotated[..., 2] / np.hypot(rotated[..., 0], rotated[..., 1])
-    return _seen(plan, faces, eye, azimuth, slope)
+    return _seen(plan, faces, pose, azimuth, slope)
 
 
 def panorama_picture(
-    plan: WorldMap, faces: EdgeArrays, eye: CameraPose, size: tuple[int, int]
+    plan: WorldMap, faces: EdgeArrays, pose: CameraPose, size: tuple[int, int]
 ) -> NDArray[np.uint8]:
     """Return the panorama: a column for each direction, a row for each height."""
     columns, rows = size
@@ -78,13 +78,13 @@ def panorama_picture(
         np.broadcast_to(azimuth, (rows, columns)),
         np.broadcast_to(height[:, None], (rows, columns)),
     )
-    if abs(eye.pitch) > 1e-4 or abs(eye.roll) > 1e-4:
+    if abs(pose.pitch) > 1e-4 or abs(pose.roll) > 1e-4:
         around = np.cos(grid[1])
         ray = np.stack((around * np.cos(grid[0]), around * np.sin(grid[0]), np.sin(grid[1])), -1)
-        ray = ray @ _rotation(eye.pitch, eye.roll).T
+        ray = ray @ _rotation(pose.pitch, pose.roll).T
         flat = np.maximum(np.hypot(ray[..., 0], ray[..., 1]), 1e-4)
-        return _seen(plan, faces, eye, np.arctan2(ray[..., 1], ray[..., 0]), ray[..., 2] / flat)
-    return _seen(plan, faces, eye, grid[0], np.tan(grid[1]))
+        return _seen(plan, faces, pose, np.arctan2(ray[..., 1], ray[..., 0]), ray[..., 2] / flat)
+    return _seen(plan, faces, pose, grid[0], np.tan(grid[1]))
 
 
 def jpeg(picture: NDArray[np.uint8], *, flip: bool = False, mirror: bool = False) -> bytes:
@@ -117,26 +117,26 @@ def _rotation(pitch: float, roll: float) -> Array:
 
 
 def _seen(
-    plan: WorldMap, faces: EdgeArrays, eye: CameraPose, azimuth: Array, slope: Array
+    plan: WorldMap, faces: EdgeArrays, pose: CameraPose, azimuth: Array, slope: Array
 ) -> NDArray[np.uint8]:
     """Return the colours in given directions: `azimuth` from ahead to the left, `slope` upwards."""
-    direction = azimuth + np.float32(eye.yaw)
-    picture = _open_country(plan, eye, direction, slope)
+    direction = azimuth + np.float32(pose.yaw)
+    picture = _open_country(plan, pose, direction, slope)
     if len(faces.height):
         bins = np.floor(direction * np.float32(_BINS / (2 * math.pi))).astype(np.int32) % _BINS
-        _paint_edges(picture, faces, eye, bins, slope)
+        _paint_edges(picture, faces, pose, bins, slope)
     return np.clip(picture, 0, 255).astype(np.uint8)
 
 
-def _open_country(plan: WorldMap, eye: CameraPose, direction: Array, slope: Array) -> Array:
+def _open_country(plan: WorldMap, pose: CameraPose, direction: Array, slope: Array) -> Array:
     """Return sky and ground."""
     above, horizon = (np.array(one, dtype=np.float32) for one in _SKY)
     share = np.clip(slope * 1.5, 0, 1)[..., None]
     picture: Array = horizon + (above - horizon) * share
     below = slope < -1e-3
-    far = np.float32(max(eye.z, 0.02)) / -slope[below]
-    x = np.float32(eye.x) + far * np.cos(direction[below])
-    y = np.float32(eye.y) + far * np.sin(direction[below])
+    far = np.float32(max(pose.z, 0.02)) / -slope[below]
+    x = np.float32(pose.x) + far * np.cos(direction[below])
+    y = np.float32(pose.y) + far * np.sin(direction[below])
     first, second = (np.array(one, dtype=np.float32) for one in _GROUNDS[plan.spec.ground])
     is_odd = ((np.floor(x).astype(np.int32) + np.floor(y).astype(np.int32)) & 1).astype(bool)
     ground = np.where(is_odd[:, None], first, second)
@@ -149,12 +149,12 @@ def _open_country(plan: WorldMap, eye: CameraPose, direction: Array, slope: Arra
 
 
 def _paint_edges(
-    picture: Array, faces: EdgeArrays, eye: CameraPose, bins: NDArray[np.int32], slope: Array
+    picture: Array, faces: EdgeArrays, pose: CameraPose, bins: NDArray[np.int32], slope: Array
 ) -> None:
     """Draw the obstacles, from the farthest to the nearest."""
     horizon = np.array(_SKY[1], dtype=np.float32)
     angles = (np.arange(_BINS, dtype=np.float64) + 0.5) * (2 * math.pi / _BINS)
-    distance, share = cast(faces, eye.x, eye.y, angles)
+    distance, share = cast(faces, pose.x, pose.y, angles)
     order = np.argsort(distance, axis=1)[:, :_LAYERS]
     rows = np.arange(_BINS)
     for layer in reversed(range(order.shape[1])):
@@ -169,8 +169,8 @@ def _paint_edges(
         far = np.where(np.isfinite(far), far, 1e9).astype(np.float32)
         haze = (far / (far + _FAR_M))[:, None]
         colour = (colour + (horizon - colour) * haze).astype(np.float32)
-        top = ((faces.height[which] - eye.z) / far).astype(np.float32)
-        foot = (-eye.z / far).astype(np.float32)
+        top = ((faces.height[which] - pose.z) / far).astype(np.float32)
+        foot = (-pose.z / far).astype(np.float32)
         seen = (slope <= top[bins]) & (slope >= foot[bins]) & (far[bins] < 1e8)
         place = bins[seen]
         skirting = slope[seen] < foot[place] + np.float32(0.08) / far[place]

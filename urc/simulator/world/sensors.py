@@ -156,7 +156,7 @@ def gps(moment: SensorInput) -> Mapping[str, object]:
     latitude, longitude = place_on_earth(spec, x, y)
     up = 2 * wide * wander(spec.seed, moment.time_s, "up")
     speed = math.hypot(motion.forward, motion.sideways)
-    course = motion.yaw + math.atan2(motion.sideways, motion.forward)
+    running_rule = motion.yaw + math.atan2(motion.sideways, motion.forward)
     time = datetime.fromtimestamp(moment.time_s, UTC)
     return {
         "latitude": latitude,
@@ -164,7 +164,7 @@ def gps(moment: SensorInput) -> Mapping[str, object]:
         "altitude": spec.datum[2] + motion.z + up,
         "speed": max(0.0, speed + 0.02 * moment.gauss("ground")),
         "climb": motion.climb + 0.02 * moment.gauss("climb"),
-        "course": math.degrees(math.pi / 2 - course) % 360,
+        "course": math.degrees(math.pi / 2 - running_rule) % 360,
         "fix": 3,
         "satellites": 9 + round(2 * wander(spec.seed, moment.time_s, "satellites")),
         "hdop": round(0.9 + 0.2 * wander(spec.seed, moment.time_s, "hdop"), 1),

@@ -133,7 +133,7 @@ class World:
 
             spec = self.spec.camera
             seen = camera_picture(
-                self.plan, self.faces(), self._eye(), (spec.width, spec.height), spec.fov
+                self.plan, self.faces(), self._pose(), (spec.width, spec.height), spec.fov
             )
             return jpeg(seen, flip=flip, mirror=mirror)
 
@@ -145,7 +145,7 @@ class World:
         def draw() -> bytes:
             from urc.simulator.world.picture import jpeg, panorama_picture
 
-            return jpeg(panorama_picture(self.plan, self.faces(), self._eye(), _PANORAMA))
+            return jpeg(panorama_picture(self.plan, self.faces(), self._pose(), _PANORAMA))
 
         return self._once("panorama", 0.5, draw)
 
@@ -157,7 +157,7 @@ class World:
             self._faces = EdgeArrays(self.plan)
         return self._faces
 
-    def _eye(self) -> "CameraPose":
+    def _pose(self) -> "CameraPose":
         from urc.simulator.world.picture import CameraPose
 
         motion, camera = self.motion, self.spec.camera

@@ -110,7 +110,7 @@ class RosbridgeTransport:
         """Return the next message, response or feedback; raise `PeerClosed` at the end."""
         if self._session is None:
             raise PeerClosed("the connection is closed")
-        return await self._session.inbox.pop()
+        return await self._session.queue.pop()
 
     async def send(self, data: Payload) -> None:
         """Publish, call a service, start or cancel a goal; return once the kernel has the data.
@@ -161,7 +161,7 @@ class RosbridgeTransport:
 
     def _log(self, fault: str) -> None:
         if self._session is not None:
-            self._session.inbox.answer(Envelope(NOTICE, {}, fault))
+            self._session.queue.answer(Envelope(NOTICE, {}, fault))
 
 
 def from_setup(setup: TransportSetup) -> Transport:
@@ -237,9 +237,9 @@ class _Session:
     def __init__(
         self, wire: WebSocketTransport, ros: int | Literal["auto"] | None, graph: TopicGraph
     ) -> None:
-        self.inbox = TopicReceiveQueue()
+        self.queue = TopicReceiveQueue()
         self._wire = wire
-        self._client = RosClient(self.inbox, None if ros == AUTO else ros)
+        self._client = RosClient(self.queue, None if ros == AUTO else ros)
         self._is_auto = ros == AUTO
         self._frames = OperationReader()
         self._graph = graph
@@ -331,7 +331,7 @@ class _Session:
 
     async def end(self) -> None:
         """Stop reading, and wake all waiting tasks."""
-        self.inbox.end("the connection is closed")
+        self.queue.end("the connection is closed")
         if self._reader is not None:
             self._reader.cancel()
             await asyncio.gather(self._reader, return_exceptions=True)
@@ -348,11 +348,11 @@ class _Session:
             while True:
                 self._receive(await self._wire.receive())
                 # Frames in the buffer need no wait, and some take long to parse.
-                if self.inbox.is_filling or clock() - began_s > _TURN_S:
+                if self.queue.is_filling or clock() - began_s > _TURN_S:
                     await asyncio.sleep(0)
                     began_s = clock()
         except TransportError as ended:
-            self.inbox.end(str(ended))
+            self.queue.end(str(ended))
 
     def _receive(self, frame: bytes) -> None:
         try:

@@ -46,9 +46,9 @@ class RosSubscription(NamedTuple):
 class RosClient:
     """Converts envelopes to operations and back, for one connection."""
 
-    def __init__(self, inbox: TopicReceiveQueue, ros: int | None) -> None:
-        """Deliver to `inbox`; `ros` (1, 2 or None: as written) selects the form of type names."""
-        self._inbox = inbox
+    def __init__(self, queue: TopicReceiveQueue, ros: int | None) -> None:
+        """Deliver to `queue`; `ros` (1, 2 or None: as written) selects the form of type names."""
+        self._queue = queue
         self._ros_version = ros
         self._protocol = _Protocol()
         self._ros = _Ros(self._protocol)
@@ -187,18 +187,18 @@ class RosClient:
 
     def _message(self, topic: str, body: object) -> None:
         envelope = Envelope("message", {"topic": topic}, body)
-        self._inbox.message(topic, envelope, self._size_bytes)
+        self._queue.message(topic, envelope, self._size_bytes)
 
     def _answer(self, number: object, is_ok: bool, values: object) -> None:
         attributes = {"id": number, "ok": is_ok}
         if not is_ok:
             said = one_line(values) if isinstance(values, str) else ""
             attributes["reason"] = said or "the service said no"
-        self._inbox.answer(Envelope("response", attributes, values), self._size_bytes)
+        self._queue.answer(Envelope("response", attributes, values), self._size_bytes)
 
     def _feedback(self, action: str, number: object, values: Any) -> None:
         attributes = {"action": action, "id": number}
-        self._inbox.answer(Envelope("feedback", attributes, dict(values)), self._size_bytes)
+        self._queue.answer(Envelope("feedback", attributes, dict(values)), self._size_bytes)
 
     def _result(self, goal: str, is_ok: bool, result: Any) -> None:
         _, number = self._goals.pop(goal, ("", None))
@@ -207,7 +207,7 @@ class RosClient:
         if not is_ok:
             said = one_line(values) if isinstance(values, str) else _OUTCOMES.get(status, "failed")
             attributes["reason"] = f"the action was {said}" if said in _ENDS else said
-        self._inbox.answer(Envelope("response", attributes, values), self._size_bytes)
+        self._queue.answer(Envelope("response", attributes, values), self._size_bytes)
 
 
 _OUTCOMES = {4: "succeeded", 5: "cancelled", 6: "aborted"}

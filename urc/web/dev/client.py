@@ -100,8 +100,8 @@ class DevClient:
     def __init__(self, line: ClientSocket, watch: ProfileWatch, flow: FlowControl) -> None:
         self._line = line
         self._watch = watch
-        self._station = watch.station
-        self._clock = watch.station.clock
+        self._service = watch.service
+        self._clock = watch.service.clock
         self._flow = flow
         self._news = asyncio.Event()
         self._backlog = Backlog()
@@ -137,12 +137,12 @@ class DevClient:
     async def _follow(self) -> None:
         """Put the traffic of the robot into the backlog, session after session."""
         while True:
-            if missing_settings(self._station.robot) or self._station.is_full:
+            if missing_settings(self._service.robot) or self._service.is_full:
                 await self._clock.sleep(RETRY_S)
                 continue
-            with self._station.visit():
+            with self._service.visit():
                 try:
-                    live = await self._station.live()
+                    live = await self._service.live()
                 except SessionFailed as error:
                     self._push(note_row(self._log_entry(str(error))))
                     await self._clock.sleep(RETRY_S)
@@ -182,7 +182,7 @@ class DevClient:
     # -- writing
 
     async def _write(self) -> None:
-        await self._send(wire.encode_hello(self._station.robot.profile.name, self._clock.now()))
+        await self._send(wire.encode_hello(self._service.robot.profile.name, self._clock.now()))
         while True:
             self._news.clear()
             for text in self._news_of_profile():

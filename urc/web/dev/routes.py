@@ -81,8 +81,8 @@ class Dev:
         self._is_here = is_here
         self._open = 0
         self._watches = {
-            name: ProfileWatch(station, remake[name], partial(take, name))
-            for name, station in stations.items()
+            name: ProfileWatch(service, remake[name], partial(take, name))
+            for name, service in stations.items()
         }
 
     async def run(self) -> None:
@@ -105,7 +105,7 @@ class Dev:
             raise HTTPException(404, "No robot of that name is served here.")
         if not self._is_here(request):
             raise HTTPException(403, _ONLY_HERE)
-        title = watch.station.robot.profile.title or name
+        title = watch.service.robot.profile.title or name
         quoted = quote(name, safe="")
         page = DevPage(
             head=PageHead(request.state.nonce, f"Dev: {title}"),

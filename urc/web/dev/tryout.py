@@ -81,7 +81,7 @@ class _Candidate(NamedTuple):
     name: str
     read: ReadSpec
     matcher: Matcher
-    ear: Expectation | None
+    expectation: Expectation | None
 
 
 def pasted_bytes(text: str, *, is_hex: bool, encoding: str) -> bytes:
@@ -204,10 +204,10 @@ def _add(takers: list[FrameConsumer], taker: FrameConsumer) -> None:
 
 
 def _taken(frame: Frame, one: _Candidate) -> FrameConsumer | None:
-    if one.ear is None:
+    if one.expectation is None:
         found = one.matcher.read(frame)
     else:
-        offer = one.ear.offer(frame)
+        offer = one.expectation.offer(frame)
         if offer is None:
             return None
         if offer.refusal:
@@ -260,8 +260,8 @@ def _candidates(
     for name, reply in _replies(driver, spec):
         mine = matcher(reply.read)
         faults = tuple((matcher(one.read), one.text) for one in reply.faults)
-        ear = Expectation(CompiledReply(mine, 0.0, reply.errors, faults, reply.read.lines))
-        found.append(_Candidate("reply", name, reply.read, mine, ear))
+        expectation = Expectation(CompiledReply(mine, 0.0, reply.errors, faults, reply.read.lines))
+        found.append(_Candidate("reply", name, reply.read, mine, expectation))
     return found
 
 

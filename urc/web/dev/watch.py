@@ -51,7 +51,7 @@ def examine(file: str) -> CheckedProfile:
 class ProfileWatch:
     """The watch over the documents of one robot."""
 
-    station: RobotService
+    service: RobotService
     remake: Remake
     take: Callable[[Robot], None]
     """Switches all users to another version; may raise `UrcError`."""
@@ -68,7 +68,7 @@ class ProfileWatch:
     @property
     def robot(self) -> Robot:
         """The newest accepted version; the session of the version before may still be closing."""
-        return self._robot or self.station.robot
+        return self._robot or self.service.robot
 
     @property
     def file(self) -> str:
@@ -77,7 +77,7 @@ class ProfileWatch:
 
     async def run(self) -> None:
         """Watch until cancelled."""
-        sleep = self.station.clock.sleep
+        sleep = self.service.clock.sleep
         watched = FileWatcher([self.file])
         found = await asyncio.to_thread(examine, self.file)
         self.problems = found.problems
@@ -102,7 +102,7 @@ class ProfileWatch:
         before: list[object] = []
         while (now := watched.states()) != before:
             before = now
-            await self.station.clock.sleep(PERIOD_S)
+            await self.service.clock.sleep(PERIOD_S)
 
     def _judge(self, found: CheckedProfile) -> None:
         self.problems = found.problems
@@ -125,7 +125,7 @@ class ProfileWatch:
 
     def _try_switch(self) -> bool:
         """Switch to the new version if there is one and the robot is at rest."""
-        if self._next is None or not self.station.is_at_rest:
+        if self._next is None or not self.service.is_at_rest:
             return False
         profile, self._next = self._next, None
         try:

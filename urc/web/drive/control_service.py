@@ -48,34 +48,36 @@ class ControlService:
         driver: Driver,
         clock: Clock,
         file: LatchStore | None = None,
-        trail: AuditRecorder | None = None,
+        recorder: AuditRecorder | None = None,
     ) -> None:
         """Restore the latch from its file.
 
         The held commands of `driver` are the controls. `file` keeps the latch over a restart, and
-        `trail` receives the events of the audit log; both may be None.
+        `recorder` receives the events of the audit log; both may be None.
         """
-        self.trail = trail or AuditRecorder("", _unread, utc=lambda: 0.0)
-        self.desk = self._desk(driver, file.load() if file is not None else Latch(LeaseState()))
+        self.recorder = recorder or AuditRecorder("", _unread, utc=lambda: 0.0)
+        self.controller = self._controller(
+            driver, file.load() if file is not None else Latch(LeaseState())
+        )
         self._driver = driver
         self._clock = clock
         self._file = file
         self._hub: Hub | None = None
-        self._seats: dict[str, OperatorSession] = {}
-        self._guests = 0
+        self._operators: dict[str, OperatorSession] = {}
+        self._peers = 0
         self._number = 0
         """Number of the newest lease."""
         self._beating: Timer | None = None
         self._expiring: Timer | None = None
-        self.once = OneShotCommands(driver, lambda: self.desk, clock, self.trail)
+        self.once = OneShotCommands(driver, lambda: self.controller, clock, self.recorder)
         self.watch = LoopWatchdog(clock, self._held_up)
         """Detects a blocked event loop; runs while the robot is connected."""
         self._heed(file)
 
     @property
-    def seats(self) -> tuple[OperatorSession, ...]:
+    def operators(self) -> tuple[OperatorSession, ...]:
         """The pages that watch the robot."""
-        return tuple(self._seats.values())
+        return tuple(self._operators.values())
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -88,53 +90,53 @@ class ControlService:
         A latched STOP stays latched, and an unacknowledged one is still sent. All leases end, and
         nothing stays armed.
         """
-        kept = Latch(self.desk.lease.state, not self.desk.is_confirmed)
-        for seat in self._seats.values():
-            for command in list(seat.alarms):
-                seat.forget(command)
-            seat.paces.clear()
+        kept = Latch(self.controller.lease.state, not self.controller.is_confirmed)
+        for operator in self._operators.values():
+            for command in list(operator.alarms):
+                operator.forget(command)
+            operator.paces.clear()
         self._driver, self._file = driver, file
         self.once.driver = driver
         self._heed(file)
-        self.desk = self._desk(driver, kept)
-        for seat in self._seats.values():
-            self.desk.join(seat.client)
-        self._changed(self.desk.lease.state)
+        self.controller = self._controller(driver, kept)
+        for operator in self._operators.values():
+            self.controller.join(operator.client)
+        self._changed(self.controller.lease.state)
 
-    def _desk(self, driver: Driver, kept: Latch) -> MotionController:
-        desk = MotionController(driver, kept=kept.state, is_owed=kept.is_owed)
-        desk.on_change = self._changed
-        desk.on_moved = self.trail.moved
-        desk.on_refused = self._refused
-        return desk
+    def _controller(self, driver: Driver, kept: Latch) -> MotionController:
+        controller = MotionController(driver, kept=kept.state, is_owed=kept.is_owed)
+        controller.on_change = self._changed
+        controller.on_moved = self.recorder.moved
+        controller.on_refused = self._refused
+        return controller
 
     # -- sessions
 
     async def serve(self, session: Drivable) -> None:
         """Let a session be driven until this task is cancelled."""
-        if not self.desk.can_move:
+        if not self.controller.can_move:
             return
         self._hub = session.hub
         if self._file is not None and self._file.fault:
             self._latch_fault(self._file.fault)
         self.watch.start()
-        self.desk.attach(session.frames, session.movers)
+        self.controller.attach(session.frames, session.backend)
         try:
             async with asyncio.TaskGroup() as group:
                 group.create_task(self.once.serve(session))
-                if session.movers is not None:
-                    group.create_task(self._follow(session.movers))
+                if session.backend is not None:
+                    group.create_task(self._follow(session.backend))
         finally:
             self.watch.end()
             self._hub = None
-            self.desk.detach()
+            self.controller.detach()
             now = self._clock.now()
             for command in self.commands:  # movers stop silently
-                self.trail.stopped(command, "the robot was disconnected", now)
+                self.recorder.stopped(command, "the robot was disconnected", now)
 
-    async def _follow(self, movers: MotionBackend) -> None:
+    async def _follow(self, backend: MotionBackend) -> None:
         while True:
-            for command, reason in await movers.stops():
+            for command, reason in await backend.stops():
                 self._stopped(command, reason)
 
     # -- pages
@@ -147,187 +149,201 @@ class ControlService:
             role: its rights.
             wake: callback for new messages to the page.
         """
-        self._guests += 1
-        name = f"screen {self._guests}{f' at {place}' if place else ''}"
-        seat = OperatorSession(Operator(f"s{self._guests}", name, role), wake)
-        self.desk.join(seat.client)
-        self._seats[seat.client.id] = seat
-        return seat
+        self._peers += 1
+        name = f"screen {self._peers}{f' at {place}' if place else ''}"
+        operator = OperatorSession(Operator(f"s{self._peers}", name, role), wake)
+        self.controller.join(operator.client)
+        self._operators[operator.client.id] = operator
+        return operator
 
-    def rise(self, seat: OperatorSession) -> None:
+    def rise(self, operator: OperatorSession) -> None:
         """Remove a page; its held controls stop."""
-        for command in list(seat.alarms):
-            seat.forget(command)
-        self._seats.pop(seat.client.id, None)
-        if seat.spare is not None:
-            seat.spare.end()
-        self.desk.part(seat.client.id)
+        for command in list(operator.alarms):
+            operator.forget(command)
+        self._operators.pop(operator.client.id, None)
+        if operator.spare is not None:
+            operator.spare.end()
+        self.controller.part(operator.client.id)
 
     def seat_of(self, key: str) -> OperatorSession | None:
         """Return the page with this key, or None."""
         said = key.encode()
         return next(
-            (one for one in self._seats.values() if compare_digest(one.key.encode(), said)), None
+            (one for one in self._operators.values() if compare_digest(one.key.encode(), said)),
+            None,
         )
 
-    def changes(self, seat: OperatorSession) -> list[str]:
+    def changes(self, operator: OperatorSession) -> list[str]:
         """Return the messages that bring a page up to date."""
         texts: list[str] = []
-        is_told = self.desk.can_move or seat.client.role == "viewer"  # a watcher gives no commands
-        if is_told and seat.seen != self._number:
-            seat.seen = self._number
-            desk, now = self.desk, self._clock.now()
-            is_confirmed = desk.is_confirmed and desk.has_own_stop
-            texts.append(seat.lease(desk.lease.state, now, is_confirmed=is_confirmed))
-        texts += seat.notices.values()
-        seat.notices.clear()
-        if seat.beat is not None:
-            texts.append(wire.encode_beat(seat.beat))
-            seat.beat = None
+        is_told = (
+            self.controller.can_move or operator.client.role == "viewer"
+        )  # a watcher gives no commands
+        if is_told and operator.seen != self._number:
+            operator.seen = self._number
+            controller, now = self.controller, self._clock.now()
+            is_confirmed = controller.is_confirmed and controller.has_own_stop
+            texts.append(operator.lease(controller.lease.state, now, is_confirmed=is_confirmed))
+        texts += operator.notices.values()
+        operator.notices.clear()
+        if operator.heartbeat is not None:
+            texts.append(wire.encode_beat(operator.heartbeat))
+            operator.heartbeat = None
         return texts
 
     # -- messages from pages
 
-    def offer(self, seat: OperatorSession, data: bytes) -> Offered:
+    def offer(self, operator: OperatorSession, data: bytes) -> Offered:
         """Take a tick as raw bytes; return its kind.
 
         A tick that arrives while another is pending replaces it without being decoded. Many of
         them pause the socket, so a flood costs nothing.
         """
-        if seat.alarms and seat.doubled is None:
+        if operator.alarms and operator.doubled is None:
             command = wire.command_of(data)
-            if command in seat.alarms:
-                self._wait(seat, command, data)
-                seat.crowd += 1
-                if seat.crowd == FLOOD:
-                    seat.hold_back(True)
+            if command in operator.alarms:
+                self._wait(operator, command, data)
+                operator.crowd += 1
+                if operator.crowd == FLOOD:
+                    operator.hold_back(True)
                 return "one more"
         now = self._clock.now()
         try:
             tick = wire.decode_tick(data)
         except wire.NO_TICK:
             return "no tick"
-        pace = seat.paces.get(tick.command)
-        is_moving = now - seat.moved_at_s < PATIENCE_S and not seat.alarms
-        if is_moving and not seat.doubled and pace is not None and pace.allow(now):
-            self._tick(seat, tick, now)
+        rate_limiter = operator.paces.get(tick.command)
+        is_moving = now - operator.moved_at_s < PATIENCE_S and not operator.alarms
+        if (
+            is_moving
+            and not operator.doubled
+            and rate_limiter is not None
+            and rate_limiter.allow(now)
+        ):
+            self._tick(operator, tick, now)
             return "in time"
-        self._thin(seat, tick)
+        self._thin(operator, tick)
         return "one more"
 
-    def handle(self, seat: OperatorSession, said: wire.Driving) -> None:
+    def handle(self, operator: OperatorSession, said: wire.Driving) -> None:
         """Handle a message from a page."""
         match said:
             case wire.Tick():
-                self._thin(seat, said)
+                self._thin(operator, said)
             case wire.Release():
-                if self.desk.holds(said.command) and not seat.is_first(said.command, said.number):
+                if self.controller.holds(said.command) and not operator.is_first(
+                    said.command, said.number
+                ):
                     return
-                seat.forget(said.command)
-                seat.moved_s.pop(said.command, None)
-                self.desk.release(seat.client.id, said.command)
+                operator.forget(said.command)
+                operator.moved_s.pop(said.command, None)
+                self.controller.release(operator.client.id, said.command)
             case wire.Stop():
-                if not seat.is_first("", said.number):
+                if not operator.is_first("", said.number):
                     return
-                self.stop(seat.client.name)
+                self.stop(operator.client.name)
             case wire.Drive():
-                self._drive(seat, said)
+                self._drive(operator, said)
 
     def stop(self, by: str) -> None:
         """Stop and latch. Never refused."""
-        for seat in self._seats.values():
-            for command in list(seat.alarms):
-                seat.forget(command)
-        self.desk.stop(by)
+        for operator in self._operators.values():
+            for command in list(operator.alarms):
+                operator.forget(command)
+        self.controller.stop(by)
         self.once.stopped()
 
-    def _drive(self, seat: OperatorSession, said: wire.Drive) -> None:
+    def _drive(self, operator: OperatorSession, said: wire.Drive) -> None:
         now = self._clock.now()
-        reason = self.desk.drive(seat.client.id, said.verb, now, said.for_s)
+        reason = self.controller.drive(operator.client.id, said.verb, now, said.for_s)
         if reason:
-            seat.notice(said.verb, wire.encode_refused(said.verb, "", reason))
-            self.trail.refused(seat.client, said.verb, reason, now)
+            operator.notice(said.verb, wire.encode_refused(said.verb, "", reason))
+            self.recorder.refused(operator.client, said.verb, reason, now)
         elif said.verb == "reset":
             self.once.reset()
         self._set_expiry()
 
-    def _thin(self, seat: OperatorSession, tick: wire.Tick) -> None:
+    def _thin(self, operator: OperatorSession, tick: wire.Tick) -> None:
         now = self._clock.now()
-        if not self.desk.holds(tick.command):
+        if not self.controller.holds(tick.command):
             text = f"{tick.command!r} is not a held command of this robot"
-            seat.notice("tick", wire.encode_refused("tick", "", text))
-            self.trail.refused(seat.client, tick.command, text, now)
+            operator.notice("tick", wire.encode_refused("tick", "", text))
+            self.recorder.refused(operator.client, tick.command, text, now)
             return
-        if not seat.is_first(tick.command, tick.number):
+        if not operator.is_first(tick.command, tick.number):
             return
-        pace = seat.paces.get(tick.command)
-        if pace is None:
-            pace = seat.paces[tick.command] = RateLimiter(THINNED_S)
-        if tick.command in seat.alarms:
-            self._wait(seat, tick.command, tick)
-        elif pace.allow(now):
-            self._tick(seat, tick, now)
+        rate_limiter = operator.paces.get(tick.command)
+        if rate_limiter is None:
+            rate_limiter = operator.paces[tick.command] = RateLimiter(THINNED_S)
+        if tick.command in operator.alarms:
+            self._wait(operator, tick.command, tick)
+        elif rate_limiter.allow(now):
+            self._tick(operator, tick, now)
         else:
-            alarm = self._clock.call_at(pace.free_at, lambda: self._ripe(seat, tick.command))
-            seat.alarms[tick.command] = alarm
-            self._wait(seat, tick.command, tick)
+            alarm = self._clock.call_at(
+                rate_limiter.free_at, lambda: self._ripe(operator, tick.command)
+            )
+            operator.alarms[tick.command] = alarm
+            self._wait(operator, tick.command, tick)
 
-    def _wait(self, seat: OperatorSession, command: str, tick: wire.Tick | bytes) -> None:
+    def _wait(self, operator: OperatorSession, command: str, tick: wire.Tick | bytes) -> None:
         """Keep a tick until its turn; the newest wins."""
-        seat.dropped += command in seat.pending
-        seat.pending[command] = tick
+        operator.dropped += command in operator.pending
+        operator.pending[command] = tick
 
-    def _ripe(self, seat: OperatorSession, command: str) -> None:
-        seat.alarms.pop(command, None)
-        seat.relax()
-        tick = seat.pending.pop(command, None)
+    def _ripe(self, operator: OperatorSession, command: str) -> None:
+        operator.alarms.pop(command, None)
+        operator.relax()
+        tick = operator.pending.pop(command, None)
         if isinstance(tick, bytes):
-            tick = self._read(seat, tick)
+            tick = self._read(operator, tick)
         if tick is not None:
             now = self._clock.now()
-            seat.paces[command].allow(now)
-            self._tick(seat, tick, now)
+            operator.paces[command].allow(now)
+            self._tick(operator, tick, now)
 
-    def _read(self, seat: OperatorSession, data: bytes) -> wire.Tick | None:
+    def _read(self, operator: OperatorSession, data: bytes) -> wire.Tick | None:
         try:
             return wire.decode_tick(data)
         except wire.NO_TICK as fault:
-            seat.notice("tick", wire.encode_refused("tick", "", str(fault)))
+            operator.notice("tick", wire.encode_refused("tick", "", str(fault)))
             return None
 
-    def _tick(self, seat: OperatorSession, tick: wire.Tick, now: float) -> None:
+    def _tick(self, operator: OperatorSession, tick: wire.Tick, now: float) -> None:
         given = tuple.__new__(
             ControlInput, (tick.epoch, tick.number, tick.echo)
         )  # fast: many a second
         command = tick.command
-        reason = self.desk.tick(seat.client.id, command, tick.arguments, given, now)
+        reason = self.controller.tick(operator.client.id, command, tick.arguments, given, now)
         if not reason:
-            seat.moved_s[command] = seat.moved_at_s = now
-        elif now - seat.moved_s.get(command, float("-inf")) > PATIENCE_S or self._is_closed(given):
-            seat.notice(command, wire.encode_refused("tick", command, reason))
-            self.trail.refused(seat.client, command, reason, now)
+            operator.moved_s[command] = operator.moved_at_s = now
+        elif now - operator.moved_s.get(command, float("-inf")) > PATIENCE_S or self._is_closed(
+            given
+        ):
+            operator.notice(command, wire.encode_refused("tick", command, reason))
+            self.recorder.refused(operator.client, command, reason, now)
 
     def _is_closed(self, given: ControlInput) -> bool:
-        return given.epoch != self.desk.lease.state.epoch
+        return given.epoch != self.controller.lease.state.epoch
 
     # -- effects
 
     def _stopped(self, command: str, reason: Reason) -> None:
-        self.desk.stopped(command, reason)
-        self.trail.stopped(command, reason, self._clock.now())
+        self.controller.stopped(command, reason)
+        self.recorder.stopped(command, reason, self._clock.now())
         if reason in ("released", "stopped"):
             return  # the operator let go, or the lease reports it
-        for seat in self._seats.values():
-            seat.moved_s.pop(command, None)
-            seat.notice(command, wire.encode_stopped(command, reason))
+        for operator in self._operators.values():
+            operator.moved_s.pop(command, None)
+            operator.notice(command, wire.encode_stopped(command, reason))
 
     def _refused(self, command: str, why: str) -> None:
         """Tell every page why the robot refused to move."""
-        self.trail.stopped(command, why, self._clock.now())
-        for seat in self._seats.values():
-            seat.forget(command)
-            seat.moved_s.pop(command, None)
-            seat.notice(command, wire.encode_refused("tick", command, why))
+        self.recorder.stopped(command, why, self._clock.now())
+        for operator in self._operators.values():
+            operator.forget(command)
+            operator.moved_s.pop(command, None)
+            operator.notice(command, wire.encode_refused("tick", command, why))
 
     def _heed(self, file: LatchStore | None) -> None:
         if file is not None:
@@ -338,20 +354,20 @@ class ControlService:
         if fault:
             text = f"STOP works, but would not survive a restart of the server: {fault}"
             self._log("error", text)
-            for seat in self._seats.values():
-                seat.notice("latch", wire.encode_refused("latch", "", text))
+            for operator in self._operators.values():
+                operator.notice("latch", wire.encode_refused("latch", "", text))
         else:
             self._log("info", "STOP survives a restart of the server again")
 
     def _held_up(self, late_s: float, is_first: bool) -> None:
         if late_s > TOO_LATE_S:
             now = self._clock.now()
-            for command in self.desk.halt():
-                self.trail.stopped(command, "the server was held up", now)
-                for seat in self._seats.values():
-                    seat.forget(command)
-                    seat.moved_s.pop(command, None)
-                    seat.notice(command, wire.encode_stopped(command, "expired"))
+            for command in self.controller.halt():
+                self.recorder.stopped(command, "the server was held up", now)
+                for operator in self._operators.values():
+                    operator.forget(command)
+                    operator.moved_s.pop(command, None)
+                    operator.notice(command, wire.encode_stopped(command, "expired"))
         if is_first:
             self._log("warning", f"the server was blocked for {late_s * 1000:.0f} ms")
 
@@ -362,37 +378,37 @@ class ControlService:
     def _changed(self, state: LeaseState) -> None:
         self._number += 1
         if self._file is not None:
-            self._file.save(Latch(state, not self.desk.is_confirmed))
-        for seat in self._seats.values():
-            seat.wake()
-        self.trail.leased(state, self._clock.now())
+            self._file.save(Latch(state, not self.controller.is_confirmed))
+        for operator in self._operators.values():
+            operator.wake()
+        self.recorder.leased(state, self._clock.now())
         self._set_expiry()
         if state.holder is not None and self._beating is None:
-            self._beat()
+            self._heartbeat()
 
-    def _beat(self) -> None:
+    def _heartbeat(self) -> None:
         """Send a heartbeat to the page that drives, and schedule the next one."""
         self._beating = None
-        holder = self.desk.lease.state.holder
-        seat = self._seats.get(holder.id) if holder is not None else None
-        if seat is None:
+        holder = self.controller.lease.state.holder
+        operator = self._operators.get(holder.id) if holder is not None else None
+        if operator is None:
             return
         now = self._clock.now()
-        seat.beat = self.desk.beat(seat.client.id, now)
-        if seat.spare is not None:
-            seat.spare.beat(seat.beat)
-        seat.wake()
-        self._beating = self._clock.call_at(now + BEAT_S, self._beat)
+        operator.heartbeat = self.controller.heartbeat(operator.client.id, now)
+        if operator.spare is not None:
+            operator.spare.heartbeat(operator.heartbeat)
+        operator.wake()
+        self._beating = self._clock.call_at(now + BEAT_S, self._heartbeat)
 
     def _set_expiry(self) -> None:
         if self._expiring is not None:
             self._expiring.cancel()
-        due = self.desk.deadline
+        due = self.controller.deadline
         self._expiring = None if due is None else self._clock.call_at(due, self._expire)
 
     def _expire(self) -> None:
         self._expiring = None
-        self.desk.expire(self._clock.now())
+        self.controller.expire(self._clock.now())
         self._set_expiry()
 
 

@@ -60,15 +60,15 @@ class OneShotCommands:
     def __init__(
         self,
         driver: Driver,
-        desk: Callable[[], MotionController],
+        controller: Callable[[], MotionController],
         clock: Clock,
-        trail: AuditRecorder,
+        recorder: AuditRecorder,
     ) -> None:
-        """Prepare; `desk` returns the current motion desk."""
+        """Prepare; `controller` returns the current motion desk."""
         self.driver = driver
-        self._desk = desk
+        self._controller = controller
         self._clock = clock
-        self._trail = trail
+        self._recorder = recorder
         self._session: Drivable | None = None
         self.on_stopped: Callable[[], None] = _nobody
         """Callback for each press of STOP."""
@@ -96,7 +96,7 @@ class OneShotCommands:
         """
         known = self.driver.commands.get(command)
         if known is not None and _moves(known, arguments):
-            return self._desk().lease.hindrance(client, stops)
+            return self._controller().lease.interlock(client, stops)
         return WATCHES if client.role == "viewer" else ""
 
     def pull_refusal(self, client: Operator, sequence: str, what: Pull) -> str:
@@ -111,7 +111,7 @@ class OneShotCommands:
         """Let STOP reach a session, at once if it is latched or not yet acknowledged."""
         self._session = session
         self._pressed.clear()
-        if self._desk().lease.latched or self._desk().owed:
+        if self._controller().lease.latched or self._controller().owed:
             self.stopped()
         try:
             async with asyncio.TaskGroup() as group:
@@ -129,7 +129,7 @@ class OneShotCommands:
         """Start a stop: STOP was pressed."""
         self.on_stopped()
         if self._session is not None:
-            self._session.latch(self._desk().lease.latched)
+            self._session.latch(self._controller().lease.latched)
             self._pressed.set()
 
     def reset(self) -> None:
@@ -139,11 +139,11 @@ class OneShotCommands:
 
     async def _give_stops(self, session: Drivable) -> None:
         """Repeat the stop commands until the robot has acknowledged each."""
-        while owed := self._desk().owed:
+        while owed := self._controller().owed:
             async with asyncio.TaskGroup() as group:
                 for command in owed:
                     group.create_task(self._give_stop(session, command))
-            if self._desk().owed:
+            if self._controller().owed:
                 await self._clock.sleep(AGAIN_S)
 
     async def _give_stop(self, session: Drivable, command: str) -> None:
@@ -154,11 +154,13 @@ class OneShotCommands:
         except CommandFailed as failed:
             outcome = f"{failed.code}: {failed.message}"
             # A refusal proves that the robot received the command. A reset ends the retries.
-            is_heard = failed.code == "refused" or (bool(sent) and not self._desk().lease.latched)
+            is_heard = failed.code == "refused" or (
+                bool(sent) and not self._controller().lease.latched
+            )
         if sent:
-            self._trail.ran(_STOP, command, {}, outcome, sent[-1])
+            self._recorder.ran(_STOP, command, {}, outcome, sent[-1])
         if is_heard:
-            self._desk().given(command)
+            self._controller().given(command)
 
 
 def _nobody() -> None:

@@ -27,7 +27,7 @@ FLOOD = 4
 class RedundantLine(Protocol):
     """A redundant socket of a page, see `urc.web.drive.redundant_socket`."""
 
-    def beat(self, number: int) -> None:
+    def heartbeat(self, number: int) -> None:
         """Send a heartbeat number."""
 
     def end(self) -> None:
@@ -42,7 +42,7 @@ class Drivable(Protocol):
         """The encoder of the engine."""
 
     @property
-    def movers(self) -> MotionBackend | None:
+    def backend(self) -> MotionBackend | None:
         """The sender of motion; None for a robot without a held command."""
 
     @property
@@ -68,7 +68,7 @@ class OperatorSession:
     def __init__(self, client: Operator, wake: Callable[[], None]) -> None:
         self.client = client
         self.wake = wake
-        self.beat: int | None = None
+        self.heartbeat: int | None = None
         self.notices: dict[str, str] = {}
         """Control or verb → newest notice about it."""
         self.seen = -1

@@ -49,22 +49,22 @@ class RedundantSocket:
     async def serve(self) -> None:
         """Serve this socket until either side closes."""
         try:
-            seat = await self._seat()
-            if seat is None:
+            operator = await self._operator()
+            if operator is None:
                 await self._line.close(CLOSE_NO_SEAT, "no open page has this key")
                 return
-            if seat.spare is not None:
-                seat.spare.end()
-            seat.spare, seat.doubled = self, seat.doubled or DuplicateElimination()
+            if operator.spare is not None:
+                operator.spare.end()
+            operator.spare, operator.doubled = self, operator.doubled or DuplicateElimination()
             try:
-                await self._listen(seat)
+                await self._listen(operator)
             finally:
-                if seat.spare is self:
-                    seat.spare = None
+                if operator.spare is self:
+                    operator.spare = None
         except WebSocketDisconnect:
             pass
 
-    def beat(self, number: int) -> None:
+    def heartbeat(self, number: int) -> None:
         """Send a heartbeat number, unless an older one is still in the buffer."""
         if self._flow.is_free():
             self._flow.write(as_frame(wire.encode_beat(number).encode(), is_text=True))
@@ -74,7 +74,7 @@ class RedundantSocket:
         self._is_over = True
         self._flow.abort()
 
-    async def _seat(self) -> OperatorSession | None:
+    async def _operator(self) -> OperatorSession | None:
         try:
             async with within(self._clock, KEY_WITHIN_S):
                 message = await self._line.receive()
@@ -83,13 +83,13 @@ class RedundantSocket:
             return None
         return self._controls.seat_of(said.key)
 
-    async def _listen(self, seat: OperatorSession) -> None:
+    async def _listen(self, operator: OperatorSession) -> None:
         while (message := await self._line.receive())["type"] != "websocket.disconnect":
-            if not self._receive(seat, message.get("text") or message.get("bytes") or b""):
+            if not self._receive(operator, message.get("text") or message.get("bytes") or b""):
                 await self._line.close(CLOSE_NOT_TAKEN, "only held controls may use this socket")
                 return
 
-    def _receive(self, seat: OperatorSession, data: str | bytes) -> bool:
+    def _receive(self, operator: OperatorSession, data: str | bytes) -> bool:
         if self._is_over or not self._allowance.allow(self._clock.now()):
             return False
         try:
@@ -97,5 +97,5 @@ class RedundantSocket:
         except _BAD:
             return False
         if said.number > 0:  # without a number, duplicates cannot be found
-            self._controls.handle(seat, said)
+            self._controls.handle(operator, said)
         return said.number > 0

@@ -58,9 +58,9 @@ class _Yes(NamedTuple):
 class TwoPersonRule:
     """The questions of one robot."""
 
-    def __init__(self, seats: Callable[[], tuple[OperatorSession, ...]], clock: Clock) -> None:
-        """Begin without questions; `seats` returns the pages that watch the robot."""
-        self._seats = seats
+    def __init__(self, operators: Callable[[], tuple[OperatorSession, ...]], clock: Clock) -> None:
+        """Begin without questions; `operators` returns the pages that watch the robot."""
+        self._operators = operators
         self._clock = clock
         self._numbers = count(1)
         self._questions: dict[int, _Question] = {}
@@ -128,8 +128,8 @@ class TwoPersonRule:
         until_s = self._clock.now() + WAIT_S
         one = _Question(next(self._numbers), run, asker, command, confirm, until_s, answer)
         self._questions[one.number] = one
-        for seat in self._seats():
-            self._send(seat, one)
+        for operator in self._operators():
+            self._send(operator, one)
         try:
             async with within(self._clock, WAIT_S):
                 second = await answer
@@ -138,7 +138,7 @@ class TwoPersonRule:
             raise CommandFailed("not-confirmed", text) from None
         finally:
             del self._questions[one.number]
-            for each in self._seats():
+            for each in self._operators():
                 each.notice(f"ask {one.number}", wire.encode_asked(one.number))
         if second is None:
             raise CommandFailed("not-confirmed", f"{confirm.text}: refused by another operator")
@@ -151,34 +151,34 @@ class TwoPersonRule:
             if not one.answer.done():
                 one.answer.set_exception(CommandFailed("not-confirmed", STOPPED))
 
-    def welcome(self, seat: OperatorSession) -> None:
+    def welcome(self, operator: OperatorSession) -> None:
         """Send the pending questions to a new page."""
         for one in self._questions.values():
-            self._send(seat, one)
+            self._send(operator, one)
 
-    def handle(self, seat: OperatorSession, said: wire.Approval) -> None:
+    def handle(self, operator: OperatorSession, said: wire.Approval) -> None:
         """Take the answer of a page; ignore it when the question is over."""
         one = self._questions.get(said.n)
-        if one is None or one.answer.done() or seat.client.role == "viewer":
+        if one is None or one.answer.done() or operator.client.role == "viewer":
             return
         if not said.yes:
             one.answer.set_result(None)
-        elif seat is not one.asker:
-            one.answer.set_result(seat)
+        elif operator is not one.asker:
+            one.answer.set_result(operator)
 
-    def _send(self, seat: OperatorSession, one: _Question) -> None:
-        if seat.client.role == "viewer" and seat is not one.asker:
+    def _send(self, operator: OperatorSession, one: _Question) -> None:
+        if operator.client.role == "viewer" and operator is not one.asker:
             return
         text = wire.encode_ask(
             one.number,
-            one.run if seat is one.asker else 0,
+            one.run if operator is one.asker else 0,
             one.asker.client.name,
             one.command,
             one.confirm.text,
             one.confirm.level,
             max(0.0, one.until_s - self._clock.now()),
         )
-        seat.notice(f"ask {one.number}", text)
+        operator.notice(f"ask {one.number}", text)
 
 
 def _meant(command: str, arguments: Mapping[str, Reading]) -> bytes:

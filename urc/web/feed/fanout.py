@@ -46,7 +46,7 @@ class Place:
     """One client's position in values and images."""
 
     known: FanoutPosition = field(default_factory=FanoutPosition)
-    looks: ImageSubscription = field(default_factory=ImageSubscription)
+    subscription: ImageSubscription = field(default_factory=ImageSubscription)
 
 
 class _Update(NamedTuple):
@@ -105,7 +105,7 @@ class Fanout:
         """The event loop while this runs."""
         self._broken: asyncio.Future[None] | None = None
         self._pictures = {name for name, signal in hub.signals.items() if is_picture(signal)}
-        self.shelf = ImageCache(hub, self._clock)
+        self.cache = ImageCache(hub, self._clock)
 
     async def run(self) -> None:
         """Flush until cancelled, or raise the exception of a flush."""

@@ -61,15 +61,15 @@ class ImageCache:
         self._encoded: dict[str, EncodedImage] = {}
         self._count = 0
 
-    def next_image(self, looks: ImageSubscription) -> EncodedImage | None:
+    def next_image(self, subscription: ImageSubscription) -> EncodedImage | None:
         """Return a shown image that the client lacks, or None; it then counts as sent."""
-        count = len(looks.names)
+        count = len(subscription.names)
         for step in range(count):
-            name = looks.names[(looks.turn + step) % count]
+            name = subscription.names[(subscription.turn + step) % count]
             made = self._newest(name)
-            if made is not None and looks.seen.get(name) != made.number:
-                looks.turn = (looks.turn + step + 1) % count
-                looks.seen[name] = made.number
+            if made is not None and subscription.seen.get(name) != made.number:
+                subscription.turn = (subscription.turn + step + 1) % count
+                subscription.seen[name] = made.number
                 return made
         return None
 

@@ -32,22 +32,22 @@ class Fleet:
     """All robots of one dashboard."""
 
     def __init__(
-        self, robots: Mapping[str, Robot], station: Callable[[str, Robot], RobotService]
+        self, robots: Mapping[str, Robot], service: Callable[[str, Robot], RobotService]
     ) -> None:
         """Prepare the robots from the start.
 
         Args:
             robots: the robots, by the name in their URL.
-            station: makes the station of a robot.
+            service: makes the station of a robot.
 
         Raises:
             UrcError: two robots bring different widgets of one name.
         """
-        self._station = station
+        self._service = service
         self.widgets: Assets = _assets(robots)
         self.robots: dict[str, Robot] = dict(robots)
         self.stations: dict[str, RobotService] = {
-            name: station(name, robot) for name, robot in robots.items()
+            name: service(name, robot) for name, robot in robots.items()
         }
         self.broken: dict[str, BrokenRobot] = {}
         """Robots that cannot be used, by name."""
@@ -73,7 +73,7 @@ class Fleet:
         robot = self._apart(name, robot)
         self.widgets = _assets({**self.robots, name: robot})
         self.robots[name] = robot
-        self.stations[name] = self._station(name, robot)
+        self.stations[name] = self._service(name, robot)
         self.broken.pop(name, None)
         self._start(name)
 
@@ -108,13 +108,13 @@ class Fleet:
         A pending stop counts while a session can deliver it. Without a session, for example because
         of a wrong address, it must not block a change of that address.
         """
-        station = self.stations.get(name)
-        if station is None or station.is_at_rest:
+        service = self.stations.get(name)
+        if service is None or service.is_at_rest:
             return ""
-        holder = station.controls.desk.lease.state.holder
+        holder = service.controls.controller.lease.state.holder
         if holder is not None:
             return holder.name
-        return t("a stop that is on its way") if station.is_open else ""
+        return t("a stop that is on its way") if service.is_open else ""
 
     def _apart(self, name: str, robot: Robot) -> Robot:
         others = [one.profile for other, one in self.robots.items() if other != name]

@@ -74,10 +74,10 @@ class InstalledInterface(NamedTuple):
 class RobotFactory:
     """The documents of the robots."""
 
-    def __init__(self, workshop: RobotOptions) -> None:
+    def __init__(self, robot_options: RobotOptions) -> None:
         """List the installed packages; no document is read yet."""
-        self.workshop = workshop
-        self.store = Store(workshop.data / "packages")
+        self.robot_options = robot_options
+        self.store = Store(robot_options.data / "packages")
         self._there = self._roots()
         """Packages that were installed at the start."""
         self._begun: dict[str, str] = {}
@@ -101,7 +101,7 @@ class RobotFactory:
 
     def kept(self, name: str) -> SettingsStore:
         """Return the file with the settings of a robot."""
-        return SettingsStore(self.workshop.data / "robots", name)
+        return SettingsStore(self.robot_options.data / "robots", name)
 
     def robot(self, name: str, profile: Profile, kept: StoredSettings | None = None) -> Robot:
         """Return a robot with its settings and all interfaces that fit; raise `UrcError`.
@@ -120,7 +120,7 @@ class RobotFactory:
                 name,
                 secret,
             )
-        return self.workshop.make(self.furnished(profile, chosen.interface), filled.values)
+        return self.robot_options.make(self.furnished(profile, chosen.interface), filled.values)
 
     def filled(self, profile: Profile, kept: StoredSettings) -> ResolvedSettings:
         """Return the resolved settings of a robot; raise `UrcError`.
@@ -141,7 +141,7 @@ class RobotFactory:
                     typed[name] = parse_setting(profile.settings[name], text)
                 except UrcError:
                     typed.pop(name, None)
-        given = dict(self.workshop.given(profile))
+        given = dict(self.robot_options.given(profile))
         package = self.package_of(profile)
         everything = typed | given
         place = destination_of(profile, package, everything)
@@ -217,7 +217,7 @@ class RobotFactory:
         locks = self.store.installed()
         found: dict[str, list[Lock]] = {}
         for name in {lock.key.name for lock in locks if lock.key.kind in DRIVEN}:
-            used = in_use(self.workshop.data / "robots", name, locks)
+            used = in_use(self.robot_options.data / "robots", name, locks)
             found[name] = [one for one in _ascending(locks) if used and one.key == used.key]
         return dict(sorted(found.items()))
 

@@ -102,7 +102,7 @@ class SessionLike(Protocol):
         """The encoder of held commands."""
 
     @property
-    def movers(self) -> MotionBackend | None:
+    def backend(self) -> MotionBackend | None:
         """The sender of motion; None for a robot without a held command."""
 
     async def command(
@@ -139,7 +139,7 @@ class Robot:
     """View of an emulated robot without a connection; None for a real one."""
     is_emulated: bool = False
     """Whether it is emulated: real and emulated robots of one name share no stored state."""
-    tape: Playback | None = None
+    playback: Playback | None = None
     """The recording in place of the robot, or None."""
 
 
@@ -192,7 +192,7 @@ class RobotService:
         linger_s: float = LINGER_S,
         clock: Clock | None = None,
         latch: LatchStore | None = None,
-        trail: AuditRecorder | None = None,
+        recorder: AuditRecorder | None = None,
     ) -> None:
         """Wait for the first client.
 
@@ -201,16 +201,16 @@ class RobotService:
             linger_s: time for which the session stays open after its last client, in seconds.
             clock: the clock.
             latch: keeps a STOP over a restart.
-            trail: receives the events of the audit log.
+            recorder: receives the events of the audit log.
         """
         self.robot = robot
         self.clock: Clock = clock or LoopClock()
-        self.controls = ControlService(robot.profile.driver, self.clock, latch, trail)
-        self.consent = TwoPersonRule(lambda: self.controls.seats, self.clock)
+        self.controls = ControlService(robot.profile.driver, self.clock, latch, recorder)
+        self.consent = TwoPersonRule(lambda: self.controls.operators, self.clock)
         self.controls.once.on_stopped = self.consent.stop
         self._linger_s = linger_s
         self._visitors = 0
-        self._seats: Counter[str] = Counter()
+        self._operators: Counter[str] = Counter()
         self._stirred = asyncio.Event()
         self._next: asyncio.Future[LiveSession] | None = None
         self._is_open = False
@@ -223,23 +223,23 @@ class RobotService:
         """Whether the limit of clients is reached."""
         return self._visitors >= CLIENTS
 
-    def has_seat_for(self, guest: SocketPeer) -> bool:
-        """Return whether another client of `guest` still leaves places for other visitors."""
-        most = KNOWN_SEATS if guest.is_known else SEATS
-        return not guest.who or self._seats[guest.who] < most
+    def has_seat_for(self, peer: SocketPeer) -> bool:
+        """Return whether another client of `peer` still leaves places for other visitors."""
+        most = KNOWN_SEATS if peer.is_known else SEATS
+        return not peer.who or self._operators[peer.who] < most
 
     @contextmanager
     def visit(self, who: str = "") -> Iterator[None]:
         """Count as a client while the context lasts; `who` is that of its `SocketPeer`."""
         self._visitors += 1
-        self._seats[who] += 1
+        self._operators[who] += 1
         self._stirred.set()
         try:
             yield
         finally:
             self._visitors -= 1
-            self._seats[who] -= 1
-            self._seats += Counter()  # drops zero counts
+            self._operators[who] -= 1
+            self._operators += Counter()  # drops zero counts
             self._stirred.set()
 
     async def live(self) -> LiveSession:
@@ -265,25 +265,25 @@ class RobotService:
 
     async def deliver_stop(self) -> bool:
         """Connect the robot if needed, and wait briefly until it has the stop; return success."""
-        desk = self.controls.desk
+        controller = self.controls.controller
         end_s = self.clock.now() + STOP_WITHIN_S
         with self.visit():
-            while not desk.is_confirmed and self.clock.now() < end_s:
+            while not controller.is_confirmed and self.clock.now() < end_s:
                 await self.clock.sleep(_LOOK_S)
-        return desk.is_confirmed and desk.has_own_stop
+        return controller.is_confirmed and controller.has_own_stop
 
     def who(self) -> dict[str, str | bool]:
         """Return lease and STOP as `urc.web.manage.wire.ControlState`."""
-        state = self.controls.desk.lease.state
+        state = self.controls.controller.lease.state
         holder = "" if state.holder is None else state.holder.name or "another screen"
-        is_emulated = self.robot.is_emulated or self.robot.tape is not None
+        is_emulated = self.robot.is_emulated or self.robot.playback is not None
         return {"holder": holder, "latched": state.latched_by, "emulated": is_emulated}
 
     @property
     def is_at_rest(self) -> bool:
         """Whether the robot is not driven and every stop has reached it."""
-        desk = self.controls.desk
-        return desk.lease.state.holder is None and desk.is_confirmed
+        controller = self.controls.controller
+        return controller.lease.state.holder is None and controller.is_confirmed
 
     @property
     def is_open(self) -> bool:
@@ -345,7 +345,7 @@ class RobotService:
         fanout = Fanout(session.hub, clock=self.clock, each=each)
         live = LiveSession(session, fanout, secrets.token_hex(8), asyncio.Event())
         self._coming().set_result(live)
-        self.controls.trail.attend(session.hub, self.clock.now)
+        self.controls.recorder.attend(session.hub, self.clock.now)
         try:
             async with asyncio.TaskGroup() as group:
                 tasks = [
@@ -358,7 +358,7 @@ class RobotService:
                     task.cancel()
         finally:
             self._next = None
-            self.controls.trail.attend(None, self.clock.now)
+            self.controls.recorder.attend(None, self.clock.now)
             live.ended.set()
             live.fanout.flush()  # wakes every client, so that each sees the end
 

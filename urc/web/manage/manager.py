@@ -36,7 +36,7 @@ class Manager:
 
     def __init__(
         self,
-        garage: RobotFactory,
+        factory: RobotFactory,
         fleet: Fleet,
         now: Callable[[], float],
         renew: Callable[[str, Robot], None],
@@ -44,16 +44,16 @@ class Manager:
         """Prepare.
 
         Args:
-            garage: the source of robots.
+            factory: the source of robots.
             fleet: the served robots.
             now: returns the time, in seconds.
             renew: switches to another version of a robot; raises `UrcError`.
         """
-        self.garage = garage
+        self.factory = factory
         self.fleet = fleet
         self._renew = renew
-        self.catalogue = PackageCatalog(garage.workshop.data / "packages", now)
-        self.jobs = Jobs(garage.store, self._sources, self._used)
+        self.catalogue = PackageCatalog(factory.robot_options.data / "packages", now)
+        self.jobs = Jobs(factory.store, self._sources, self._used)
         self._parked: dict[str, Lock] = {}
         """Robots that are on the menu because they are installed: name → served version."""
         self._offered: dict[str, str] = {}
@@ -77,9 +77,9 @@ class Manager:
 
     async def park(self) -> None:
         """Serve the installed robots if the menu shows them, and no others."""
-        if not self.garage.workshop.shows_installed:
+        if not self.factory.robot_options.shows_installed:
             return
-        parked = await asyncio.to_thread(self.garage.parked)
+        parked = await asyncio.to_thread(self.factory.parked)
         for name in [one for one in self._parked if one not in parked]:
             if self._waits(name):
                 continue
@@ -92,14 +92,14 @@ class Manager:
 
     async def _park(self, name: str, locks: list[Lock]) -> None:
         try:
-            kept = await asyncio.to_thread(self.garage.kept(name).load)
-            lock, served = self.garage.chosen(locks, kept.version), self._parked.get(name)
+            kept = await asyncio.to_thread(self.factory.kept(name).load)
+            lock, served = self.factory.chosen(locks, kept.version), self._parked.get(name)
             if served in locks and not kept.version:
                 lock = served  # another program installed a newer one; the user chooses
             if name in self.fleet.robots and (served == lock or self._waits(name)):
                 return
-            profile = await asyncio.to_thread(self.garage.profile, lock)
-            robot = await asyncio.to_thread(self.garage.robot, name, profile, kept)
+            profile = await asyncio.to_thread(self.factory.profile, lock)
+            robot = await asyncio.to_thread(self.factory.robot, name, profile, kept)
             if name in self.fleet.robots:
                 self._renew(name, robot)
             else:
@@ -118,7 +118,7 @@ class Manager:
 
     async def refurnish(self) -> None:
         """Offer the installed interfaces on every robot that is not driven."""
-        added = await asyncio.to_thread(self.garage.interfaces)
+        added = await asyncio.to_thread(self.factory.interfaces)
         now = {one.lock.key.name: one.lock.digest for one in added}
         changed = {name for name, _ in now.items() ^ self._offered.items()}
         self._offered = now
@@ -129,7 +129,7 @@ class Manager:
                 continue
             try:
                 profile = await asyncio.to_thread(self.document_of, name, robot)
-                made = await asyncio.to_thread(self.garage.robot, name, profile)
+                made = await asyncio.to_thread(self.factory.robot, name, profile)
                 if changed & {*robot.profile.interfaces, *made.profile.interfaces}:
                     self._renew(name, made)
             except (UrcError, OSError) as error:
@@ -142,16 +142,16 @@ class Manager:
         else:
             self.fleet.add(name, robot)
         if name in self._parked:
-            locks = (await asyncio.to_thread(self.garage.parked)).get(name)
+            locks = (await asyncio.to_thread(self.factory.parked)).get(name)
             if locks:
-                self._parked[name] = self.garage.chosen(locks, version)
+                self._parked[name] = self.factory.chosen(locks, version)
 
     def document_of(self, name: str, robot: Robot) -> Profile:
         """Return a robot's profile as its document says, without added interfaces."""
         lock = self._parked.get(name)
         if lock is not None:
-            return self.garage.profile(lock)
-        return self.garage.reread(robot.profile)
+            return self.factory.profile(lock)
+        return self.factory.reread(robot.profile)
 
     def drivers(self) -> dict[str, str]:
         """Return name → installed package, as ``drivers/puppet 1.0.0``."""
@@ -165,13 +165,13 @@ class Manager:
 
     async def refresh(self) -> None:
         """Update the menu if another program has installed or removed a package."""
-        if await asyncio.to_thread(self.garage.stamp) != self._seen:
+        if await asyncio.to_thread(self.factory.stamp) != self._seen:
             await self.changed()
 
     async def changed(self) -> None:
         """Update the menu from the installed packages."""
         async with self._changing:
-            self._seen = await asyncio.to_thread(self.garage.stamp)
+            self._seen = await asyncio.to_thread(self.factory.stamp)
             self._is_behind = False
             try:
                 await self.park()
@@ -193,29 +193,29 @@ class Manager:
         await asyncio.to_thread(known.remove, url)
         self.catalogue.refresh(force=True)
 
-    def gone(self, wish: PackageRequirement) -> list[str]:
+    def gone(self, required: PackageRequirement) -> list[str]:
         """Return all packages that a removal would remove, as ``drivers/puppet 1.0.0``; raise."""
-        before = self.garage.store.installed()
-        meant = self._meant(wish)
+        before = self.factory.store.installed()
+        meant = self._meant(required)
         after = [lock for lock in before if lock not in meant]
         return sorted(_all(before) - _all(after))
 
-    def _meant(self, wish: PackageRequirement) -> list[Lock]:
+    def _meant(self, required: PackageRequirement) -> list[Lock]:
         """Return the installed packages that a wish names; raise `PackageError` for none."""
         meant = [
             lock
-            for lock in self.garage.store.installed()
-            if lock.key == PackageId(wish.kind or lock.key.kind, wish.name)
-            and wish.range in ("*", lock.version)
+            for lock in self.factory.store.installed()
+            if lock.key == PackageId(required.kind or lock.key.kind, required.name)
+            and required.range in ("*", lock.version)
         ]
         if not meant:
-            raise PackageError(f"{wish} was not installed by itself")
+            raise PackageError(f"{required} was not installed by itself")
         return meant
 
-    def forgettable(self, wish: PackageRequirement) -> list[str]:
+    def forgettable(self, required: PackageRequirement) -> list[str]:
         """Return the robots whose settings a removal could delete; raise."""
-        meant = self._meant(wish)
-        left = [lock for lock in self.garage.store.installed() if lock not in meant]
+        meant = self._meant(required)
+        left = [lock for lock in self.factory.store.installed() if lock not in meant]
         return names_kept(self._kept_folder, meant, left)
 
     async def remove(self, text: str, *, forgets: bool = True) -> list[str]:
@@ -226,18 +226,18 @@ class Manager:
         Raises:
             PackageError: it is not installed, or its robot is being driven.
         """
-        wish = parse_wish(text)
-        for lock in await asyncio.to_thread(self._meant, wish):
+        required = parse_wish(text)
+        for lock in await asyncio.to_thread(self._meant, required):
             self._check_idle_of(lock.key)
 
         def work() -> list[str]:
-            with self.garage.store.changing() as change:
-                return change.remove(wish)[1]
+            with self.factory.store.changing() as change:
+                return change.remove(required)[1]
 
-        names = await asyncio.to_thread(self.forgettable, wish) if forgets else []
+        names = await asyncio.to_thread(self.forgettable, required) if forgets else []
         gone = await asyncio.to_thread(work)
         for name in names:
-            await asyncio.to_thread(self.garage.kept(name).forget)
+            await asyncio.to_thread(self.factory.kept(name).forget)
         await self.changed()
         return gone
 
@@ -257,7 +257,7 @@ class Manager:
 
     def installed(self, text: str) -> Lock:
         """Return the newest installed version of a package; raise `PackageError`."""
-        lock = self.garage.store.find(parse_wish(text))
+        lock = self.factory.store.find(parse_wish(text))
         if lock is None:
             raise PackageError(f"{text} is not installed")
         return lock
@@ -268,7 +268,7 @@ class Manager:
         self._check_idle_of(lock.key)
 
         def work() -> Lock:
-            with self.garage.store.changing() as change:
+            with self.factory.store.changing() as change:
                 return change.back(lock)
 
         old = await asyncio.to_thread(work)
@@ -282,7 +282,7 @@ class Manager:
 
     def _used(self, key: PackageId) -> Lock | None:
         """Return the version of a package in use; for a driven robot, any package of its name."""
-        installed = self.garage.store.installed()
+        installed = self.factory.store.installed()
         if key.kind in DRIVEN:
             return in_use(self._kept_folder, key.name, installed)
         mine = [lock for lock in installed if lock.key == key]
@@ -290,7 +290,7 @@ class Manager:
 
     @property
     def _kept_folder(self) -> Path:
-        return self.garage.workshop.data / "robots"
+        return self.factory.robot_options.data / "robots"
 
     def check_idle(self, name: str) -> None:
         """Raise `Busy` while a robot is driven."""
@@ -300,7 +300,7 @@ class Manager:
 
     # Data for pages
 
-    def shelf(self, words: str, kinds: tuple[str, ...], *, may_manage: bool) -> PackageList:
+    def cache(self, words: str, kinds: tuple[str, ...], *, may_manage: bool) -> PackageList:
         """Return the lists of a page; in a thread, since it reads files.
 
         Args:
@@ -311,7 +311,7 @@ class Manager:
         catalogue = self.catalogue
         # Read first: replies that arrive during the search then cause one more request.
         is_asking = catalogue.is_asking
-        locks = self.garage.store.installed()
+        locks = self.factory.store.installed()
         hits = catalogue.hits(words, kinds)
         has = {lock.root: lock.version for lock in sorted(locks, key=lambda lock: lock.number)}
         job = self.jobs.newest
@@ -344,7 +344,7 @@ class Manager:
     def _installed(self, lock: Lock) -> Installed:
         said, fault = None, ""
         try:
-            said = self.garage.manifest(lock)
+            said = self.factory.manifest(lock)
         except UrcError as error:
             fault = str(error)
         key, name = lock.key, lock.key.name
@@ -365,7 +365,7 @@ class Manager:
             brings=tuple(
                 f"{root} {pin.version}" for root, pin in lock.packages.items() if root != lock.root
             ),
-            before=before.version if (before := self.garage.store.previous(lock)) else "",
+            before=before.version if (before := self.factory.store.previous(lock)) else "",
             newer=newest.version if newest is not None and is_old else "",
             url=url,
             settings_url=f"{page}settings" if is_served else "",

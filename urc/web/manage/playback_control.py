@@ -16,31 +16,31 @@ from urc.web.manage.wire import PlaybackRequest, PlaybackState
 __all__ = ["move_tape", "tape_state"]
 
 
-def tape_state(tape: Playback | None) -> Response:
+def tape_state(playback: Playback | None) -> Response:
     """Return the state of the playback as a response; 404 for None."""
-    if tape is None:
+    if playback is None:
         return told(404, "this robot is no recording")
     return answer(
         PlaybackState(
-            began_s=tape.began_s,
-            length_s=tape.length_s,
-            position_s=tape.position_s,
-            is_playing=tape.is_playing,
-            speed=tape.speed,
+            began_s=playback.began_s,
+            length_s=playback.length_s,
+            position_s=playback.position_s,
+            is_playing=playback.is_playing,
+            speed=playback.speed,
         )
     )
 
 
-async def move_tape(request: Request, tape: Playback | None) -> Response:
+async def move_tape(request: Request, playback: Playback | None) -> Response:
     """Run, pause or move the playback, and return its state as a response."""
-    if tape is None:
+    if playback is None:
         return told(404, "this robot is no recording")
     try:
         asked = await body_of(request, PlaybackRequest)
     except ApiError as refusal:
         return told(refusal.status, refusal.line)
     if asked.position_s is not None and math.isfinite(asked.position_s):
-        tape.seek(asked.position_s)
-    if asked.is_playing is not None and asked.is_playing != tape.is_playing:
-        (tape.play if asked.is_playing else tape.pause)()
-    return tape_state(tape)
+        playback.seek(asked.position_s)
+    if asked.is_playing is not None and asked.is_playing != playback.is_playing:
+        (playback.play if asked.is_playing else playback.pause)()
+    return tape_state(playback)

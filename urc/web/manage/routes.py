@@ -201,7 +201,7 @@ class ManageRoutes:
             Route("/drivers", self.page),
             Route("/interfaces", self.page),
             Route("/widgets/installed", self.page),
-            Route("/api/v1/packages", self.shelf),
+            Route("/api/v1/packages", self.cache),
             *(Route(f"/api/v1/{path}", one, methods=["POST"]) for path, one in posts.items()),
         ]
 
@@ -219,22 +219,22 @@ class ManageRoutes:
             self._ways,
             may_manage=self.may_manage(request),
             may_name_paths=self._is_here(request),
-            is_shown=self._manager.garage.workshop.shows_installed,
+            is_shown=self._manager.factory.robot_options.shows_installed,
         )
         return HTMLResponse(html, headers=_NO_STORE)
 
     @_api
-    async def shelf(self, request: Request) -> Response:
+    async def cache(self, request: Request) -> Response:
         """Return the packages; ``kinds`` and ``words`` filter. No repository is contacted."""
         query = request.query_params
         kinds = tuple(one for one in query.get("kinds", "").split(",") if one in _KINDS) or _KINDS
-        shelf = await asyncio.to_thread(
-            self._manager.shelf,
+        cache = await asyncio.to_thread(
+            self._manager.cache,
             query.get("words", "")[:200],
             kinds,
             may_manage=self.may_manage(request),
         )
-        return answer(shelf)
+        return answer(cache)
 
     @_api
     async def refresh(self, request: Request) -> Response:
@@ -288,7 +288,7 @@ class ManageRoutes:
         name = request.query_params.get("name", "")[:200]
         data = await request.body()
         source = await asyncio.to_thread(
-            given_source, name, data, self._manager.garage.store.installed()
+            given_source, name, data, self._manager.factory.store.installed()
         )
         return self._begun(source)
 
@@ -313,9 +313,9 @@ class ManageRoutes:
         self.check(request)
         said = await body_of(request, InstallRequest)
         if not said.yes:
-            wish = parse_wish(said.package)
-            gone = await asyncio.to_thread(self._manager.gone, wish)
-            filled = await asyncio.to_thread(self._manager.forgettable, wish)
+            required = parse_wish(said.package)
+            gone = await asyncio.to_thread(self._manager.gone, required)
+            filled = await asyncio.to_thread(self._manager.forgettable, required)
             return answer(RemovedPackages(tuple(gone), "", has_settings=bool(filled)))
         gone = await self._manager.remove(said.package, forgets=said.forget)
         line = t("removed {names}", names=", ".join(gone))

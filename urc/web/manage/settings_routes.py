@@ -68,12 +68,12 @@ class SettingsRoutes:
         return HTMLResponse(html, headers=_NO_STORE)
 
     def _page(self, request: Request, name: str) -> str:
-        garage = self._manager.garage
+        factory = self._manager.factory
         lock = self._manager.lock_of(name)
-        locks = garage.parked().get(name, []) if lock is not None else []
+        locks = factory.parked().get(name, []) if lock is not None else []
         fault = ""
         try:
-            kept = garage.kept(name).load()
+            kept = factory.kept(name).load()
         except UrcError as error:
             kept, fault = StoredSettings(), str(error)
         profile = self._profile(name)
@@ -82,7 +82,7 @@ class SettingsRoutes:
             if broken is None:
                 raise HTTPException(404, t("No robot of that name is served here."))
             profile, fault = Profile(name, broken.title, ""), broken.fault
-        filled = None if fault else garage.filled(profile, kept)
+        filled = None if fault else factory.filled(profile, kept)
         return settings_page(
             request.state.nonce,
             name,
@@ -122,7 +122,7 @@ class SettingsRoutes:
             return told(422, str(error).strip().partition("\n")[0])
 
     async def _save(self, name: str, said: SettingsAsked) -> SettingsAnswer:
-        manager, garage = self._manager, self._manager.garage
+        manager, factory = self._manager, self._manager.factory
         if name not in manager.fleet.robots and name not in manager.fleet.broken:
             raise ApiError(404, "no robot of that name is served here")
         manager.check_idle(name)
@@ -132,7 +132,7 @@ class SettingsRoutes:
         if faults:
             text = t("not saved: look at what is marked")
             return SettingsAnswer(is_saved=False, text=text, faults=faults)
-        robot = await asyncio.to_thread(garage.robot, name, bare, kept)
+        robot = await asyncio.to_thread(factory.robot, name, bare, kept)
         missing = tuple(one.title or spoken(one.name) for one in missing_settings(robot))
         lines: tuple[ProbedTransport, ...] = ()
         if said.test and not missing:
@@ -141,7 +141,7 @@ class SettingsRoutes:
                 text = t("not saved: the robot could not be reached")
                 return SettingsAnswer(is_saved=False, text=text, lines=lines)
         manager.check_idle(name)  # again: the test takes a while
-        await asyncio.to_thread(garage.kept(name).save, kept)
+        await asyncio.to_thread(factory.kept(name).save, kept)
         await manager.apply_settings(name, robot, said.version)
         text = t("saved, and used from now on")
         if missing:
@@ -150,28 +150,28 @@ class SettingsRoutes:
 
     def _kept(self, name: str) -> StoredSettings:
         try:
-            return self._manager.garage.kept(name).load()
+            return self._manager.factory.kept(name).load()
         except UrcError:
             return StoredSettings()  # damaged: the new values replace it
 
     def _document(self, name: str, version: str) -> Profile:
         """Return the profile of the chosen version, as written in its document."""
-        manager, garage = self._manager, self._manager.garage
+        manager, factory = self._manager, self._manager.factory
         lock = manager.lock_of(name)
         if lock is not None:
-            locks = garage.parked().get(name, [lock])
+            locks = factory.parked().get(name, [lock])
             if version and version not in [one.version for one in locks]:
                 raise UrcError(f"{name} {version} is not installed")
-            return garage.profile(garage.chosen(locks, version))
-        return garage.reread(manager.fleet.robots[name].profile)
+            return factory.profile(factory.chosen(locks, version))
+        return factory.reread(manager.fleet.robots[name].profile)
 
     def _filled_in(
         self, profile: Profile, before: StoredSettings, said: SettingsAsked
     ) -> tuple[StoredSettings, dict[str, str]]:
         """Return the settings to store, and the mistakes by field."""
         texts, faults = _typed(profile, said)
-        garage = self._manager.garage
-        package = garage.package_of(profile)
+        factory = self._manager.factory
+        package = factory.package_of(profile)
         untouched = {
             name: before.settings.get(name, "")
             for name, text in said.settings.items()
@@ -185,7 +185,7 @@ class SettingsRoutes:
             destination=before.destination,
             package=package,
         )
-        found = garage.filled(profile, kept)
+        found = factory.filled(profile, kept)
         for name in untouched.keys() & found.withheld:
             faults[name] = t("enter it again: it was entered for another place, or another package")
         return msgspec.structs.replace(kept, destination=found.destination), faults
@@ -194,16 +194,18 @@ class SettingsRoutes:
         self, name: str, profile: Profile, values: Mapping[str, Value]
     ) -> tuple[ProbedTransport, ...]:
         """Test every transport while the robot is disconnected; a STOP ends the test at once."""
-        workshop = self._manager.garage.workshop
-        station = self._manager.fleet.stations.get(name)
-        held_off = station.held_off() if station is not None else nullcontext()
-        epoch = _epoch(station)
+        robot_options = self._manager.factory.robot_options
+        service = self._manager.fleet.stations.get(name)
+        held_off = service.held_off() if service is not None else nullcontext()
+        epoch = _epoch(service)
         async with held_off:
-            work = probe(lambda: workshop.tried(profile, values), built_in_catalog().transports)
+            work = probe(
+                lambda: robot_options.tried(profile, values), built_in_catalog().transports
+            )
             trying = asyncio.get_running_loop().create_task(work)
             try:
                 while not trying.done():
-                    if _epoch(station) != epoch:
+                    if _epoch(service) != epoch:
                         raise Busy(t("the robot was stopped meanwhile: try again"))
                     await asyncio.wait((trying,), timeout=_LOOK_S)
             finally:
@@ -212,9 +214,9 @@ class SettingsRoutes:
             return tuple(map(_line, trying.result()))
 
 
-def _epoch(station: RobotService | None) -> int:
+def _epoch(service: RobotService | None) -> int:
     """Return a number that changes with every STOP and every new operator."""
-    return station.controls.desk.lease.state.epoch if station is not None else 0
+    return service.controls.controller.lease.state.epoch if service is not None else 0
 
 
 def _line(tried: ProbeResult) -> ProbedTransport:

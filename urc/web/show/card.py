@@ -42,15 +42,15 @@ class Cards:
 
     async def card(self, request: Request) -> Response:
         """Send an image, or values as JSON ``[[title, text], …]``; 204 without any data."""
-        station = self._stations().get(request.path_params["name"])
-        if station is None:
+        service = self._stations().get(request.path_params["name"])
+        if service is None:
             raise HTTPException(404, t("No robot of that name is served here."))
-        seen = station.glimpse()
+        seen = service.glimpse()
         if seen is None:
             return Response(status_code=204, headers=_FRESH)
         if isinstance(seen, bytes):
             return Response(seen, media_type=media_type(seen), headers=_FRESH)
-        shown = small_values(station.robot.profile.driver, seen)
+        shown = small_values(service.robot.profile.driver, seen)
         return JSONResponse(shown, headers=_FRESH)
 
 

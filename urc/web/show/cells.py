@@ -81,17 +81,17 @@ def render_widget(widget: Widget, context: WidgetContext) -> Markup:
     return Markup(widget_template(source).render(variables))  # noqa: S704  # autoescaped
 
 
-def render_foreign(uses: Iterable[tuple[WidgetUse, Profile]], border: WidgetTrust) -> None:
+def render_foreign(uses: Iterable[tuple[WidgetUse, Profile]], trust: WidgetTrust) -> None:
     """Render the markup of all third-party widgets of a page at once, which saves time.
 
     Args:
         uses: the cells in their order, each with the profile of its robot.
-        border: tells third-party widgets from trusted ones.
+        trust: tells third-party widgets from trusted ones.
     """
     wanted = []
     for index, (use, profile) in enumerate(uses):
         widget = profile.widgets[use.widget]
-        if border.is_foreign(widget):
+        if trust.is_foreign(widget):
             try:
                 context = widget_context(use, widget, profile, uid=f"cell-{index}")
                 wanted.append((_source(widget), _variables(context)))
@@ -145,7 +145,7 @@ def widget_cell(
     index: int,
     use: WidgetUse,
     profile: Profile,
-    border: WidgetTrust = WidgetTrust(),  # noqa: B008  # frozen
+    trust: WidgetTrust = WidgetTrust(),  # noqa: B008  # frozen
     *,
     is_background: bool = False,
 ) -> Cell:
@@ -157,7 +157,7 @@ def widget_cell(
     widget = profile.widgets[use.widget]
     context = widget_context(use, widget, profile, uid=f"cell-{index}")
     html, error = Markup(), ""
-    is_foreign = border.is_foreign(widget)
+    is_foreign = trust.is_foreign(widget)
     try:
         if is_foreign:
             html, fault, line = markup_of([(_source(widget), _variables(context))])[0]

@@ -60,7 +60,7 @@ class WidgetLookup:
     def names(self) -> list[str]:
         """Return the names of all widgets, with broken ones."""
         profiles = list(self._profiles())
-        names = {name for shelf in self._shelves(profiles) for name in shelf.names()}
+        names = {name for registry in self._registries(profiles) for name in registry.names()}
         return sorted(names.union(*(profile.widgets for profile in profiles)))
 
     def find(self, name: str) -> Found | None:
@@ -68,29 +68,29 @@ class WidgetLookup:
         profiles = list(self._profiles())
         mine = next((one.widgets[name] for one in profiles if name in one.widgets), None)
         if mine is not None:
-            shelf = WidgetFolder(mine.folder.parent)
-            is_read = self._is_fresh and shelf.has(name)
-            return _on(shelf, name) if is_read else Found(mine.folder, mine)
-        shelves = self._shelves(profiles)
-        return next((_on(shelf, name) for shelf in shelves if shelf.has(name)), None)
+            registry = WidgetFolder(mine.folder.parent)
+            is_read = self._is_fresh and registry.has(name)
+            return _on(registry, name) if is_read else Found(mine.folder, mine)
+        registries = self._registries(profiles)
+        return next((_on(registry, name) for registry in registries if registry.has(name)), None)
 
     def folder(self, name: str) -> Path | None:
         """Return the folder of a widget without a look at its manifest, or None."""
         profiles = list(self._profiles())
         mine = [one.widgets[name].folder for one in profiles if name in one.widgets]
-        shelves = self._shelves(profiles)
-        on_shelf = (shelf.place(name) for shelf in shelves if shelf.has(name))
+        registries = self._registries(profiles)
+        on_shelf = (registry.place(name) for registry in registries if registry.has(name))
         return next(iter(mine), None) or next(on_shelf, None)
 
-    def _shelves(self, profiles: Iterable[Profile]) -> list[WidgetFolder]:
+    def _registries(self, profiles: Iterable[Profile]) -> list[WidgetFolder]:
         """Return the folders of widgets; none of them can replace a widget of URC."""
         files = dict.fromkeys(one.file for one in profiles)
         return [WidgetFolder(shipped("widgets")), *(shelf_of(file) for file in files)]
 
 
-def _on(shelf: WidgetFolder, name: str) -> Found:
-    widget = shelf.get(name)
-    return Found(shelf.place(name), widget, tuple(shelf.problems))
+def _on(registry: WidgetFolder, name: str) -> Found:
+    widget = registry.get(name)
+    return Found(registry.place(name), widget, tuple(registry.problems))
 
 
 def mark(text: str) -> str:
@@ -185,7 +185,7 @@ class Gallery:
         profiles: returns the profiles of the served robots.
         is_dev: whether pages reload when a file of their widgets is saved.
         ways: navigation links of this server.
-        border: tells third-party widgets from trusted ones.
+        trust: tells third-party widgets from trusted ones.
     """
 
     def __init__(
@@ -194,14 +194,14 @@ class Gallery:
         profiles: Callable[[], Iterable[Profile]],
         *,
         is_dev: bool = False,
-        border: WidgetTrust = WidgetTrust(),  # noqa: B008  # frozen
+        trust: WidgetTrust = WidgetTrust(),  # noqa: B008  # frozen
         ways: NavigationLinks = NavigationLinks(),  # noqa: B008 - it cannot be changed
     ) -> None:
         self._modules = modules
         self._lookup = WidgetLookup(profiles, is_fresh=is_dev)
         self._is_dev = is_dev
         self._ways = ways
-        self._border = border
+        self._trust = trust
         self.assets = Assets()
         """Files of the shown widgets, which need not belong to any robot."""
 
@@ -249,11 +249,11 @@ class Gallery:
         return DemoPage(
             head=replace(
                 self._head(request, titles[0] if is_single else t("Widgets")),
-                widget_styles=self._border.styles(widgets),
+                widget_styles=self._trust.styles(widgets),
             ),
             title=", ".join(titles),
             summary=widgets[0].summary if is_single and widgets else "",
-            exhibits=tuple(_exhibits(shown, self._border)),
+            exhibits=tuple(_exhibits(shown, self._trust)),
             faults=tuple(WidgetProblem(one.headline, one.hint) for one in problems),
             stamp_url="stamp" if self._is_dev else "",
             stamp=stamp,
@@ -312,11 +312,11 @@ class Gallery:
             return WidgetView(name, found.widget, [], error.problems)
 
 
-def _exhibits(shown: Iterable[WidgetView], border: WidgetTrust) -> Iterable[DemoView]:
+def _exhibits(shown: Iterable[WidgetView], trust: WidgetTrust) -> Iterable[DemoView]:
     every = [(one.widget, state) for one in shown if one.widget for state in one.states]
-    render_foreign(((state.use, state.profile) for _, state in every), border)
+    render_foreign(((state.use, state.profile) for _, state in every), trust)
     for index, (widget, state) in enumerate(every):
-        cell = widget_cell(index, state.use, state.profile, border)
+        cell = widget_cell(index, state.use, state.profile, trust)
         label = t(state.name) if state.name in EXAMPLES else state.name
         yield DemoView(widget.name, state.name, label, widget.title, cell, state.news)
 

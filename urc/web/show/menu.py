@@ -152,7 +152,7 @@ def _card(name: str, robot: Robot, ways: NavigationLinks, driver: str) -> Card:
         settings_url=f"{url}settings" if ways.has_managers else "",
         dev_url=f"{url}dev" if ways.has_dev else "",
         is_looked_at=robot.glimpse is not None,
-        recorded=_utc(robot.tape.began_s) if robot.tape is not None else "",
+        recorded=_utc(robot.playback.began_s) if robot.playback is not None else "",
     )
 
 

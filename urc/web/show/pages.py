@@ -87,7 +87,7 @@ class RobotPage:
     """JSON list of the transports over which STOP reaches the robot."""
     can_move: bool
     """Whether the controls and STOP are shown."""
-    tape: str
+    playback: str
     """Path of the playback's state; "" for a robot."""
 
 
@@ -110,9 +110,9 @@ def robot_page(
     is_watching: bool = False,
     tab: str = "",
     wire: str = "",
-    tape: str = "",
+    playback: str = "",
     is_part: bool = False,
-    border: WidgetTrust = WidgetTrust(),  # noqa: B008  # frozen
+    trust: WidgetTrust = WidgetTrust(),  # noqa: B008  # frozen
 ) -> str:
     """Return the page of one interface.
 
@@ -125,13 +125,13 @@ def robot_page(
         is_watching: whether the page never drives.
         tab: name of the open page; "" or an unknown one selects the first.
         wire: path of the developer page; "" if this visitor has none.
-        tape: path of the playback's state; "" for a robot.
+        playback: path of the playback's state; "" for a robot.
         is_part: whether an open page swaps its interface.
-        border: tells third-party widgets from trusted ones.
+        trust: tells third-party widgets from trusted ones.
     """
     uses = _uses(profile, interface)
     slots = tuple(uses)
-    styles = _styles(profile, interface, uses, border)
+    styles = _styles(profile, interface, uses, trust)
     place = quote(name, safe="")
     url, watch = f"/robots/{place}/", "&watch" if is_watching else ""
     tabs = page_tabs(interface, tab)
@@ -151,11 +151,11 @@ def robot_page(
         is_turned=is_turned(interface, slots),
         is_part=is_part,
         debug=debug_part(profile, wire) if interface is DEBUGGING else None,
-        cells=_cells(profile, interface, uses, border),
+        cells=_cells(profile, interface, uses, trust),
         stop_url=f"/api/v1/robots/{place}/stop",
         lines=json.dumps(motion_lines(profile.driver)),
-        can_move=can_move(profile.driver) and not tape,
-        tape=tape,
+        can_move=can_move(profile.driver) and not playback,
+        playback=playback,
     )
     return render("robot.html.j2", page)
 
@@ -185,22 +185,22 @@ def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
 
 
 def _cells(
-    profile: Profile, interface: Interface, uses: Mapping[str, WidgetUse], border: WidgetTrust
+    profile: Profile, interface: Interface, uses: Mapping[str, WidgetUse], trust: WidgetTrust
 ) -> tuple[Cell, ...]:
-    render_foreign(((use, profile) for use in uses.values()), border)
+    render_foreign(((use, profile) for use in uses.values()), trust)
     return tuple(
-        widget_cell(index, use, profile, border, is_background=slot == interface.background)
+        widget_cell(index, use, profile, trust, is_background=slot == interface.background)
         for index, (slot, use) in enumerate(uses.items())
     )
 
 
 def _styles(
-    profile: Profile, interface: Interface, uses: Mapping[str, WidgetUse], border: WidgetTrust
+    profile: Profile, interface: Interface, uses: Mapping[str, WidgetUse], trust: WidgetTrust
 ) -> tuple[str, ...]:
     if interface is DEBUGGING:
         return DEBUG_STYLES
     used = dict.fromkeys(use.widget for use in uses.values())
-    return border.styles(profile.widgets[name] for name in used)
+    return trust.styles(profile.widgets[name] for name in used)
 
 
 @lru_cache(maxsize=1)

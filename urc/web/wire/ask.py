@@ -78,7 +78,7 @@ class ApprovalRequest(
     command: str
     arguments: Arguments = {}
     stops: int | None = None
-    """As in `Run`, whose value counts."""
+    """As in `CommandRequest`, whose value counts."""
 
 
 class SequenceAction(

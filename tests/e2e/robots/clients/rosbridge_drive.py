@@ -47,10 +47,10 @@ class Ears:
             return self._heard[topic]
 
 
-def driven(ros: roslibpy.Ros, ears: Ears) -> dict[str, Any]:
+def driven(ros: roslibpy.Ros, expectations: Ears) -> dict[str, Any]:
     """Drive until it has moved, let go, and see that it stands."""
-    ears.listen("/odom", "nav_msgs/Odometry")
-    before = ears.until("/odom")["pose"]["pose"]["position"]
+    expectations.listen("/odom", "nav_msgs/Odometry")
+    before = expectations.until("/odom")["pose"]["pose"]["position"]
     drive = roslibpy.Topic(ros, "/cmd_vel", "geometry_msgs/Twist")
 
     def way(message: Any) -> float:
@@ -62,26 +62,26 @@ def driven(ros: roslibpy.Ros, ears: Ears) -> dict[str, Any]:
     while time.monotonic() < end_s:
         drive.publish(roslibpy.Message({"linear": {"x": 0.2}, "angular": {"z": 0.1}}))
         time.sleep(0.1)
-        now = ears.until("/odom")
+        now = expectations.until("/odom")
         if way(now) > 0.02:
             break
     drive.publish(roslibpy.Message({"linear": {"x": 0}, "angular": {"z": 0}}))
-    ears.until("/odom", lambda message: message["twist"]["twist"]["linear"]["x"] == 0)
+    expectations.until("/odom", lambda message: message["twist"]["twist"]["linear"]["x"] == 0)
     drive.unadvertise()
     return {"way": way(now)}
 
 
-def absolem(ros: roslibpy.Ros, ears: Ears) -> dict[str, Any]:
+def absolem(ros: roslibpy.Ros, expectations: Ears) -> dict[str, Any]:
     """Lift a flipper."""
-    ears.listen("/flippers_state", "nifti_robot_driver_msgs/FlippersStateStamped")
-    ears.listen("/robot_status", "nifti_robot_driver_msgs/RobotStatusStamped")
+    expectations.listen("/flippers_state", "nifti_robot_driver_msgs/FlippersStateStamped")
+    expectations.listen("/robot_status", "nifti_robot_driver_msgs/RobotStatusStamped")
     lift = roslibpy.Topic(ros, "/flipper_cmd", "nifti_robot_driver_msgs/FlipperCommand")
     lift.publish(roslibpy.Message({"object_id": 3, "angle": 0.5}))
-    flippers = ears.until("/flippers_state", lambda one: abs(one["frontLeft"] - 0.5) < 0.01)
-    return {"flipper": flippers["frontLeft"], "status": ears.until("/robot_status")}
+    flippers = expectations.until("/flippers_state", lambda one: abs(one["frontLeft"] - 0.5) < 0.01)
+    return {"flipper": flippers["frontLeft"], "status": expectations.until("/robot_status")}
 
 
-def turtlebot3(ros: roslibpy.Ros, ears: Ears) -> dict[str, Any]:
+def turtlebot3(ros: roslibpy.Ros, expectations: Ears) -> dict[str, Any]:
     """Ask for a service, and for what others ask for, too."""
     power = roslibpy.Service(ros, "/motor_power", "std_srvs/SetBool")
     answer = power.call(roslibpy.ServiceRequest({"data": True}), timeout=WAIT_S)
@@ -100,15 +100,15 @@ def main() -> None:
         ros = roslibpy.Ros("127.0.0.1", int(port))
         ros.run(WAIT_S)
         lines.append(ros)
-        ears = Ears(ros)
-        found[name] = driven(ros, ears)
+        expectations = Ears(ros)
+        found[name] = driven(ros, expectations)
         if name in MORE:
-            found[name] |= MORE[name](ros, ears)
+            found[name] |= MORE[name](ros, expectations)
         if name != "absolem":
-            ears.listen("/battery_state", "sensor_msgs/BatteryState")
-            found[name]["battery"] = ears.until("/battery_state")["percentage"]
-        ears.listen("/scan", "sensor_msgs/LaserScan")
-        found[name]["beams"] = len(ears.until("/scan")["ranges"])
+            expectations.listen("/battery_state", "sensor_msgs/BatteryState")
+            found[name]["battery"] = expectations.until("/battery_state")["percentage"]
+        expectations.listen("/scan", "sensor_msgs/LaserScan")
+        found[name]["beams"] = len(expectations.until("/scan")["ranges"])
     sys.stdout.write(json.dumps(found) + "\n")
     lines[0].terminate()
 

@@ -240,7 +240,7 @@ async def test_one_of_a_moment_is_not_looped_for_ever(clock: FakeClock) -> None:
 
 async def test_nothing_can_be_commanded(clock: FakeClock) -> None:
     async with player(clock).session() as session:
-        assert session.movers is None
+        assert session.backend is None
         with pytest.raises(CommandFailed) as refused:
             await session.command("ask", {})
         assert refused.value.message == REFUSAL

@@ -185,7 +185,7 @@ def test_a_full_disk_ends_the_recording_and_says_so(
 ) -> None:
     disk = FullDisk()
     disk.is_full = is_full_at_once
-    monkeypatch.setattr(Recorder, "_made", lambda _: disk)
+    monkeypatch.setattr(Recorder, "_open", lambda _: disk)
     kept = recorder(file)
     if not is_full_at_once:
         wait(lambda: kept.is_begun)
@@ -200,7 +200,7 @@ def test_a_full_disk_ends_the_recording_and_says_so(
 def test_a_file_that_could_not_be_begun_is_not_left_behind(
     file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Recorder, "_begin", lambda *_: full())
+    monkeypatch.setattr(Recorder, "_write_header", lambda *_: full())
     kept = recorder(file)
     kept.close()
     assert "No space left" in kept.fault
@@ -216,7 +216,7 @@ def test_a_disk_that_hangs_is_waited_for_a_while_only(
 ) -> None:
     goes_on = threading.Event()
     monkeypatch.setattr(module, "_CLOSE_S", 0.05)
-    monkeypatch.setattr(Recorder, "_made", lambda self: (goes_on.wait(), self.file.open("xb"))[1])
+    monkeypatch.setattr(Recorder, "_open", lambda self: (goes_on.wait(), self.file.open("xb"))[1])
     file.parent.mkdir()
     kept = recorder(file)
     kept.record(readings(1))
