@@ -127,8 +127,8 @@ def test_what_one_publishes_another_installs_updates_and_undoes(
     told = ben.does("update", "puppet", "--yes", "--allow-more")
     for line in (
         f"signed by {key}, as before",
-        "  may from now on: connects by tcp (wire)",
-        "  may no longer: connects by tcp (wire)",
+        "  new permission: connects by tcp (wire)",
+        "  lost permission: connects by tcp (wire)",
         '    - commands.beep.send: "beep"\n    + commands.beep.send: "BEEP"',
         "updated drivers/puppet to 1.1.0; 'urc update --back drivers/puppet' reverts it",
     ):

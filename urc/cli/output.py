@@ -34,4 +34,4 @@ def _plain(value: object) -> object:
         return b64encode(value).decode("ascii")
     if isinstance(value, Mapping):
         return dict(value)
-    raise TypeError(f"no JSON for {type(value).__name__}")
+    raise TypeError(f"{type(value).__name__} has no JSON form")

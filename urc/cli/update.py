@@ -115,8 +115,8 @@ def _told(
 
 def difference_lines(difference: "UpdateDiff") -> list[str]:
     """Return the differences in permissions and sent bytes between two versions, for people."""
-    lines = [f"  may from now on: {line}" for line in difference.gained]
-    lines += [f"  may no longer: {line}" for line in difference.lost]
+    lines = [f"  new permission: {line}" for line in difference.gained]
+    lines += [f"  lost permission: {line}" for line in difference.lost]
     if not difference.gained:
         lines.append("  no new permissions")
     if difference.wire:

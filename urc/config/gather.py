@@ -1,7 +1,7 @@
 """The passes over documents: compose, expand, shape, for a robot and the documents that it names.
 
 Compose merges a document with its base and its includes. Expand fills in `params` and `each`. Shape
-compares the result with the schema. Each is a function of one document.
+compares the result with the schema. Each pass is a function of one document.
 
 A robot comes first, because it names its driver and its interfaces.
 """

@@ -73,7 +73,7 @@ def _rule(code: str, summary: str) -> dict[str, object]:
     rule: dict[str, object] = {"id": code}
     if summary:
         rule["shortDescription"] = {"text": summary}
-    rule["help"] = {"text": f"'urc explain {code}' tells more."}
+    rule["help"] = {"text": f"'urc explain {code}' explains this problem."}
     return rule
 
 

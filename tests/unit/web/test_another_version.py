@@ -200,7 +200,7 @@ def test_urc_install_shows_and_asks_the_same(
     folder = write_package(tmp_path / "shop", "driver", "rover", "3.0.0", text=text)
     assert main(["install", str(folder), "--yes"]) == 1
     said = capsys.readouterr()
-    assert "may from now on: connects by udp (leak)" in said.out
+    assert "new permission: connects by udp (leak)" in said.out
     assert "--allow-more" in said.err
     assert main(["install", str(folder), "--yes", "--allow-more"]) == 1
     assert main(["install", str(folder), "--yes", "--allow-more", RISKS_FLAG]) == 0

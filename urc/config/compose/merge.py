@@ -17,7 +17,7 @@ _NAMES: Final = ("name", "id")
 _EXCLUSIVE: Final = (frozenset(("grid", "layouts", "tabs")),)
 """Groups of keys that exclude each other, in addition to forms of frames."""
 _OF_USED_DRIVER: Final = frozenset(("use", "params", "overrides"))
-"""Keys of a robot's ``driver`` that names a document."""
+"""Keys of ``driver`` in a robot that refers to a driver's document."""
 
 
 class Tree(NamedTuple):

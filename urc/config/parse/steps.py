@@ -205,7 +205,7 @@ def _timeout_s(part: Node, findings: Problems) -> float | None:
 def _else(
     part: Node, context: StepContext, findings: Problems
 ) -> tuple[tuple[sequence.Step, ...] | None, str]:
-    """Return what to do when it does not come: steps, or what to say."""
+    """Return the steps after a failed wait, or the message of the failure."""
     inner = part.get("else")
     if inner is None:
         return None, ""
