@@ -175,9 +175,9 @@ async def test_the_key_stands_nowhere_but_in_its_file(
         (
             ("--manage", "--host", "0.0.0.0"),
             "--manage lets others at 0.0.0.0 install packages and change settings: add --token"
-            " FILE, and only those with the token in that file may",
+            " FILE to require the token in that file",
         ),
-        (("--token", "x"), "--token is for those who manage from other machines: add --manage"),
+        (("--token", "x"), "--token is for management from other machines: add --manage"),
     ],
 )
 def test_nobody_opens_the_managers_to_a_network_by_a_slip(

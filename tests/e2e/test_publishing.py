@@ -98,7 +98,7 @@ def test_what_one_publishes_another_installs_updates_and_undoes(
         f"published widgets/dial 1.0.0, signed by {key}\n"
         f"published drivers/puppet 1.0.0, signed by {key}\n"
     )
-    assert anna.does("publish", *lab.writes("1.0.0"), *lab.to).count("there already: ") == 2
+    assert anna.does("publish", *lab.writes("1.0.0"), *lab.to).count("already there: ") == 2
 
     ben.does("repo", "add", lab.url)
     assert (
@@ -106,7 +106,7 @@ def test_what_one_publishes_another_installs_updates_and_undoes(
     )
     other = f"SHA256:{'A' * 43}"
     told = ben.refuses("install", "puppet", "--yes", "--signed-by", other)
-    assert f"drivers/puppet 1.0.0 is signed by {key}, and not by {other}" in told
+    assert f"drivers/puppet 1.0.0 is signed by {key}, expected a signature by {other}" in told
     fingerprint = key.partition("(")[2].rstrip(")")
     told = ben.does("install", "puppet", "--yes", "--signed-by", fingerprint)
     assert (
@@ -121,7 +121,7 @@ def test_what_one_publishes_another_installs_updates_and_undoes(
     assert ben.does("list", "--updates") == (
         "drivers/puppet 1.0.0 → 1.1.0  with widgets/dial 1.0.0 → 1.1.0\n"
     )
-    assert "nobody can be asked here" in ben.does("update", code=2)
+    assert "there is no terminal to ask" in ben.does("update", code=2)
     assert "it gains permissions" in ben.does("update", "--yes", code=1)
     assert ben.does("list") == "drivers/puppet 1.0.0  with widgets/dial 1.0.0\n"
     told = ben.does("update", "puppet", "--yes", "--allow-more")
@@ -199,7 +199,7 @@ def test_what_is_wrong_is_refused_in_one_line(
     car = str(write_package(lab.home, "driver", "car"))
     told = anna.refuses("publish", car, *lab.to)
     assert "warning unused-setting settings.key:" in told
-    assert "; --allow-warnings publishes it all the same" in told
+    assert "; --allow-warnings publishes it despite warnings" in told
     told = anna.refuses("publish", car, *lab.to, "--allow-warnings")
     assert "the token 'x' may publish" in told
     module = (lab.home / "widgets/dial/widget.js").rename(lab.home / "kept.js")
@@ -214,10 +214,10 @@ def test_what_is_wrong_is_refused_in_one_line(
     assert "this repository needs a token" in anna.refuses("publish", dial, *lab.to)
     for url in ("http://robots.example/", "http://192.168.1.5:8090/"):
         told = anna.does("publish", dial, "--to", url, "--token-file", str(lab.token), code=2)
-        assert f"{url} is not encrypted: anybody on the way can read the token" in told
+        assert f"{url} is not encrypted: an attacker on the way can read the token" in told
     inside = str(lab.folder / "tokens.json")
     told = anna.does("repo", "serve", str(lab.folder), "--tokens", inside, code=2)
-    assert "it stands in the repository, which any web server gives out" in told
+    assert "it is inside the repository, which web servers publish" in told
     assert lab.holds() == before
 
     _is_cut_off(lab, package("widget", "dial", "3.0.0").data)

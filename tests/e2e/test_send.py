@@ -205,7 +205,7 @@ async def test_a_latched_stop_holds_what_is_sent(profile: str, cart: Cart, data:
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == (
         "urc send: go failed (not-allowed): STOP is latched, pressed by screen 1, before a restart:"
-        " reset it first; --despite-stop moves it all the same\n"
+        " reset it first; --despite-stop overrides this\n"
     )
     done = await send(profile, "drive", "speed=1", "--hold", "200ms", *place)
     assert (done.returncode, done.stdout) == (1, "")

@@ -15,7 +15,7 @@ MOST = 1_000_000
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the number of entries, the robot, and the data folder."""
     parser.add_argument(
-        "--last", type=_count, default=USUAL, metavar="N", help="number of newest entries (default: 200)"
+        "--last", type=_count, default=USUAL, metavar="N", help="newest entries (default: 200)"
     )
     parser.add_argument("--robot", default="", metavar="NAME", help="entries of this robot only")
     parser.add_argument(

@@ -127,7 +127,7 @@ def _compare(
         line = str(error).strip().partition("\n")[0]
         complain(f"urc install: the changes are unknown: {used} cannot be read: {line}")
         # Unknown changes count as new permissions.
-        return UpdateDiff([], ["whatever stands above"], [], risks, [])
+        return UpdateDiff([], ["all permissions above"], [], risks, [])
     print(f"{used} is in use; this changes:")
     for line in difference_lines(found):
         print(printable(line))

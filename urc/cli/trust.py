@@ -102,7 +102,7 @@ def _decide(line: "SshTransport", offer: "OfferedHostKey", yes: str | None) -> i
             f"the key was {offer.expected} before: a reinstalled robot, or an attacker in between"
         )
     if yes is None and not _is_confirmed():
-        print("nothing is kept")
+        print("nothing is stored")
         return 1
     if yes is not None and yes.rstrip("=") != offer.fingerprint:
         raise UrcError(f"this is not the key to trust ({yes}); nothing is stored")
