@@ -99,7 +99,7 @@ def test_a_robot_is_got_once_and_driven_for_ever_without_a_network(
         assert "--yes agrees in advance" in person.does("install", "my-puppet", code=2)
         assert person.does("list") == ""
         told = person.does("install", "my-puppet", "--yes")
-    assert "robots/my-puppet 1.0.0 may do this:" in told
+    assert "robots/my-puppet 1.0.0 has these permissions:" in told
     assert "connects by tcp (wire): host from the settings: {{ settings.host }}" in told
     assert "port always 6789" in told
     assert "secret: is given what the setting key holds" in told
