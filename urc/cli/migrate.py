@@ -1,4 +1,4 @@
-"""`urc migrate`: old keys and values of documents under their present names."""
+"""`urc migrate`: replaces old keys and values of documents with their present names."""
 
 import argparse
 import os
@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Rename in each file; 1 when a file fails, or when a check finds an old name."""
+    """Rename in each file; return 1 when a file fails, or when a check finds an old name."""
     code = 0
     for file in dict.fromkeys(arguments.files):
         try:
@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _migrate(file: str, *, is_check: bool) -> bool:
-    """Rename in one file, unless it is only checked; return whether it had an old name."""
+    """Rename in one file, or only check it; return whether it has an old name."""
     from urc.config.migrate import migrate
 
     migrated = migrate(file)
@@ -57,9 +57,9 @@ def _migrate(file: str, *, is_check: bool) -> bool:
 
 
 def _write(file: str, content: bytes) -> None:
-    """Replace the content of a file at once: a failure leaves the old content.
+    """Replace the content of a file atomically: a failure leaves the old content.
 
-    A link stays a link, and the permissions stay.
+    A symbolic link and the permissions stay.
     """
     real = os.path.realpath(file)
     number, new = tempfile.mkstemp(dir=os.path.dirname(real), suffix=".new")

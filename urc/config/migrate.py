@@ -1,4 +1,4 @@
-"""Renaming of old keys and values in the text of a document; every other byte stays."""
+"""Renames old keys and values in the text of a document, and keeps every other byte."""
 
 import re
 from collections.abc import Iterator
@@ -33,18 +33,18 @@ class Change(NamedTuple):
 
 
 class Migrated(NamedTuple):
-    """A document under the present names."""
+    """A document with the present names."""
 
     content: bytes
     changes: tuple[Change, ...]
-    """In the order of the text; empty when the document has present names only."""
+    """Changes in the order of the text; empty when the document has no old names."""
 
 
 def migrate(path: str) -> Migrated:
-    """Return the content of a file with old names replaced. The file stays as it is.
+    """Return the content of a file with old names replaced, without changing the file.
 
     Raises:
-        ProblemsError: the file cannot be read, is no document, or has a key under both names.
+        ProblemsError: the file cannot be read, is not a document, or has a key under both names.
     """
     content = read_bytes(path, DocumentLimits().size_bytes)
     document = parse_document(content, path)
@@ -67,7 +67,7 @@ def migrate(path: str) -> Migrated:
 
 
 def _replaced(written: str, new: str) -> str:
-    """Return a scalar with another text: its anchor, tag and quotes stay."""
+    """Return a scalar with another text, and with its anchor, tag and quotes."""
     return _SCALAR.sub(
         lambda found: f"{found['head']}{found['quote']}{new}{found['quote']}", written, count=1
     )
@@ -94,7 +94,7 @@ def _parts(document: Document) -> Iterator[tuple[Content, Path]]:
                     (),
                     "unknown-kind",
                     "this document has no known 'kind'",
-                    hint="robot, driver, interface and widget are migrated",
+                    hint="known kinds: robot, driver, interface, widget",
                 )
             ]
         )
@@ -145,7 +145,7 @@ def _both(document: Document, path: Path, old: str, new: str) -> ProblemsError:
             document.problem(
                 (*path, old),
                 "duplicate-key",
-                f"'{old}' is called '{new}' now, and both stand here",
+                f"'{old}' is an old name of '{new}', and both are given here",
                 hint="remove one of them",
                 key=True,
             )

@@ -19,7 +19,7 @@ __all__ = [
 ]
 
 Content = Literal["driver", "interface", "widget", "demo"]
-"""The part of the language: a robot holds the content of a driver and of interfaces."""
+"""The part of the language; a robot contains a driver and interfaces."""
 
 _TRANSPORT: Final = "transports/[^/]+"
 _ARRAY: Final = "signals/[^/]+|commands/[^/]+/args/[^/]+"
@@ -37,14 +37,15 @@ class KeyRename(NamedTuple):
 
     content: Content
     place: str
-    """A pattern of the path of the mapping that has the key, with slashes between its parts."""
+    """A pattern of the path of the mapping with the key, with slashes between its parts."""
     old: str
     new: str
     types: tuple[str, ...] = ()
-    """Values of `type` with which the key is renamed; empty: any. A missing `type` fits each."""
+    """Values of `type` for which the key is renamed; empty for all. A missing `type` always
+    fits."""
 
     def applies(self, mapping: Mapping[str, Any]) -> bool:
-        """Return whether a mapping at the place holds the old key."""
+        """Return whether a mapping at the place has the old key."""
         if self.old not in mapping:
             return False
         kind = mapping.get("type")
@@ -125,7 +126,7 @@ def renamed_hint(path: tuple[str | int, ...], key: str, known: Mapping[str, Any]
         if one.old != key or one.new not in known:
             continue
         if re.search(f"(?:^|/)(?:{one.place})$", where):
-            return f"it is called '{one.new}' now; 'urc migrate' renames it"
+            return f"its name is '{one.new}' now; 'urc migrate' renames it"
     return ""
 
 
@@ -133,5 +134,5 @@ def renamed_value_hint(key: str, value: str) -> str:
     """Return a hint for an old value of a key, or ""."""
     for one in VALUES:
         if (one.key, one.old) == (key, value):
-            return f"it is called '{one.new}' now; 'urc migrate' renames it"
+            return f"its name is '{one.new}' now; 'urc migrate' renames it"
     return ""

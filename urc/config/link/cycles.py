@@ -1,4 +1,4 @@
-"""Cycles among names: signals that rest on themselves, and sequences that run themselves."""
+"""Cycles of names: signals that depend on themselves, and sequences that run themselves."""
 
 from collections.abc import Callable, Iterable
 

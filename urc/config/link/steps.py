@@ -133,8 +133,8 @@ class _Walk:
                     self._linker.findings.error(
                         part,
                         "too-many-steps",
-                        f"{loops!r} is a loop inside this loop, so the number of steps has no limit"
-                        " that takes",
+                        f"{loops!r} is a loop inside this loop, so the number of steps is not"
+                        " limited",
                         at="repeat",
                         key=True,
                         hint="use a loop in only one of the two",

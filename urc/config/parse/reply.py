@@ -158,10 +158,7 @@ def refuse(part: Node, keys: tuple[str, ...], why: str, findings: Problems) -> N
 def parse_own_framing(
     part: Node, findings: Problems, context: FormContext
 ) -> tuple[FramingSpec | None, FormContext]:
-    """Return the reply's own framing and the context of its forms, which is then another one.
-
-    Without a framing of its own, the reply has None.
-    """
+    """Return the reply's own framing, if any, and the context of its forms."""
     inner = part.get("framing")
     if inner is None:
         return None, context
