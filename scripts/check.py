@@ -1,8 +1,8 @@
-"""What `./dev test` does: lint, types and every test, always in this order, told in one summary.
+"""The command `./dev test`: lint, types and every test, in a fixed order, with one summary.
 
-`./dev test quick` leaves out the tests with real servers and browsers; it needs Node alone.
-A failing step does not stop the ones after it. Exit code 0 when all passed, 1 otherwise. A test
-whose program could not be brought is left out by name; with ``CI=true`` that is a failure.
+`./dev test quick` leaves out the tests with real servers and browsers; it needs only Node. A failed
+step does not stop the ones after it. Exit code 0 when all passed, 1 otherwise. A test without its
+program is left out by name; with ``CI=true`` that is a failure.
 """
 
 import hashlib
@@ -35,16 +35,16 @@ class Step:
     command: tuple[str, ...]
     timeout_s: float = 120
     beside: tuple[str, ...] = ()
-    """A second one, run at the same time; it must too, and what it says is shown at the end."""
+    """A second command to run at the same time; it must pass too, and its output comes last."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a step ended."""
+    """Result of a step."""
 
     name: str
     fault: str
-    """Empty when it passed."""
+    """Empty after a pass."""
     seconds: float
 
 
@@ -59,10 +59,10 @@ PYTEST = (PYTHON, "-m", "pytest")
 
 
 def halves(tests: str, *half: str, timeout_s: float) -> Step:
-    """Return the step that runs `half` of the `tests`, by time, and beside it all the others.
+    """Return a step that runs the folders `half` of `tests`, in parallel with all other tests.
 
-    The two processes know nothing of each other: a third that hands out thousands of small tests,
-    and hears of each, would take a fifth of the processors.
+    The two processes do not communicate. A third one that distributed thousands of small tests
+    would need a fifth of the processors.
     """
     half = tuple(f"{tests}/{name}" for name in half)
     others = (*PYTEST, tests, *(f"--ignore={path}" for path in half))
@@ -86,7 +86,7 @@ QUICK = (
 QUICK_NEEDS = tuple(need for need in NEEDS if need.name == "node")
 TESTS = (
     *QUICK,
-    # Most of them wait for a server or for silence, so a few at a time take no more processor.
+    # Most of them wait for a server or for silence, so a few in parallel need no more processor.
     Step(
         "tests e2e",
         (
@@ -95,7 +95,7 @@ TESTS = (
         ),
         timeout_s=900,
     ),
-    # They measure how soon a robot stops.
+    # They measure the time until a robot stops.
     Step("tests motion", (*PYTEST, "tests/e2e/motion", "-m", "alone"), timeout_s=420),
 )
 
@@ -109,7 +109,7 @@ def main() -> int:
     outcomes: list[Outcome] = []
     brought = bring(QUICK_NEEDS if is_quick else NEEDS)
     javascript, not_checked = javascript_step()
-    brought.look_again()  # npm brings a language server, too
+    brought.look_again()  # npm also installs a language server
     environment = os.environ | brought.environment
     steps = (*STATIC, *([javascript] if javascript else []), *(QUICK if is_quick else TESTS))
     try:
@@ -122,7 +122,7 @@ def main() -> int:
 
 
 def javascript_step() -> tuple[Step | None, str]:
-    """Return the type check of our JavaScript, or None and why it can't be done."""
+    """Return the type check of URC's JavaScript, or None and the reason why it cannot run."""
     node = node_executable()
     if node is None:
         return None, "the type check of the JavaScript: no Node"
@@ -135,7 +135,7 @@ def javascript_step() -> tuple[Step | None, str]:
 
 
 def install_checkers() -> None:
-    """Bring node_modules to what the lock says; when it is, do nothing."""
+    """Update node_modules to the lock file; do nothing if it is up to date."""
     lock = hashlib.sha256((ROOT / "package-lock.json").read_bytes()).hexdigest()
     stamp = NODE_MODULES / ".urc-lock"
     if stamp.is_file() and stamp.read_text("utf-8") == lock:
@@ -154,7 +154,7 @@ def install_checkers() -> None:
 
 
 def run(step: Step, environment: Mapping[str, str]) -> Outcome:
-    """Run one step with its output shown as it comes, and end all that it started."""
+    """Run one step with its output shown at once, and end all processes that it started."""
     print(f"\n== {step.name}", flush=True)
     start = time.monotonic()
     fault = ""
@@ -176,8 +176,8 @@ def run(step: Step, environment: Mapping[str, str]) -> Outcome:
 def running(
     command: tuple[str, ...], environment: Mapping[str, str], output: IO[bytes] | None = None
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """Start a program; in the end nothing of it is left. `output`: where it writes, if not here."""
-    # A session of its own, so that what a killed test leaves behind can be ended too.
+    """Start a program, and end it with all its children; `output` replaces standard output."""
+    # A session of its own, so that processes of a killed test can be ended too.
     process = subprocess.Popen(
         command,
         cwd=ROOT,
@@ -195,7 +195,7 @@ def running(
 
 @contextmanager
 def shown_at_the_end() -> Iterator[IO[bytes]]:
-    """Give a file to write to, and show what was written."""
+    """Yield a file to write to, and print its content at the end."""
     with TemporaryFile() as said:
         try:
             yield said
@@ -205,17 +205,17 @@ def shown_at_the_end() -> Iterator[IO[bytes]]:
 
 
 def end_group(process: subprocess.Popen[bytes]) -> None:
-    """Kill whatever the step left running."""
+    """Kill all processes that the step left running."""
     if os.name == "nt":
         process.kill()
     else:
-        with suppress(ProcessLookupError, PermissionError):  # nothing is left: the usual case
+        with suppress(ProcessLookupError, PermissionError):  # usually no process is left
             os.killpg(process.pid, signal.SIGKILL)
     process.wait()
 
 
 def summarise(outcomes: list[Outcome], brought: Brought, not_checked: str) -> int:
-    """Print one line a step, then what was left out, then the verdict; return the exit code."""
+    """Print a line for each step, then the left-out tests and the result; return the exit code."""
     print("\n== summary", flush=True)
     for outcome in outcomes:
         word = "FAILED" if outcome.fault else "ok"

@@ -1,6 +1,6 @@
-"""What `./dev docs` does: check that every link and picture of the Markdown files leads somewhere.
+"""The command `./dev docs`: check that every link and picture of the Markdown files exists.
 
-Only links inside the tree are followed; the check needs no network.
+It follows only links inside the tree, so it needs no network.
 """
 
 import re
@@ -18,7 +18,7 @@ SCHEME = re.compile(r"[a-z][a-z0-9+.-]*:", re.IGNORECASE)
 
 
 def main() -> int:
-    """Print a line per broken link; return 1 when there is any."""
+    """Print a line for each broken link; return 1 if there is any."""
     pages = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
     faults = [fault for page in pages for fault in faults_of(page)]
     for fault in faults:
@@ -28,7 +28,7 @@ def main() -> int:
 
 
 def faults_of(page: Path) -> Iterator[str]:
-    """Yield one line per link of `page` that leads nowhere."""
+    """Yield a line for each broken link of `page`."""
     text = page.read_text("utf-8")
     prose = FENCE.sub(lambda match: "\n" * match[0].count("\n"), text)
     for match in LINK.finditer(prose):
@@ -41,7 +41,7 @@ def faults_of(page: Path) -> Iterator[str]:
 
 
 def fault_of(page: Path, target: str) -> str:
-    """Return what is wrong with a link inside the tree, or nothing."""
+    """Return the fault of a link inside the tree, or ""."""
     path, _, anchor = target.partition("#")
     file = (page.parent / path).resolve() if path else page
     if not file.is_relative_to(ROOT):
@@ -54,7 +54,7 @@ def fault_of(page: Path, target: str) -> str:
 
 
 def anchors_of(page: Path) -> set[str]:
-    """Return the anchors that code-hosting sites make of a page's headings."""
+    """Return the anchors that code-hosting sites generate from a page's headings."""
     prose = FENCE.sub("", page.read_text("utf-8"))
     plain = (re.sub(r"[^\w\- ]", "", heading.lower()) for heading in HEADING.findall(prose))
     return {heading.strip().replace(" ", "-") for heading in plain}

@@ -1,4 +1,4 @@
-"""Mutants and what became of them, as mutmut keeps it; and those that are explained."""
+"""Mutants with their results, as stored by mutmut; and the explained survivors."""
 
 import json
 import re
@@ -17,8 +17,8 @@ _STATUS = {
     None: "waiting",
     0: "survived",
     1: "killed",
-    3: "killed",  # pytest itself broke down
-    -1: "killed",  # a signal of a test, which the mutant did not take
+    3: "killed",  # pytest itself failed
+    -1: "killed",  # a test's signal, which the mutant did not handle
     -15: "killed",
     5: "no tests",
     33: "no tests",
@@ -28,19 +28,19 @@ _STATUS = {
     152: "timeout",
     255: "timeout",
 }
-"""By exit codes of mutmut; all others are odd."""
+"""Exit code of mutmut → status; all others are odd."""
 STATUSES = ("killed", "timeout", "survived", "no tests", "odd", "waiting")
 DEAD = ("killed", "timeout")
-"""Of those a test noticed: it failed, or did not end any more."""
+"""Statuses of mutants that a test noticed by a failure or a hang."""
 Change = tuple[str, str]
-"""What a mutant takes out, and what it puts in its place."""
+"""Removed and inserted code of a mutant."""
 
 
 class Mutant:
     """One small change of one function."""
 
     def __init__(self, folder: Path, module: str, name: str, status: str) -> None:
-        """Name it as mutmut does: ``urc.guard.motion_scheduler.xǁReinsǁtick__mutmut_3``."""
+        """Return its name in mutmut: ``urc.guard.motion_scheduler.xǁReinsǁtick__mutmut_3``."""
         self._folder = folder
         self.module = module
         self.name = name
@@ -48,14 +48,14 @@ class Mutant:
 
     @property
     def function(self) -> str:
-        """Where it is: ``urc.guard.motion_scheduler.MotionScheduler.tick``."""
+        """Its place: ``urc.guard.motion_scheduler.MotionScheduler.tick``."""
         inner = self.name.removeprefix(f"{self.module}.").partition("__mutmut_")[0]
         plain = inner.replace("ǁ", ".").removeprefix("x.").removeprefix("x_")
         return f"{self.module}.{plain.removesuffix(PLAIN)}"
 
     @cached_property
     def change(self) -> Change:
-        """What it changes, without indents."""
+        """Removed and inserted code, without indentation."""
         before, after = [], []
         for line in self._diff():
             if line.startswith("-"):
@@ -88,9 +88,9 @@ class Kind(NamedTuple):
     """Mutants that are all harmless for one reason."""
 
     before: re.Pattern[str]
-    """Matches the whole of what they take out."""
+    """Pattern of the whole removed code."""
     after: str
-    """What they put in its place, with references to the groups of `before`."""
+    """Inserted code, with references to the groups of `before`."""
 
     def fits(self, change: Change) -> bool:
         """Return whether a change is of this kind."""
@@ -99,10 +99,10 @@ class Kind(NamedTuple):
 
 
 class Explained(NamedTuple):
-    """The mutants that live, and why no test is to kill them."""
+    """Surviving mutants, with the reasons why no test has to kill them."""
 
     reasons: dict[tuple[str, Change], str]
-    """Function and change → why."""
+    """Function and change → reason."""
     kinds: tuple[Kind, ...] = ()
 
     def covers(self, mutant: Mutant) -> bool:
@@ -111,7 +111,7 @@ class Explained(NamedTuple):
         return known or any(kind.fits(mutant.change) for kind in self.kinds)
 
     def unused(self, mutants: list[Mutant]) -> Iterator[str]:
-        """Yield the reasons to which no mutant belongs that lives or waits."""
+        """Yield the reasons without a surviving or waiting mutant."""
         lives = {(one.function, one.change) for one in mutants if one.status not in DEAD}
         for function, (before, after) in sorted(self.reasons.keys() - lives):
             yield f"{function}: {before} -> {after}"
@@ -121,7 +121,7 @@ def explained_in(path: Path) -> Explained:
     """Read the file of explanations.
 
     Raises:
-        KeyError, TypeError, ValueError: an entry is not as it should be.
+        KeyError, TypeError, ValueError: an entry is invalid.
     """
     told = tomllib.loads(path.read_text("utf-8"))
     reasons = {
@@ -134,7 +134,7 @@ def explained_in(path: Path) -> Explained:
 
 
 def mutants_in(copy: Path, settings: Settings) -> list[Mutant]:
-    """Return all mutants that were made."""
+    """Return all generated mutants."""
     folder = copy / "mutants"
     found = []
     for path in sorted(folder.rglob("*.py.meta")):

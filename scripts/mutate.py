@@ -1,10 +1,11 @@
-"""What `./dev mutate` does: break the code in thousands of small ways, and see that a test notices.
+"""The command `./dev mutate`: break the code in thousands of small ways; a test must notice each.
 
-mutmut makes the mutants and runs the tests, as `[tool.mutmut]` in pyproject.toml says, in a copy of
-the tree under `.mutate`. Results stay there: a run that is stopped goes on where it was, and only
-what a change concerns is tried again. `tests/mutants.toml` explains the mutants that no test can
-kill. Exit code 0: all of them are killed or explained, and 90 % are killed; 1: not so; 3: there is
-more to do. Why mutmut, and what it leaves out: docs/decisions/0024-mutants-by-mutmut.md.
+mutmut generates the mutants and runs the tests, as configured in `[tool.mutmut]` of pyproject.toml,
+in a copy of the tree under `.mutate`. The results stay there, so an interrupted run can continue,
+and only mutants affected by a change run again. `tests/mutants.toml` explains the mutants that no
+test can kill. Exit code 0: all mutants are killed or explained, and 90 % are killed. 1: some are
+not. 3: some are still waiting. Decision record:
+docs/decisions/0024-mutants-by-mutmut.md.
 """
 
 import argparse
@@ -25,11 +26,11 @@ WANTED = 0.9
 UNFINISHED = 3
 _END_S = 30
 _TEST_S = 20
-"""A test that a mutant makes hang is ended then; the longest takes two."""
+"""Limit of a test, in seconds, for mutants that hang; the longest test takes two."""
 
 
 def main() -> int:
-    """Run what is left to run; print the summary; return the exit code."""
+    """Run the waiting mutants; print the summary; return the exit code."""
     options = _options()
     if os.name == "nt":
         print("mutate: mutmut needs fork, which Windows has not; use WSL", file=sys.stderr)
@@ -55,20 +56,20 @@ def _options() -> argparse.Namespace:
         "names",
         nargs="*",
         metavar="NAME",
-        help="try these again, such as 'urc.guard.motion_scheduler.*'",
+        help="run these again, such as 'urc.guard.motion_scheduler.*'",
     )
     add("--minutes", type=float, metavar="N", help="stop then; the next run goes on from there")
     add("--workers", type=int, default=2, metavar="N", help="so many at a time; 2 unless told")
-    add("--timeouts", action="store_true", help="try those again that did not end in time")
-    add("--report", action="store_true", help="try nothing; show what is known")
+    add("--timeouts", action="store_true", help="run those again that hit the time limit")
+    add("--report", action="store_true", help="run no mutants; show the known results")
     return parser.parse_args()
 
 
 def _run(names: list[str], workers: int, minutes: float | None) -> bool:
-    """Run mutmut until it is done or its time is up; return False when it could not work."""
+    """Run mutmut until its end or the time limit; return False if it failed."""
     mutmut = Path(sys.executable).with_name("mutmut")
     command = [str(mutmut), "run", "--max-children", str(workers), *names]
-    # The copy stands before the checkout, also for programs that a test starts.
+    # The copy comes before the checkout, also for programs that a test starts.
     environment = {
         **os.environ,
         "PYTHONPATH": str(COPY / "mutants"),
@@ -89,12 +90,12 @@ def _run(names: list[str], workers: int, minutes: float | None) -> bool:
 
 
 def hung(mutants: list[Mutant]) -> list[str]:
-    """Return the names of those that did not end in time; a busy machine may be the reason."""
+    """Return the names of mutants that hit the time limit, perhaps only on a busy machine."""
     return [one.name for one in mutants if one.status == "timeout"]
 
 
 def summarise(mutants: list[Mutant], explained: Explained, *, is_part: bool) -> int:
-    """Print a line for each module, then each mutant that is to be looked at."""
+    """Print a line for each module, then each unexplained survivor."""
     print("\n".join(table(mutants, explained)))
     lives = [one for one in mutants if one.status not in (*DEAD, "waiting")]
     new = [one for one in lives if not explained.covers(one)]

@@ -1,8 +1,8 @@
-"""The copy of the tree in which mutmut works, and which of its results still hold.
+"""The copy of the tree for mutmut, and the validity of stored results.
 
-The sources are copied with one change. mutmut leaves functions alone that have a decorator, and
-many a property here decides whether a robot stops: in the copy a property is a plain method, and
-what was its name a property of that method.
+The sources are copied with one change. mutmut skips decorated functions, but many properties of
+URC decide whether a robot stops. So the copy turns each property into a plain method, with a
+generated property under the old name.
 """
 
 import ast
@@ -23,39 +23,39 @@ __all__ = [
 ]
 
 PLAIN = "_as_method"
-"""Ends the name of a method that was a property."""
+"""Suffix of a method that was a property."""
 STAMP = "urc-mutate.json"
 SETTLED = (1, 3, -1, -15, 24, -24, 36, 152, 255)
-"""Exit codes of mutmut's runs that say that it was killed, or did not end."""
+"""Exit codes of mutmut for killed mutants and for hangs."""
 
 
 class Settings(NamedTuple):
-    """What `[tool.mutmut]` says."""
+    """The settings in `[tool.mutmut]`."""
 
     mutated: tuple[str, ...]
-    """Patterns of files."""
+    """Patterns of files to mutate."""
     spared: tuple[str, ...]
-    """Those of them that are not."""
+    """Patterns of files to leave out."""
     copied: tuple[str, ...]
     """Files and folders that the tests need."""
 
     @classmethod
     def of(cls, root: Path) -> "Settings":
-        """Read them."""
+        """Read the settings."""
         told = tomllib.loads((root / "pyproject.toml").read_text("utf-8"))["tool"]["mutmut"]
         named = [*told["source_paths"], *told["also_copy"], "tests", "pyproject.toml"]
         return cls(tuple(told["only_mutate"]), tuple(told.get("do_not_mutate", ())), tuple(named))
 
     def is_mutated(self, name: str) -> bool:
-        """Return whether mutants are made of a file."""
+        """Return whether a file is mutated."""
         is_named = any(fnmatch(name, pattern) for pattern in self.mutated)
         return is_named and not any(fnmatch(name, pattern) for pattern in self.spared)
 
 
 def bring_up_to_date(root: Path, copy: Path, settings: Settings) -> bool:
-    """Make `copy` hold what the tree holds; return whether anything changed.
+    """Update `copy` from the tree; return whether anything changed.
 
-    A file that did not change keeps its time, by which mutmut knows that its mutants still stand.
+    An unchanged file keeps its time, which tells mutmut that its mutants are still valid.
     """
     digest = hashlib.sha256()
     names = set()
@@ -69,7 +69,7 @@ def bring_up_to_date(root: Path, copy: Path, settings: Settings) -> bool:
         if not target.is_file() or target.read_bytes() != data:
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(data)
-    # Python remembers of a folder on its path that there was none.
+    # Without it, Python would cache that this folder of its path does not exist.
     (copy / "mutants").mkdir(exist_ok=True)
     for folder in (copy, copy / "mutants"):
         for name in _files(folder, settings.copied):
@@ -91,9 +91,9 @@ def _files(root: Path, named: tuple[str, ...]) -> Iterator[str]:
 
 
 def forget_open_questions(copy: Path) -> None:
-    """Have all tried again that lives: another test may kill it.
+    """Mark all survivors for another run, because a new test may kill them.
 
-    What was killed stays so until its function changes; mutmut sees to that.
+    A killed mutant stays killed until its function changes, which mutmut detects.
     """
     (copy / "mutants" / "mutmut-stats.json").unlink(missing_ok=True)
     for path in (copy / "mutants").rglob("*.meta"):

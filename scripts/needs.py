@@ -1,7 +1,7 @@
-"""The programs beside Python that the tests use, and how they come onto this machine.
+"""The programs that the tests need in addition to Python, and their installation.
 
-As root they come from apt; a browser also from npm, for those without root. Whatever could not
-be brought is returned, never passed over: the summary of ``./dev test`` lists it.
+With root, they come from apt; a browser also comes from npm, without root. Missing programs are
+returned and never ignored: the summary of ``./dev test`` lists them.
 """
 
 import os
@@ -28,7 +28,7 @@ LANGUAGE_SERVER = (
     / "yaml-language-server"
 )
 _SYSTEM_PATH = f"{os.environ.get('PATH', os.defpath)}{os.pathsep}/usr/sbin{os.pathsep}/sbin"
-"""Servers are where only root looks by itself."""
+"""Search path with the folders of servers, which only root has by default."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,19 +37,19 @@ class Need:
 
     name: str
     executables: tuple[str, ...]
-    """Any one of them will do."""
+    """Any one of them is enough."""
     package: str
-    """Or several, with spaces between; "" when npm brings it."""
+    """Debian packages, separated by spaces; "" for a program from npm."""
     purpose: str
     variable: str = ""
-    """The environment variable that names another executable, if there is one."""
+    """Environment variable with the path of another executable, if any."""
     other: Callable[[], str | None] | None = None
-    """Finds it where it is on no path."""
+    """Finds a program that is not on the search path."""
     is_of_root: bool = False
-    """Nothing brings it: only root has it."""
+    """Whether the program needs root, so that no installation helps."""
 
     def find(self) -> str | None:
-        """Return what the variable names, else the first executable that is there."""
+        """Return the path in the variable, else the first existing executable."""
         named = os.environ.get(self.variable) if self.variable else None
         found = named or next(
             (path for name in self.executables if (path := shutil.which(name))), None
@@ -57,7 +57,7 @@ class Need:
         return found or (self.other() if self.other else None)
 
 
-# Later tests extend this table; nothing else has to know.
+# The only table of needs: add a program for a new test here.
 NEEDS = (
     Need(
         name="chromium",
@@ -67,8 +67,8 @@ NEEDS = (
         variable="URC_CHROMIUM",
     ),
     Need(
-        # The same browser without windows: a page takes half the time. Where it is missing, the
-        # whole one does as well.
+        # The same browser without windows, for which a page takes half the time. The whole browser
+        # is the fallback.
         name="headless-shell",
         executables=("chromium-headless-shell", "chrome-headless-shell"),
         package="chromium-headless-shell",
@@ -228,14 +228,14 @@ NEEDS = (
 
 @dataclass(slots=True)
 class Brought:
-    """What the tests are to know about this machine."""
+    """Installed and missing programs, for the tests."""
 
     environment: dict[str, str] = field(default_factory=dict)
     left_out: list[Need] = field(default_factory=list)
 
     @property
     def remedy(self) -> str:
-        """The one command that brings all that was left out."""
+        """The command that installs all missing programs."""
         sudo = "" if _is_root() else "sudo "
         packages = [need.package for need in self.left_out if need.package]
         commands = [f"{sudo}apt-get install -y {' '.join(packages)}"] if packages else []
@@ -246,13 +246,13 @@ class Brought:
         return " && ".join(commands)
 
     def look_again(self) -> None:
-        """Take note of what has been brought meanwhile."""
+        """Check the missing programs again after an installation."""
         self.left_out = [need for need in self.left_out if need.find() is None]
         self.environment["URC_LEFT_OUT"] = ",".join(need.name for need in self.left_out)
 
 
 def bring(needs: Sequence[Need] = NEEDS) -> Brought:
-    """Find or install each of these needs; report what is missing."""
+    """Find or install each of these needs; report the missing ones."""
     missing = [need for need in needs if need.find() is None]
     if any(need.package for need in missing) and _is_root() and shutil.which("apt-get"):
         _apt_install([name for need in missing for name in need.package.split()])
@@ -267,7 +267,7 @@ def bring(needs: Sequence[Need] = NEEDS) -> Brought:
 
 
 def _shell_of(needs: Sequence[Need]) -> str | None:
-    """Return what does for the browser without windows where that is missing."""
+    """Return the fallback for the missing browser without windows."""
     whole = next(
         (path for need in needs if need.name == "chromium" and (path := need.find())), None
     )
@@ -281,11 +281,11 @@ def _shell_of(needs: Sequence[Need]) -> str | None:
 
 
 def _apt_install(packages: list[str]) -> None:
-    """Install Debian packages; what fails shows, and is missing afterwards."""
+    """Install Debian packages; a failure is printed, and the program stays missing."""
     print(f"installing {' '.join(packages)} ...", flush=True)
     _apt("update")
     if not _apt("install", "--no-install-recommends", *packages) and len(packages) > 1:
-        for package in packages:  # one that this system does not know keeps back no other
+        for package in packages:  # one by one, so that an unknown package affects no other
             _apt("install", "--no-install-recommends", package)
 
 

@@ -1,4 +1,4 @@
-"""Where Node is on this machine: for the type check of JavaScript and for the test browser."""
+"""The path of Node on this machine, for the type check of JavaScript and for the test browser."""
 
 import os
 import shutil
@@ -18,11 +18,11 @@ def node_executable() -> str | None:
         command = npm_command()
     except VendorError:
         return None
-    return command[0] if len(command) > 1 else None  # npm alone on the path: not ours to run
+    return command[0] if len(command) > 1 else None  # npm without a Node is not usable
 
 
 def playwright_environment() -> dict[str, str]:
-    """Return which Node playwright is to use, where its own can't start (it needs libatomic)."""
+    """Return the Node for playwright if its own cannot start (it needs libatomic)."""
     import playwright
 
     own = Path(playwright.__file__).parent / "driver" / ("node.exe" if os.name == "nt" else "node")

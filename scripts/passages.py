@@ -1,7 +1,7 @@
 """The prose of the tree: documentation, docstrings, and strings that people read.
 
-The draw of sentences and the check of prose both read it, so they mean the same by "prose". Left
-out are pages written by a program (docs/reference, docs/robots), tests, code blocks and licences.
+The draw of sentences and the check of prose share it, so both have the same definition of prose.
+Generated pages (docs/reference, docs/robots), tests, code blocks and licences are left out.
 """
 
 import ast
@@ -20,7 +20,7 @@ YAML_FOLDERS = ("robots/", "widgets/")
 PROSE_KEYS = ("title", "summary", "description", "help", "notes", "why")
 """Keys of schemas and documents whose values are prose."""
 FEWEST_WORDS = 4
-"""A shorter string in code is a name or a label, and no sentence."""
+"""Fewest words of a sentence in code; a shorter string is a name or a label."""
 
 _FENCE = re.compile(r"^\s*(```|~~~)")
 _ITEM = re.compile(r"^\s*(?:[-*+]|\d+\.)\s+|^\s*#+\s+|^\s*>\s?")
@@ -28,7 +28,7 @@ _SECTIONS = ("Args:", "Attributes:", "Raises:", "Returns:", "Yields:")
 _ENTRY = re.compile(r"^\s+\*{0,2}\w+(?: \([^)]*\))?: ")
 """The beginning of an entry under `Args:` or `Raises:`."""
 _QUERY = re.compile(r"(?:CREATE TABLE|DELETE FROM|INSERT INTO|PRAGMA|SELECT|WHERE)\b")
-"""The beginning of a piece of SQL, which is no prose."""
+"""The beginning of an SQL statement, which is not prose."""
 _LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")
 _MARKED = re.compile(r"""\b(?:t|mark|phrase)\(\s*(?:"((?:[^"\\\n]|\\.)*)"|'((?:[^'\\\n]|\\.)*)')""")
 _WORD = re.compile(
@@ -45,11 +45,11 @@ class Passage(NamedTuple):
     kind: str
     """`docs`, `docstring` or `string`."""
     text: str
-    """Line breaks are kept, so that each sentence has its line."""
+    """Text with its line breaks, which locate each sentence."""
 
 
 class Sentence(NamedTuple):
-    """One sentence in its place."""
+    """One sentence with its position."""
 
     path: str
     line: int
@@ -58,7 +58,7 @@ class Sentence(NamedTuple):
 
 
 def is_read(path: str) -> bool:
-    """Return whether the file has prose that is checked."""
+    """Return whether the file has prose to check."""
     if path.startswith(GENERATED):
         return False
     if path.endswith(".md"):
@@ -130,7 +130,7 @@ def _paragraph(path: str, kind: str, lines: list[tuple[int, str]]) -> Iterator[P
 def _of_python(path: str, text: str) -> Iterator[Passage]:
     tree = ast.parse(text)
     apart: set[ast.AST] = set()
-    """Strings that another node has yielded already."""
+    """Strings that another node has already yielded."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             apart.add(node.value)

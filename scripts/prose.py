@@ -1,13 +1,13 @@
-"""Checks the English of docs, docstrings and strings that people read.
+"""A check of the English in docs, docstrings and strings for people.
 
     python -m scripts.prose                 fail where a file has more hits than its baseline
     python -m scripts.prose docs urc/motion list every hit below these paths
     python -m scripts.prose --update        write the baseline after hits were reworded or moved
 
 The rules keep sentences short and plain: subject and verb first, nouns instead of relative clauses,
-and the words of docs/glossary.md. The baseline has the hits that are left, by file and rule. It can
-only shrink: `--update` refuses a rule whose total has grown, so hits may move with their file, and
-new text has none. After a merge conflict in the baseline, `--update` sets it right.
+and the words of docs/glossary.md. The baseline has the remaining hits, by file and rule. It can
+only shrink. `--update` refuses a rule with a larger total, so hits may move between files, but new
+text has none. After a merge conflict in the baseline, `--update` restores it.
 """
 
 import argparse
@@ -41,7 +41,7 @@ RULES: Mapping[str, re.Pattern[str]] = {
     "who-subject": re.compile(r"^[(\"“*]*(?:Who|What|Whose|Of which|Of whom)\s(?!.*\?)"),
     "what-clause": re.compile(rf"(?<!^)\bwhat (?:{_VERBS})\b(?!.*\?)"),
 }
-"""Rule → what it finds. `long` and `glossary` are the two that are no pattern."""
+"""Rule → its pattern. The rules `long` and `glossary` have no pattern."""
 
 _CODE = re.compile(r"(`+).+?\1")
 _LETTER = re.compile(r"[A-Za-z0-9{]")
@@ -49,7 +49,7 @@ _ROW = re.compile(r"^(\S+) (\S+) (\d+)$", re.MULTILINE)
 
 
 class Hit(NamedTuple):
-    """A rule that a sentence breaks."""
+    """A sentence that breaks a rule."""
 
     rule: str
     sentence: Sentence
@@ -109,7 +109,7 @@ def hits(files: Mapping[str, str], replaced: Iterable[str]) -> Iterator[Hit]:
 
 
 def check(found: list[Hit], allowed: Counter[tuple[str, str]]) -> int:
-    """Print the hits of every file and rule that has more than it may; return the exit code."""
+    """Print the files with more hits than their baseline; return the exit code."""
     counted = counts(found)
     over = {key for key, count in counted.items() if count > allowed[key]}
     for hit in found:
@@ -124,7 +124,7 @@ def check(found: list[Hit], allowed: Counter[tuple[str, str]]) -> int:
 
 
 def update(found: list[Hit], allowed: Counter[tuple[str, str]] | None) -> int:
-    """Write the baseline unless a rule has more hits in all than before; return the exit code."""
+    """Write the baseline unless the total of a rule has grown; return the exit code."""
     totals = Counter(hit.rule for hit in found)
     before: Counter[str] = Counter()
     for (_, rule), count in (allowed or {}).items():

@@ -1,7 +1,7 @@
-"""Writes the reference of the language, docs/reference/*.md, out of the schemas.
+"""The generator of the language reference, docs/reference/*.md, from the schemas.
 
-``python -m scripts.reference`` writes the pages; a test fails when they are not what this writes.
-The same schema gives the same bytes on every machine.
+``python -m scripts.reference`` writes the pages; a test fails if they are out of date. The same
+schema gives the same bytes on every machine.
 """
 
 import json
@@ -46,7 +46,7 @@ _WORDS_OF_YAML = frozenset(("true", "false", "null", "yes", "no", "on", "off", "
 
 
 def main() -> int:
-    """Write every page; print those that changed."""
+    """Write every page; print the changed ones."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     for kind in KINDS:
         file, text = FOLDER / f"{kind}.md", page(kind)
@@ -81,7 +81,7 @@ def page(kind: str) -> str:
 
 
 def missing() -> list[str]:
-    """Return every property that has no description or no example."""
+    """Return every property without a description or an example."""
     found = []
     for kind in KINDS:
         file = f"{kind}.schema.json"
@@ -111,14 +111,14 @@ def _keys(file: str, owner: str, schema: Schema) -> Iterator[str]:
 
 
 def _required_when_whole(schema: Schema) -> list[str]:
-    """Return the keys that only parts of documents, and those that build on others, leave out."""
+    """Return the keys that only parts, and documents with a parent, may leave out."""
     otherwise = schema.get("else", {})
     inner: list[str] = list(otherwise.get("required", ()))
     return inner + _required_when_whole(otherwise) if otherwise else inner
 
 
 def _described(file: str, schema: Any, required: str = "") -> Iterator[str]:
-    """Yield what is said about one value: what it is, its type, what is allowed, an example."""
+    """Yield the description of one value, its type, its allowed values, and an example."""
     whole = _whole(file, schema)
     yield from _paragraph(whole.get("description", ""))
     facts = [("type", _type(file, schema))]
@@ -142,13 +142,13 @@ def _described(file: str, schema: Any, required: str = "") -> Iterator[str]:
 
 
 def _paragraph(text: str) -> list[str]:
-    """Return a sentence per line, and an empty line."""
+    """Return one sentence per line, and an empty line."""
     sentences = re.sub(r"(?<=[a-z)`'\"}\]]\.) (?=[A-Z{`])", "\n", text)
     return [*sentences.split("\n"), ""] if text else []
 
 
 def _whole(file: str, schema: Any) -> dict[str, Any]:
-    """Return a schema with what it refers to; what stands beside a reference goes first."""
+    """Return a schema merged with its references; its own keys take precedence."""
     whole: dict[str, Any] = dict(schema) if isinstance(schema, Mapping) else {}
     while "$ref" in whole:
         file, target = _target(file, whole.pop("$ref"))
@@ -168,7 +168,7 @@ def _target(file: str, reference: str) -> tuple[str, Schema]:
 
 
 def _type(file: str, schema: Any) -> str:
-    """Return the type in words, with a link to what it is made of."""
+    """Return the type in words, with a link to its definition."""
     if not isinstance(schema, Mapping):
         return "anything"
     if "$ref" in schema:
@@ -192,7 +192,7 @@ def _type(file: str, schema: Any) -> str:
 
 
 def _kinds(file: str, schema: Schema) -> list[str]:
-    """Return the types between which `if` chooses."""
+    """Return the types of the branches of `if`."""
     if "if" not in schema or ("properties" in schema and not _refers(schema)):
         return []
     found: list[str] = []
@@ -222,7 +222,7 @@ def _link(file: str, reference: str) -> str:
 
 
 def _allowed(schema: Schema) -> str:
-    """Return the words or the range that a value may have."""
+    """Return the allowed words or the range of a value."""
     words = [f"`{_yaml(word)}`" for word in schema.get("enum", ())]
     bounds = [_bound(key, schema[key]) for key in _BOUNDS if key in schema]
     return ", ".join(words + bounds)

@@ -1,11 +1,11 @@
-"""Takes the pictures of the robots' pages, and writes their manual pages round them.
+"""The generator of the robots' pages: pictures, and manual pages around them.
 
-    python -m scripts.robot_pictures             all robots that ship
-    python -m scripts.robot_pictures NAME ...    only those
-    python -m scripts.robot_pictures --text      the pages alone, with the pictures that there are
+    python -m scripts.robot_pictures             all shipped robots
+    python -m scripts.robot_pictures NAME ...    only these
+    python -m scripts.robot_pictures --text      only the pages, with the existing pictures
 
-``docs/images/robots/NAME.png`` shows the default interface on a tablet, ``docs/robots/NAME.md`` is
-what `urc docs` says with that picture below its first lines.
+``docs/images/robots/NAME.png`` shows the default interface on a tablet. ``docs/robots/NAME.md`` is
+the output of `urc docs` with that picture below its first lines.
 """
 
 import argparse
@@ -34,7 +34,7 @@ IMAGES = DOCS / "images" / "robots"
 TABLET = {"width": 1024, "height": 768}
 COLOURS = 128
 SETTLED_MS = 3000
-"""Time for values that come slowly; those of a few seconds more are shown as they are by then."""
+"""Time for slow values, in milliseconds; even slower ones are shown as they are."""
 READY_MS = 60_000
 
 
@@ -49,7 +49,7 @@ def with_picture(page: str, name: str) -> str:
 async def take(browser: Browser, address: str, name: str) -> None:
     """Write the picture of one robot."""
     context = await browser.new_context(
-        viewport=TABLET,  # type: ignore[arg-type]  # a mapping of the right keys
+        viewport=TABLET,  # type: ignore[arg-type]  # a mapping with the right keys
         locale=LOCALE,
         color_scheme="light",
         reduced_motion="reduce",
@@ -72,12 +72,12 @@ async def take(browser: Browser, address: str, name: str) -> None:
 async def pictures(names: list[str]) -> None:
     """Take the pictures, one after the other."""
     IMAGES.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as folder:  # nobody's latched stop is in the pictures
+    with tempfile.TemporaryDirectory() as folder:  # without a latched stop of the user
         await pictures_of(names, {"URC_DATA_DIR": folder})
 
 
 async def pictures_of(names: list[str], environment: Mapping[str, str]) -> None:
-    """Take them of a demo in an environment."""
+    """Take the pictures from a demo in an environment."""
     demo = UrcProcess(("demo", "--no-browser", "--port", "0"), environment)
     try:
         address = (await demo.wait_for_async(r"dashboard (http://\S+)", READY_MS / 1000))[1]
@@ -89,7 +89,7 @@ async def pictures_of(names: list[str], environment: Mapping[str, str]) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Take them, and write the pages."""
+    """Take the pictures, and write the pages."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("names", nargs="*", metavar="NAME")
     parser.add_argument("--text", action="store_true", help="write the pages alone")

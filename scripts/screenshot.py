@@ -1,8 +1,8 @@
-"""Takes the README's picture of the dashboard: `python -m scripts.screenshot`.
+"""The generator of the README's picture of the dashboard: `python -m scripts.screenshot`.
 
-The demo runs as a process of its own, and the picture is taken in a real Chromium at the moment
-its battery shows the charge that the README speaks of. With ``--all FOLDER`` it takes every screen
-and theme instead, for people who change how things look.
+The demo runs in a separate process. A real Chromium takes the picture when the battery shows the
+charge that the README mentions. With ``--all FOLDER`` it takes every screen and theme instead, for
+work on the design.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from tests.e2e.processes import UrcProcess
 
 PICTURE = Path(__file__).resolve().parents[1] / "docs" / "images" / "dashboard.png"
 CHARGE = "74"
-"""Per cent; the emulated battery comes by once in 100 s."""
+"""Charge in percent; the emulated battery reaches it once in 100 s."""
 WAIT_MS = 110_000
 MAX_BYTES = 150_000
 THEMES = ("light", "dark", "sunlight", "night")
@@ -37,7 +37,7 @@ class Shot:
     height: int = 800
     theme: str = "light"
     charge: str = ""
-    """Text that the battery must show; "" takes any value."""
+    """Required text of the battery; "" accepts any value."""
 
 
 def main() -> int:
@@ -71,7 +71,7 @@ def every_shot(folder: Path) -> list[Shot]:
 
 
 async def take(address: str, shots: Sequence[Shot]) -> None:
-    """Take the pictures one after the other, each on a page of its own."""
+    """Take the pictures one after the other, each on a new page."""
     async with running_browser() as browser:
         for shot in shots:
             await take_one(browser, address, shot)
@@ -79,7 +79,7 @@ async def take(address: str, shots: Sequence[Shot]) -> None:
 
 
 async def take_one(browser: Browser, address: str, shot: Shot) -> None:
-    """Open the page, wait until it shows what it should, and write the picture."""
+    """Open the page, wait for the required values, and write the picture."""
     context = await browser.new_context(
         viewport={"width": shot.width, "height": shot.height},
         color_scheme="dark" if shot.theme in ("dark", "night") else "light",

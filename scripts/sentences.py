@@ -1,11 +1,11 @@
-"""Draws sentences at random from the prose of a commit, for a reader who judges the English.
+"""A random draw of sentences from the prose of a commit, for a reader who judges the English.
 
     python -m scripts.sentences             60 sentences of HEAD
     python -m scripts.sentences COMMIT      of another commit
 
-The seed is the hash of the commit: the same commit gives the same sentences on every machine, and
-no one can choose them. Each sentence of at least four words is as likely as any other, once for all
-its copies. `scripts/passages.py` says what counts as prose.
+The seed is the hash of the commit. So the same commit gives the same sentences on every machine,
+and no one can choose them. Each sentence of at least four words is equally likely, and copies count
+once. `scripts/passages.py` defines prose.
 """
 
 import argparse
@@ -39,7 +39,7 @@ def main() -> int:
 
 
 def candidates(files: dict[str, str]) -> list[Sentence]:
-    """Return every sentence that may be drawn, in the order of the files."""
+    """Return every sentence of the draw, in the order of the files."""
     found: dict[str, Sentence] = {}
     for passage in passages(files):
         for one in sentences(passage):

@@ -1,4 +1,4 @@
-"""Measures the structure of the code: how much there is, and how it is cut up.
+"""Measurements of the code's structure: its size, and its division into parts.
 
     python -m scripts.structure             this tree
     python -m scripts.structure ROOT        another one, such as a worktree of an older commit
@@ -6,13 +6,13 @@
 Figures to compare before and after a change; none is a goal by itself. `--names` lists the modules,
 classes and functions behind the counts. How each is counted:
 
-- modules with one importer: modules of `urc` that exactly one other module imports, at any level or
-  by an entry `"urc.module:name"` of a table; packages and `__main__` apart;
+- modules with one importer: modules of `urc` that exactly one other module imports, at any level,
+  or by an entry `"urc.module:name"` of a table; packages and `__main__` do not count;
 - class names used more than once: the same name defined in two places of `urc`;
-- functions over 60 lines: decorators are not counted, the docstring is;
-- repeated lines: each function is read as a list of statements (of a compound one its head), with
-  names of variables and values of constants blanked; four in a row that an earlier function has too
-  are repeats; lines of repeats are counted once.
+- functions over 60 lines: without decorators, with the docstring;
+- repeated lines: each function is a list of statements, with variable names and constants blanked.
+  A compound statement counts with its head. Four statements in a row that an earlier function also
+  has are repeats, and their lines are counted once.
 """
 
 import argparse
@@ -42,29 +42,29 @@ class Module:
 
     @property
     def is_package(self) -> bool:
-        """Whether it is the file of a folder."""
+        """Whether it is the file of a package."""
         return self.path.endswith("__init__.py")
 
 
 @dataclass
 class Lines:
-    """Lines of Python by what stands on them."""
+    """Lines of Python by kind."""
 
     total: int = 0
     blank: int = 0
     docstring: int = 0
     comments: int = 0
-    """Comments, whether they stand alone or behind code."""
+    """Comments, alone or after code."""
 
     @property
     def code(self) -> int:
-        """Lines with code, or with a comment alone."""
+        """Lines with code or a comment."""
         return self.total - self.blank - self.docstring
 
 
 @dataclass
 class Structure:
-    """Every figure, and what is behind it."""
+    """Every figure, with the names behind it."""
 
     lines: Lines = field(default_factory=Lines)
     files: int = 0
@@ -77,11 +77,11 @@ class Structure:
 
 
 def main() -> int:
-    """Print the table, and the names when they are wanted; return the exit code."""
+    """Print the table, and the names if requested; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m scripts.structure", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("root", nargs="?", type=Path, default=ROOT, help="the tree to measure")
-    parser.add_argument("--names", action="store_true", help="list what is behind the counts")
+    parser.add_argument("--names", action="store_true", help="list the names behind the counts")
     options = parser.parse_args()
     root: Path = options.root
     found = structure(modules(root, "urc"))
@@ -100,7 +100,7 @@ def main() -> int:
 
 
 def table(found: Structure) -> list[tuple[str, str | int]]:
-    """Return the name and figure of each row that is about `urc`."""
+    """Return the name and figure of each row about `urc`."""
     lines = found.lines
     return [
         ("lines of Python in urc/", lines.total),
@@ -120,7 +120,7 @@ def table(found: Structure) -> list[tuple[str, str | int]]:
 
 
 def names(found: Structure) -> Iterator[str]:
-    """Yield the lists behind the counts."""
+    """Yield the names behind the figures."""
     yield "\nmodules with one importer"
     yield from (f"  {name}" for name in found.one_importer)
     yield "\nclass names used more than once"
@@ -215,7 +215,7 @@ def classes(found: list[Module]) -> Iterator[tuple[str, str]]:
 
 
 def repeated_names(found: list[Module]) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
-    """Return the public, then the private, class names that stand for two classes, with places."""
+    """Return public and private class names with two or more definitions, and their places."""
     places: dict[str, list[str]] = defaultdict(list)
     for name, place in classes(found):
         places[name].append(place)
@@ -232,7 +232,7 @@ def functions(module: Module) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef
 
 
 def long_functions(found: list[Module]) -> list[str]:
-    """Return name, place and length of each function that is too long."""
+    """Return name, place and length of each function over the limit."""
     return [
         f"{node.name} {module.path}:{node.lineno} ({length} lines)"
         for module in found
@@ -242,7 +242,7 @@ def long_functions(found: list[Module]) -> list[str]:
 
 
 def repeated_lines(found: list[Module]) -> int:
-    """Count the lines in runs of statements that an earlier function has, too."""
+    """Count the lines in runs of statements that an earlier function also has."""
     seen: set[tuple[str, ...]] = set()
     repeated: set[tuple[str, int]] = set()
     for module in found:
@@ -259,16 +259,16 @@ def repeated_lines(found: list[Module]) -> int:
                         for number in lines
                     )
                 fresh.add(window)
-            # Only now: rows of alike statements within one function are no copy of another.
+            # Only now, because repeated rows within one function do not count.
             seen |= fresh
     return len(repeated)
 
 
 def statements(node: ast.AST) -> Iterator[tuple[range, str]]:
-    """Yield lines and shape of each statement in a function, in the order of reading."""
+    """Yield lines and shape of each statement in a function, in reading order."""
     for inner in ast.iter_child_nodes(node):
         if isinstance(inner, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-            continue  # counted by itself
+            continue  # counted on its own
         if isinstance(inner, ast.Expr) and isinstance(inner.value, ast.Constant):
             continue  # a docstring
         if isinstance(inner, ast.stmt):
@@ -280,7 +280,7 @@ def statements(node: ast.AST) -> Iterator[tuple[range, str]]:
 
 
 def shape_of(node: ast.AST) -> str:
-    """Return a statement without its blocks, its names of variables and its constants."""
+    """Return a statement without its blocks, variable names and constants."""
     if isinstance(node, ast.Name | ast.Constant):
         return type(node).__name__
     parts = [type(node).__name__]

@@ -1,11 +1,11 @@
-"""The catalogues of what pages say: brings them up to date with the sources, and compiles them.
+"""The catalogues of the pages' texts: update from the sources, and compilation.
 
     python -m scripts.translations            update translations/*.po and compile them
-    python -m scripts.translations --check    exit 1 when a catalogue is behind, or has gaps
+    python -m scripts.translations --check    exit 1 if a catalogue is out of date or has gaps
 
-Sources are the page templates, the widgets' templates, modules, titles and summaries, and the
-page's own modules: whatever stands in ``t("...")`` or ``ctx.t("...")`` is a message. The
-catalogues are gettext's PO files, so any translation program opens them.
+Sources are the page templates, the pages' modules, and the widgets' templates, modules, titles and
+summaries. A message is a text in ``t("...")`` or ``ctx.t("...")``. The catalogues are gettext's PO
+files, which any translation program opens.
 """
 
 import argparse
@@ -32,12 +32,12 @@ IDLE_HEADERS = tuple(
     f'"{name}'
     for name in ("POT-", "PO-", "Project-", "Report-", "Last-", "Language-Team", "Generated-")
 )
-"""Of a PO file; they would change with the day, or with the program that wrote it."""
+"""Headers of a PO file that would change with the date or the program."""
 HOLE = re.compile(r"\{[a-z_]+\}")
 
 
 def sources() -> Iterator[tuple[str, Path]]:
-    """Yield (method, file) of everything that has words for people."""
+    """Yield (method, file) for every file with text for people."""
     for pattern, method in (
         ("templates/*.j2", "jinja2"),
         ("widgets/*/*.j2", "jinja2"),
@@ -53,7 +53,7 @@ def sources() -> Iterator[tuple[str, Path]]:
 
 
 def messages() -> dict[str, list[str]]:
-    """Return message → the files that say it, in order of appearance."""
+    """Return message → its files, in order of appearance."""
     found: dict[str, list[str]] = {}
     for method, path in sources():
         with path.open("rb") as stream:
@@ -70,7 +70,7 @@ def messages() -> dict[str, list[str]]:
 
 
 def updated(tag: str, wanted: dict[str, list[str]]) -> Catalog:
-    """Return the catalogue with exactly the wanted messages; what was translated stays."""
+    """Return the catalogue with exactly these messages; existing translations stay."""
     place = FOLDER / f"{tag}.po"
     old = read_po(io.BytesIO(place.read_bytes()), tag) if place.is_file() else Catalog(tag)
     new = Catalog(
@@ -85,7 +85,7 @@ def updated(tag: str, wanted: dict[str, list[str]]) -> Catalog:
 
 
 def faults(tag: str, catalog: Catalog) -> Iterator[str]:
-    """Yield what is wrong: gaps, and holes that a translation lost or made up."""
+    """Yield the faults: gaps, and placeholders that a translation lost or added."""
     for message in entries(catalog):
         text, said = str(message.id), str(message.string)
         if not said:
@@ -100,7 +100,7 @@ def entries(catalog: Catalog) -> list[Message]:
 
 
 def written(catalog: Catalog) -> dict[Path, str]:
-    """Return the files of one catalogue and what stands in them."""
+    """Return the files of one catalogue with their content."""
     stream = io.BytesIO()
     write_po(stream, catalog, width=100, omit_header=False, include_lineno=False)
     lines = stream.getvalue().decode().splitlines()
@@ -112,7 +112,7 @@ def written(catalog: Catalog) -> dict[Path, str]:
 
 
 def is_same(place: Path, text: str) -> bool:
-    """Whether a file says this; how a PO file is laid out is its writer's matter."""
+    """Return whether a file has this content, regardless of the layout of a PO file."""
     if not place.is_file():
         return False
     old = place.read_text(encoding="utf-8")
@@ -124,7 +124,7 @@ def is_same(place: Path, text: str) -> bool:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Update or check."""
+    """Update or check the catalogues."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--check", action="store_true")
     is_check = parser.parse_args(arguments).check

@@ -1,9 +1,9 @@
-"""Takes the pictures of the widgets for the manual: ``docs/images/widgets/NAME.png``.
+"""The generator of the widgets' pictures for the manual: ``docs/images/widgets/NAME.png``.
 
     python -m scripts.widget_pictures             all widgets
-    python -m scripts.widget_pictures NAME ...    only those
+    python -m scripts.widget_pictures NAME ...    only these
 
-Each shows the first states of the widget's demo side by side, dark, as in the gallery.
+Each shows the first states of the widget's demo in one row, dark, as in the gallery.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images" / "widgets"
 STATES = 3
-"""Most states on one picture."""
+"""Limit of states in one picture."""
 WIDTH = 1240
 READY_MS = 30_000
 
@@ -71,7 +71,7 @@ async def run(names: list[str]) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Take them."""
+    """Take the pictures."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("names", nargs="*", metavar="NAME")
     known = WidgetFolder(shipped("widgets")).names()

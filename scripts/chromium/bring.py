@@ -1,8 +1,8 @@
-"""A Chromium out of npm, for Linux x64 machines without a browser and without root.
+"""A Chromium from npm, for Linux x64 machines without a browser and without root.
 
 The package is made for cloud functions: brotli archives of the browser, its libraries, fonts and a
-software renderer. They are unpacked once into the user's cache, with a launcher beside them that
-says where libraries and fonts are.
+software renderer. They are unpacked once into the user's cache, together with a launcher that sets
+the paths of libraries and fonts.
 """
 
 import hashlib
@@ -25,7 +25,7 @@ PACKAGE = "node_modules/@sparticuz/chromium"
 ARCHIVES = ("al2023", "fonts", "swiftshader")
 TIMEOUT_S = 300
 
-# Node has a brotli decoder; Python's standard library has none.
+# Node has a brotli decoder; Python's standard library does not.
 DECOMPRESS = """
 const fs = require("node:fs"), zlib = require("node:zlib");
 const { pipeline } = require("node:stream");
@@ -53,11 +53,11 @@ FONTS_CONF = """<?xml version="1.0"?>
 
 
 class BringError(Exception):
-    """Why there is no browser from npm, in one line."""
+    """The reason why npm provides no browser, in one line."""
 
 
 def bring_chromium() -> str:
-    """Return the launcher of a Chromium in the user's cache; install it there the first time."""
+    """Return the launcher of a Chromium in the user's cache; install it at the first use."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
         raise BringError("it exists for Linux x64 only")
     folder = cache_folder()
@@ -68,7 +68,7 @@ def bring_chromium() -> str:
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix="chromium-") as name:
             unpacked = install(Path(name))
             shutil.rmtree(folder, ignore_errors=True)
-            unpacked.rename(folder)  # whole or not at all
+            unpacked.rename(folder)  # atomic
     return str(launcher)
 
 
@@ -111,7 +111,7 @@ def decompress(node: str, source: Path, target: Path) -> None:
 
 
 def unpack(archive: Path, folder: Path) -> None:
-    """Extract a tar whose hash the lock pins, plain files and folders inside `folder` only."""
+    """Extract a tar whose hash is in the lock file: plain files and folders inside `folder`."""
     with tarfile.open(archive) as tar:
         for member in tar.getmembers():
             target = (folder / member.name).resolve()

@@ -139,8 +139,11 @@ HOSTILE: dict[str, tuple[Answer, str]] = {
     "other bytes": (says(DIAL.data[:-1] + b"\1"), "the bytes differ from those named in the index"),
     "more": (says(DIAL.data + b"x" * 99999), "more than the"),
     "10 GB of zeros": (floods, "more than the"),
-    "elsewhere": (says(b"", 302, location="http://127.0.0.1:1/"), "the server answers 302, not"),
-    "gone": (says(b"", 404), "the server answers 404, not 200"),
+    "elsewhere": (
+        says(b"", 302, location="http://127.0.0.1:1/"),
+        "the server replied with status 302, not",
+    ),
+    "gone": (says(b"", 404), "the server replied with status 404, not 200"),
     "compressed": (
         says(gzip.compress(bytes(1 << 20)), content_encoding="gzip"),
         "the server compresses",
@@ -239,10 +242,10 @@ def test_a_package_that_says_less_than_its_index_is_refused(person: Person) -> N
 @pytest.mark.parametrize(
     ("status", "body", "told"),
     [
-        (302, b"", "the server answers 302"),
+        (302, b"", "the server replied with status 302"),
         (405, b"", "this server accepts no packages (status 405); start one with"),
         (409, b'{"error": "listed\\n\\u001b[2J already"}', "listed\\x0a\\x1b[2J already"),
-        (500, b"<html>", "the server answers 500"),
+        (500, b"<html>", "the server replied with status 500"),
         (201, b"{}", "it was accepted, but the server's response is invalid"),
         (201, b'{"listed": "x", "sha256": "0"}', "the server listed other bytes than were sent"),
         (422, b"x" * 100_000, "more than the expected 65536 bytes"),

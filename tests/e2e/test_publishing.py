@@ -163,7 +163,7 @@ def _is_withdrawn(lab: Lab, keeper: Person, owner: Person, other: Person) -> Non
     )
     other.does("repo", "add", lab.url)
     told = other.refuses("install", "puppet@1.1.0", "--yes")
-    assert f"drivers/puppet 1.1.0 was withdrawn: {why}; --withdrawn takes it all the same" in told
+    assert f"drivers/puppet 1.1.0 was withdrawn: {why}; --withdrawn installs it anyway" in told
     assert "installed drivers/puppet 1.0.0" in other.does("install", "puppet", "--yes")
     told = other.does("install", "puppet@1.1.0", "--yes", "--allow-more", "--withdrawn")
     assert f"; WITHDRAWN: {why}" in told

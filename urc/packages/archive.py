@@ -70,7 +70,7 @@ def name_fault(path: str) -> str:
         if not _PART.fullmatch(part) or part.endswith(".") or _RESERVED.fullmatch(part):
             return (
                 f"{path!r}: the name {part!r} is not allowed;"
-                " letters, digits, '-', '_' and '.' are, and no system may give it a meaning"
+                " use letters, digits, '-', '_' and '.', and no name that a system reserves"
             )
     last = parts[-1]
     if last not in _BARE and last.rpartition(".")[2].lower() not in _ENDINGS:

@@ -131,7 +131,7 @@ async def _exchange(
     ):
         status = response.status_code
         if status not in accepted:
-            raise PackageError(f"{url}: the server answers {status}, not 200")
+            raise PackageError(f"{url}: the server replied with status {status}, not 200")
         if method == "GET" and status != 200:
             return HttpResponse(status if status == 304 else 404, "", b"")
         if response.headers.get("content-encoding", "identity") != "identity":

@@ -1,12 +1,14 @@
 """The folder of a repository: source packages, and the files for any web server to serve.
 
-DIR/drivers/puppet/package.yaml …     source of a package, edited by the maintainer
-DIR/archives/drivers/puppet/1.0.0.zip every version that was ever listed
-DIR/archives/drivers/puppet/1.0.0.sig its signature, if any
-DIR/archives/drivers/puppet/1.0.0.json its origin, and whether it is withdrawn
-DIR/index.json                        all versions, with a number that grows with each change
-DIR/index/head.json                   its number and digest, signed by the maintainer, see `head`
-DIR/drivers/puppet/urcpm.json         the same in the thesis's form
+    DIR/drivers/puppet/package.yaml …     source of a package, edited by the maintainer
+    DIR/archives/drivers/puppet/1.0.0.zip every version that was ever listed
+    DIR/archives/drivers/puppet/1.0.0.sig its signature, if any
+    DIR/archives/drivers/puppet/1.0.0.json its origin, and whether it is withdrawn
+    DIR/index.json                        all versions, with a number that grows with each change
+    DIR/index/head.json                   its number and digest, signed by the maintainer
+    DIR/drivers/puppet/urcpm.json         the same in the thesis's form
+
+Only listed files are served.
 """
 
 import shutil

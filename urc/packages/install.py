@@ -106,7 +106,7 @@ def plan_root(
     chosen = settle(root, wanted, found)
     lock = lock_of(root, chosen)
     if pinned is not None and lock != pinned:
-        raise PackageError(f"{root}: what the lock names is not what it needs; make a new lock")
+        raise PackageError(f"{root}: the lock does not match its needs; make a new lock")
     check_names(chosen)
     archives: dict[str, bytes] = {}
     origins: dict[str, str] = {}
@@ -188,7 +188,7 @@ def _withdrawn(required: PackageRequirement, found: Found) -> str:
         and entry.why_withdrawn
         and wanted.allows(entry.number)
     ]
-    return "; ".join([*gone[-3:], "--withdrawn takes it all the same"]) if gone else ""
+    return "; ".join([*gone[-3:], "--withdrawn installs it anyway"]) if gone else ""
 
 
 def _pinned(found: Found, lock: Lock) -> Found:
@@ -201,5 +201,5 @@ def _pinned(found: Found, lock: Lock) -> Found:
             if (entry.version, entry.sha256, entry.size) == (pin.version, pin.sha256, pin.size)
         ]
         if not kept[key]:
-            raise PackageError(f"{text} {pin.version}, with the bytes of the lock, is nowhere")
+            raise PackageError(f"{text} {pin.version} is not available with the bytes of the lock")
     return kept

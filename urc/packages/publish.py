@@ -94,4 +94,4 @@ def _reason(status: int, body: bytes) -> str:
     try:
         return printable(msgspec.json.decode(body, type=_Fault).error)[:2000]
     except (msgspec.DecodeError, UnicodeDecodeError):
-        return f"the server answers {status}"
+        return f"the server replied with status {status}"

@@ -55,7 +55,7 @@ class Signature(msgspec.Struct, frozen=True):
             if base64.b64encode(base64.b64decode(text)).decode() != text:
                 raise ValueError("base64 with bits left over")
         if not self.by.isprintable():
-            raise ValueError("a name on one line is expected")
+            raise ValueError("expected a name on one line")
 
     @property
     def fingerprint(self) -> str:

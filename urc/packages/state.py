@@ -58,7 +58,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
         """Return the state without a package's pinned key; raise `PackageError`."""
         if str(key) not in self.keys:
             known = ", ".join(sorted(self.keys)) or "none"
-            raise PackageError(f"no key is kept for {key}; there are keys for: {known}")
+            raise PackageError(f"no key is pinned for {key}; keys are pinned for: {known}")
         keys = {name: one for name, one in self.keys.items() if name != str(key)}
         return msgspec.structs.replace(self, keys=keys)
 

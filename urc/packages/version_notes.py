@@ -37,9 +37,9 @@ class Provenance(msgspec.Struct, frozen=True, omit_defaults=True):
         if not self.source.startswith(("https://", "http://", "ssh://")):
             raise PackageError("a source begins with https://, http:// or ssh://")
         if self.commit and not _COMMIT.fullmatch(self.commit):
-            raise PackageError("a commit is 7 to 64 hex digits, in small letters")
+            raise PackageError("a commit is 7 to 64 hex digits, in lower case")
         if not (self.source + self.tool).isprintable():
-            raise PackageError("text on one line is expected")
+            raise PackageError("expected text on one line")
 
     def __str__(self) -> str:
         at = f" at {self.commit}" if self.commit else ""
@@ -57,7 +57,7 @@ class Notes(msgspec.Struct, frozen=True, omit_defaults=True):
     def __post_init__(self) -> None:
         """Reject text with hidden characters."""
         if not self.withdrawn.isprintable():
-            raise ValueError("a reason on one line is expected")
+            raise ValueError("expected a reason on one line")
 
 
 def notes_beside(archive: Path) -> Path:

@@ -48,7 +48,7 @@ log = logging.getLogger(__name__)
 
 
 class AuditEntry(NamedTuple):
-    """One entry. Its maker must leave secrets out."""
+    """One entry. The caller must leave secrets out."""
 
     at: float
     """UTC time of this machine's clock, in seconds since 1970."""

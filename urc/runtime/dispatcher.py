@@ -182,7 +182,7 @@ class LinkPort(Protocol):
 
 
 class Dispatcher:
-    """A passer of input to the engine and of its events to links, hub and callers."""
+    """The owner of an engine; it performs the engine's events."""
 
     def __init__(
         self,

@@ -56,7 +56,7 @@ class MotionBackend(Protocol):
         """Replace the stop frame of `command`; this arms nothing."""
 
     def is_stopping(self, command: str) -> bool:
-        """Return whether `command` may move, or its stop may still be repeated."""
+        """Return whether `command` may be moving, or its stop may be repeated."""
 
     def is_open(self, command: str) -> bool:
         """Return whether its transport is connected, by the last report."""

@@ -53,7 +53,7 @@ log = logging.getLogger(__name__)
 
 
 class Link:
-    """A transport that stays connected, with the traffic between it and the engine."""
+    """A transport that is kept connected, with the traffic between it and the engine."""
 
     def __init__(
         self,

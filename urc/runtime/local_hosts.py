@@ -47,8 +47,8 @@ def check_hosts(profile: Profile) -> None:
         host = _fixed(spec.options)
         if host:
             raise UrcError(
-                f"{profile.file}: the transport {spec.name} always leads to {host}, this machine"
-                " itself: a package may only do so by a setting that you fill in"
+                f"{profile.file}: the transport {spec.name} has the fixed host {host}, this machine"
+                " itself: a package may use it only through a setting"
             )
 
 

@@ -51,7 +51,7 @@ def secret_texts(profile: Profile, settings: Mapping[str, Value]) -> list[str]:
 
 
 class Redactor:
-    """A remover of secrets from frames, texts and streams."""
+    """Redaction of secrets in frames, texts and streams."""
 
     def __init__(self, secrets: Iterable[str], encodings: Iterable[str] = ("utf-8",)) -> None:
         """Prepare for these secrets, written in any of the encodings; empty ones do not count."""

@@ -1,14 +1,16 @@
 """URC from a Python script: the same profile, the same engine, no dashboard.
 
-import asyncio
-from urc import connect
+    import asyncio
+    from urc import connect
 
-async def main():
-    async with connect("robots/puppet.yaml", port=6789) as robot:
-        async for sample in robot.watch("battery"):
-            print(sample.value)
+    async def main():
+        async with connect("robots/puppet.yaml", port=6789) as robot:
+            async for sample in robot.watch("battery"):
+                print(sample.value)
 
-asyncio.run(main())
+    asyncio.run(main())
+
+Lost connections are reopened.
 """
 
 import logging

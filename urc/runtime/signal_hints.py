@@ -39,7 +39,7 @@ class _Asked(NamedTuple):
 
 
 class SignalHints:
-    """A finder of the reason why a test has not set a signal."""
+    """A search for the reason why a test has not set a signal."""
 
     def __init__(self, trial: TestEngine, *, in_steps: bool) -> None:
         self._trial = trial

@@ -198,7 +198,7 @@ def test_forgetting_what_is_not_kept_is_told(store: Store, anna: Signer) -> None
     """With what there is."""
     install(store, DIAL, signatures=sign(anna, DIAL))
     with (
-        pytest.raises(PackageError, match="there are keys for: widgets/dial"),
+        pytest.raises(PackageError, match="keys are pinned for: widgets/dial"),
         store.changing() as change,
     ):
         change.forget_key(PackageId("driver", "dial"))

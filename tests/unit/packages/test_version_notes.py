@@ -60,7 +60,7 @@ def test_what_is_withdrawn_is_not_taken_unless_it_is_asked_for(store: Store) -> 
     with pytest.raises(PackageError) as refused:
         planned(store, "dial@1.1.0", there)
     assert str(refused.value).endswith(
-        f"; widgets/dial 1.1.0 was withdrawn: {WHY}; --withdrawn takes it all the same"
+        f"; widgets/dial 1.1.0 was withdrawn: {WHY}; --withdrawn installs it anyway"
     )
     plan = planned(store, "dial@1.1.0", there, takes=True)
     assert origin_lines(plan, store)[0].endswith(f"not signed; WITHDRAWN: {WHY}")
