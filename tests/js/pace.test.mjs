@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { tell } from "../../urc/web/static/widgets/kit.js";
-import { FEW, LONGEST_TURN, Pace, SHARE_MS, SHARE_OF_TWO_MS } from "../../urc/web/static/widgets/draw_scheduler.js";
+import { FEW, LONGEST_TURN, DrawScheduler, SHARE_MS, SHARE_OF_TWO_MS } from "../../urc/web/static/widgets/draw_scheduler.js";
 
 const COUNT = 60;
 
@@ -11,7 +11,7 @@ const COUNT = 60;
  * Let frames pass on a device where all widgets always have something new; return how many each of
  * the last two drew.
  *
- * @param {Pace} pace
+ * @param {DrawScheduler} pace
  * @param {(drawn: number) => number} cost milliseconds of a frame that draws so many
  * @param {number} [frames]
  */
@@ -26,18 +26,18 @@ function play(pace, cost, frames = 200) {
 }
 
 test("a device that is fast enough draws everything in each frame", () => {
-  assert.deepEqual(play(new Pace(), (drawn) => drawn * 0.1), [COUNT, COUNT]);
+  assert.deepEqual(play(new DrawScheduler(), (drawn) => drawn * 0.1), [COUNT, COUNT]);
 });
 
 test("a slower one draws as many widgets as fit into their share of a frame", () => {
-  for (const drawn of play(new Pace(), (each) => 2 + each * 0.15)) {
+  for (const drawn of play(new DrawScheduler(), (each) => 2 + each * 0.15)) {
     assert.ok(drawn >= 34 && drawn <= 41, `${drawn} widgets, ${2 + drawn * 0.15} of ${SHARE_MS} ms`);
   }
 });
 
 test("where there is no room for half of them, every second frame is free, and more are drawn", () => {
   const cost = (/** @type {number} */ each) => 5 + each * 0.3;
-  const [one = 0, other = 0] = play(new Pace(), cost);
+  const [one = 0, other = 0] = play(new DrawScheduler(), cost);
   const drawn = Math.max(one, other);
   assert.equal(Math.min(one, other), 0);
   assert.ok(drawn >= 20 && drawn <= 24, `${drawn} widgets, ${cost(drawn)} of ${SHARE_OF_TWO_MS} ms`);
@@ -46,7 +46,7 @@ test("where there is no room for half of them, every second frame is free, and m
 });
 
 test("few widgets are drawn in each frame, whatever it was like with many", () => {
-  const pace = new Pace();
+  const pace = new DrawScheduler();
   play(pace, () => 300);
   for (let frame = 0; frame < 10; frame += 1) {
     const room = pace.begin(COUNT);
@@ -56,11 +56,11 @@ test("few widgets are drawn in each frame, whatever it was like with many", () =
 });
 
 test("on the slowest one each widget still has its turn", () => {
-  assert.deepEqual(play(new Pace(), () => 300).sort(), [0, COUNT / LONGEST_TURN]);
+  assert.deepEqual(play(new DrawScheduler(), () => 300).sort(), [0, COUNT / LONGEST_TURN]);
 });
 
 test("after a free frame, or one in which nothing was new, widgets are drawn", () => {
-  const pace = new Pace();
+  const pace = new DrawScheduler();
   play(pace, () => 300, 21); // the last one drew
   assert.equal(pace.begin(COUNT), 0);
   assert.ok(pace.begin(COUNT) > 0);
@@ -69,13 +69,13 @@ test("after a free frame, or one in which nothing was new, widgets are drawn", (
 });
 
 test("what was a moment's hindrance is forgotten within a second", () => {
-  const pace = new Pace();
+  const pace = new DrawScheduler();
   play(pace, () => 300, 20);
   assert.deepEqual(play(pace, (drawn) => drawn * 0.05, 60), [COUNT, COUNT]);
 });
 
 test("a page whose turns are as short as can be still finds out that there is room", () => {
-  const pace = new Pace();
+  const pace = new DrawScheduler();
   play(pace, () => 300, 20);
   const drawn = pace.begin(COUNT);
   assert.ok(drawn < FEW, `${drawn} widgets have their turn`);
@@ -83,13 +83,13 @@ test("a page whose turns are as short as can be still finds out that there is ro
 });
 
 test("a frame of few widgets, or of none, tells nothing", () => {
-  const pace = new Pace();
+  const pace = new DrawScheduler();
   assert.equal(pace.end(FEW - 1, 0), false);
   assert.equal(pace.end(0, COUNT), false);
 });
 
 test("fewer widgets than frames of a turn are one each", () => {
-  const pace = new Pace();
+  const pace = new DrawScheduler();
   pace.learn(2, 300, 2);
   assert.equal(pace.begin(2), 1);
 });

@@ -11,7 +11,7 @@ Object.assign(globalThis, {
   },
   localStorage: { getItem: () => null, setItem() {}, removeItem() {} },
 });
-const { Pads } = await import("../../urc/web/static/control/gamepad.js");
+const { Gamepads } = await import("../../urc/web/static/control/gamepad.js");
 const { STANDARD, withAxis } = await import("../../urc/web/static/widgets/gamepad_map.js");
 
 const ENABLE = STANDARD.left[0] ?? 0;
@@ -23,7 +23,7 @@ function played() {
     axes: [0, 0, 0, 0], buttons: Array.from({ length: 16 }, () => ({ pressed: false })),
   };
   Object.defineProperty(globalThis, "navigator", { value: { getGamepads: () => [pad] }, configurable: true });
-  const pads = new Pads(() => {});
+  const pads = new Gamepads(() => {});
   plugged.at(-1)?.();
   const grip = {
     spec: { pad: "left" },

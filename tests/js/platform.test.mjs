@@ -3,8 +3,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Budget } from "../../urc/web/static/widgets/render_budget.js";
-import { Alerts, Follows, Log } from "../../urc/web/static/live/page_topics.js";
+import { RenderBudget } from "../../urc/web/static/widgets/render_budget.js";
+import { Alerts, PageTopics, Log } from "../../urc/web/static/live/page_topics.js";
 import { frameOf } from "../../urc/web/static/live/frames.js";
 import { DASH, clamp, format, many, number, numbers, t } from "../../urc/web/static/widgets/kit.js";
 import { Decoder } from "../../urc/web/static/widgets/image_decoder.js";
@@ -12,7 +12,7 @@ import { Store } from "../../urc/web/static/live/store.js";
 import { Units, converted } from "../../urc/web/static/core/units.js";
 
 test("a widget that is long in twenty of sixty calls is called once a second", () => {
-  const budget = new Budget();
+  const budget = new RenderBudget();
   for (let call = 0; call < 19; call += 1) budget.count(call * 16, 51);
   assert.equal(budget.isSlow, false);
   budget.count(19 * 16, 51);
@@ -22,7 +22,7 @@ test("a widget that is long in twenty of sixty calls is called once a second", (
 });
 
 test("long calls that are sixty calls ago are forgotten, and one that got quick is quick again", () => {
-  const budget = new Budget();
+  const budget = new RenderBudget();
   for (let call = 0; call < 600; call += 1) budget.count(call * 16, call % 4 === 0 ? 60 : 1);
   assert.equal(budget.isSlow, false);
   for (let call = 0; call < 20; call += 1) budget.count(10_000 + call, 60);
@@ -32,7 +32,7 @@ test("long calls that are sixty calls ago are forgotten, and one that got quick 
 });
 
 test("one that stops the page even once a second has spent what it had", () => {
-  const budget = new Budget();
+  const budget = new RenderBudget();
   for (let call = 0; call < 29; call += 1) budget.count(call * 1000, 600);
   assert.equal(budget.isSpent, true);
 });
@@ -119,7 +119,7 @@ test("who follows is told in a frame: at once, on change, and not after the end"
   let name = "dark";
   let woken = 0;
   const theme = () => ({ look: name, value: { name } });
-  const follows = new Follows(/** @type {any} */ ({ theme }), () => (woken += 1));
+  const follows = new PageTopics(/** @type {any} */ ({ theme }), () => (woken += 1));
   const end = new AbortController();
   /** @type {string[]} */
   const told = [];

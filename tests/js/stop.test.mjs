@@ -5,7 +5,7 @@ import test from "node:test";
 
 Object.assign(globalThis, { addEventListener() {}, window: globalThis });
 const { StopButton } = await import("../../urc/web/static/control/stop.js");
-const { Giver } = await import("../../urc/web/static/widgets/command_state.js");
+const { CommandState } = await import("../../urc/web/static/widgets/command_state.js");
 
 /** A button of which it can be said what is known of STOP. */
 function scene() {
@@ -43,7 +43,7 @@ test("what waits to be given is forgotten then, and questions are", async () => 
     given.push(args);
     return new Promise((resolve) => (answer = () => resolve(undefined)));
   };
-  const giver = new Giver({
+  const giver = new CommandState({
     give,
     show() {},
     t: (/** @type {string} */ text) => text,

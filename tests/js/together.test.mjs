@@ -2,7 +2,7 @@
 /** What several hands on one command give together. */
 import assert from "node:assert/strict";
 import test from "node:test";
-import { Together } from "../../urc/web/static/control/merge_axes.js";
+import { MergedAxes } from "../../urc/web/static/control/merge_axes.js";
 
 /** A hand on a control of a command: what it gives, and what that is at rest. */
 class Hand {
@@ -22,7 +22,7 @@ class Hand {
 
 /** @param {Hand[]} hands */
 function shared(...hands) {
-  const together = new Together();
+  const together = new MergedAxes();
   const grips = new Set(hands);
   return {
     grips,

@@ -2,12 +2,12 @@
 /** Frames that do not answer: who is blamed, and who comes back. */
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { TICK_MS, Watch } from "../../urc/web/static/frame/frame_watchdog.js";
+import { TICK_MS, FrameWatchdog } from "../../urc/web/static/frame/frame_watchdog.js";
 
 /** Plays a page with frames. */
 class Page {
   constructor() {
-    this.watch = new Watch();
+    this.watch = new FrameWatchdog();
     this.nowMs = 0;
     /** @type {string[]} */
     this.told = [];

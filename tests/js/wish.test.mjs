@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Wish } from "../../urc/web/static/widgets/pending_value.js";
+import { PendingValue } from "../../urc/web/static/widgets/pending_value.js";
 
 const WITHIN_MS = 3000;
 
@@ -11,7 +11,7 @@ globalThis.window = globalThis;
 /** Make a wish whose clock the test moves. @param {import("node:test").TestContext} context */
 function made(context) {
   context.mock.timers.enable({ apis: ["setTimeout"] });
-  return new Wish({ withinMs: WITHIN_MS, show: () => undefined, signal: new AbortController().signal });
+  return new PendingValue({ withinMs: WITHIN_MS, show: () => undefined, signal: new AbortController().signal });
 }
 
 /** @param {number} serial @param {unknown} value */

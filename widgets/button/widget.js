@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
-import { Giver, slide } from "urc/command_kit";
+import { CommandState, slide } from "urc/command_kit";
 import { attribute, noteOf, part, style, write } from "urc/kit";
 import { listen } from "./gesture.js";
 
@@ -54,7 +54,7 @@ class Button {
     this.reading = undefined;
     /** @type {number | undefined} */
     this.cooling = undefined;
-    this.giver = new Giver({ give: () => send("press"), show: () => this.show(), t, signal });
+    this.giver = new CommandState({ give: () => send("press"), show: () => this.show(), t, signal });
     const gesture = options["gesture"];
     const isReady = () => this.isFree;
     if (gesture === "slide") {

@@ -1,7 +1,7 @@
 // @ts-check
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
-import { Giver } from "urc/command_kit";
+import { CommandState } from "urc/command_kit";
 import { attribute, part, write } from "urc/kit";
 
 export default {
@@ -15,7 +15,7 @@ export default {
     const done = el.querySelector(".checklist-done");
     const isAutomatic = options["automatic"] === true;
     const hasCommand = command("complete") !== null;
-    const giver = new Giver({ give: () => send("complete"), show, t, signal });
+    const giver = new CommandState({ give: () => send("complete"), show, t, signal });
     if (!hasCommand) giver.reason = "";
     /** Ticked items, stored by their text, so that a changed list is not ticked by position. */
     const kept = memory.read();

@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Hand} Hand */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
-/** @typedef {import("../../urc/web/static/widgets/response_curve.js").Gate} Gate */
+/** @typedef {import("../../urc/web/static/widgets/response_curve.js").DeadMan} DeadMan */
 /** @typedef {import("../../urc/web/static/widgets/motion.js").Look} Look */
 import { gate, settingsOf } from "urc/response_curve";
 import { attribute, drawing, part, write } from "urc/kit";

@@ -1,7 +1,7 @@
 // @ts-check
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
-import { Setpoint, SetpointFace } from "urc/command_kit";
+import { Setpoint, SetpointView } from "urc/command_kit";
 import { attribute, drawing } from "urc/kit";
 import { Pull, arc, ray, shareAt } from "./dial.js";
 
@@ -16,7 +16,7 @@ export default {
    */
   mount({ ...ctx }) {
     const { el, signal } = ctx;
-    const face = new SetpointFace(el, "knob");
+    const face = new SetpointView(el, "knob");
     const dial = el.querySelector(".knob-dial");
     const setpoint = new Setpoint(ctx, show);
     let pull = new Pull(0);

@@ -3,7 +3,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/core/types.js").Lease} Lease */
 /** @typedef {import("../../urc/web/static/core/types.js").Link} Link */
-/** @typedef {import("../../urc/web/static/core/types.js").Wish} Wish */
+/** @typedef {import("../../urc/web/static/core/types.js").PendingValue} PendingValue */
 import { attribute, DASH, part, write } from "urc/kit";
 import { quality, Trips } from "./trips.js";
 
@@ -125,7 +125,7 @@ export default {
         made.className = "link-verb urc-act";
         made.textContent = text;
         made.hidden = true;
-        made.addEventListener("click", () => drive(/** @type {Wish} */ (wish)), { signal });
+        made.addEventListener("click", () => drive(/** @type {PendingValue} */ (wish)), { signal });
         return { wish, made };
       });
       verbs.append(...buttons.map(({ made }) => made));

@@ -1,7 +1,7 @@
 // @ts-check
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
-import { Setpoint, SetpointFace, keyed } from "urc/command_kit";
+import { Setpoint, SetpointView, keyed } from "urc/command_kit";
 import { attribute, part } from "urc/kit";
 import { numberOf } from "./typed.js";
 
@@ -14,7 +14,7 @@ export default {
    */
   mount({ ...ctx }) {
     const { el, signal, t } = ctx;
-    const face = new SetpointFace(el, "number");
+    const face = new SetpointView(el, "number");
     const field = el.querySelector(".number-field");
     const argument = Object.values(ctx.command("change")?.arguments ?? {})[0];
     const setpoint = new Setpoint(ctx, show);

@@ -5,7 +5,7 @@
  * @typedef {import("./look.js").Pose} Pose
  * @typedef {import("./look.js").View} View
  *
- * @typedef {object} Stage
+ * @typedef {object} ViewSwitch
  * @property {HTMLCanvasElement} canvas
  * @property {(bitmap: ImageBitmap, pose: Pose | null) => void} show
  * @property {(view: View) => void} draw
@@ -20,7 +20,7 @@ const MOST_DENSITY = 1.5;
 
 /**
  * @param {typeof import("three")} three
- * @returns {Stage} throws without WebGL
+ * @returns {ViewSwitch} throws without WebGL
  */
 export function sphere(three) {
   const renderer = new three.WebGLRenderer({ antialias: false, powerPreference: "low-power" });
@@ -79,7 +79,7 @@ export function sphere(three) {
   };
 }
 
-/** @returns {Stage} */
+/** @returns {ViewSwitch} */
 export function flat() {
   const canvas = document.createElement("canvas");
   /** @type {ImageBitmap | null} */

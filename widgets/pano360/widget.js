@@ -5,7 +5,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("./look.js").Pose} Pose */
 /** @typedef {import("./look.js").View} View */
-/** @typedef {import("./stage.js").Stage} Stage */
+/** @typedef {import("./stage.js").ViewSwitch} ViewSwitch */
 import { DASH, attribute, button, noteOf, part, write } from "urc/kit";
 import { MOST_XMP, bearing, firstView, poseOf, tilted, turned } from "./look.js";
 import { flat, sphere } from "./stage.js";
@@ -37,7 +37,7 @@ export default {
 
 /**
  * @param {boolean} isFlat
- * @returns {Promise<Stage>}
+ * @returns {Promise<ViewSwitch>}
  */
 async function makeStage(isFlat) {
   if (isFlat) return flat();
@@ -52,7 +52,7 @@ async function makeStage(isFlat) {
 class Panorama {
   /**
    * @param {Context} ctx
-   * @param {Stage} stage
+   * @param {ViewSwitch} stage
    */
   constructor(ctx, stage) {
     const { el, options, t, send, signal } = ctx;

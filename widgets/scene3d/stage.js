@@ -13,7 +13,7 @@ const MOST_DENSITY = 1.5;
 /** Extent of the ground to each side, in metres. */
 const REACH = 10;
 
-export class Stage {
+export class ViewSwitch {
   /**
    * @param {Three} three
    * @param {typeof import("three/addons/controls/OrbitControls.js").OrbitControls} Controls

@@ -7,7 +7,7 @@
 import { DASH, attribute, colours, many, noteOf, number, part, write } from "urc/kit";
 import { box, urdf } from "./model.js";
 import { angles, cloud, fromAngles, fromOrientation, posture } from "./pose.js";
-import { Stage } from "./stage.js";
+import { ViewSwitch } from "./stage.js";
 
 const STEP = Math.PI / 24;
 const VIEWS = /** @type {const} */ (["follow", "top", "orbit"]);
@@ -80,7 +80,7 @@ class Scene {
     this.pointsSerial = -1;
     const view = VIEWS.find((each) => each === options["view"]) ?? "orbit";
     try {
-      this.stage = new Stage(three, Controls, this.face, { frames: Number(options["frames"] ?? 30), view });
+      this.stage = new ViewSwitch(three, Controls, this.face, { frames: Number(options["frames"] ?? 30), view });
     } catch {
       // The words below still describe the pose.
       this.stage = null;

@@ -4,7 +4,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet */
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("../../urc/web/static/core/types.js").Value} Value */
-import { Giver, Wish } from "urc/command_kit";
+import { CommandState, PendingValue } from "urc/command_kit";
 import { attribute, noteOf, part, wordOf, write } from "urc/kit";
 
 /** @typedef {{value: Value, label: string}} Choice */
@@ -43,8 +43,8 @@ class Select {
     /** @type {Value} */
     this.chosen = null;
     const show = () => this.show();
-    this.giver = new Giver({ give: (args) => this.give(args), show, t, signal, onStop });
-    this.wish = new Wish({
+    this.giver = new CommandState({ give: (args) => this.give(args), show, t, signal, onStop });
+    this.wish = new PendingValue({
       withinMs: 1000 * Number(options["echo_s"] ?? 3),
       show,
       signal,

@@ -1,7 +1,7 @@
 // @ts-check
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
-import { Setpoint, SetpointFace } from "urc/command_kit";
+import { Setpoint, SetpointView } from "urc/command_kit";
 import { part, style, write } from "urc/kit";
 
 export default {
@@ -11,7 +11,7 @@ export default {
    */
   mount({ ...ctx }) {
     const { el, options, signal } = ctx;
-    const face = new SetpointFace(el, "slider");
+    const face = new SetpointView(el, "slider");
     const track = el.querySelector(".slider-track");
     const isVertical = options["direction"] === "vertical";
     const setpoint = new Setpoint(ctx, show);

@@ -4,7 +4,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet */
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("../../urc/web/static/core/types.js").Value} Value */
-import { Giver, Wish } from "urc/command_kit";
+import { CommandState, PendingValue } from "urc/command_kit";
 import { attribute, noteOf, part, wordOf, write } from "urc/kit";
 
 export default {
@@ -38,8 +38,8 @@ class Switch {
     /** @type {Reading | undefined} */
     this.state = undefined;
     const show = () => this.show();
-    this.giver = new Giver({ give: () => Promise.resolve(), show, t, signal });
-    this.wish = new Wish({
+    this.giver = new CommandState({ give: () => Promise.resolve(), show, t, signal });
+    this.wish = new PendingValue({
       withinMs: 1000 * Number(options["echo_s"] ?? 3),
       show,
       signal,

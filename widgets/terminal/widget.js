@@ -3,7 +3,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/core/types.js").LogLine} LogLine */
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
-import { Giver } from "urc/command_kit";
+import { CommandState } from "urc/command_kit";
 import { attribute, noteOf, part, write } from "urc/kit";
 import { hexOf, pairsOf, plain, Typed } from "./hex.js";
 import { Screen } from "./screen.js";
@@ -26,7 +26,7 @@ export default {
     let fault = "";
     /** @type {Reading | undefined} */
     let state;
-    const giver = new Giver({ give: (args) => send("typed", args), show, t, signal });
+    const giver = new CommandState({ give: (args) => send("typed", args), show, t, signal });
     if (!hasCommand) giver.reason = "";
 
     function show() {

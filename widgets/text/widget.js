@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
-import { Giver, Wish } from "urc/command_kit";
+import { CommandState, PendingValue } from "urc/command_kit";
 import { attribute, noteOf, part, write } from "urc/kit";
 
 export default {
@@ -20,8 +20,8 @@ export default {
     let fault = "";
     /** @type {Reading | undefined} */
     let state;
-    const giver = new Giver({ give: (args) => send("change", args), show, t, signal });
-    const wish = new Wish({ withinMs: 1000 * Number(options["echo_s"] ?? 3), show, signal });
+    const giver = new CommandState({ give: (args) => send("change", args), show, t, signal });
+    const wish = new PendingValue({ withinMs: 1000 * Number(options["echo_s"] ?? 3), show, signal });
 
     function show() {
       const isHoped = isOptimistic && wish.isWaiting;

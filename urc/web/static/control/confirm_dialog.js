@@ -33,7 +33,7 @@ export function questionsOf(asks, args) {
   return asks.filter(({ argument, value }) => !argument || String(args[argument] ?? "") === value);
 }
 
-export class Asks {
+export class ConfirmDialog {
   /**
    * @param {HTMLElement} heading element after which questions of other pages are shown
    * @param {(message: object) => boolean} say

@@ -12,7 +12,7 @@
  * @property {() => void} run Starts the sampling.
  * @property {() => boolean} isDriving Whether a control is held.
  */
-import { Control, Grip } from "./held_control.js";
+import { Control, HeldControl } from "./held_control.js";
 import { t } from "../core/words.js";
 
 /** A dead-man control has no command of its own. */
@@ -21,7 +21,7 @@ const NOTHING = {
   leaseMs: 0, isAnswered: false,
 };
 
-export class Gate {
+export class DeadMan {
   /**
    * @param {Keeper} keeper
    * @param {GateSpec} spec
@@ -36,7 +36,7 @@ export class Gate {
     const { el, key, pad = "" } = spec;
     const keys = key ? [key, "Enter"] : ["Enter"];
     /** The held control of one that must be held; it handles all kinds of release. */
-    this.grip = new Grip(this, new Control(""), NOTHING, {
+    this.grip = new HeldControl(this, new Control(""), NOTHING, {
       el, keys, pad,
       ...(key && { page: () => /** @type {const} */ ("all") }),
       sample: () => ({}),

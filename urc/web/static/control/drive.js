@@ -8,12 +8,12 @@
  * @typedef {"" | "sending" | "sent" | "failed"} StopPhase State of the last press of STOP, until the
  *   lease reports the latch.
  */
-import { Spare } from "./redundant_socket.js";
+import { RedundantSocket } from "./redundant_socket.js";
 
 /** Silence of the server after which STOP is also sent by HTTP. */
 const STOP_AGAIN_MS = 300;
 const POST_WITHIN_MS = 3000;
-/** Round-trip time above which packet loss costs too much time: see `Spare`. */
+/** Round-trip time above which packet loss costs too much time: see `RedundantSocket`. */
 const FAR_MS = 40;
 /** Interval of heartbeats that means loss or delay. */
 const LATE_BEAT_MS = 150;
@@ -45,7 +45,7 @@ export class Drive {
     this.beatMs = 0;
     /** Time of the last late heartbeat, on this page's clock. */
     this.lateMs = -Infinity;
-    this.spare = new Spare(spareUrl, (message) => this.hear(message.n, performance.now()));
+    this.spare = new RedundantSocket(spareUrl, (message) => this.hear(message.n, performance.now()));
     /** Time of the last tick that left an empty buffer. */
     this.freeMs = -Infinity;
     /** Counter of messages about held controls. */

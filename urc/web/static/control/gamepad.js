@@ -28,7 +28,7 @@ const STORED = "urc-pad:";
 /** Indexes of each side's stick in the result of `sticksOf`. */
 const PLACES = { left: [0, 1], right: [2, 3] };
 
-export class Pads {
+export class Gamepads {
   /** @param {() => void} run starts the sampling */
   constructor(run) {
     this.isConnected = false;

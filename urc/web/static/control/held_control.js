@@ -12,17 +12,17 @@
  * @typedef {import("../core/types.js").Value} Value
  *
  * @typedef {object} Holder The owner of all held controls.
- * @property {(grip: Grip) => void} begin
- * @property {(grip: Grip) => void} moved The input has changed.
- * @property {(grip: Grip) => boolean} isGuarded Whether another control is held, so that it may stay.
- * @property {(grip: Grip) => void} end
- * @property {(grip: Grip) => void} forget
+ * @property {(grip: HeldControl) => void} begin
+ * @property {(grip: HeldControl) => void} moved The input has changed.
+ * @property {(grip: HeldControl) => boolean} isGuarded Whether another control is held, so that it may stay.
+ * @property {(grip: HeldControl) => void} end
+ * @property {(grip: HeldControl) => void} forget
  */
 import { isDown } from "./pointer_capture.js";
 import { takesKeys, takesText } from "./keys.js";
 import { feel } from "./haptics.js";
 import { argumentsOf } from "../widgets/output.js";
-import { Together } from "./merge_axes.js";
+import { MergedAxes } from "./merge_axes.js";
 import { t } from "../core/words.js";
 
 /** Every kind of input, to release all. @type {Hand["kind"][]} */
@@ -35,9 +35,9 @@ export class Control {
   /** @param {string} command */
   constructor(command) {
     this.command = command;
-    /** @type {Set<Grip>} */
+    /** @type {Set<HeldControl>} */
     this.grips = new Set();
-    this.together = new Together();
+    this.together = new MergedAxes();
     /** @type {HoldPhase} */
     this.phase = "idle";
     this.reason = "";
@@ -59,7 +59,7 @@ export class Control {
 }
 
 /** One held control. */
-export class Grip {
+export class HeldControl {
   /**
    * @param {Holder} holder
    * @param {Control} control

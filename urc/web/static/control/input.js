@@ -15,9 +15,9 @@
  * @typedef {import("../core/types.js").GateSpec} GateSpec
  * @typedef {import("../core/types.js").HoldSpec} HoldSpec
  */
-import { Gate } from "./dead_man.js";
-import { ANY, Control, Grip } from "./held_control.js";
-import { Pads } from "./gamepad.js";
+import { DeadMan } from "./dead_man.js";
+import { ANY, Control, HeldControl } from "./held_control.js";
+import { Gamepads } from "./gamepad.js";
 import { said, t } from "../core/words.js";
 
 const TICK_MS = 50;
@@ -32,13 +32,13 @@ export class Input {
     this.drive = drive;
     /** @type {Map<string, Control>} */
     this.controls = new Map();
-    /** @type {Set<Grip>} */
+    /** @type {Set<HeldControl>} */
     this.grips = new Set();
-    /** @type {Set<Gate>} */
+    /** @type {Set<DeadMan>} */
     this.gates = new Set();
     /** Cells of dead-man controls, also of unmounted or failed ones. @type {Set<HTMLElement>} */
     this.gated = new Set();
-    this.pads = new Pads(() => this.run());
+    this.pads = new Gamepads(() => this.run());
     this.isRunning = false;
     this.frameMs = 0;
     /** Number of the sampling loop; callbacks of an older loop do nothing. */
@@ -77,7 +77,7 @@ export class Input {
   hold(output, spec, signal) {
     const control = this.controls.get(output.command) ?? new Control(output.command);
     this.controls.set(output.command, control);
-    const grip = new Grip(this, control, output, spec);
+    const grip = new HeldControl(this, control, output, spec);
     this.grips.add(grip);
     grip.listen(signal);
     grip.show(true);
@@ -88,7 +88,7 @@ export class Input {
    * @param {AbortSignal} signal
    */
   gate(spec, signal) {
-    const gate = new Gate(this, spec);
+    const gate = new DeadMan(this, spec);
     this.gates.add(gate);
     gate.listen(signal);
     signal.addEventListener("abort", () => {
@@ -107,14 +107,14 @@ export class Input {
     return [...this.grips].some((grip) => grip.hand);
   }
 
-  /** @param {Grip} grip */
+  /** @param {HeldControl} grip */
   isGuarded(grip) {
     if ([...this.gates].some((gate) => gate.isHeld)) return true;
     const others = [...grip.control.grips].filter((other) => other !== grip);
     return others.some(({ hand }) => hand && hand.kind !== "stay");
   }
 
-  /** @param {Grip} grip */
+  /** @param {HeldControl} grip */
   begin(grip) {
     const { control } = grip;
     control.grips.add(grip);
@@ -173,7 +173,7 @@ export class Input {
   /**
    * Send a tick for a moved input at once, without waiting for the next frame.
    *
-   * @param {Grip} grip
+   * @param {HeldControl} grip
    */
   moved(grip) {
     const { control } = grip;
@@ -185,7 +185,7 @@ export class Input {
     this.stepOne(control, nowMs);
   }
 
-  /** @param {Grip} grip */
+  /** @param {HeldControl} grip */
   end(grip) {
     const { control } = grip;
     control.grips.delete(grip);
@@ -356,7 +356,7 @@ export class Input {
     control.sentMs = nowMs;
   }
 
-  /** @param {Grip} grip */
+  /** @param {HeldControl} grip */
   forget(grip) {
     grip.drop(ANY);
     this.grips.delete(grip);

@@ -17,7 +17,7 @@
 /** @type {ReadonlySet<string>} */
 const NONE = new Set();
 
-export class Together {
+export class MergedAxes {
   constructor() {
     /** Argument → its owner. @type {Map<string, Giving>} */
     this.owners = new Map();

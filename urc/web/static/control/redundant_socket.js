@@ -8,7 +8,7 @@
 
 const AGAIN_MS = 1000;
 
-export class Spare {
+export class RedundantSocket {
   /**
    * @param {string} url "" for no redundant socket
    * @param {(message: any) => void} take handles messages of the server

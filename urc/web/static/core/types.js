@@ -89,7 +89,7 @@
  * @property {"idle" | "running" | "paused"} state
  * @property {string} reason Why it ended without success.
  *
- * @typedef {"take" | "ask" | "yes" | "no" | "force" | "leave" | "reset"} Wish Request of an operator
+ * @typedef {"take" | "ask" | "yes" | "no" | "force" | "leave" | "reset"} PendingValue Request of an operator
  *   about the controls.
  *
  * @typedef {object} Link
@@ -236,7 +236,7 @@
  *   resumes or ends the sequence of an output.
  * @property {{read: () => unknown, write: (value: unknown) => void}} memory Stored state of this widget
  *   for the lifetime of the browser's tab, also over a reload: a JSON value, or null.
- * @property {(wish: Wish) => void} drive Sends a request about the controls.
+ * @property {(wish: PendingValue) => void} drive Sends a request about the controls.
  * @property {AbortSignal} signal Aborted when the widget ends; pass it to every listener.
  * @property {<T extends keyof Topics>(what: T, listener: (news: Topics[T]) => void) => void} follow
  *   Calls the listener in the next animation frame, and in one after every change, with data of the

@@ -10,9 +10,9 @@
  * @typedef {import("../core/types.js").Reading} Reading
  * @typedef {import("../core/types.js").WidgetModule} WidgetModule
  */
-import { Budget } from "../widgets/render_budget.js";
+import { RenderBudget } from "../widgets/render_budget.js";
 import { contextOf } from "./context.js";
-import { Grips } from "./grips.js";
+import { FrameHeldControls } from "./grips.js";
 import { part, t } from "../widgets/kit.js";
 
 /** Base URL of all code of the frame: a frame sends no cookies, so its path holds a secret. */
@@ -38,8 +38,8 @@ export class Frame {
     this.say = port.postMessage.bind(port);
     this.el = part(document, "[data-frame]");
     this.end = new AbortController();
-    this.budget = new Budget();
-    this.grips = new Grips(this);
+    this.budget = new RenderBudget();
+    this.grips = new FrameHeldControls(this);
     this.widget = "";
     /** @type {Instance} */
     this.instance = {};

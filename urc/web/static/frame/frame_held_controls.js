@@ -11,7 +11,7 @@
  * @typedef {import("./frame_protocol.js").Said} Said
  * @typedef {import("../core/types.js").Hand} Hand
  * @typedef {import("../core/types.js").Value} Value
- * @typedef {import("./frame_host.js").Warden} Warden
+ * @typedef {import("./frame_host.js").FrameHost} FrameHost
  */
 
 /** Time limit for the widget's reply to an input; later its values no longer count. */
@@ -21,7 +21,7 @@ const MOST_GRIPS = 16;
 /** One overlay over a frame. */
 class Overlay {
   /**
-   * @param {Warden} warden
+   * @param {FrameHost} warden
    * @param {number} id
    */
   constructor(warden, id) {
@@ -103,7 +103,7 @@ class Overlay {
 }
 
 export class Overlays {
-  /** @param {Warden} warden */
+  /** @param {FrameHost} warden */
   constructor(warden) {
     this.warden = warden;
     /** @type {Map<number, Overlay>} */

@@ -19,7 +19,7 @@ import { give } from "../widgets/context.js";
 import { t } from "../widgets/kit.js";
 import { memoryOf } from "../widgets/tab_storage.js";
 import { describe } from "../widgets/output.js";
-import { TICK_MS, Watch } from "./frame_watchdog.js";
+import { TICK_MS, FrameWatchdog } from "./frame_watchdog.js";
 import { filesOf } from "./frame_files.js";
 import { Overlays } from "./frame_held_controls.js";
 
@@ -32,7 +32,7 @@ const MOST_STOPS = 5;
 /** Messages a second to the page itself. Browser extensions may send some; widgets have a port. */
 const MOST_ASIDE = 20;
 
-/** Frame hosts whose frames may send messages to the page. @type {Set<Warden>} */
+/** Frame hosts whose frames may send messages to the page. @type {Set<FrameHost>} */
 const wardens = new Set();
 // The first of all listeners, without a look at the content: a flood costs little.
 addEventListener("message", (event) => {
@@ -44,12 +44,12 @@ addEventListener("message", (event) => {
   }
 }, { capture: true });
 
-const watch = new Watch();
+const watch = new FrameWatchdog();
 setInterval(() => {
   if (!document.hidden) watch.tick(performance.now());
 }, TICK_MS);
 
-export class Warden extends Cell {
+export class FrameHost extends Cell {
   /**
    * @param {HTMLElement} el
    * @param {Doors} doors

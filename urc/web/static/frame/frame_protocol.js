@@ -29,7 +29,7 @@
  *   | {t: "space", isTaken: boolean}
  *   | {t: "send", id: number, output: string, args: Record<string, Given>}
  *   | {t: "steer", output: string, verb: string}
- *   | {t: "drive", wish: import("../core/types.js").Wish}
+ *   | {t: "drive", wish: import("../core/types.js").PendingValue}
  *   | {t: "follow", what: keyof Topics}
  *   | {t: "look", input: string, places: number[]}
  *   | {t: "memory", text: string}
@@ -194,7 +194,7 @@ export function heard(message, outputs) {
     }
     case "drive": {
       const wish = textOf(message["wish"]);
-      return WISHES.has(wish) ? { t, wish: /** @type {import("../core/types.js").Wish} */ (wish) } : null;
+      return WISHES.has(wish) ? { t, wish: /** @type {import("../core/types.js").PendingValue} */ (wish) } : null;
     }
     case "follow": {
       const what = textOf(message["what"]);

@@ -36,7 +36,7 @@ const MOST_PAUSE_TICKS = 48;
 const LOAD_TICKS = 40;
 const STAND_TICKS = 8;
 
-export class Watch {
+export class FrameWatchdog {
   constructor() {
     /** Frame → ticks since its first unanswered ping. @type {Map<Watched, number>} */
     this.waiting = new Map();

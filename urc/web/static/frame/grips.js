@@ -13,7 +13,7 @@ const LOOK_EVERY_MS = 250;
 /** Elements that stay clickable inside a held control, where the widget's `isFree` says so. */
 const PRESSED = "a, button, input, select, textarea, [role=button]";
 
-export class Grips {
+export class FrameHeldControls {
   /** @param {Frame} frame */
   constructor(frame) {
     this.frame = frame;

@@ -11,7 +11,7 @@ import { t } from "../core/words.js";
 /** @type {Record<Alarm, string>} */
 const WORDS = { "": "", lolo: t("very low"), low: t("low"), high: t("high"), hihi: t("very high") };
 
-export class Alarms {
+export class AlarmAnnouncer {
   /** @param {HTMLElement} el an element with role alert */
   constructor(el) {
     this.el = el;

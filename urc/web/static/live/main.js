@@ -5,20 +5,20 @@
  * @typedef {import("../core/types.js").Reply} Reply
  * @typedef {import("../core/types.js").Value} Value
  */
-import { Alarms } from "./alarm_announcer.js";
-import { Asks } from "../control/confirm_dialog.js";
+import { AlarmAnnouncer } from "./alarm_announcer.js";
+import { ConfirmDialog } from "../control/confirm_dialog.js";
 import { backSafely } from "./leave_page.js";
 import { Badge, part } from "./badge.js";
 import { Controls } from "../control/controls.js";
 import { Drive } from "../control/drive.js";
-import { Alerts, Follows, Log, Themes, watched } from "./page_topics.js";
+import { Alerts, PageTopics, Log, Themes, watched } from "./page_topics.js";
 import { frameOf } from "./frames.js";
 import { Host } from "../widgets/host.js";
 import { Input } from "../control/input.js";
 import { Panel } from "./panel.js";
 import { FullScreen, WakeLock } from "./screen.js";
 import { Socket } from "./socket.js";
-import { Stage } from "./view_switch.js";
+import { ViewSwitch } from "./view_switch.js";
 import { StopButton } from "../control/stop.js";
 import { Store } from "./store.js";
 import { offerSystems } from "../core/units.js";
@@ -38,7 +38,7 @@ const root = part(document, "[data-robot]");
 const store = new Store();
 const badge = new Badge(part(root, "[data-badge]"));
 const panel = new Panel(part(root, "[data-panel]"));
-const alarms = new Alarms(part(root, "[data-alarms]"));
+const alarms = new AlarmAnnouncer(part(root, "[data-alarms]"));
 
 /** @type {Map<number, {resolve: (values: Record<string, Value>) => void, reject: (error: Error) => void}>} */
 const waiting = new Map();
@@ -74,7 +74,7 @@ const drive = new Drive(socket, root.dataset["stop"] ?? "", wake, spare.href);
 const input = new Input(drive);
 const bar = root.querySelector("[data-controls]");
 const stop = new StopButton(drive, input, store, JSON.parse(root.dataset["lines"] ?? "[]"), bar !== null);
-const asks = new Asks(part(root, ".urc-bar"), (message) => socket.send(message));
+const asks = new ConfirmDialog(part(root, ".urc-bar"), (message) => socket.send(message));
 stop.onPressed = forgetQuestions;
 /** States of the sequences. @type {Record<string, import("../core/types.js").Progress>} */
 let sequences = {};
@@ -82,7 +82,7 @@ const controls = bar instanceof HTMLElement ? new Controls(bar, drive, stop) : n
 const log = new Log();
 const alerts = new Alerts();
 const themes = new Themes(wake);
-const follows = new Follows(
+const follows = new PageTopics(
   {
     links: () => {
       const value = { isUp: store.isUp, links: [...store.links.values()], isReplay: badge.isReplay };
@@ -131,7 +131,7 @@ function tellOfDoor() {
 }
 new FullScreen(root.querySelector("[data-fullscreen]"), tell);
 const wakeLock = new WakeLock(tell);
-const stage = new Stage(root, { store, run, input, asks, host, panel: panel.el, wake });
+const stage = new ViewSwitch(root, { store, run, input, asks, host, panel: panel.el, wake });
 /** Images that the server sends, as JSON. */
 let shown = "";
 

@@ -14,7 +14,7 @@
  *   present value, and a text that changes with it.
  */
 
-export class Follows {
+export class PageTopics {
   /**
    * @param {Sources} sources
    * @param {() => void} wake requests an animation frame

@@ -6,7 +6,7 @@
  * a gap in the numbers means loss. It knows no page.
  */
 
-export class Each {
+export class SampleHistory {
   constructor() {
     this.session = "";
     /** Signal → number of its newest reading. @type {Map<string, number>} */

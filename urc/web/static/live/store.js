@@ -19,7 +19,7 @@
  *
  * @typedef {{value: Held, alarm: Alarm, timeMs: number, serial: number, image?: Picture}} Sample
  */
-import { Each } from "./sample_history.js";
+import { SampleHistory } from "./sample_history.js";
 import { digitsIn } from "../core/number_format.js";
 import { ageText, textOf } from "../core/formatting.js";
 import { converted, factorOf, Units } from "../core/units.js";
@@ -67,7 +67,7 @@ export class Store {
     this.hasPictures = false;
     this.skewMs = Infinity;
     this.skewSetMs = 0;
-    this.each = new Each();
+    this.each = new SampleHistory();
     this.units = new Units();
     /** Signals in the units that inputs ask for. @type {WeakMap<Conversion, Signal>} */
     this.wanted = new WeakMap();

@@ -16,7 +16,7 @@ import { Interfaces } from "./interfaces.js";
 import { tabsOf } from "./tabs.js";
 import { said, t } from "../core/words.js";
 
-export class Stage {
+export class ViewSwitch {
   /**
    * @param {HTMLElement} root
    * @param {DebugDoors & More} doors

@@ -31,17 +31,17 @@
  *
  * @typedef {object} Doors Services of the page for widgets.
  * @property {Run} run
- * @property {import("../control/confirm_dialog.js").Asks} asks
+ * @property {import("../control/confirm_dialog.js").ConfirmDialog} asks
  * @property {(command: string, verb: string) => void} steer
- * @property {(wish: import("../core/types.js").Wish) => void} drive
+ * @property {(wish: import("../core/types.js").PendingValue) => void} drive
  * @property {() => void} wake requests an animation frame
  * @property {() => void} again requests one for widgets alone
  * @property {Pick<import("../control/input.js").Input, "hold" | "gate" | "gated" | "letGo" | "refusal" | "hindrance" | "isDriving"> & {pads: PadDesk}} input
  * @property {Pick<import("../control/stop.js").StopButton, "press" | "follow">} stop
- * @property {Pick<import("../live/page_topics.js").Follows, "listen">} follows
+ * @property {Pick<import("../live/page_topics.js").PageTopics, "listen">} follows
  * @property {Store} store
  */
-import { Budget } from "./render_budget.js";
+import { RenderBudget } from "./render_budget.js";
 import { contextOf } from "./context.js";
 import { t } from "./kit.js";
 import { PICTURES } from "../live/store.js";
@@ -81,7 +81,7 @@ export class Cell {
     this.instance = {};
     this.isMounted = false;
     this.isVisible = true;
-    this.budget = new Budget();
+    this.budget = new RenderBudget();
     /** @type {Map<string, ((reading: Reading) => void)[]>} */
     this.listeners = new Map();
     /** State of the outputs at the widget's last call; null before the first. @type {string | null} */

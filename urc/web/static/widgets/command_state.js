@@ -13,7 +13,7 @@
 const TELL_MS = 4000;
 
 /** One command: sent, pending, done or failed. */
-export class Giver {
+export class CommandState {
   /**
    * @param {object} spec
    * @param {(args: Record<string, Value>) => Promise<unknown>} spec.give

@@ -31,9 +31,9 @@
  * @property {Record<string, string | Record<string, Value>>} replies Command or output → its values, or
  *   the reason of its failure.
  */
-import { Asks } from "../control/confirm_dialog.js";
+import { ConfirmDialog } from "../control/confirm_dialog.js";
 import { Drive } from "../control/drive.js";
-import { Alerts, Follows, watched } from "../live/page_topics.js";
+import { Alerts, PageTopics, watched } from "../live/page_topics.js";
 import { Host } from "./host.js";
 import { Input } from "../control/input.js";
 import { StopButton } from "../control/stop.js";
@@ -106,7 +106,7 @@ class PlayedSocket {
   }
 }
 
-export class Exhibit {
+export class DemoRobot {
   /**
    * @param {HTMLElement} el
    * @param {HTMLElement} bar element for questions of other pages
@@ -130,7 +130,7 @@ export class Exhibit {
     socket.drive = this.drive;
     this.input = new Input(this.drive);
     this.stop = new StopButton(this.drive, this.input, this.store, []);
-    this.follows = new Follows(this.sources(), wake);
+    this.follows = new PageTopics(this.sources(), wake);
     this.host = new Host(this.store, this.doors(bar, wake, say));
     this.host.isAllInSight = true;
   }
@@ -148,7 +148,7 @@ export class Exhibit {
       again: wake,
       input,
       follows,
-      asks: new Asks(bar, (message) => {
+      asks: new ConfirmDialog(bar, (message) => {
         say(JSON.stringify(message));
         return true;
       }),

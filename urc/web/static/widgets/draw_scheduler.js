@@ -23,7 +23,7 @@ const SLOWER = 0.75;
 /** Load of all widgets in every second frame below which each frame is tried again, in shares. */
 const NEARLY = 1.25;
 
-export class Pace {
+export class DrawScheduler {
   constructor() {
     this.most = Infinity;
     /** Whether widgets are drawn in every second frame only. */

@@ -10,7 +10,7 @@
  */
 import { part } from "../live/badge.js";
 import { t } from "./kit.js";
-import { Exhibit } from "./demo_robot.js";
+import { DemoRobot } from "./demo_robot.js";
 import { Themes } from "../live/page_topics.js";
 import { chosenSystem } from "../core/units.js";
 
@@ -36,7 +36,7 @@ function tell(state, text) {
   while (sent.childElementCount > LINES_KEPT) sent.lastElementChild?.remove();
 }
 
-/** @type {Exhibit[]} */
+/** @type {DemoRobot[]} */
 const exhibits = [];
 let isFrameDue = false;
 
@@ -53,7 +53,7 @@ function wake() {
 async function start() {
   const themes = new Themes(wake);
   for (const el of gallery.querySelectorAll("[data-news]")) {
-    if (el instanceof HTMLElement) exhibits.push(new Exhibit(el, bar, wake, tell, themes));
+    if (el instanceof HTMLElement) exhibits.push(new DemoRobot(el, bar, wake, tell, themes));
   }
   const mounted = exhibits.map((exhibit) => exhibit.start(chosenSystem()));
   setInterval(() => {

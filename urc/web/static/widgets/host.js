@@ -9,7 +9,7 @@
  * @typedef {import("../live/store.js").Store} Store
  */
 import { Cell } from "./cell.js";
-import { Pace } from "./draw_scheduler.js";
+import { DrawScheduler } from "./draw_scheduler.js";
 
 export class Host {
   /**
@@ -22,7 +22,7 @@ export class Host {
     this.doors = { ...doors, store };
     /** @type {Map<Element, Cell>} */
     this.cells = new Map();
-    this.pace = new Pace();
+    this.pace = new DrawScheduler();
     /** Cells that wait for their turn, oldest first. @type {Set<Cell>} */
     this.waiting = new Set();
     /** Number of widgets drawn in the frame that is being painted; 0 without one. */
@@ -81,8 +81,8 @@ export class Host {
    * @param {HTMLElement} el
    */
   async mountForeign(el) {
-    const { Warden } = await import("../frame/frame_host.js"); // most pages need none
-    if (el.isConnected && !this.cells.has(el)) await this.mount(new Warden(el, this.doors));
+    const { FrameHost } = await import("../frame/frame_host.js"); // most pages need none
+    if (el.isConnected && !this.cells.has(el)) await this.mount(new FrameHost(el, this.doors));
   }
 
   /**

@@ -7,7 +7,7 @@
  * @typedef {import("../core/types.js").Value} Value
  */
 
-export class Wish {
+export class PendingValue {
   /**
    * @param {object} spec
    * @param {number} spec.withinMs time limit of the confirmation

@@ -18,7 +18,7 @@ const ENDLESS_MS = 500;
 /** Number of blocking calls after which the widget is ended. */
 const ENDLESS_CALLS = 10;
 
-export class Budget {
+export class RenderBudget {
   constructor() {
     /** Whether each of the last calls was long. @type {boolean[]} */
     this.calls = [];

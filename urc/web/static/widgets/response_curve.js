@@ -6,11 +6,11 @@
  * rate. A push is a set of shares by name, each from -1 to 1. `x` and `y` form a vector: x is forward, y
  * is left (REP 103); any other name is independent.
  *
- * @typedef {"circle" | "square" | "cross"} Gate
+ * @typedef {"circle" | "square" | "cross"} DeadMan
  * @typedef {Record<string, number>} Push
  *
  * @typedef {object} Settings
- * @property {Gate} gate Shape of the range: a circle, a square, or one axis at a time.
+ * @property {DeadMan} gate Shape of the range: a circle, a square, or one axis at a time.
  * @property {number} deadZone Share of the travel that counts as zero, 0 to 0.5.
  * @property {number} expo 0 is linear, 1 is cubic.
  * @property {number} scale Share of the command's range at full deflection, 0 to 1.
@@ -67,7 +67,7 @@ export function slew(before, target, perS, dtS) {
  *
  * @param {number} x
  * @param {number} y
- * @param {Gate} shape
+ * @param {DeadMan} shape
  * @returns {[number, number]}
  */
 export function gate(x, y, shape) {

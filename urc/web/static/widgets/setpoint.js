@@ -9,9 +9,9 @@
  * @typedef {import("../core/types.js").Reading} Reading
  */
 import { boundsOf, keyed, snapped } from "./number_bounds.js";
-import { Giver } from "./command_state.js";
+import { CommandState } from "./command_state.js";
 import { format, noteOf, number } from "./kit.js";
-import { Wish } from "./pending_value.js";
+import { PendingValue } from "./pending_value.js";
 
 export class Setpoint {
   /**
@@ -35,8 +35,8 @@ export class Setpoint {
     this.state = undefined;
     const everyMs = Number(options["every_ms"] ?? 100);
     const give = (/** @type {Record<string, Value>} */ args) => this.sent(send("change", args));
-    this.giver = new Giver({ give, show, t, signal, everyMs, onStop });
-    this.wish = new Wish({
+    this.giver = new CommandState({ give, show, t, signal, everyMs, onStop });
+    this.wish = new PendingValue({
       withinMs: 1000 * Number(options["echo_s"] ?? 3),
       show,
       signal,

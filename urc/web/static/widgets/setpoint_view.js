@@ -8,7 +8,7 @@
 import { grasp } from "../control/pointer_capture.js";
 import { attribute, part, write } from "./kit.js";
 
-export class SetpointFace {
+export class SetpointView {
   /**
    * @param {HTMLElement} el the cell with `.NAME`, `.NAME-text` and `.NAME-note`
    * @param {string} name name of the widget
