@@ -64,14 +64,14 @@ def main() -> int:
 
 
 def bring_programs(names: Sequence[str]) -> set[str]:
-    """Install what these benchmarks need; return those whose program could not be brought."""
+    """Install what these benchmarks need; return those whose program is missing."""
     wanted = {PROGRAMS[name] for name in names if name in PROGRAMS}
     brought = bring([need for need in NEEDS if need.name in wanted])
     os.environ.update(brought.environment)
     missing = {need.name for need in brought.left_out}
     left_out = {name for name in names if PROGRAMS.get(name) in missing}
     for name in sorted(left_out):
-        remedy = f"to bring it: {brought.remedy}"
+        remedy = f"to install it: {brought.remedy}"
         print(f"bench: {name} left out: no {PROGRAMS[name]}; {remedy}", file=sys.stderr)
     return left_out
 

@@ -76,8 +76,8 @@ async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:
 
     Args:
         one: the page.
-        seconds: for how long, from the first value on.
-        rate_hz: how often the robot tells its clock.
+        seconds: duration, from the first value.
+        rate_hz: rate of the robot's clock values.
 
     Raises:
         TooFew: fewer than `LEAST_SHARE` of them were shown.
@@ -86,7 +86,7 @@ async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:
         async with asyncio.timeout(FIRST_S + seconds * 4):
             answer = await one.page.evaluate(WATCH, seconds)
     except TimeoutError as error:
-        raise TooFew("the page drew no frames any more") from error
+        raise TooFew("the page stopped drawing frames") from error
     found: Sequence[tuple[float, float]] = answer["found"]
     if len(found) < LEAST_SHARE * seconds * rate_hz:
         said = json.dumps(answer["said"])
@@ -97,5 +97,5 @@ async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:
 
 
 def _age_ms(now_ms: float, told_ms: float) -> float:
-    """Return the difference of two times of which the second is known modulo the clock's turn."""
+    """Return the difference of two times, the second of which is modulo the clock's period."""
     return (now_ms - told_ms + MODULUS_MS / 2) % MODULUS_MS - MODULUS_MS / 2

@@ -83,12 +83,12 @@ def peer(script: str, *arguments: object) -> Iterator[int]:
 
 @contextmanager
 def served(robot_port: int, document: str, work: Path) -> Iterator[str]:
-    """Run a real ``urc serve`` for a robot; give the address of its page.
+    """Run a real ``urc serve`` for a robot; yield the address of its page.
 
     Args:
-        robot_port: where the robot listens.
+        robot_port: port of the robot.
         document: the profile without its name and its transport.
-        work: a folder for it.
+        work: its working folder.
     """
     file = work / "bench.yaml"
     file.write_text(TRANSPORT.format(port=robot_port) + document, "utf-8")
@@ -120,12 +120,12 @@ async def opened(browser: Browser, address: str, *, script: str = "") -> AsyncIt
 
 
 async def cost_of(one: Opened, seconds: float, *, slowed: int = 1) -> Cost:
-    """Let a page run for a while; its time is the processor's, so others on the machine count less.
+    """Let a page run for a while; its processor time is little affected by other programs.
 
     Args:
-        one: the page; it draws already.
+        one: the page, which already draws.
         seconds: for how long.
-        slowed: how many times slower the page's processor is made.
+        slowed: factor by which the page's processor is slowed.
     """
     page, line = one.page, one.line
     await page.evaluate(COUNT)

@@ -109,7 +109,7 @@ class _Robot:
     def ask(self) -> asyncio.Future[list[Sample]]:
         """Return a future for the next odometry line."""
         if len(self._waiting) >= MOST_WAITING:
-            raise ConnectionError("too many requests wait for their answers")
+            raise ConnectionError("too many pending requests")
         answer: asyncio.Future[list[Sample]] = asyncio.get_running_loop().create_future()
         self._waiting.append((answer, time.monotonic()))
         return answer

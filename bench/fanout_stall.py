@@ -117,7 +117,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def _result(name: str, ratio: float, goal: float, base: float, subject: float) -> Result:
-    title = f"{HEALTHY + STOPPED + 1} pages of which 3 do not keep up: {name}"
+    title = f"{HEALTHY + STOPPED + 1} pages, 3 of them too slow: {name}"
     return Result(title, round(ratio, 3), goal, round(base, 1), round(subject, 1), 1.0, 1)
 
 

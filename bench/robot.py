@@ -2,7 +2,6 @@
 
 `LINE` is the number of an inherited socket. The robot starts with the first received data, and
 closes the socket at the end.
-it at the end.
 """
 
 import socket

@@ -225,7 +225,7 @@ def summarise(outcomes: list[Outcome], brought: Brought, not_checked: str) -> in
     for text in left_out:
         print(f"LEFT OUT  {text}")
     if brought.left_out:
-        print(f"          to bring it: {brought.remedy}")
+        print(f"          to install it: {brought.remedy}")
     failed = [outcome.name for outcome in outcomes if outcome.fault]
     if failed:
         print(f"{len(failed)} of {len(outcomes)} steps failed: {', '.join(failed)}")

@@ -1,4 +1,4 @@
-"""Compares what two commits say of the same documents, through the table of renames.
+"""A comparison of two commits' results for the same documents, through the table of renames.
 
     python -m scripts.compare_reports COMMIT            that commit and this tree
     python -m scripts.compare_reports COMMIT --list     every difference, not the first of each kind
@@ -9,7 +9,7 @@ Two comparisons:
   documents of the commit are migrated in memory, which moves the columns behind a renamed key;
 - resolved profiles: `urc resolve` of each robot of the commit, migrated, and of this tree.
 
-The exit code is 1 when anything differs that no rename explains. A document that was changed
+The exit code is 1 after a difference that no rename explains. A document that was changed
 otherwise since the commit, such as its comments, is listed and left out.
 """
 
@@ -77,7 +77,7 @@ Problem = tuple[str, int, int, str, str]
 
 
 def main() -> int:
-    """Compare; return 1 when anything differs that no rename explains."""
+    """Compare; return 1 after a difference that no rename explains."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
@@ -97,7 +97,7 @@ def main() -> int:
 
 
 def unpack(commit: str, folder: Path) -> None:
-    """Write what the comparison needs of a commit into a folder."""
+    """Write the needed files of a commit into a folder."""
     packed = subprocess.run(
         ["git", "archive", commit, *FOLDERS], cwd=ROOT, check=True, capture_output=True
     )
@@ -145,8 +145,8 @@ class Comparison:
             files = sorted({name, *(one[0] for one in old)})
             changed = [file for file in files if not self.is_only_migrated(file)]
             if changed:
-                self.counts["documents that were changed otherwise: left out"] += 1
-                print(f"left out: {name}: {', '.join(changed)} changed otherwise")
+                self.counts["documents with other changes: left out"] += 1
+                print(f"left out: {name}: other changes in {', '.join(changed)}")
                 continue
             moved = Counter(self.moved(tuple(one)) for one in old)
             found = Counter(tuple(one) for one in after[name])
@@ -198,7 +198,7 @@ class Comparison:
         return content == now.read_bytes()
 
     def migrated(self, file: str) -> Migrated | None:
-        """Return a broken document of the old tree, migrated; None where it is no document."""
+        """Return a migrated broken document of the old tree, or None for an invalid one."""
         if file not in self._migrated:
             try:
                 self._migrated[file] = migrate(str(self.old / BROKEN / file))
@@ -207,7 +207,7 @@ class Comparison:
         return self._migrated[file]
 
     def moved(self, problem: Problem) -> Problem:
-        """Return a problem of the old tree where it should be now: no rename changes a line."""
+        """Return a problem of the old tree at its expected place; no rename changes a line."""
         file, line, column, severity, code = problem
         migrated = self.migrated(file) if (self.old / BROKEN / file).is_file() else None
         changes = migrated.changes if migrated is not None else ()

@@ -58,8 +58,8 @@ def _options() -> argparse.Namespace:
         metavar="NAME",
         help="run these again, such as 'urc.guard.motion_scheduler.*'",
     )
-    add("--minutes", type=float, metavar="N", help="stop then; the next run goes on from there")
-    add("--workers", type=int, default=2, metavar="N", help="so many at a time; 2 unless told")
+    add("--minutes", type=float, metavar="N", help="time limit in minutes; the next run continues")
+    add("--workers", type=int, default=2, metavar="N", help="number of workers, 2 by default")
     add("--timeouts", action="store_true", help="run those again that hit the time limit")
     add("--report", action="store_true", help="run no mutants; show the known results")
     return parser.parse_args()
@@ -79,7 +79,7 @@ def _run(names: list[str], workers: int, minutes: float | None) -> bool:
     try:
         return process.wait(minutes * 60 if minutes is not None else None) == 0
     except (subprocess.TimeoutExpired, KeyboardInterrupt):
-        print("\nstopped; the next run goes on from here", flush=True)
+        print("\nstopped; the next run continues here", flush=True)
         process.send_signal(signal.SIGINT)
         try:
             process.wait(_END_S)
@@ -102,7 +102,7 @@ def summarise(mutants: list[Mutant], explained: Explained, *, is_part: bool) -> 
     for one in new:
         print(f"\n{one.status}: {one.name}\n{one.shown}")
     for entry in explained.unused(mutants):
-        print(f"\n{EXPLAINED.name}: no mutant that lives is so any more: {entry}")
+        print(f"\n{EXPLAINED.name}: no surviving mutant matches any more: {entry}")
     killed = sum(one.status in DEAD for one in mutants)
     waiting = sum(one.status == "waiting" for one in mutants)
     print(f"\n{len(new)} survivors are neither killed nor explained")

@@ -63,7 +63,7 @@ NEEDS = (
         name="chromium",
         executables=("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"),
         package="chromium",
-        purpose="the tests of frames in processes of their own, of sensors, and the benchmarks",
+        purpose="the tests of framed pages and of sensors, and the benchmarks",
         variable="URC_CHROMIUM",
     ),
     Need(
@@ -220,7 +220,7 @@ NEEDS = (
         name="axe",
         executables=(),
         package="",
-        purpose="the tests of the pages for people who see, hear or point otherwise",
+        purpose="the tests of the pages' accessibility",
         other=lambda: os.fspath(AXE) if AXE.is_file() else None,
     ),
 )

@@ -91,7 +91,7 @@ class EngineRig(Rig):
             before = [one.text for one in robots.heard[queue] if one.time_ns <= killed_ns]
             return before[-1:] != ["M 0"]
 
-        robots.wait_until(lambda: bool(again()), AGAIN_S, "another guard with something to say")
+        robots.wait_until(lambda: bool(again()), AGAIN_S, "the replacement of the guard")
         queue, opened_ns = again()[0]
         if not moved(queue):
             return []

@@ -98,7 +98,7 @@ class Page:
         while b"\r\n\r\n" not in answer:
             data = self.socket.recv(65536)
             if not data:
-                raise ConnectionError("the server hung up")
+                raise ConnectionError("the server closed the connection")
             answer += data
         first, self._rest = answer.split(b"\r\n\r\n", 1)
         if b" 101 " not in first.split(b"\r\n")[0]:

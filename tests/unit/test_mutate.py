@@ -205,7 +205,7 @@ def test_an_explanation_that_is_not_needed_is_told(
 ) -> None:
     code, said = summary(tmp_path, capsys, EXPLAINED, _1=1, _2=36)
     assert (
-        "mutants.toml: no mutant that lives is so any more: "
+        "mutants.toml: no surviving mutant matches any more: "
         "urc.guard.motion_scheduler.MotionScheduler.tick" in said
     )
     assert code == 0
