@@ -36,8 +36,8 @@ WITNESSES = 2
 _PROFILE = """\
 urc: 1
 kind: robot
-name: lane-{lane}
-title: Lane {lane}
+name: lane-{queue}
+title: Lane {queue}
 summary: A robot of the rig. It stamps what it hears.
 transports:
   wire: {{ type: {kind}, host: {host}, port: {port}, framing: {{ type: {framing} }} }}

@@ -68,8 +68,8 @@ def bounds_of(kind: str) -> Bounds:
 _DOCUMENT = """\
 urc: 1
 kind: robot
-name: lane-{lane}
-title: Lane {lane}
+name: lane-{queue}
+title: Lane {queue}
 summary: A robot of the rig. It stamps what it hears.
 transports:
   wire: {{ {options} }}
