@@ -498,20 +498,9 @@ class Conversation(Connection):
         if offer.fields is None and frame is not None:
             events += self.receiver.message(frame, now) or ()
         if pending.is_late:
-            # It also answers a retransmission of the same request.
-            again = self._pending_replies.again(exchange)
-            if again is not None:
-                again.is_late = True
-            elif exchange in self._request_queue:
-                self._request_queue.remove(exchange)
-            elif offer.aside == "extend":
-                pending.extend(
-                    now
-                )  # its reply is still pending, and still matches no other request
-                return events
-            else:
-                return [*events, self._late(pending)]
-            pending.is_late = False
+            late = self._late_answer(pending, offer, now)
+            if late is not None:
+                return events + late
         self._misses = 0
         if offer.told is not None:
             events += self.receiver.samples(*offer.told, now)[0]
@@ -524,7 +513,7 @@ class Conversation(Connection):
             text = f"the robot asked for {exchange.ask.label} again"
             return [
                 *events,
-                Violation(self.spec.name, "retry-not-idempotent", text),
+                Violation(self.spec.name, "sent-again", text),
                 *self._send(exchange, now),
             ]
         if offer.aside:
@@ -547,10 +536,26 @@ class Conversation(Connection):
         # Each request has its own connection: close after the reply.
         return events + self.leave(now) if self.is_per_request and self.is_ready else events
 
-    def _late(self, pending: PendingReply) -> Violation:
-        self._pending_replies.remove(pending)
-        text = f"the answer to {pending.exchange.ask.label} was late and has been dropped"
-        return Violation(self.spec.name, "late-reply", text)
+    def _late_answer(
+        self, pending: PendingReply, offer: MatchResult, now: float
+    ) -> list[LineEvent] | None:
+        """Return the events of a late answer, or None if it answers a retransmission as well."""
+        exchange = pending.exchange
+        again = self._pending_replies.again(exchange)
+        if again is not None:
+            again.is_late = True
+        elif exchange in self._request_queue:
+            self._request_queue.remove(exchange)
+        elif offer.aside == "extend":
+            # Its reply is still pending, and still matches no other request.
+            pending.extend(now)
+            return []
+        else:
+            self._pending_replies.remove(pending)
+            text = f"the answer to {exchange.ask.label} was late and has been dropped"
+            return [Violation(self.spec.name, "late-reply", text)]
+        pending.is_late = False
+        return None
 
     def _silent(self, pending: PendingReply, now: float) -> list[LineEvent]:
         """Treat the silence of the robot as success."""
