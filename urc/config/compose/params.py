@@ -1,6 +1,6 @@
 """`params`: values of a driver that each robot chooses, ``{params.id}`` in keys and texts.
 
-They are filled in while the documents are loaded. Settings, in contrast, belong to the operator.
+Params are filled in while the documents are loaded. Settings, in contrast, belong to the operator.
 """
 
 from collections.abc import Mapping

@@ -159,7 +159,7 @@ def _check_order(part: Node, use: WidgetUse, widget: Widget, findings: Problems)
             findings.error(
                 own.get(name) or own[above],
                 "wrong-order",
-                f"option {name!r} is {low:g}, which must be below {above!r}, {high:g}",
+                f"option {name!r} is {low:g}, and must be below {above!r}, {high:g}",
                 hint="change one of the two" if above in own else f"give the option {above} too",
             )
 
@@ -203,7 +203,7 @@ def _check_text(
     elif argument.choices and value not in argument.choices:
         code, wrong = "unknown-word", "has other choices"
     elif not isinstance(value, str) and _is_outside(value, argument):
-        code, wrong = "out-of-range", f"is from {_bound(argument.min)} to {_bound(argument.max)}"
+        code, wrong = "out-of-range", f"allows {_bound(argument.min)} to {_bound(argument.max)}"
     else:
         return
     choices = [str(one) for one in argument.choices]

@@ -9,7 +9,7 @@ from urc.model.sequence import ExpectStep, PromptStep, Step, all_steps
 
 __all__ = ["check_answers"]
 
-_HINT: Final = "remove 'answers: never', or remove the waits for this transport"
+_HINT: Final = "remove 'replies: never', or remove the waits for this transport"
 
 
 def check_answers(part: Node, driver: Driver, findings: Problems) -> None:
@@ -37,7 +37,7 @@ def check_answers(part: Node, driver: Driver, findings: Problems) -> None:
             findings.error(
                 inner,
                 "never-replies",
-                f"{driver.messages[name].transport!r} receives nothing: it has 'answers: never'",
+                f"{driver.messages[name].transport!r} receives nothing: it has 'replies: never'",
                 key=True,
                 hint=_HINT,
             )
@@ -68,7 +68,7 @@ def _check_silence(
 
 
 def _refuse(part: Node, key: str, name: str, findings: Problems) -> None:
-    text = f"{name!r} waits for a reply on a transport with 'answers: never'"
+    text = f"{name!r} waits for a reply on a transport with 'replies: never'"
     findings.error(part, "never-replies", text, at=key, key=True, hint=_HINT)
 
 
@@ -76,7 +76,7 @@ def _check_line(part: Node, spec: TransportSpec, findings: Problems) -> None:
     timeouts = part.get("timeouts")
     for place, key in ((part, "stale_after"), (timeouts, "idle")):
         if place is not None and key in place.data:
-            text = f"{key!r} waits for the robot on a transport with 'answers: never'"
+            text = f"{key!r} waits for the robot on a transport with 'replies: never'"
             findings.error(place, "never-replies", text, at=key, key=True, hint=_HINT)
     for key, steps in (("on_connect", spec.on_connect), ("on_close", spec.on_close)):
         if steps:
@@ -86,6 +86,6 @@ def _check_line(part: Node, spec: TransportSpec, findings: Problems) -> None:
 def _check_steps(part: Node, steps: tuple[Step, ...], mute: set[str], findings: Problems) -> None:
     for step in all_steps(steps):
         if isinstance(step, (ExpectStep, PromptStep)) and step.transport in mute:
-            text = f"a step waits for {step.transport!r}, which has 'answers: never'"
+            text = f"a step waits for {step.transport!r}, which has 'replies: never'"
             findings.error(part, "never-replies", text, key=True, hint=_HINT)
             return

@@ -56,7 +56,7 @@ def check_motion(part: Node, driver: Driver, findings: Problems) -> None:
             " and no poll has a reply",
             key=True,
             hint="give its transport stale_after: or add a poll with a reply, or"
-            " write answers: never if it never sends anything",
+            " write replies: never if it never sends anything",
         )
     elif held:
         for name, spec in driver.transports.items():
@@ -78,7 +78,7 @@ def _check_freeze(one: tuple[Node, Command, Hold], spec: TransportSpec, findings
         f" {spec.name!r} has no liveness check",
         key=True,
         hint=f"give {spec.name!r} a stale_after: as short as the robot's traffic allows, or"
-        " answers: never if it never sends anything",
+        " replies: never if it never sends anything",
     )
 
 
