@@ -145,7 +145,7 @@ def _check_silence(part: Node, spec: TransportSpec, driver: Driver, findings: Pr
             findings.warn(
                 place.must(key),
                 "slow-keepalive",
-                f"the line {what} after {shown_duration(limit_s)}, and the robot is polled every"
-                f" {shown_duration(min(periods))} only",
+                f"the line {what} after {shown_duration(limit_s)}, but the robot is polled every"
+                f" {shown_duration(min(periods))}",
                 hint="make it at least two periods, so that one reply may be lost",
             )
