@@ -1,8 +1,8 @@
 """Names in single braces → their values: ``{i}`` of an `each`, ``{params.id}`` of a driver.
 
-Names are filled in while a document is loaded, in keys and texts alike. Templates have double braces
-and are not changed. A text with nothing but one name becomes the value itself, so ``"{i}"`` may be
-a number.
+Names are filled in while a document is loaded, in keys and texts alike. Templates have double
+braces and are not changed. A text with nothing but one name becomes the value itself, so ``"{i}"``
+may be a number.
 """
 
 import re
