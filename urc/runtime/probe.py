@@ -24,7 +24,7 @@ LONGEST_S: Final = 12.0
 _ANSWER_S: Final = 4.0
 """Time for a connected robot to send a frame, in seconds."""
 _FIRST_S: Final = 1.0
-"""Time after which an idle transport is one that only commands use, in seconds."""
+"""Time after which an idle transport is considered unused by polls, in seconds."""
 _LOOK_S: Final = 0.05
 _CLOSE_S: Final = 2.0
 

@@ -94,7 +94,7 @@ def _value(signal: Signal, told: Mapping[str, Any]) -> Reading:
     if not isinstance(value, _KINDS[signal.type]) or (
         isinstance(value, bool) and signal.type != "boolean"
     ):
-        raise TypeError(f"{signal.name} is no {signal.type}")
+        raise TypeError(f"{signal.name} is not of type {signal.type}")
     if signal.type in ("image", "blob"):
         return base64.b64decode(str(value), validate=True)
     return _frozen(value)
