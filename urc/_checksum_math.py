@@ -109,11 +109,11 @@ def sum_of(value: Any, name: Any) -> int:
     """Return the checksum of bytes, or of text as UTF-8."""
     data = value.encode("utf-8", "surrogatepass") if isinstance(value, str) else value
     if not isinstance(data, bytes):
-        raise TypeError(f"text or bytes are expected, found {repr(value)[:40]}")
+        raise TypeError(f"expected text or bytes, found {repr(value)[:40]}")
     if len(data) > MAX_BYTES:
         raise ValueError(f"the text has more than {MAX_BYTES} bytes")
     if not isinstance(name, str):
-        raise TypeError(f"the name of a checksum is expected, found {repr(name)[:40]}")
+        raise TypeError(f"expected the name of a checksum, found {repr(name)[:40]}")
     return _named(name)(data)
 
 

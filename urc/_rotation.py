@@ -51,7 +51,7 @@ def _parts(value: object) -> _Parts | None:
     else:
         items = []
     if len(items) != 4 or any(isinstance(one, (bool, str)) for one in items):
-        raise TypeError("a quaternion is expected: [x, y, z, w], or the parts x, y, z and w")
+        raise TypeError("expected a quaternion: [x, y, z, w], or the parts x, y, z and w")
     if any(one is None for one in items):
         return None
     try:

@@ -16,7 +16,7 @@ _QUOTED_VALUE = re.compile(r"""^(?:[^'"]*?[:\-,{\[]\s+|\s*)(?P<value>'[^']*'|"[^
 _LAST_ALIAS = re.compile(r"(?:^|[\s:,\[{])(?P<alias>\*[\w-]+)\s*$")
 UNQUOTED_TEMPLATE: Final = "a value that starts with '{{' must be quoted"
 _RESERVED: Final = "%@`"
-_SIGN: Final = "{!r} at the start of a value is a sign of YAML, not text"
+_SIGN: Final = "{!r} at the start of a value is YAML syntax, not text"
 
 
 class SyntaxFault(NamedTuple):
@@ -124,7 +124,7 @@ def _escape(at: _Clue) -> SyntaxFault | None:
         at.line,
         column,
         "bad-escape",
-        f"'{shown}' means nothing in double quotes",
+        f"'{shown}' is not an escape in double quotes",
         "write the text in single quotes: there a backslash is a backslash, and a quote is written"
         " twice: ''; in double quotes a backslash is written \\\\",
     )

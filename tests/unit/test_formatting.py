@@ -92,7 +92,7 @@ def test_filters_take_fields_apart(
             "a type such as 'u16le'",
         ),
         ("x | hexbytes | numbers('u16le')", {"x": "010203"}, "3 bytes have no 'u16le' at 2"),
-        ("x | unpack('u8')", {"x": "a"}, "bytes are expected, as 'hexbytes' gives them"),
+        ("x | unpack('u8')", {"x": "a"}, "expected bytes, as from 'hexbytes'"),
         ("x | ramp(1, n)", {"x": 0, "n": 9000}, "a number of steps is a whole number from 0"),
     ],
 )

@@ -39,7 +39,7 @@ def test_what_each_gives(text: str, expected: float) -> None:
         ("2 | asin", "'asin' has no value for 2; it takes -1 to 1"),
         ("0 | log", "'log' has no value for 0; it takes numbers above 0"),
         ("1000 | exp", "'exp' has no value for 1000"),
-        ("'a' | sin", "a number is expected, found 'a'"),
+        ("'a' | sin", "expected a number, found 'a'"),
     ],
 )
 def test_what_has_no_value_says_why(text: str, why: str) -> None:

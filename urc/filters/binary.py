@@ -51,7 +51,7 @@ def _data(value: object) -> bytes:
     """Return bytes unchanged, and text as UTF-8."""
     data = value.encode("utf-8", "surrogatepass") if isinstance(value, str) else value
     if not isinstance(data, bytes):
-        raise TypeError(f"text is expected, found {_short(value)}")
+        raise TypeError(f"expected text, found {_short(value)}")
     if len(data) > MAX_BYTES:
         raise ValueError(f"the text has more than {MAX_BYTES} bytes")
     return data
@@ -67,25 +67,25 @@ def _iso(value: object) -> str:
     from datetime import UTC, datetime
 
     if not isinstance(value, (int, float)) or not 0 <= value < _YEAR_10000:
-        raise ValueError(f"a time in seconds since 1970 is expected, found {_short(value)}")
+        raise ValueError(f"expected a time in seconds since 1970, found {_short(value)}")
     text = datetime.fromtimestamp(value, UTC).isoformat(timespec="milliseconds")
     return text.replace("+00:00", "Z")
 
 
 def _hexbytes(value: object) -> bytes:
     if not isinstance(value, str):
-        raise TypeError(f"hex digits are expected, found {_short(value)}")
+        raise TypeError(f"expected hex digits, found {_short(value)}")
     try:
         return bytes.fromhex(value)
     except ValueError:
-        raise ValueError(f"hex digits are expected, found {_short(value)}") from None
+        raise ValueError(f"expected hex digits, found {_short(value)}") from None
 
 
 def _b64decode(value: object) -> bytes:
     try:
         return binascii.a2b_base64(_data(value), strict_mode=True)
     except binascii.Error:
-        raise ValueError(f"base64 text is expected, found {_short(value)}") from None
+        raise ValueError(f"expected base64 text, found {_short(value)}") from None
 
 
 def _hash(name: str) -> Callable[[object], str]:

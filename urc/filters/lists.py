@@ -31,7 +31,7 @@ def _short(value: object) -> str:
 def _list(value: object) -> Sequence[Any]:
     if isinstance(value, (list, tuple)):
         return value
-    raise TypeError(f"a list is expected, found {_short(value)}")
+    raise TypeError(f"expected a list, found {_short(value)}")
 
 
 def _numbers(value: object) -> Sequence[Any]:
@@ -40,14 +40,14 @@ def _numbers(value: object) -> Sequence[Any]:
         raise ValueError("an empty list has no minimum or maximum")
     for item in items:
         if not isinstance(item, (int, float)):
-            raise TypeError(f"a list of numbers is expected, {_short(item)} is in it")
+            raise TypeError(f"expected a list of numbers, found {_short(item)} in it")
     return items
 
 
 def _text(value: object) -> str:
     if isinstance(value, str):
         return value
-    raise TypeError(f"text is expected, found {_short(value)}")
+    raise TypeError(f"expected text, found {_short(value)}")
 
 
 def sliced(value: Any, start: Any, stop: Any) -> Any:
@@ -91,7 +91,7 @@ def _join(value: Any, between: Any = "") -> str:
 
 def _split(value: Any, between: Any = None) -> list[str]:
     if between is not None and not _text(between):
-        raise ValueError("'split' needs something to look for")
+        raise ValueError("'split' needs a separator")
     parts = _text(value).split(between)
     if len(parts) > MAX_PARTS:
         raise ValueError(f"the text has more than {MAX_PARTS} parts")
@@ -118,11 +118,11 @@ def _ddmm(value: Any, hemisphere: Any = "N") -> float | None:
         return None
     sign = _HEMISPHERES.get(hemisphere) if isinstance(hemisphere, str) else None
     if sign is None:
-        raise ValueError(f"N, S, E or W is expected, found {_short(hemisphere)}")
+        raise ValueError(f"expected N, S, E or W, found {_short(hemisphere)}")
     text = value if isinstance(value, str) else repr(value)
     found = _DDMM.fullmatch(text)
     if found is None or float(found[2]) >= 60:
-        raise ValueError(f"degrees and minutes are expected, as 4807.038; found {_short(value)}")
+        raise ValueError(f"expected degrees and minutes, as 4807.038, found {_short(value)}")
     return sign * (int(found[1] or 0) + float(found[2]) / 60)
 
 

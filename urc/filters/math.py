@@ -15,7 +15,7 @@ def _number(value: object) -> float:
     if isinstance(value, (int, float)):
         return value
     text = repr(value)
-    raise TypeError(f"a number is expected, found {text if len(text) <= 40 else text[:37] + '...'}")
+    raise TypeError(f"expected a number, found {text if len(text) <= 40 else text[:37] + '...'}")
 
 
 def _of(name: str, function: Callable[..., float], where: str = "") -> Callable[..., float]:

@@ -26,13 +26,13 @@ def _short(value: object) -> str:
 def _list(value: object) -> Sequence[Any]:
     if isinstance(value, (list, tuple)):
         return value
-    raise TypeError(f"a list is expected, found {_short(value)}")
+    raise TypeError(f"expected a list, found {_short(value)}")
 
 
 def _text(value: object) -> str:
     if isinstance(value, str):
         return value
-    raise TypeError(f"text is expected, found {_short(value)}")
+    raise TypeError(f"expected text, found {_short(value)}")
 
 
 def _whole(value: object, what: str, least: int, most: int) -> int:
@@ -117,14 +117,14 @@ class _Short(ValueError):
 def _reader(name: str) -> Callable[[bytes, int, int], tuple[Any, int]]:
     number = number_of(name)
     if number is None:
-        raise ValueError(f"a type such as 'u16le' is expected, found {_short(name)}")
+        raise ValueError(f"expected a type such as 'u16le', found {_short(name)}")
     return reader_of(number, _Short)
 
 
 def _bytes(value: Any) -> bytes:
     if isinstance(value, bytes):
         return value
-    raise TypeError(f"bytes are expected, as 'hexbytes' gives them; found {_short(value)}")
+    raise TypeError(f"expected bytes, as from 'hexbytes', found {_short(value)}")
 
 
 def _unpack(value: Any, name: Any, at: Any = 0) -> int | float:
@@ -160,7 +160,7 @@ def _ramp(value: Any, step: Any, count: Any) -> list[float]:
     """Return `count` numbers from the subject upwards, with the distance `step`."""
     for one in (value, step):
         if not isinstance(one, (int, float)):
-            raise TypeError(f"a number is expected, found {_short(one)}")
+            raise TypeError(f"expected a number, found {_short(one)}")
     return [value + place * step for place in range(_whole(count, "a number of steps", 0, 8192))]
 
 

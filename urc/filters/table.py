@@ -25,7 +25,7 @@ MAX_DIGITS = 15
 def _number(value: object) -> Any:
     if isinstance(value, (int, float)):
         return value
-    raise TypeError(f"a number is expected, found {_short(value)}")
+    raise TypeError(f"expected a number, found {_short(value)}")
 
 
 def _short(value: object) -> str:
@@ -138,7 +138,7 @@ def _int(value: Any, fallback: Any = None, base: Any = 10) -> Any:
         return int(value, base) if isinstance(value, str) else int(_number(value))
     except (ValueError, OverflowError):
         if fallback is None:
-            raise ValueError(f"a whole number is expected, found {_short(value)}") from None
+            raise ValueError(f"expected a whole number, found {_short(value)}") from None
         return fallback
 
 
@@ -147,7 +147,7 @@ def _float(value: Any, fallback: Any = None) -> Any:
         return float(value) if isinstance(value, str) else float(_number(value))
     except ValueError:
         if fallback is None:
-            raise ValueError(f"a number is expected, found {_short(value)}") from None
+            raise ValueError(f"expected a number, found {_short(value)}") from None
         return fallback
 
 
@@ -161,7 +161,7 @@ def _round(value: Any, digits: Any = 0) -> Any:
 def _require_text(value: Any) -> str:
     if isinstance(value, str):
         return value
-    raise TypeError(f"text is expected, found {_short(value)}")
+    raise TypeError(f"expected text, found {_short(value)}")
 
 
 def _length(value: Any) -> int:
@@ -173,7 +173,7 @@ def _length(value: Any) -> int:
 def _replace(value: Any, old: Any, new: Any) -> str:
     text, found, put = _require_text(value), _require_text(old), _require_text(new)
     if found == "":
-        raise ValueError("'replace' needs something to look for")
+        raise ValueError("'replace' needs a text to search for")
     if len(text) + text.count(found) * (len(put) - len(found)) > MAX_TEXT:
         raise ValueError(f"the text has more than {MAX_TEXT} characters")
     return text.replace(found, put)
@@ -205,7 +205,7 @@ def _pad(value: Any, width: Any, fill: Any = "0") -> str:
 def _sign(value: Any) -> str:
     text = _text(value).strip()
     if not text.removeprefix("-").removeprefix("+")[:1].isdigit():
-        raise ValueError(f"a number is expected, found {_short(value)}")
+        raise ValueError(f"expected a number, found {_short(value)}")
     return text if text[0] in "+-" else f"+{text}"
 
 

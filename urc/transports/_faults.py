@@ -51,7 +51,7 @@ def explain(host: str, place: str, fault: OSError | UnicodeError) -> str:
     if isinstance(fault, TimeoutError):
         return f"no answer from {place}"
     if fault.errno in (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENETDOWN):
-        return f"no way to {place} from this network ({reason(fault)})"
+        return f"no route to {place} from this network ({reason(fault)})"
     return f"cannot connect to {place} ({reason(fault)})"
 
 

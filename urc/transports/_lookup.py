@@ -66,7 +66,7 @@ class AddressLookup:
                 fault = fault or TimeoutError(errno.ETIMEDOUT, "timed out")
             except OSError as refused:
                 fault = refused
-        raise fault or OSError("the name leads to no address")
+        raise fault or OSError("the name has no address")
 
 
 def _look_up(host: str, port: int, kind: socket.SocketKind) -> asyncio.Future[list[Address]]:

@@ -222,7 +222,7 @@ def _load_own(
 
 
 def _no_password() -> str:
-    raise ValueError("the key has a password; give it without one")
+    raise ValueError("the key has a password; use a key without one")
 
 
 def _pem(given: str) -> str:
@@ -237,11 +237,11 @@ def _explain(place: str, name: str, fault: ssl.SSLError) -> str:
         if code == _EXPIRED:
             return f"the certificate of {place} has expired"
         if code == _NOT_YET:
-            return f"the certificate of {place} is not valid yet; check the clocks of both"
+            return f"the certificate of {place} is not valid yet; check both clocks"
         if code in _WRONG_NAME:
             return f"the certificate of {place} is not for {name!r}; see tls.server_name"
         if code in _UNKNOWN:
-            return f"the certificate of {place} is from an authority unknown here; see tls.ca"
+            return f"the certificate of {place} is from an unknown authority; see tls.ca"
         return f"the certificate of {place} is not valid ({fault.verify_message})"
     if fault.reason in ("WRONG_VERSION_NUMBER", "HTTP_REQUEST", "PACKET_LENGTH_TOO_LONG"):
         return f"{place} does not speak TLS"

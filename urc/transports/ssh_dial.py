@@ -188,17 +188,17 @@ def _explain_key(target: SshTarget, offer: OfferedHostKey) -> str:
     command = f"'urc trust PROFILE {target.name}'"
     if offer.expected == "unknown":
         return (
-            f"the host key of {place} is not known: it shows {shown}; "
-            f"if that is the robot's own, {command} trusts it"
+            f"the host key of {place} is not known: found {shown}; "
+            f"if it is the key of the robot, {command} trusts it"
         )
     if offer.expected == "revoked":
-        return f"the host key of {place} is revoked: it shows {shown}"
+        return f"the host key of {place} is revoked: found {shown}"
     if target.keys.is_pinned:
         remedy = "put the new one into host_key"
     else:
         remedy = f"{command} trusts the new one"
     return (
-        f"the host key of {place} is another one: expected {offer.expected}, it shows {shown}; "
+        f"the host key of {place} has changed: expected {offer.expected}, found {shown}; "
         f"the connection may be intercepted. If the robot was reinstalled, {remedy}"
     )
 

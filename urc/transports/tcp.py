@@ -209,7 +209,7 @@ class TcpListener(StreamTransport):
         if stream is None or self._newer is None:
             return
         if isinstance(stream, SupportsEnd):
-            stream.end(f"another robot took its place ({self._newer[1]})")
+            stream.end(f"another robot has replaced it ({self._newer[1]})")
 
     def _stay_open(self) -> None:
         if self._shut is not None:

@@ -250,7 +250,7 @@ class UdpTransport:
         if isinstance(fault, ConnectionRefusedError | ConnectionResetError):
             self._end(f"nothing listens on {place} (port unreachable)")
         elif fault.errno in _NO_WAY:
-            self._end(f"no way to {place} from this network ({reason(fault)})")
+            self._end(f"no route to {place} from this network ({reason(fault)})")
         else:
             self._end(broke(fault))
         raise PeerClosed(self._ended) from fault

@@ -170,7 +170,7 @@ def test_salt_of_an_unknown_message_drops_it() -> None:
     [fault] = framing(MAVLINK).decoder().feed(unknown)
     assert isinstance(fault, FrameFault)
     assert (fault.code, fault.message) == (
-        "no-salt", "the salt of the checksum's table has no row 7",
+        "no-salt", "the salt table of the checksum has no row 7",
     )  # fmt: skip
     with pytest.raises(FramingError, match="no row 7"):
         framing(MAVLINK).encode(unknown[2:-2])

@@ -124,8 +124,8 @@ async def test_unknown_host_key_is_refused_and_told(sshd: Sshd) -> None:
     line = line_to(sshd, host_key=None)
     said = await refusal(line)
     assert said == (
-        f"the host key of 127.0.0.1:{sshd.port} is not known: it shows {sshd.fingerprint} "
-        "(ssh-ed25519); if that is the robot's own, 'urc trust PROFILE gauge' trusts it"
+        f"the host key of 127.0.0.1:{sshd.port} is not known: found {sshd.fingerprint} "
+        "(ssh-ed25519); if it is the key of the robot, 'urc trust PROFILE gauge' trusts it"
     )
     assert not own_file().exists()
     assert PASSWORD not in sshd.said
@@ -149,7 +149,7 @@ async def test_trusted_host_key_opens_the_line_until_it_changes(sshd: Sshd) -> N
     logins = sshd.said.count("Accepted")
     said = await refusal(line)
     assert said == (
-        f"the host key of 127.0.0.1:{sshd.port} is another one: expected {before}, it shows "
+        f"the host key of 127.0.0.1:{sshd.port} has changed: expected {before}, found "
         f"{sshd.fingerprint} (ssh-ed25519); the connection may be intercepted. If the robot was "
         "reinstalled, 'urc trust PROFILE gauge' trusts the new one"
     )
@@ -163,7 +163,7 @@ async def test_pinned_host_key_is_the_only_one(sshd: Sshd, tmp_path: Path) -> No
     remember("127.0.0.1", sshd.port, offer.key)
     other = fingerprint_of(new_key(tmp_path / "other"))
     said = await refusal(line_to(sshd, host_key=other))
-    assert f"expected {other}, it shows {sshd.fingerprint}" in said
+    assert f"expected {other}, found {sshd.fingerprint}" in said
     assert said.endswith("put the new one into host_key")
 
 

@@ -90,7 +90,7 @@ async def test_line_is_encrypted(authority: Authority) -> None:
 async def test_certificate_of_an_unknown_authority_is_refused(authority: Authority) -> None:
     """By the system's authorities, and by another one; unless checking is switched off."""
     async with secret_echo(authority.sign("127.0.0.1")) as port, nothing_left():
-        told = f"the certificate of 127.0.0.1:{port} is from an authority unknown here; see tls.ca"
+        told = f"the certificate of 127.0.0.1:{port} is from an unknown authority; see tls.ca"
         assert await refusal(line(port, tls=True)) == told
         other = Authority(Path(authority.file).parent)
         assert await refusal(line(port, {"ca": other.file})) == told
@@ -206,7 +206,7 @@ async def test_newer_robot_takes_the_place_of_the_older() -> None:
         reader, newer = await asyncio.open_connection("127.0.0.1", transport.port)
         with pytest.raises(PeerClosed) as told:
             await asyncio.wait_for(transport.receive(), WAIT_S)
-        assert str(told.value).startswith("another robot took its place (127.0.0.1:")
+        assert str(told.value).startswith("another robot has replaced it (127.0.0.1:")
         await transport.close()
         await transport.open(20.0)
         newer.write(b"it is me")

@@ -45,7 +45,7 @@ def test_no_orientation_is_not_available(absent: object) -> None:
 @pytest.mark.parametrize("wrong", [[1, 2, 3], "0 0 0 1", 3, {"x": 1}, ["a", 0, 0, 1], [True] * 4])
 def test_what_is_no_orientation_is_refused(wrong: object) -> None:
     """With words for the author."""
-    with pytest.raises(ExpressionError, match="a quaternion is expected"):
+    with pytest.raises(ExpressionError, match="expected a quaternion"):
         compile_expression("q | roll").evaluate({"q": wrong})
 
 

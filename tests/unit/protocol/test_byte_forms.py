@@ -66,7 +66,7 @@ REFUSED = [
     ("hex: '{{ x | u8 }}'", {"x": float("nan")}, "'u8' takes a whole number, found nan"),
     ("hex: '{{ x | u8 }}'", {"x": "a"}, "'u8' takes a number, found 'a'"),
     ("hex: '{{ x | f32be }}'", {"x": 1e39}, "1e+39 is too large for 'f32be'"),
-    ("hex: '{{ x | hexbytes }}'", {"x": "0g"}, "hex digits are expected, found '0g'"),
+    ("hex: '{{ x | hexbytes }}'", {"x": "0g"}, "expected hex digits, found '0g'"),
     ("bytes: ['{{ x }}']", {"x": 256}, "x: expected a byte, 0 to 255, found 256"),
     ("bytes: ['{{ x }}']", {"x": None}, "x: None is neither a byte nor text"),
     ("bytes: ['{{ x }}']", {"x": 1.5}, "x: 1.5 is neither a byte nor text"),

@@ -81,7 +81,7 @@ class Checksum:
     def saltless(self, frame: bytes | bytearray) -> BadFrame:
         """Return the error for a frame to be sent whose salt is unknown."""
         number = self.spec.salt.number(frame)
-        return BadFrame("no-salt", f"the salt of the checksum's table has no row {number}")
+        return BadFrame("no-salt", f"the salt table of the checksum has no row {number}")
 
     def _place(self, frame: bytes | bytearray) -> int:
         place = self.spec.at if self.spec.at >= 0 else len(frame) + self.spec.at
@@ -138,7 +138,7 @@ def _salter(salt: Salt) -> Callable[[bytes | bytearray], bytes | None] | None:
             return found
         # An empty code drops the frame silently: see `SKIPPED`.
         code = "" if salt.otherwise == "skip" and number is not None else "no-salt"
-        raise BadFrame(code, f"the salt of the checksum's table has no row {number}")
+        raise BadFrame(code, f"the salt table of the checksum has no row {number}")
 
     return choose
 

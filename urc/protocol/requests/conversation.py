@@ -153,7 +153,7 @@ class Conversation(Connection):
         if self._is_leaving:
             return "the connection is being closed"
         if exchange.ask.is_motion:
-            return "the robot is not ready: the steps of its connection are not done"
+            return "the robot is not ready: its login is not complete"
         return ""  # it waits in the queue for the login
 
     def _pump(self, now: float) -> list[LineEvent]:

@@ -176,7 +176,7 @@ class Expectation:
         self._lines.append(payload)
         self._size += len(payload) + 1
         if self._size > _MOST_COLLECTED:
-            return self._drop(len(self._lines), "it has too many lines")
+            return self._drop(len(self._lines), "too many lines")
         if isinstance(lines, int):
             if len(self._lines) < lines:
                 return _MORE

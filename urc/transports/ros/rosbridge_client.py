@@ -193,7 +193,7 @@ class RosClient:
         attributes = {"id": number, "ok": is_ok}
         if not is_ok:
             said = one_line(values) if isinstance(values, str) else ""
-            attributes["reason"] = said or "the service said no"
+            attributes["reason"] = said or "the service refused"
         self._queue.answer(Envelope("response", attributes, values), self._size_bytes)
 
     def _feedback(self, action: str, number: object, values: Any) -> None:
@@ -238,13 +238,13 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
         handler: Callable[[Any], None] | None = self._message_handlers.get(operation["op"])
         if handler is None:
             unknown = one_line(repr(operation["op"]), _NAME_SHOWN)
-            raise BadOperation(f"the bridge sent an operation {unknown} that is not known")
+            raise BadOperation(f"the bridge sent an unknown operation {unknown}")
         try:
             handler(operation)
         except Exception as problem:  # roslibpy does not validate its input
             name = operation.get("id") or operation.get("topic")
             shown = one_line(repr(name), _NAME_SHOWN) if isinstance(name, str) else "?"
-            raise BadOperation(f"{operation['op']} of {shown} is not understood") from problem
+            raise BadOperation(f"{operation['op']} of {shown} is invalid") from problem
 
     # -- overridden methods of roslibpy
 
