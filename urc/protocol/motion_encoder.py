@@ -1,8 +1,8 @@
-"""Frames of motion: what moves a robot for as long as it is held, and what stops it.
+"""Frames of motion: setpoints of held commands, and their stops.
 
-Floor 3, pure. These frames do not go through the queue of their line: whoever owns the wire writes
-the newest one, and the stop before anything else. All that a command must fulfil before it is sent,
-a frame of motion must fulfil, too.
+Pure. These frames bypass the queue of their connection. The owner of the transport sends the newest
+setpoint, and a stop before any other frame. Frames of motion are subject to all requirements of
+their command.
 """
 
 from collections.abc import Callable, Container, Mapping
@@ -25,17 +25,17 @@ from urc.protocol.sequences.commands import is_guarded, why_refused
 __all__ = ["MotionEncoder", "MotionRefused"]
 
 _SPARE_STOPS: Final = 24
-"""Numbers that other frames may use up before the stops are rendered again."""
+"""Numbers that other frames may use before the stops are rendered again."""
 
 Check = Callable[[Mapping[str, object]], dict[str, Reading]]
 
 
 class MotionRefused(UrcError):
-    """Motion that is not allowed now; the message says why."""
+    """Motion that is refused now; the message gives the reason."""
 
 
 class _Way:
-    """What a frame of one held command takes: looked up once, for there are many a second."""
+    """The inputs of the frames of one held command, looked up once because of their rate."""
 
     __slots__ = ("ask", "check", "command", "is_guarded", "line")
 
@@ -57,7 +57,7 @@ class MotionEncoder:
         lines: Mapping[str, Conversation],
         known: SignalState,
     ) -> None:
-        """Take what the engine has built of the commands; nothing is copied."""
+        """Use the tables of the engine, without copying them."""
         self._held = {name: one for name, one in commands.items() if one.hold is not None}
         self._ways = {
             name: _Way(one, checks[name], asks[name], lines[one.transport])
@@ -67,17 +67,18 @@ class MotionEncoder:
         self._lines = lines
         self._known = known
         self._counting: dict[str, int] = {}
-        """Line → how many controls it has whose frames carry numbers; none: left out."""
+        """Connection → number of its controls whose frames have counters, if any."""
         self._made: dict[str, Made] = {}
-        """Command → its stops that were rendered already."""
+        """Command → its rendered stops."""
         self._lengths: dict[str, int] = {}
-        """Line that is shared → stops of each control that are rendered in advance."""
+        """Shared connection → number of stops rendered in advance for each control."""
         self.on_count: Callable[[str], None] = _nobody
-        """Told the line on which a number was used up that the stops made so far come after."""
+        """Called with a connection after a counter has changed, which may outdate rendered
+        stops."""
         self.on_ready: Callable[[str], None] = _nobody
-        """Told the line that was connected, and is ready for everybody."""
+        """Called with a connection that has become ready."""
         self.on_refused: Callable[[str, str], None] = _unrefused
-        """Told a held command that the robot refuses, and in which words."""
+        """Called with a held command and the refusal of the robot."""
         for one, command in self._held.items():
             line = command.transport
             lines[line].on_ready = partial(self._told_ready, line)
@@ -89,41 +90,41 @@ class MotionEncoder:
                 self._counting[line] = self._counting.get(line, 0) + 1
 
     def share(self, repeating: Container[str]) -> None:
-        """Leave the numbers of frames to whoever writes motion, who says how they stand.
+        """Share the counters with the sender of motion, which confirms their values.
 
         Args:
-            repeating: lines on which a stop is sent several times, because it may be lost.
+            repeating: connections that repeat a stop, because it may be lost.
         """
         for line, controls in self._counting.items():
             self._lines[line].counters.is_shared = True
             self._lengths[line] = controls * (MOST_STOPS if line in repeating else 1) + _SPARE_STOPS
 
     def set_counters(self, line: str, stand: Mapping[str, int], is_settled: bool) -> None:
-        """Take how the shared counters of a line stand.
+        """Update the shared counters of a connection.
 
         Args:
-            line: its name.
-            stand: counter → the last number that has left.
-            is_settled: whether no frame of the engine is still on its way.
+            line: name of the connection.
+            stand: counter → last transmitted number.
+            is_settled: whether all frames of the engine have been transmitted.
         """
         if line in self._lengths:
             self._lines[line].counters.set_counters(stand, is_settled=is_settled)
             self.on_count(line)
 
     def is_lasting(self, command: str) -> bool:
-        """Return whether its stop is the same bytes for ever; else it is to be made anew.
+        """Return whether the stop of `command` always has the same bytes.
 
-        It is not where it carries a number, or what the robot or a setting says. Nor does it count
-        as such where one side of the line talks at a time, and each frame made may owe an answer.
+        False for a stop with a counter, or with values from the robot or from settings. False in
+        half duplex, too, because each rendered frame may expect a reply.
         """
         ask, line = self._asks[command], self._lines[self._found(command).transport]
         return ask.is_local and not (ask.has_counters or line.spec.is_half_duplex)
 
     def has_stops(self, command: str) -> bool:
-        """Return whether the stops that were made last are enough for now.
+        """Return whether the rendered stops of `command` suffice for now.
 
-        They are while most of those that were made to spare are left, and while they depend on
-        nothing but their numbers.
+        They suffice while at least half of the spare numbers are left, and if they depend only on
+        their numbers.
         """
         made, line = self._made.get(command), self._found(command).transport
         if made is None or not self._asks[command].is_local or line not in self._lengths:
@@ -131,19 +132,19 @@ class MotionEncoder:
         return self._lines[line].counters.is_near(made, _SPARE_STOPS // 2)
 
     def is_ready(self, command: str) -> bool:
-        """Return whether its line is connected, and the steps of the connection are done."""
+        """Return whether the connection of `command` is open and ready."""
         line = self._lines[self._found(command).transport]
         return line.is_open and line.is_ready
 
     def stop_frame(self, command: str) -> Payload | FrameVariants:
-        """Return what stops the motion of `command`: bytes, framing included, or an envelope.
+        """Return the stop of `command`: bytes, framing included, or an envelope.
 
-        It needs no connection. Where it carries a number, that is a series: the frame for each
-        number that it may have when it leaves, as many as all stops of the line may need.
-        A robot that moves in steps stops by itself, and is told nothing: no bytes at all.
+        The stop can be rendered without a connection. A stop with a counter is a series: one frame
+        for each number that may be next, as many as all stops of the connection may need. A robot
+        that moves in steps stops by itself, so its stop is empty.
 
         Raises:
-            BadArgument: it is no motion, or cannot be written.
+            BadArgument: the command is not held, or the stop cannot be written.
         """
         found = self._found(command)
         hold, ask, line = found.hold, self._asks[command], self._lines[found.transport]
@@ -156,7 +157,7 @@ class MotionEncoder:
         return line.counters.series(
             lambda draw: ask.encode({**names, COUNTERS: draw}),
             self._lengths.get(found.transport, 1),
-            # What the robot says may have changed since.
+            # Values from the robot may have changed since then.
             self._made.setdefault(command, {}) if ask.is_local else {},
         )
 
@@ -167,24 +168,24 @@ class MotionEncoder:
         now: float,
         confirmed_by: tuple[str, ...] = (),
     ) -> Payload | CountedFrame:
-        """Return the frame of `command` with these arguments, as it is to be written now.
+        """Return the frame of `command` with these arguments, to be sent now.
 
-        On a line where one side talks at a time, it may be no bytes: the robot owes an answer, and
-        the next value goes out instead.
+        In half duplex, the frame is empty while a reply is outstanding; the next setpoint replaces
+        it.
 
-        On a line that is shared, a number in it is only proposed: it counts once the frame has
-        left, which `told` says.
+        On a shared connection, the numbers of counters are only proposed; `told` confirms them
+        after the transmission.
 
         Args:
-            command: one with `hold`.
-            arguments: by name; those left out take their defaults.
-            now: the time, for what the command requires of fresh signals.
-            confirmed_by: people who said yes to it, where two must.
+            command: name of a held command.
+            arguments: values by name; missing ones take their defaults.
+            now: the time, for requirements over fresh signals.
+            confirmed_by: people who have confirmed the command, for the two-person rule.
 
         Raises:
-            BadArgument: it is no motion, or an argument is not as declared.
-            NotNow: the line is not ready, the robot silent, what it requires does not hold, or
-                nobody confirmed it.
+            BadArgument: the command is not held, or an argument is invalid.
+            NotNow: the connection is not ready, the robot is silent, a requirement is not met, or a
+                confirmation is missing.
         """
         way = self._ways.get(command)
         if way is None:
@@ -220,7 +221,7 @@ class MotionEncoder:
         now: float,
         confirmed_by: tuple[str, ...],
     ) -> Numbered | None:
-        """Make a frame of motion again: another frame has used up its numbers."""
+        """Render a frame of motion again: another frame has used up its numbers."""
         try:
             made = self.motion_frame(command, arguments, now, confirmed_by)
         except UrcError:
@@ -244,8 +245,8 @@ class MotionEncoder:
 
 
 def _unrefused(command: str, why: str) -> None:
-    """Nobody wants to know."""
+    """Ignore the call."""
 
 
 def _nobody(line: str) -> None:
-    """Nobody wants to know."""
+    """Ignore the call."""
