@@ -86,7 +86,7 @@ class RosbridgeTransport:
     @property
     def address(self) -> str:
         """Target of the transport as text for people: ``rosbridge 192.168.1.5:9090``."""
-        return f"rosbridge {self._where}"
+        return f"ros {self._where}"
 
     async def open(self, timeout_s: float) -> None:
         """Connect and subscribe, or raise `ConnectFailed` within `timeout_s` seconds."""
@@ -175,15 +175,15 @@ def from_setup(setup: TransportSetup) -> Transport:
         raise TransportError(f"ros needs rosbridge as via, not {via!r}")
     host, port = options.get("host"), options.get("port", DEFAULT_PORT)
     if not isinstance(host, str) or not host.strip():
-        raise TransportError(f"rosbridge needs a host name or address, not {host!r}")
+        raise TransportError(f"ros needs a host name or address, not {host!r}")
     if isinstance(port, bool) or not isinstance(port, int) or not 1 <= port <= 65535:
-        raise TransportError(f"rosbridge needs a port from 1 to 65535, not {port!r}")
+        raise TransportError(f"ros needs a port from 1 to 65535, not {port!r}")
     path, tls = options.get("path", "/"), options.get("tls") or None
     if not isinstance(path, str) or not path.startswith("/"):
-        raise TransportError(f"rosbridge needs a path that starts with /, not {path!r}")
+        raise TransportError(f"ros needs a path that starts with /, not {path!r}")
     ros = options.get("version")
     if ros is not None and (isinstance(ros, bool) or ros not in (1, 2, AUTO)):
-        raise TransportError(f"rosbridge needs 1, 2 or auto as version, not {ros!r}")
+        raise TransportError(f"ros needs 1, 2 or auto as version, not {ros!r}")
     host = host.strip()
     where = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
     url = f"{'ws' if tls is None else 'wss'}://{where}{path}"
@@ -199,12 +199,12 @@ def _listening(topic: str, attributes: Mapping[str, Value]) -> RosSubscription:
     def number(name: str, factor: float = 1) -> int:
         value = attributes.get(name) or 0
         if isinstance(value, bool) or not isinstance(value, int | float) or value < 0:
-            raise TransportError(f"rosbridge needs a number as {name} of {topic}, not {value!r}")
+            raise TransportError(f"ros needs a number as {name} of {topic}, not {value!r}")
         return round(value * factor)
 
     compression = attributes.get("compression") or "none"
     if compression not in ("none", "png", "cbor"):
-        raise TransportError(f"rosbridge: {compression!r} of {topic} is not none, png or cbor")
+        raise TransportError(f"ros: {compression!r} of {topic} is not none, png or cbor")
     if compression == "cbor" and find_spec("cbor2") is None:
         raise TransportError("cbor needs the package cbor2: pip install 'urc[cbor]'")
     return RosSubscription(

@@ -319,7 +319,7 @@ def _keep(table: dict[str, object], name: str, waiting: object) -> None:
 def _text(attributes: Mapping[str, object], name: str) -> str:
     value = attributes.get(name)
     if not isinstance(value, str) or not value:
-        raise TransportError(f"rosbridge needs a {name}, not {value!r}")
+        raise TransportError(f"ros needs a {name}, not {value!r}")
     return value
 
 
