@@ -139,9 +139,9 @@ class MotionEncoder:
     def stop_frame(self, command: str) -> Payload | FrameVariants:
         """Return the stop of `command`: bytes, framing included, or an envelope.
 
-        The stop can be rendered without a connection. A stop with a counter is a series: one frame
-        for each number that may be next, as many as all stops of the connection may need. A robot
-        that moves in steps stops by itself, so its stop is empty.
+        The stop can be rendered without a connection. A stop with a counter is a series, with one
+        frame for each possible next number. The series is as long as all stops of the connection
+        may need. A robot that moves in steps stops by itself, so its stop is empty.
 
         Raises:
             BadArgument: the command is not held, or the stop cannot be written.
@@ -173,7 +173,7 @@ class MotionEncoder:
         In half duplex, the frame is empty while a reply is outstanding; the next setpoint replaces
         it.
 
-        On a shared connection, the numbers of counters are only proposed; `told` confirms them
+        On a shared connection, the numbers of counters are only proposed; `set_counters` confirms them
         after the transmission.
 
         Args:
@@ -184,12 +184,12 @@ class MotionEncoder:
 
         Raises:
             BadArgument: the command is not held, or an argument is invalid.
-            NotNow: the connection is not ready, the robot is silent, a requirement is not met, or a
+            MotionRefused: the connection is not ready, the robot is silent, a requirement is not met, or a
                 confirmation is missing.
         """
         way = self._ways.get(command)
         if way is None:
-            raise BadArgument(f"{command!r} is no command with a release")
+            raise BadArgument(f"{command!r} is not a held command")
         line, ask = way.line, way.ask
         if line.motion_must_wait(now):
             return b""
@@ -240,7 +240,7 @@ class MotionEncoder:
     def _found(self, command: str) -> Command:
         found = self._held.get(command)
         if found is None:
-            raise BadArgument(f"{command!r} is no command with a release")
+            raise BadArgument(f"{command!r} is not a held command")
         return found
 
 

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from tests.unit.protocol.framing_samples import MAVLINK, NMEA, UBX, framing
+from urc.protocol.framing import checksums, searched
 from urc.protocol.framing.receive_buffer import ReceiveBuffer, RescanBudget
-from urc.protocol.framing.table import checksums, searched
 
 SIZE = 1 << 14
 
