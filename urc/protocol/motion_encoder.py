@@ -173,7 +173,7 @@ class MotionEncoder:
         In half duplex, the frame is empty while a reply is outstanding; the next setpoint replaces
         it.
 
-        On a shared connection, the numbers of counters are only proposed; `set_counters` confirms them
+        On a shared connection, counters are only proposed; `set_counters` confirms their values
         after the transmission.
 
         Args:
@@ -184,8 +184,8 @@ class MotionEncoder:
 
         Raises:
             BadArgument: the command is not held, or an argument is invalid.
-            MotionRefused: the connection is not ready, the robot is silent, a requirement is not met, or a
-                confirmation is missing.
+            MotionRefused: the connection is not ready, the robot is silent, a requirement is not
+                met, or a confirmation is missing.
         """
         way = self._ways.get(command)
         if way is None:
