@@ -2,7 +2,7 @@
 
 Each engine assembles the source text once: the conversions of the fields, their checks, and the
 samples. For a value outside the type or range of its signal, the function calls the closures
-(`Slow`), which read the frame again.
+(`slow`), which read the frame again.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -57,7 +57,7 @@ class Connection:
         self.held = HoldReplies()
         """Replies to hold-to-run commands."""
         self.is_behind = False
-        """Whether received frames wait for `go_on`."""
+        """Whether received frames wait for `process_frames`."""
         self._askers: dict[object, object] = {}
         """Numbers of requests made by steps → owner of the expected reply, if any."""
         self._is_leaving = False
