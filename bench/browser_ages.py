@@ -68,11 +68,11 @@ async (seconds) => {
 
 
 class TooFew(Exception):
-    """A page that showed too few of the robot's values."""
+    """A failed measurement: the page showed too few of the robot's values."""
 
 
 async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:
-    """Return the ages of the values that a page shows in some seconds, in milliseconds.
+    """Return the ages of the values on a page during `seconds`, in milliseconds.
 
     Args:
         one: the page.
@@ -80,7 +80,7 @@ async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:
         rate_hz: rate of the robot's clock values.
 
     Raises:
-        TooFew: fewer than `LEAST_SHARE` of them were shown.
+        TooFew: the page showed less than `LEAST_SHARE` of the values.
     """
     try:
         async with asyncio.timeout(FIRST_S + seconds * 4):

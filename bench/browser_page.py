@@ -1,7 +1,7 @@
-"""A page in a real Chromium, with measurements: ages of values, frames, processor time.
+"""Measurements of a page in a real Chromium: ages of values, frames, processor time.
 
-Ages use one clock, the machine's monotonic clock. Robots send its time (``peers/robot.py``), and
-the browser reports the start of its page in it.
+Ages use one clock, the machine's monotonic clock. Robots send the time of this clock
+(``peers/robot.py``), and the browser reports the page's start by the same clock.
 """
 
 import asyncio
@@ -56,7 +56,7 @@ COUNT = """
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """A page, and its debugging connection."""
+    """A page with its debugging connection."""
 
     page: Page
     line: CDPSession

@@ -2,8 +2,8 @@
 
 One robot sends its clock 50 times a second, over TCP, to each of the four. A real Chromium opens
 each in turn. After the drawing of every frame, the age of a new value on the screen is measured.
-The other dashboards come from npm and PyPI at their first use. Missing ones are left out, with a
-message.
+The other dashboards come from npm and PyPI at their first use. Missing dashboards are left out,
+with a message.
 """
 
 import asyncio
@@ -101,7 +101,7 @@ async def _look_all(addresses: Mapping[str, str], seconds: float, rounds: int) -
 
 
 async def _look(browser: Browser, address: str, seconds: float) -> list[float]:
-    """Return the ages of one measurement; repeat a disturbed one."""
+    """Return the ages of one measurement; repeat a disturbed measurement."""
     for tries_left in reversed(range(TRIES)):
         async with opened(browser, address) as one:
             await ages(one, SETTLE_S, 0.0)  # it shows values: what it does at its start is over
@@ -110,7 +110,7 @@ async def _look(browser: Browser, address: str, seconds: float) -> list[float]:
             except TooFew:
                 if tries_left == 0:
                     raise
-    raise AssertionError("no try was made")
+    raise AssertionError("no measurement was made")
 
 
 def _results(taken: Ages) -> list[Result]:

@@ -1,9 +1,9 @@
 """Sixty widgets that receive ten thousand values a second: the number of frames.
 
 Real widgets show values of a real server, also with the page's processor slowed six times, as on an
-old phone. When a frame is too short for all sixty, widgets take turns
-(``static/widgets/draw_scheduler.js``). Each is drawn with its newest value in every twentieth frame
-or more often.
+old phone. If a frame is too short for all sixty, widgets take turns
+(``static/widgets/draw_scheduler.js``). Each widget is drawn with its newest value in every
+twentieth frame or more often.
 """
 
 import asyncio
@@ -24,7 +24,7 @@ LOOK_S, LOOK_IF_FULL_S = 3.0, 8.0
 ROUNDS, ROUNDS_IF_FULL = 2, 9
 COLUMNS, ROWS = 10, 6
 EVERY = 3
-"""Distance of the shown signals; the page receives only shown signals."""
+"""Step between shown signals: every third signal is shown, and the page receives only those."""
 KINDS = (
     ("value", "value", ""),
     ("gauge", "value", "V"),

@@ -1,6 +1,6 @@
 """Cost of a flood of lines over a real socket, against a hand-written driver.
 
-It is the CPU time of this process, from the request until the newest value of each signal is
+The cost is the CPU time of this process, from the request until the newest value of each signal is
 stored.
 """
 

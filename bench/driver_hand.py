@@ -1,6 +1,6 @@
-"""A hand-written driver for the robot of `bench.driver_robot`, as people write it without URC.
+"""A typical hand-written driver for the robot of `bench.driver_robot`.
 
-It is tidy, and has the parts that every driver of a real robot needs, as URC has:
+The code is tidy, and like URC, has the parts that every driver of a real robot needs:
 
 - A speed is clamped, and a value that is not a number is refused: `max` and `min` would turn it
   into full speed.
@@ -11,7 +11,7 @@ It is tidy, and has the parts that every driver of a real robot needs, as URC ha
 - Every buffer has a limit: unterminated lines, pending requests, and output.
 - When the connection is lost, all pending requests fail at once.
 
-It lacks the other features of URC, such as link states, reconnecting, alarms and priorities.
+Other features of URC are missing, such as link states, reconnecting, alarms and priorities.
 """
 
 import asyncio
@@ -119,7 +119,7 @@ class _Robot:
         while self._waiting:
             answer, _ = self._waiting.popleft()
             if not answer.done():
-                answer.set_exception(ConnectionError("the robot is gone"))
+                answer.set_exception(ConnectionError("the robot has disconnected"))
         self.done.set()
 
 
@@ -133,7 +133,7 @@ def request(vx: float, wz: float) -> bytes:
 
 
 class StreamDriver:
-    """A driver on `StreamReader` and `StreamWriter` with a reader task, as most people write it."""
+    """A driver on `StreamReader` and `StreamWriter` with a reader task, the most common design."""
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._robot = _Robot()

@@ -1,7 +1,7 @@
 """Cost of a request and its reply over a real socket, against a hand-written driver.
 
-It is the CPU time of this process; the robot is another process, the same for all. Each round opens
-a new connection, and sends `TIMES` requests after a warm-up.
+The cost is the CPU time of this process; the robot runs in another process, the same for all
+drivers. Each round opens a new connection, and sends `TIMES` requests after a warm-up.
 """
 
 import asyncio

@@ -1,7 +1,7 @@
 """The robot of `driver_poll` and `driver_flood`, in a separate process that is not measured.
 
-``python -m bench.driver_robot`` prints its port. It answers ``VEL …`` with an odometry line, and
-``FLOOD n`` with n mixed lines and ``OK n``. It ends with its standard input.
+``python -m bench.driver_robot`` prints its port. The robot answers ``VEL …`` with an odometry line,
+and ``FLOOD n`` with n mixed lines and ``OK n``. The process ends when its standard input closes.
 """
 
 import os
@@ -28,8 +28,8 @@ def robot(*, is_beside: bool) -> Iterator[int]:
     """Run the robot during the context; yield its port.
 
     Args:
-        is_beside: whether it shares the processor of the driver, if the system allows that. On
-            another processor, a reply sometimes arrives before and sometimes after the driver
+        is_beside: whether the robot shares the processor of the driver, if the system allows that.
+            On another processor, a reply sometimes arrives before and sometimes after the driver
             sleeps. Then the cost of waking up would decide the figure, instead of the work.
     """
     allowed = (

@@ -1,8 +1,8 @@
 """Cost of a binary frame of 24 bytes, 8 fields and a CRC, against tidy hand-written code.
 
 Both convert a frame from its bytes to a mapping of named, scaled values, and back. The declaration
-is that of a normal profile. The hand-written code is what an author would write without URC. It has
-one precompiled `struct.Struct` and the CRC of the standard library, which is C.
+is from a normal profile. The hand-written code is what an author would write without URC. The code
+uses one precompiled `struct.Struct`, and the CRC of the standard library, which is written in C.
 """
 
 import platform
@@ -192,7 +192,7 @@ def run(*, full: bool = False) -> Sequence[Result]:
 def _seconds(
     function: Callable[..., object], argument: object, times: int = 20_000
 ) -> Callable[[], float]:
-    """Return a function that measures so many calls, in seconds of this process."""
+    """Return a function that measures a number of calls, in seconds of CPU time."""
 
     def measure() -> float:
         began = time.process_time()

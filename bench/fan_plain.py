@@ -1,7 +1,7 @@
 """A bare loop of sends, the baseline of `fanout`: ``fan_plain.py CLIENTS SIZE FRAMES RATE``.
 
-It accepts the clients, answers each with status 101, and sends a frame to each at the rate. It
-knows no values. It prints its port, and at the end its processor time in seconds.
+The loop accepts the clients, answers each with status 101, and sends a frame to each at the rate.
+The program prints its port, and at the end its processor time in seconds.
 """
 
 import socket
@@ -12,7 +12,7 @@ HEAD_BYTES = 4
 
 
 def accepted(server: socket.socket) -> socket.socket:
-    """Accept a client; each waits for its reply before the next one connects."""
+    """Accept a client, and send the reply that allows the next client to connect."""
     page, _ = server.accept()
     page.recv(4096)
     page.sendall(b"HTTP/1.1 101 Switching Protocols\r\n\r\n")

@@ -1,8 +1,8 @@
 """Two hundred values to 50 pages: URC against a bare loop of sends.
 
-The figure is the processor time of the server, with the readings and their encoding. The pages are
-in another process, and so is the robot that wakes the server. The loop sends the same number of
-bytes to the same number of pages, and knows neither values nor WebSockets.
+The figure is the processor time of the server, with the readings and their encoding. The pages run
+in another process, and so does the robot. The loop sends the same number of bytes to the same
+number of pages, without any knowledge of values or WebSockets.
 """
 
 import subprocess

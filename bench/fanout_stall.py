@@ -1,7 +1,7 @@
 """Cost of slow pages for the others: of twenty pages, two read nothing.
 
 One more page reads a quarter of its data. The baseline is a server with an unbounded queue for each
-page. The age of the data at its slow page grows with the queue.
+page. The age of the baseline's data at the slow page grows with the queue.
 """
 
 import asyncio
@@ -45,7 +45,7 @@ class Look(NamedTuple):
 
     ticks: int
     healthy: int
-    """Frames of the healthy page with the fewest frames."""
+    """Smallest number of frames of a healthy page."""
     age_ms: float
     """Age of the data at the slow page in the last quarter, in milliseconds."""
     growth_mb: float
@@ -53,7 +53,7 @@ class Look(NamedTuple):
 
 
 class Naive:
-    """An unbounded queue for each page."""
+    """A baseline with an unbounded queue for each page."""
 
     def __init__(self) -> None:
         self.queues: set[asyncio.Queue[str]] = set()

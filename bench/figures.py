@@ -1,7 +1,6 @@
 """Figures of a run: printed as JSON, one line each, and optionally written into the documentation.
 
-`./dev bench --full --write-docs` writes those of the motion benchmarks into docs/motion.md, between
-the marks there.
+`./dev bench --full --write-docs` writes the figures of motion into docs/motion.md, between marks.
 """
 
 import json
@@ -83,7 +82,7 @@ def _drawing(row: Mapping[str, object], name: str) -> str:
     assert isinstance(bins, dict)
     most = max(bins.values())
     wide = max(len(start) for start in bins)
-    lines = [f"{row[name]}: from so many ms on, how often"]
+    lines = [f"{row[name]}: lower bound in ms, and count"]
     for start, count in bins.items():
         lines.append(f"{start:>{wide}} {'█' * max(1, round(count / most * BARS))} {count}")
     return "\n".join(lines) + "\n"

@@ -1,4 +1,4 @@
-"""How URC measures: baseline and subject in turn, and the median of the ratios of each pair.
+"""Measurement of ratios: baseline and subject in turn, then the median of the pairs' ratios.
 
 Machines are noisy and drift; a ratio inside one run is stable, unlike a time.
 """
@@ -50,7 +50,7 @@ def process_seconds(command: Sequence[str]) -> float:
     """Run a command to its end and return its wall time in seconds.
 
     Raises:
-        SystemExit: it failed, or took longer than `PROCESS_TIMEOUT_S`.
+        SystemExit: the command failed, or took longer than `PROCESS_TIMEOUT_S`.
     """
     # With this variable, nothing stays compiled, and Python's compiler would be measured.
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
@@ -73,7 +73,7 @@ def compare(
     rounds: int = 11,
     versions: Mapping[str, str] | None = None,
 ) -> Result:
-    """Measure both in turn, after one round that does not count."""
+    """Measure baseline and subject in turn, after one round that does not count."""
     return compare_all([(goal, baseline)], subject, rounds=rounds, versions=versions)[0]
 
 

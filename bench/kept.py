@@ -1,7 +1,7 @@
 """Stored rows of a long run, so that an interrupted run can continue.
 
-Each benchmark has one file in the user's cache. A complete run deletes it. Rows of other code do
-not count.
+Each benchmark has one file in the user's cache. A complete run deletes it. Rows from other versions
+of the code do not count.
 """
 
 import hashlib
@@ -17,7 +17,7 @@ _ROOT: Final = Path(__file__).resolve().parents[1]
 
 
 class Kept:
-    """The rows of one benchmark."""
+    """The stored rows of one benchmark."""
 
     def __init__(self, name: str) -> None:
         """Load the rows of an earlier run of the same code."""

@@ -3,7 +3,7 @@
 Real programs run on both sides of a relay between two network namespaces: `urc serve` with its
 guards, and robots, brokers and login servers. The link of each robot is cut at different moments.
 The lengths of the cuts are spread evenly over their logarithm. Every second control is released
-during the cut. It needs root and /dev/net/tun; otherwise it is left out, with a message.
+during the cut. The benchmark needs root and /dev/net/tun; otherwise it is left out, with a message.
 """
 
 import json
@@ -52,7 +52,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def _spread(count: int, longest_s: float, dice: random.Random) -> list[tuple[float, float]]:
-    """Return times in random order, each with the share after which a control is released."""
+    """Return lengths of cuts in random order, each with its share before the release."""
     ratio = longest_s / SHORTEST_S
     times = [SHORTEST_S * ratio ** (place / (count - 1)) for place in range(count)]
     dice.shuffle(times)
@@ -60,7 +60,7 @@ def _spread(count: int, longest_s: float, dice: random.Random) -> list[tuple[flo
 
 
 def _queue(rig: CutRig, queue: int, plan: list[tuple[float, float]]) -> list[Cut]:
-    """Run the rest of the plan, in parallel with others; repeat an invalid cut."""
+    """Run the rest of the plan in one of several parallel threads; repeat an invalid cut."""
     cuts: list[Cut] = []
     while True:
         try:

@@ -21,7 +21,7 @@ LANES = 20
 EACH, EACH_IF_FULL = 40, 1000
 BIN_MS = 10
 MOST_BOUTS = 3
-"""Limit of the bouts, relative to the needed ones, on a machine that is too busy."""
+"""Limit of the bouts on a machine that is too busy, as a multiple of the needed bouts."""
 
 
 def run(*, full: bool) -> Sequence[Result]:

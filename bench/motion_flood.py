@@ -1,9 +1,9 @@
 """Effect of a page with a thousand ticks a second on another page that drives another robot.
 
-The way of the other page from its socket to its robot is measured in short windows. They alternate
-between a normal page, a page that floods another server, and a page that floods the same server.
-A flood uses processor time of this machine in any case, in its page and in its server. So the goal
-compares the last two, and the first is only printed.
+The benchmark measures, in short windows, the other page's latency from its socket to its robot. The
+windows alternate between a normal page, a page that floods another server, and a page that floods
+the same server. A flood uses processor time of this machine in any case, in its page and in its
+server. So the goal compares the two floods, and the result of the normal page is only printed.
 """
 
 import statistics
@@ -30,7 +30,7 @@ WAYS = {"quiet": "outside", "flood elsewhere": "flood", "flood": "flood"}
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Measure the three in turns."""
+    """Measure the three cases in turn."""
     ticks = TICKS_IF_FULL if full else TICKS
     rounds = ROUNDS_IF_FULL if full else ROUNDS
     taken: dict[str, list[list[float]]] = {way: [] for way in WAYS}
@@ -68,7 +68,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def _profiles(folder: Path, ports: Sequence[int]) -> tuple[list[Path], list[Path]]:
-    """Write the documents of the measured server, and of the other one."""
+    """Write the documents of the measured server and the other server."""
     path, *lanes = folder / "path.yaml", folder / "lane-1.yaml", folder / "lane-2.yaml"
     path.write_text(PROFILE.format(port=ports[0]), "utf-8")
     for number, queue in enumerate(lanes, 1):

@@ -48,7 +48,7 @@ def _told(rig: CutRig, queue: int, from_ns: int) -> Result:
     figures = {"line": kind, "seconds": round(seconds), "motions": _motions(texts)}
     tell({"figure": "motion_idle", **figures, "stops": len(texts) - _motions(texts)})
     return Result(
-        name=f"motion: words to a robot at rest over {kind} in {seconds:.0f} s",
+        name=f"motion: frames to a robot at rest over {kind} in {seconds:.0f} s",
         ratio=float(len(texts)),
         goal=0.0,
         baseline_ms=0.0,

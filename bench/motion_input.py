@@ -1,9 +1,9 @@
-"""Time until a robot gets the stop after a release, for each of the twelve ways of a page.
+"""Time until a robot gets the stop after a release, for each of the twelve ways to release.
 
 A real Chromium drives through a real ``urc serve`` with its guard. The robot stamps received data.
 The time runs from the page's event to the first byte of the stop at the robot, on the machine's
 monotonic clock. The lease is one second here, so a stop by the lease would be visible. A late trial
-is repeated if this machine was late by the same time.
+is repeated if the delay came from this machine.
 """
 
 import asyncio
@@ -28,7 +28,7 @@ __all__ = ["run"]
 
 EACH, EACH_IF_FULL = 5, 50
 MOST_TIMES = 3
-"""Limit of the trials, relative to the needed ones, on a machine that is too busy."""
+"""Limit of the trials on a machine that is too busy, as a multiple of the needed trials."""
 MOST_MS = 100.0
 WAIT_S = 15.0
 DOCUMENT = """\
@@ -67,7 +67,7 @@ EVENTS = {
     "context menu": "contextmenu",
     "pad lost": "gamepaddisconnected",
 }
-"""Way → the event that the page gets."""
+"""Way to release → event in the page."""
 # Before any script of the page: its own listeners run after these.
 STAMP = f"""
 window.stamps = {{}};
@@ -92,12 +92,12 @@ class Trial(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """A page, its robot, and a witness of the machine's delays."""
+    """A page, its robot, and a monitor of the machine's delays."""
 
     one: Opened
     robots: Robots
     witness: Robots
-    """A program that measures how late it wakes, and watches server, guard and browser."""
+    """A program that measures its own late wake-ups, and watches server, guard and browser."""
 
 
 def run(*, full: bool) -> Sequence[Result]:

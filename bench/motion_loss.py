@@ -1,9 +1,9 @@
 """Unwanted stops of a robot on a link that loses packets.
 
 Pages drive over a relay with a round trip of 100 ms and random loss in both directions. After each
-stop, a page starts a new gesture. One run has a single connection, for comparison; the other has
-URC's second connection for such links. It needs root and /dev/net/tun; otherwise it is left out,
-with a message.
+stop, a page starts a new gesture. One run has a single connection, for comparison; the other run
+has URC's second connection for lossy links. It needs root and /dev/net/tun; otherwise it is left
+out, with a message.
 """
 
 import json
@@ -25,15 +25,15 @@ DELAY_MS = 50
 LOOK_S = 0.25
 CALM_S = 20.0
 LATE_MS, LATE_WITHIN_NS = 50.0, 600_000_000
-"""Delay of the machine that may have caused a stop within this time after it."""
+"""Time after a delay of the machine in which a stop may be caused by this delay."""
 MOST = {0: None, 1: 0.1, 3: 4.0}
-"""Loss in percent → largest number of stops a minute; None where only the machine causes stops."""
+"""Loss in percent → limit of stops a minute; None if only the machine causes stops."""
 LASTS_S, LASTS_IF_FULL_S = {0: 10, 1: 15, 3: 10}, {0: 60, 1: 180, 3: 60}
 """Loss in percent → duration of the run, in seconds, with all lanes in parallel."""
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Drive at each loss."""
+    """Drive at each rate of loss."""
     if not can_relay():
         print(json.dumps({"left_out": "motion_loss: needs root and /dev/net/tun"}))
         return []
@@ -71,7 +71,7 @@ def _is_still(rig: Rig, queue: int) -> bool:
 
 
 def _drive(rig: Rig, seconds: float, *, has_spare: bool) -> tuple[float, int, int]:
-    """Drive every lane for so long; return the minutes of motion, and the stops.
+    """Drive every lane; return the minutes of motion, and the numbers of stops.
 
     The third number counts the stops after a delay of the machine.
     """

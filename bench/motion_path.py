@@ -1,8 +1,8 @@
-"""Time of a tick from the page's socket to the robot's socket, against a bare relay in Python.
+"""Latency of a tick from the page's socket to the robot's socket, against a bare Python relay.
 
 Each tick is stamped before the page's socket accepts it, and after the robot has read its line, on
-one clock. Both ways alternate in one run. URC's way includes the checks of the motion contract, the
-engine, and the pipe to the guard.
+one clock. URC and the relay alternate in one run. The path in URC includes the checks of the motion
+contract, the engine, and the pipe to the guard.
 """
 
 import json
@@ -30,7 +30,7 @@ TICK_NS = 20_000_000
 """Interval of 50 ticks a second: faster than pages, slower than the limit of the profile."""
 SETTLE_NS = 100_000_000
 LEAST_SHARE = 0.5
-"""Smallest valid share of arrived ticks, because a busy machine thins some out."""
+"""Smallest valid share of arrived ticks, because a busy machine drops some."""
 PROFILE = """\
 urc: 1
 kind: robot
@@ -62,7 +62,7 @@ class TimedPage(Page):
         self.refusal = ""
 
     def tick_number(self, number: int) -> int:
-        """Send a tick with `number` as its value; return its time, in nanoseconds."""
+        """Send a tick with `number` as its value; return its send time, in nanoseconds."""
         self.hear()  # the newest beat
         self.sent += 1
         body = {
@@ -82,7 +82,7 @@ class TimedPage(Page):
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Measure both ways in turns."""
+    """Measure both paths in turn."""
     ticks = TICKS_IF_FULL if full else TICKS
     rounds = ROUNDS_IF_FULL if full else ROUNDS
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
@@ -137,7 +137,7 @@ def _urc(folder: Path, ticks: int) -> Iterator[Callable[[], list[float]]]:
 
 
 def ticks_of(page: TimedPage, robots: Robots, ticks: int) -> list[float]:
-    """Send ticks; return the time of each tick that arrived, in milliseconds."""
+    """Send ticks; return the latency of each arrived tick, in milliseconds."""
     first = len(robots.heard[0]) + 1
     sent: dict[int, int] = {}
     next_ns = time.monotonic_ns()
@@ -156,7 +156,7 @@ def ticks_of(page: TimedPage, robots: Robots, ticks: int) -> list[float]:
     heard = {int(one.text[2:]): one.time_ns for one in robots.heard[0]}
     came = [(heard[value] - at) / 1e6 for value, at in sent.items() if value in heard]
     if len(came) < ticks * LEAST_SHARE:
-        raise SystemExit(f"bench: {len(came)} of {ticks} ticks came; {page.refusal}")
+        raise SystemExit(f"bench: {len(came)} of {ticks} ticks arrived; {page.refusal}")
     return came
 
 

@@ -1,6 +1,6 @@
 """Time until a robot gets the stop after its operator vanishes, for each way to vanish.
 
-Real processes: pages, `urc serve` with its guards, and robots that stamp received data. The time
+Pages, `urc serve` with its guards, and robots that stamp received data are real processes. The time
 runs from the last effective tick to the first byte of the stop. As root, a relay between network
 namespaces adds two failures of the link; otherwise they are left out, with a message.
 """

@@ -10,7 +10,7 @@ import time
 
 
 def main() -> None:
-    """Send until the end."""
+    """Send the text until the last tick."""
     number, ticks, rate_hz = sys.argv[1:]
     with socket.socket(fileno=int(number)) as line:
         line.recv(1)

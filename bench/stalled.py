@@ -1,8 +1,9 @@
-"""Pages for `fanout_stall`: most read all data, some read nothing, one reads slowly.
+"""Pages for `fanout_stall`: most read all data, some read nothing, and one reads slowly.
 
 ``python -m bench.stalled PORT PATH HEALTHY STOPPED BYTES_PER_S`` prints ``ready``. At the end of
-its input it prints a JSON object. It has the number of frames with values of each healthy page, and
-the times and ages of the slow page's frames. Both are in milliseconds of the monotonic clock.
+its input it prints a JSON object. The object has the number of frames with values of each healthy
+page. It also has the times and ages of the slow page's frames, in milliseconds of the monotonic
+clock.
 """
 
 import json
@@ -31,7 +32,7 @@ class Page(Viewer):
         self.is_open = True
 
     def read(self, most: int, *, is_aged: bool = False) -> int:
-        """Read a limited number of bytes; return how many there were."""
+        """Read a limited number of bytes; return the number."""
         try:
             data = self.line.recv(most)
         except BlockingIOError:
@@ -62,7 +63,7 @@ class Page(Viewer):
 
 
 def main() -> None:
-    """Read until the input ends."""
+    """Read frames until standard input ends."""
     port, path = int(sys.argv[1]), sys.argv[2]
     healthy_count, stopped_count, rate = map(int, sys.argv[3:6])
     healthy = [Page(port, path) for _ in range(healthy_count)]

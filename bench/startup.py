@@ -1,4 +1,4 @@
-"""Cost of starting a command, as whole processes, against common tools."""
+"""Time to start a command as a whole process, against common tools."""
 
 import platform
 import shutil

@@ -46,7 +46,7 @@ class Viewer:
         self.skip = 0
 
     def take(self) -> bool:
-        """Count received frames; return whether more can come."""
+        """Count received frames; return whether the connection is still open."""
         data = self.line.recv(CHUNK)
         if not data:
             return False
@@ -80,7 +80,7 @@ def head_and_body(data: bytes) -> int | None:
 
 
 def main() -> None:
-    """Count until the input ends."""
+    """Count frames until standard input ends."""
     port, path, count, *shown = sys.argv[1:]
     viewers = [Viewer(int(port), path, shown) for _ in range(int(count))]
     ready = selectors.DefaultSelector()

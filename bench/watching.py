@@ -68,7 +68,7 @@ class Robot:
         self._ticks = ticks
 
     async def heard(self, tell: Callable[[int], None]) -> None:
-        """Start it, and call `tell` after each received piece, until its end."""
+        """Start the robot, and call `tell` after each received piece, until its end."""
         loop = asyncio.get_running_loop()
         done = loop.create_future()
         tick = 0
@@ -89,15 +89,15 @@ class Robot:
         finally:
             loop.remove_reader(self._line)
         if tick != self._ticks:
-            raise SystemExit("bench: the robot fell silent")
+            raise SystemExit("bench: the robot stopped sending")
 
 
 @asynccontextmanager
 async def speaking(ticks: int, rate_hz: float) -> AsyncIterator[Robot]:
     """Start a robot, which waits for its first received data.
 
-    It wakes the server as a real robot does, by a readable socket. A timer in this process would
-    cost several times as much, and its cost would be measured.
+    Like a real robot, it wakes the server by a readable socket. A timer in this process would cost
+    several times as much, and its cost would be measured.
     """
     ours, theirs = socket.socketpair()
     with ours, theirs:

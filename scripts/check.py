@@ -29,7 +29,7 @@ NODE_MODULES = ROOT / "node_modules"
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One program that must exit with 0."""
+    """A program that must exit with 0."""
 
     name: str
     command: tuple[str, ...]

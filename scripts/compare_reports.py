@@ -73,7 +73,7 @@ for path in sorted(Path("robots").glob("*.yaml")):
     resolved[path.name] = resolve(path.as_posix(), shelf, profile).text
 print(json.dumps({"reports": reports, "resolved": resolved}))
 """
-"""Runs in the tree of a commit, on the code of that commit."""
+"""Program that runs in the tree of a commit, with the code of that commit."""
 
 Problem = tuple[str, int, int, str, str]
 """File, line, column, severity and code."""
@@ -119,7 +119,7 @@ def unpack(commit: str, folder: Path) -> None:
 
 
 def recorded(root: Path) -> dict[str, Any]:
-    """Return the reports and the resolved profiles of a tree, by its own code."""
+    """Return the reports and resolved profiles of a tree, computed by the code of that tree."""
     done = subprocess.run(
         [sys.executable, "-c", RECORD],
         cwd=root,
@@ -132,7 +132,7 @@ def recorded(root: Path) -> dict[str, Any]:
 
 
 def without_title(text: str) -> str:
-    """Return a resolved profile without its first line, a comment for people."""
+    """Return a resolved profile without its first line, which is a comment."""
     return text.partition("\n")[2]
 
 
@@ -186,7 +186,7 @@ class Comparison:
                     break
 
     def differs(self, text: str, kind: str) -> None:
-        """Count a difference; show the first of each kind, or all of them."""
+        """Count a difference; print the first of each kind, or all differences."""
         self.is_different = True
         self.counts[kind] += 1
         if self.counts[kind] == 1:

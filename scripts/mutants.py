@@ -66,7 +66,7 @@ class Mutant:
 
     @property
     def shown(self) -> str:
-        """Its change with the lines around it."""
+        """The change with the surrounding lines."""
         return f"  {self.function}\n" + "\n".join(f"  {line}" for line in self._diff())
 
     def _diff(self) -> list[str]:
@@ -85,7 +85,7 @@ class Mutant:
 
 
 class Kind(NamedTuple):
-    """Mutants that are all harmless for one reason."""
+    """A group of mutants that are harmless for the same reason."""
 
     before: re.Pattern[str]
     """Pattern of the whole removed code."""
@@ -150,7 +150,7 @@ def mutants_in(copy: Path, settings: Settings) -> list[Mutant]:
 
 
 def table(mutants: list[Mutant], explained: Explained) -> Iterator[str]:
-    """Yield a line for each module, and one for all."""
+    """Yield a line for each module, and a line with the totals."""
     heads = [*STATUSES[:3], "explained", *STATUSES[3:]]
     yield f"{'':<28}" + "".join(f"{head:>10}" for head in [*heads, "all", "killed %"])
     modules = sorted({one.module for one in mutants})

@@ -33,7 +33,7 @@ def main() -> int:
     """Run the waiting mutants; print the summary; return the exit code."""
     options = _options()
     if os.name == "nt":
-        print("mutate: mutmut needs fork, which Windows has not; use WSL", file=sys.stderr)
+        print("mutate: mutmut needs fork, which Windows lacks; use WSL", file=sys.stderr)
         return 2
     settings = Settings.of(ROOT)
     if not options.report:

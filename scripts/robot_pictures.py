@@ -70,7 +70,7 @@ async def take(browser: Browser, address: str, name: str) -> None:
 
 
 async def pictures(names: list[str]) -> None:
-    """Take the pictures, one after the other."""
+    """Take the pictures one after another."""
     IMAGES.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:  # without a latched stop of the user
         await pictures_of(names, {"URC_DATA_DIR": folder})
@@ -92,7 +92,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Take the pictures, and write the pages."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("names", nargs="*", metavar="NAME")
-    parser.add_argument("--text", action="store_true", help="write the pages alone")
+    parser.add_argument("--text", action="store_true", help="write only the pages")
     given = parser.parse_args(arguments)
     known = sorted(file.stem for file in shipped("robots").glob("*.yaml"))
     if unknown := sorted(set(given.names) - set(known)):

@@ -60,7 +60,7 @@ def main() -> int:
 
 
 def every_shot(folder: Path) -> list[Shot]:
-    """Return the menu and the GUI on each screen, in each theme."""
+    """Return the shots of the menu and the GUI for each screen and theme."""
     pages = {"menu": "", "gui": "robots/puppet/"}
     return [
         Shot(folder / f"{name}-{size}-{theme}.png", page, width, height, theme)

@@ -54,7 +54,7 @@ def draw(found: list[Sentence], seed: str, count: int = COUNT) -> list[Sentence]
 
 
 def files_of(commit: str) -> dict[str, str]:
-    """Return path and text of every file of a commit that has prose."""
+    """Return path and text of every file with prose in a commit."""
     with tarfile.open(fileobj=io.BytesIO(_git("archive", "--format=tar", commit))) as archive:
         return {
             member.name: file.read().decode("utf-8")

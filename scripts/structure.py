@@ -3,8 +3,8 @@
     python -m scripts.structure             this tree
     python -m scripts.structure ROOT        another one, such as a worktree of an older commit
 
-Figures to compare before and after a change; none is a goal by itself. `--names` lists the modules,
-classes and functions behind the counts. How each is counted:
+Compare the figures before and after a change; no figure is a goal by itself. `--names` lists the
+modules, classes and functions behind the counts. How each is counted:
 
 - modules with one importer: modules of `urc` that exactly one other module imports, at any level,
   or by an entry `"urc.module:name"` of a table; packages and `__main__` do not count;
@@ -142,7 +142,7 @@ def modules(root: Path, folder: str) -> list[Module]:
 
 
 def structure(found: list[Module]) -> Structure:
-    """Return every figure about the modules."""
+    """Return all figures of the modules."""
     public, private = repeated_names(found)
     return Structure(
         lines=lines_of(found),
@@ -157,7 +157,7 @@ def structure(found: list[Module]) -> Structure:
 
 
 def lines_of(found: list[Module]) -> Lines:
-    """Count the lines of the modules together."""
+    """Return the total line counts of the modules."""
     counted = Lines()
     for module in found:
         lines = module.text.splitlines()
@@ -182,7 +182,7 @@ def lines_of(found: list[Module]) -> Lines:
 
 
 def with_one_importer(found: list[Module]) -> list[str]:
-    """Return the names of modules that exactly one other module imports."""
+    """Return the names of modules with exactly one importer."""
     known = {module.name for module in found}
     importers: dict[str, set[str]] = defaultdict(set)
     for module in found:
@@ -193,7 +193,7 @@ def with_one_importer(found: list[Module]) -> list[str]:
 
 
 def imported(module: Module, known: set[str]) -> set[str]:
-    """Return the modules among `known` that a module imports or names in a table."""
+    """Return the modules of `known` that a module imports or names in a table."""
     found: set[str] = set()
     for node in ast.walk(module.tree):
         if isinstance(node, ast.Import):
@@ -225,7 +225,7 @@ def repeated_names(found: list[Module]) -> tuple[dict[str, list[str]], dict[str,
 
 
 def functions(module: Module) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
-    """Yield each function of a module, methods and inner ones included."""
+    """Yield each function of a module, including methods and inner functions."""
     for node in ast.walk(module.tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             yield node

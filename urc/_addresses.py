@@ -22,7 +22,7 @@ _ROUTED_TO = ("192.0.2.1", "10.255.255.254", "172.31.255.254", "192.168.255.254"
 
 
 class _Interface(ctypes.Structure):
-    """The beginning of ``struct ifaddrs`` in C; the rest differs between systems."""
+    """Start of ``struct ifaddrs`` in C; the remaining fields differ between systems."""
 
     _fields_ = (
         ("next", ctypes.c_void_p),
@@ -46,7 +46,7 @@ def local_addresses() -> tuple[Address, ...]:
 def is_of_this_machine(address: Address) -> bool:
     """Return whether `address` belongs to an interface of this machine.
 
-    False for an address that a router or a container host forwards to this machine.
+    The result is False for an address that a router or a container host forwards to this machine.
     """
     plain = unmapped(address)
     return plain.is_loopback or plain.is_unspecified or plain in _all()

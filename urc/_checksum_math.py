@@ -1,7 +1,7 @@
 """Checksum algorithms: their parameters, and the functions from bytes to numbers.
 
-A library computes CRCs (`anycrc`, or the standard library for its own two); sums and folds are one
-call into C each.
+A library computes CRCs (`anycrc`, or the standard library for its own two); each sum or fold is one
+call of a C function.
 """
 
 import binascii
@@ -53,7 +53,7 @@ class FoldSpec(NamedTuple):
     added: int = 0
     """Number to add to the result, after the mask."""
     ored: int = 0
-    """Bits of the result to set, last of all."""
+    """Bits of the result to set in the last step."""
     is_odd_xored: bool = False
     """Whether an odd last byte is combined by exclusive or, with numbers of 16 bits."""
 
@@ -122,7 +122,7 @@ def build_algorithm(spec: CrcSpec | FoldSpec | str, *, is_big: bool = True) -> C
 
     Args:
         spec: the algorithm.
-        is_big: byte order of numbers wider than one byte, which only folds have.
+        is_big: byte order of numbers wider than one byte; only folds have such numbers.
     """
     if isinstance(spec, str):
         return NAMED[spec]
@@ -169,7 +169,7 @@ def _numbers(data: bytes, size: int, order: str) -> list[int]:
 
 
 def _fletcher(modulus: int, bits: int, size: int = 1) -> Compute:
-    """Return Fletcher's checksum; `size` is that of its little-endian numbers in bytes."""
+    """Return Fletcher's checksum; `size` is the width of its little-endian numbers in bytes."""
 
     def compute(data: bytes) -> int:
         numbers = data if size == 1 else _numbers(data, size, "little")

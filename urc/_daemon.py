@@ -1,7 +1,7 @@
-"""Work that may block, in a thread that delays neither the loop nor the exit of the process.
+"""Blocking work in a thread that delays neither the loop nor the exit of the process.
 
-The loop waits for `asyncio.to_thread` when it closes. A repository that hangs for two
-minutes must not delay Ctrl-C by two minutes.
+A closing loop waits for threads of `asyncio.to_thread`, so this module has its own. A repository
+that hangs for two minutes must not delay Ctrl-C by two minutes.
 """
 
 import asyncio
@@ -16,9 +16,9 @@ _T = TypeVar("_T")
 
 
 def in_daemon(work: Callable[[], _T], name: str) -> "asyncio.Future[_T]":
-    """Start `work` in a thread of its own; return a future of its result or exception.
+    """Start `work` in a new thread; return a future of its result or exception.
 
-    After a cancel the thread runs to its end, and its result is dropped.
+    A cancelled future does not stop the thread, whose result is then discarded.
     """
     loop = asyncio.get_running_loop()
     future: asyncio.Future[_T] = loop.create_future()

@@ -60,7 +60,7 @@ def too_large(most: int) -> str:
 
 
 def refused(file: str, code: str, message: str, hint: str = "") -> ProblemsError:
-    """Return the error for a file that is refused as a whole."""
+    """Return the error for a completely rejected file."""
     return ProblemsError([Problem(code, message, file, hint=hint)])
 
 

@@ -1,8 +1,8 @@
 """Text forms of values: in templates, joined lists, paths, topics and messages.
 
 Private to expressions. The same number always has the same text, whether it arrived as 20 or as
-20.0. The text has as few decimal digits as distinguish it from its neighbours, and no exponent,
-which few robots can read.
+20.0. The text has the fewest decimal digits that identify the number. It has no exponent, because
+few robots can read exponents.
 """
 
 import json
@@ -13,7 +13,7 @@ from urc.problems import printable
 __all__ = ["quoted", "spelt"]
 
 _ENDS = {"\n": "\\n", "\r": "\\r", "\t": "\\t"}
-"""Escapes in their familiar form."""
+"""Control characters with short escapes."""
 
 
 def spelt(value: object) -> str:
@@ -34,11 +34,11 @@ def spelt(value: object) -> str:
 def quoted(value: object, most: int = 40) -> str:
     """Return a value for a message to people: quoted text, or bytes as hex digits.
 
-    Terminal control characters are escaped, once.
+    Terminal control characters are escaped exactly once.
 
     Args:
         value: any value from a robot, a page or a document.
-        most: longest result in characters; longer ones are cut.
+        most: limit of the result in characters; longer results are cut.
     """
     if value is None:
         return "“not available”"

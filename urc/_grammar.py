@@ -2,7 +2,8 @@
 
 Private to `urc.expressions`. Grammar and precedence are those of Jinja ("Expressions" in its
 template designer documentation). A parser of our own gives the column of every error, and saves 40
-ms for importing a template engine. `tests/unit/test_expressions.py` compares it with Jinja.
+ms for importing a template engine. `tests/unit/test_expressions.py` compares this parser with
+Jinja.
 
 WARNING: the result is passed to eval. The Python source may contain only the `repr()` of constants,
 the text that `resolve` returns, and names of `urc.filters.table.SCOPE`.
@@ -41,7 +42,7 @@ _TESTS = (
 )  # fmt: skip
 _PATTERNS = ("match", "search")
 COUNTERS: Final = "seq()"
-"""Root name of the counters of a namespace; no name of a document can equal it."""
+"""Root name of the counters of a namespace; documents cannot have this name."""
 NONCE: Final = "nonce()"
 """Root name of the nonce of a namespace."""
 _MOST_NONCE: Final = 64
@@ -308,7 +309,7 @@ class _Parser:
         return f"{self._resolve(COUNTERS)}({string_of(name)!r}, {low}, {high})"
 
     def _nonce(self, token: Token) -> str:
-        """Parse ``nonce()`` or ``nonce(8)``: that many nonce bytes, 16 by default."""
+        """Parse ``nonce()`` or ``nonce(8)``: 16 nonce bytes, or the given number."""
         size = 16 if self._next.text == ")" else self._whole()
         if size is None or not self._accept(")"):
             raise ExpressionSyntaxError(
@@ -348,7 +349,7 @@ class _Parser:
                 return value
 
     def _pattern(self, test: Token) -> str:
-        """Parse ``('regular expression')`` after a test; it is compiled with the expression."""
+        """Parse ``('regular expression')`` after a test, and compile the pattern."""
         self._expect("(")
         token = self._advance()
         if token.kind != "string":

@@ -1,6 +1,6 @@
-"""HTTP headers that documents must not set, because they identify the sender or frame the request.
+"""HTTP headers reserved for URC, because they identify the sender or delimit the request.
 
-Browsers withhold them from scripts for the same reason. With these headers, a document could
+Browsers forbid scripts these headers for the same reason. With these headers, a document could
 pretend to be a page of the dashboard, a page of another program, or a proxy.
 """
 

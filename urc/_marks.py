@@ -31,9 +31,9 @@ class Mark:
         self.key: Span | None = None
         self.children = {} if children is None else children
         self.origin: Any = None
-        """Document that contains this value and its children; None: that of the parent."""
+        """Document that contains this value and its children; None for the parent's document."""
         self.written: UnfilledText | None = None
-        """Original text, when the value was made from it."""
+        """Original text of a computed value."""
 
     def copy(self, children: "dict[str | int, Mark] | None" = None) -> "Mark":
         """Return a mark of the same place, with `children` if given."""
@@ -43,7 +43,7 @@ class Mark:
 
 
 class UnfilledText(NamedTuple):
-    """A text before its names were filled in."""
+    """A text before the substitution of its names."""
 
     text: str
     edits: tuple[tuple[int, int, int], ...]

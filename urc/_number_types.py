@@ -23,27 +23,27 @@ class Number(NamedTuple):
     is_signed: bool = False
     endian: Literal["big", "little"] = "big"
     are_words_swapped: bool = False
-    """Whether its words of 16 bits are in reverse order; `endian` is the byte order of each
-    word."""
+    """Whether the words of 16 bits are in reverse order; `endian` is the byte order of each word.
+    """
     is_by_seven: bool = False
     """Whether each byte has seven bits of the number after a zero bit."""
 
     @property
     def size(self) -> int:
-        """Size in bytes; the least size of a variable number."""
+        """Size in bytes; the smallest size of a number with variable size."""
         if self.is_by_seven:
             return self.bits // 7
         return 1 if self.is_variable else self.bits // 8
 
     @property
     def is_coded(self) -> bool:
-        """Whether it has an encoding of its own."""
+        """Whether the number has a special encoding."""
         is_odd = self.is_variable or self.kind == "bcd"
         return is_odd or self.are_words_swapped or self.is_by_seven
 
     @property
     def is_variable(self) -> bool:
-        """Whether its size depends on the value."""
+        """Whether the size depends on the value."""
         return self.kind in ("varint", "zigzag")
 
     @property

@@ -1,9 +1,9 @@
-r"""Regular expressions of documents: matched in linear time, or refused.
+r"""Regular expressions of documents, with matching in linear time.
 
-Private to `urc.patterns` and `urc.filters.lists`. The dialect is that of RE2: no look-around, no
-back-references, ``$`` is the very end, ``\d`` is ASCII. A pattern that `_is_linear` proves harmless
-runs on `re`, ten times faster on short lines; all others run on RE2. Without an installed RE2,
-unproven patterns are refused.
+Private to `urc.patterns` and `urc.filters.lists`. The dialect is RE2: no look-around, no
+back-references; ``$`` matches only the end, and ``\d`` only ASCII digits. A pattern that
+`_is_linear` proves harmless runs on `re`, ten times faster on short lines; all others run on RE2.
+Without an installed RE2, unproven patterns are refused.
 
 Theory of operation: backtracking exceeds linear time only if two parts of a pattern can share the
 same characters in many ways. A proven pattern must therefore be anchored at the start, and
@@ -11,8 +11,8 @@ alternatives must differ in their first character. Every repeat must be over one
 disjoint from the possible next characters.
 
 The time of RE2 is proportional to the text and to its program, in which ``{n}`` is expanded. The
-size of an unproven pattern is therefore bounded. It is computed here, from the source, so that the
-result is the same without RE2.
+size of an unproven pattern is therefore bounded. This module computes the size from the source, so
+that the result is the same without RE2.
 """
 
 import re
@@ -36,9 +36,9 @@ __all__ = [
 
 MAX_SOURCE: Final = 1024
 MAX_REPEAT: Final = 1000
-"""Limit of RE2 on ``{n}``."""
+"""Limit of ``n`` in ``{n}`` in RE2."""
 MAX_COST: Final = 1000
-"""Size limit of an unproven pattern, its repeats expanded: about the instructions of RE2.
+"""Size limit of an unproven pattern with expanded repeats, approximately in instructions of RE2.
 
 A sentence of NMEA 0183, ``\\$[^\\r\\n]{1,80}\\r\\n``, has the size 802. The worst pattern at the
 limit takes about half a second for a frame of 64 KiB.
@@ -102,7 +102,7 @@ class Pattern:
         self.groups = groups
         """Names of its groups, in order."""
         self.is_proven = is_proven
-        """Whether it runs on `re`; otherwise on RE2."""
+        """Whether the pattern runs on `re` instead of RE2."""
         self._search = search
 
     @property
@@ -139,8 +139,8 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
         is_over_bytes: whether it matches bytes, each as one character, instead of text.
 
     Raises:
-        PatternError: an invalid pattern, one outside of the dialect, or one that needs an absent
-            RE2.
+        PatternError: the pattern is invalid, outside of the dialect, or needs RE2, which is
+            missing.
     """
     if len(text) > MAX_SOURCE:
         raise PatternError(f"a pattern has at most {MAX_SOURCE} characters, found {len(text)}")
@@ -180,9 +180,9 @@ def example(pattern: Pattern, groups: Mapping[str, str], variant: int = 0) -> st
     Args:
         pattern: pattern of the text.
         groups: name of a group → its text.
-        variant: 0 omits optional parts without given groups, and takes the first alternative and
-            the first printable character of a class. Other numbers take other alternatives,
-            characters and repeats.
+        variant: with 0, the text omits optional parts without given groups, and has the first
+            alternative and the first printable character of a class. Other numbers select other
+            alternatives, characters and repeats.
     """
     tree = _parser.parse(pattern.source, re.ASCII)
     names = {number: name for name, number in tree.state.groupdict.items()}
@@ -215,7 +215,7 @@ def can_be_empty(pattern: Pattern, name: str) -> bool:
 
 
 def _least_width(tree: Any, number: int) -> int | None:
-    """Return the least length of the group, or None when it is not in `tree`."""
+    """Return the least length of the group, or None for a group outside of `tree`."""
     for operation, argument in tree:
         if operation is _constants.SUBPATTERN and argument[0] == number:
             return int(argument[3].getwidth()[0])
@@ -227,7 +227,7 @@ def _least_width(tree: Any, number: int) -> int | None:
 
 
 def _alphabet(tree: Any, number: int) -> frozenset[int] | None:
-    """Return all possible characters of the group, or None when it is not in `tree`."""
+    """Return all possible characters of the group, or None for a group outside of `tree`."""
     for operation, argument in tree:
         if operation is _constants.SUBPATTERN and argument[0] == number:
             return _letters(argument[3])
@@ -314,12 +314,12 @@ def _parts(operation: Any, argument: Any) -> list[Any]:
 
 
 def cost_of(source: str) -> int:
-    """Return the size of a pattern, its repeats expanded."""
+    """Return the size of a pattern with expanded repeats."""
     return _cost(_parser.parse(source, re.ASCII))
 
 
 def _cost(tree: Any, beyond: int = _BEYOND_ASCII) -> int:
-    """Return the size of a program; `beyond` is that of all characters outside ASCII."""
+    """Return the size of a program; `beyond` is the size of all characters outside ASCII."""
     return sum(_cost_of_item(operation, argument, beyond) for operation, argument in tree)
 
 

@@ -1,7 +1,7 @@
 """Conversion of a quaternion to roll, pitch and yaw, in radians.
 
-Private to `urc.filters.table`. A quaternion is [x, y, z, w] or {x, y, z, w}, of any length but
-zero. The angles are about x, then y, then z in its axis convention (REP-103). Without an
+Private to `urc.filters.table`. A quaternion is [x, y, z, w] or {x, y, z, w}, of any norm except
+zero. The angles are rotations about x, then y, then z, in the axes of REP-103. Without an
 orientation the angles are not-a-number, which any arithmetic preserves: "not available".
 """
 
@@ -41,7 +41,7 @@ def yaw(value: object) -> float:
 
 
 def _parts(value: object) -> _Parts | None:
-    """Return a unit quaternion, or None for an absent, zero or infinite one."""
+    """Return a unit quaternion, or None for an absent, zero or infinite quaternion."""
     if value is None:
         return None
     if isinstance(value, Mapping):

@@ -1,7 +1,7 @@
 """Translatable texts for people.
 
-A phrase is its English text together with its parts, so that a catalogue can translate it later;
-see `urc.web.words`. `scripts.translations` finds the texts by the name `phrase`.
+A phrase keeps its English text and its parts, so that a catalogue can translate it later; see
+`urc.web.words`. `scripts.translations` finds the texts by the name `phrase`.
 """
 
 from collections.abc import Iterable, Mapping

@@ -1,7 +1,7 @@
 """Translation of YAML parser errors into messages and hints for people.
 
-Private to `urc.source`. The module handles both parsers of PyYAML (C and pure Python). The messages
-of the two parsers differ, so the text at the place decides wherever possible.
+Private to `urc.source`. The module handles both parsers of PyYAML (C and pure Python). Their
+messages differ, so the module uses the text at the error where possible.
 """
 
 import re
@@ -53,7 +53,7 @@ class _Clue(NamedTuple):
 
 
 def explain(error: yaml.YAMLError, lines: Sequence[str]) -> SyntaxFault:
-    """Return the syntax error that `error` means, at the most useful place."""
+    """Translate `error` into a syntax error at the most useful place."""
     mark = getattr(error, "problem_mark", None)
     opened = getattr(error, "context_mark", None) or mark
     said = str(getattr(error, "problem", None) or error).splitlines()[0]

@@ -36,7 +36,7 @@ class DocumentLimits(NamedTuple):
 
 
 class StoppedError(Exception):
-    """Reading has stopped; the last problem of the reader gives the reason."""
+    """The end of reading at an error; the last problem of the reader gives the reason."""
 
 
 class _Built(NamedTuple):
@@ -175,7 +175,7 @@ class TreeReader:
         return items, height + 1
 
     def _key(self, event: Any, start: Any, depth: int) -> str | None:
-        """Return the key, or None when it was reported and its value is skipped."""
+        """Return the key, or None for a reported key whose value is skipped."""
         if type(event) is not yaml.ScalarEvent:
             self._node(event, depth + 1)
             self._report_complex_key(event, start)
@@ -289,7 +289,7 @@ class TreeReader:
         return not self._line(end.line)[end.column :].lstrip().startswith(":")
 
     def _report_comma(self, event: Any, before: Any) -> None:
-        """Report a key without a colon, which is the rest of the text `before`."""
+        """Report a key without a colon: the rest of the text `before`."""
         self._report(
             event,
             "unquoted",

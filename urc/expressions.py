@@ -42,7 +42,7 @@ NOW: Final = "now"
 """Root name of the time of day, in seconds since 1970."""
 _HASHES: Final = frozenset(f"_filter_{name}" for name in ("md5", "sha1", "sha256", "hmac_sha256"))
 _SUMMARIES: Final = frozenset(("_filter_length", "_is_defined", "_is_none", "_match", "_search"))
-"""Functions whose result reveals too little of their operand to matter."""
+"""Functions whose results reveal almost nothing of their operands."""
 _NONCE: Final = re.compile(rf"ns\['{re.escape(NONCE)}'\]\(\d+\)")
 MAX_SOURCE: Final = 4096
 """Longest template, in characters."""
@@ -59,7 +59,7 @@ _INSTEAD: Final = {
 
 
 class ExpressionError(UrcError):
-    """A template that cannot be compiled, or not be evaluated with the given values.
+    """A failure to compile a template, or to evaluate it with the given values.
 
     `offset` is the 0-based character of the error in the template.
     """
@@ -80,9 +80,9 @@ class Template:
         self.python = python
         """Compiled Python expression, over a mapping `ns`."""
         self.names = names
-        """Root names that it uses: ``settings``, an argument, a signal."""
+        """Root names in the expression: ``settings``, an argument, a signal."""
         self.settings = settings
-        """Names of the settings that it uses, as ``settings.NAME``."""
+        """Names of settings in the expression, from ``settings.NAME``."""
         self.is_constant = not names
         self._function: Callable[[Mapping[str, object]], Any] = _function(python)
 
@@ -118,7 +118,7 @@ def compile_template(text: str) -> Template:
     """Compile text that contains ``{{ expression }}``.
 
     Raises:
-        ExpressionError: with the offset of the error in `text`.
+        ExpressionError: an invalid template; the error has its offset in `text`.
     """
     _check_length(text)
     parts: list[str] = []
@@ -143,7 +143,7 @@ def compile_expression(text: str, *, allows_bytes: bool = False) -> Template:
 
     Args:
         text: the expression.
-        allows_bytes: whether its value may be bytes.
+        allows_bytes: whether the expression's value may be bytes.
     """
     _check_length(text)
     if not text.strip():
@@ -271,7 +271,7 @@ def _gather(node: ast.AST, needed: set[str], spare: set[str], *, has_default: bo
 def digested_settings(template: Template) -> frozenset[str]:
     """Return the settings that appear only in tests and in hashes with a nonce or time.
 
-    Such a hash reveals nothing about the setting, and is useless for a replay.
+    A hash with a nonce or time reveals nothing about the setting, and is useless for a replay.
     """
     if not template.settings:
         return frozenset()

@@ -1,8 +1,8 @@
 """Media type and size of a picture from its first bytes, without decoding it.
 
-A few kilobytes may decode to gigabytes in a browser, so the size of the picture counts, not that of
-the file. Sources: PNG (ISO/IEC 15948, 11.2.2), JPEG (ITU-T T.81, B.2.2), GIF89a (section 18), WebP
-(RFC 9649), BMP (BITMAPINFOHEADER).
+A few kilobytes may decode to gigabytes in a browser, so the picture's size matters, not the file's
+size. Sources: PNG (ISO/IEC 15948, 11.2.2), JPEG (ITU-T T.81, B.2.2), GIF89a (section 18), WebP (RFC
+9649), BMP (BITMAPINFOHEADER).
 """
 
 import struct
@@ -11,7 +11,7 @@ from typing import Final
 __all__ = ["MAX_PIXELS", "media_type", "picture_size", "pixels"]
 
 MAX_PIXELS: Final = 16_000_000
-"""Largest picture in pixels: 64 MB in a browser."""
+"""Limit of a picture in pixels, which take 64 MB in a browser."""
 
 _OTHER: Final = "application/octet-stream"
 _SIGNS: Final = (
@@ -41,7 +41,7 @@ def media_type(data: bytes) -> str:
 def picture_size(data: bytes) -> tuple[int, int] | None:
     """Return width and height in pixels, or None if the first bytes do not contain them.
 
-    AVIF gives None, too: its size is in nested boxes, and browsers limit it themselves.
+    The result for AVIF is None, too: its size is in nested boxes, and browsers limit it themselves.
     """
     read = _READERS.get(media_type(data))
     try:

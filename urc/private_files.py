@@ -1,6 +1,6 @@
 """Atomic writing of private files, safe against a power failure.
 
-For data that outlives a run: settings, a latched STOP, host keys.
+The files contain data that outlives a run: settings, a latched STOP, host keys.
 """
 
 import os
@@ -36,8 +36,8 @@ def put_private(file: Path, data: bytes) -> None:
         data: complete content.
 
     Raises:
-        OSError: for example a full disk. The old content then remains, unless only the sync of the
-            folder failed.
+        OSError: the file cannot be written, for example on a full disk. The old content then
+            remains, unless only the sync of the folder failed.
     """
     make_private(file.parent)
     # `mkstemp` makes files that only their owner can read.

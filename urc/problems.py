@@ -1,7 +1,8 @@
 """Problems of documents, and their output for people and programs.
 
-Independent of YAML, robots and the command line. All passes of the loader, the tests of documents
-and the widget manifests report a `Problem`. Text, JSON and the web editor show the same values.
+This module is independent of YAML, robots and the command line. All passes of the loader, the tests
+of documents and the widget manifests report a `Problem`. Text, JSON and the web editor show the
+same values.
 """
 
 from collections.abc import Iterable, Sequence
@@ -49,16 +50,18 @@ class Problem(NamedTuple):
     """One problem: the place, the found and the expected text, and a hint."""
 
     code: str
-    """Name of the fault, never of the hint: ``unknown-key``."""
+    """Name of the fault, such as ``unknown-key``."""
     message: str
-    """One line: the found and the expected text."""
+    """The found and the expected text, in one line."""
     file: str
     line: int = 1
     """1-based."""
     column: int = 1
     """1-based, in characters."""
     end_column: int = 0
-    """1-based, exclusive, on the same line; 0 when only the start is known."""
+    """End of the underlined text: 1-based, exclusive, on the same line; 0 if only the start is
+    known.
+    """
     path: str = ""
     """Path in the document, as ``transports.wire.port``."""
     hint: str = ""
@@ -81,7 +84,7 @@ def printable(text: str) -> str:
 
 
 def printable_json(text: str) -> str:
-    """Return equivalent JSON with the same characters written as JSON escapes."""
+    """Return equivalent JSON with control and reordering characters written as JSON escapes."""
     return text.translate(_IN_JSON)
 
 

@@ -15,7 +15,7 @@ __all__ = ["Registries", "RegistryEntry", "Table"]
 
 
 class RegistryEntry:
-    """One entry: a word of documents, and the place of its code."""
+    """A row of a table: a word of documents, and the place of its code."""
 
     __slots__ = ("factory", "name")
 
@@ -43,7 +43,10 @@ class Table:
         return iter(self._rows)
 
     def get(self, name: str) -> RegistryEntry | None:
-        """Return the row, or None. Entry points are read only when no built-in row has the name."""
+        """Return the row of this name, or None.
+
+        Entry points are read only if no built-in row has the name.
+        """
         if name not in self._rows:
             self._read_entry_points()
         return self._rows.get(name)

@@ -1,6 +1,6 @@
 """Conversion of YAML text into a `Document`: plain data, and the position of every value.
 
-This module knows YAML, but nothing about robots. The only exception is `ProblemsError`, whose
+This module knows YAML, but nothing about robots. All errors are raised as `ProblemsError`, whose
 problems have the place and a hint. Time and memory are bounded for any content.
 """
 
@@ -66,7 +66,7 @@ class Document:
         self.mark = mark
         """Marks of the whole document; `at` finds one of them."""
         self.findings = findings
-        """Warnings of the reader; errors are raised."""
+        """Warnings of the reader; errors raise an exception."""
 
     def at(self, path: Path) -> Mark | None:
         """Return the marks of the value at `path`, or None for a missing value."""
@@ -106,9 +106,9 @@ class Document:
             code: name of the problem.
             message: the found and the expected text.
             hint: advice.
-            key: point at the key instead of the value.
-            offset: 0-based character inside the text at `path` to point at.
-            length: characters to underline from `offset`.
+            key: whether to point at the key instead of the value.
+            offset: 0-based character to point at in the text at `path`.
+            length: number of characters to underline from `offset`.
             severity: ``error`` or ``warning``.
         """
         home, mark, depth = self._nearest(path)
@@ -332,8 +332,8 @@ def _inside_lines(
 ) -> Span | None:
     """Return the place of a character in a scalar of several lines.
 
-    The function looks up the lines in the value one by one. The method works for literal and folded
-    blocks and for plain and quoted text, unless escapes occur.
+    The function searches the lines in the value one after another. The search works for blocks,
+    plain text and quoted text without escapes.
     """
     position = 0
     last = min(span.end_line, len(lines))

@@ -1,1 +1,1 @@
-"""Other dashboards on the same job, for `bench.browser_peers`."""
+"""Other dashboards with the same task, for `bench.browser_peers`."""

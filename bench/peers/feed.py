@@ -1,4 +1,4 @@
-"""A robot with 200 values, 50 times a second in one JSON line; prints its port."""
+"""A robot that sends 200 values in one JSON line, 50 times a second; it prints its port."""
 
 import asyncio
 import contextlib

@@ -1,4 +1,4 @@
-"""The same page in NiceGUI: ``python nice.py ROBOT_PORT PORT``."""
+"""The benchmark's page in NiceGUI: ``python nice.py ROBOT_PORT PORT``."""
 
 import asyncio
 import sys

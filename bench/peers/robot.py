@@ -1,9 +1,9 @@
 """A robot that sends the time: ``python robot.py RATE_HZ``; it prints its port.
 
 Each line is the machine's monotonic clock in tenths of milliseconds, modulo `MODULUS`, plus
-`START`. So it has ten digits, and a page that shows it shows its age. At 50 lines a second, there
-are five phases between robot and display, a fifth of a frame apart. Each line is shifted by up to
-half of that, the same way in each run, so that all phases are equally frequent.
+`START`. So each line has ten digits, and a page that shows it shows its age. At 50 lines a second,
+there are five phases between robot and display, a fifth of a frame apart. Each line is shifted by
+up to half of that interval, in the same way in each run, so that all phases are equally frequent.
 """
 
 import asyncio

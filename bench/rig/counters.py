@@ -1,8 +1,8 @@
-"""Robots driven over UDP together with polls, in frames that all have one counter.
+"""Robots driven over UDP together with polls, whose frames share one counter.
 
-Each robot is a socket that stores received frames in order and answers polls. The driver is a
-session with its guard. Each gesture is one connection. It is held for seconds, sometimes with two
-controls, and then released or left to its lease.
+Each robot is a socket that stores received frames in order and answers polls. A session with its
+guard drives the robots. Each gesture uses its own connection. A control is held for seconds,
+sometimes together with a second control. Then both are released, or their lease expires.
 """
 
 import asyncio
@@ -64,7 +64,7 @@ class Gesture(NamedTuple):
     frames: int
     motions: int
     fault: str
-    """First fault, or ""."""
+    """First fault in the frames, or ""."""
 
 
 class _Robot(asyncio.DatagramProtocol):
@@ -89,7 +89,7 @@ async def gestures(
     seed: int = 1,
     told: Callable[[Gesture], None] | None = None,
 ) -> Sequence[Gesture]:
-    """Hold for each of these times, with `lanes` robots in parallel."""
+    """Hold a control for each of these times, with `lanes` robots in parallel."""
     dice = random.Random(seed)  # noqa: S311 - the same gestures in every run
     left, done = list(lasts_s), list[Gesture]()
 
@@ -129,14 +129,14 @@ def _profile(port: int) -> Profile:
 
 
 async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
-    """Hold one control all the time and another sometimes; then release them, or fall silent."""
+    """Hold one control all the time and another sometimes; then release both, or stop sending."""
     controller, loop = MotionController(session.profile.driver), asyncio.get_running_loop()
     controller.join(Operator("hand", "hand", "driver"))
     controller.attach(session.frames, session.backend)
     ready_s = loop.time() + _READY_S
     while not session.frames.is_ready("drive"):
         if loop.time() > ready_s:
-            return "the line was never ready"
+            return "the connection was never ready"
         await asyncio.sleep(0.02)
     controller.drive("hand", "take", loop.time())
     ends_s, ticks = loop.time() + lasts_s, 0
@@ -169,7 +169,7 @@ async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
 
 
 async def _follow(session: Session, controller: MotionController) -> None:
-    """Report stops to the motion controller, without end."""
+    """Report stops to the motion controller until cancelled."""
     assert session.backend is not None
     while True:
         for command, reason in await session.backend.stops():
@@ -177,7 +177,7 @@ async def _follow(session: Session, controller: MotionController) -> None:
 
 
 def _judged(lasts_s: float, heard: Sequence[tuple[int, int, str]], fault: str) -> Gesture:
-    """Find the first gap, and motion without a later stop."""
+    """Return the first gap, or motion without a later stop."""
     motions = [words for _, _, words in heard if words.startswith(("DRIVE", "LIFT"))]
     places: dict[int, int] = {}
     for port, number, words in heard:
@@ -188,5 +188,5 @@ def _judged(lasts_s: float, heard: Sequence[tuple[int, int, str]], fault: str) -
     moving = [words for words in last.values() if not words.endswith(" 0")]
     fault = fault or (f"nothing stops {moving[0]}" if moving else "")
     if len(motions) < lasts_s:
-        fault = fault or f"only {len(motions)} frames of motion"
+        fault = fault or f"found only {len(motions)} frames of motion"
     return Gesture(lasts_s, len(heard), len(motions), fault)

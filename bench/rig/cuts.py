@@ -1,8 +1,8 @@
 """Cuts of the link between server and robots while the robots are driven.
 
 Each value of the motion is the send time of its tick, so the robot knows its age at arrival. One
-rig has robots on every kind of transport. A cut affects the whole link, or the link of one robot at
-its own times.
+rig has robots on every kind of transport. A cut affects the whole link or the link of a single
+robot.
 """
 
 import json
@@ -39,7 +39,7 @@ ATTEMPTS = 3
 
 
 class NotDrivenError(AssertionError):
-    """A page that has not moved its robot; a single case is tolerated."""
+    """A page failed to move its robot; a single case is tolerated."""
 
 
 class Cut(NamedTuple):
@@ -48,9 +48,9 @@ class Cut(NamedTuple):
     kind: str
     lasted_s: float
     was_held: bool
-    """Whether the control was held all the time, instead of being released during the cut."""
+    """Whether the control was held all the time; otherwise it was released during the cut."""
     oldest_ms: float
-    """Age of the oldest motion that arrived after the cut; 0 without any."""
+    """Age of the oldest motion that arrived after the cut; 0 without motion."""
     stop_ms: float
     """Time from the end of the cut to the stop; infinite without a stop."""
     fault: str
@@ -73,7 +73,7 @@ class Cut(NamedTuple):
 
     @property
     def is_good(self) -> bool:
-        """Whether the contract was kept."""
+        """Whether the robot's motion kept the contract."""
         is_stopped = self.stop_ms <= self.bounds.stop_ms or not self.is_stop_needed
         is_fresh = self.oldest_ms <= self.bounds.oldest_ms
         return self.was_moving and not self.fault and is_fresh and is_stopped
@@ -90,10 +90,10 @@ class Cut(NamedTuple):
 
 
 class CutRig:
-    """Robots behind a relay, and a server with pages on this side of it. Needs root."""
+    """Robots behind a relay, and a server with its pages on this side of the relay. Needs root."""
 
     def __init__(self, folder: Path, kinds: Sequence[str]) -> None:
-        """Start everything; the robots' documents and the server's data go into `folder`.
+        """Start all programs; the robots' documents and the server's data go into `folder`.
 
         Args:
             folder: an empty folder.
@@ -131,7 +131,7 @@ class CutRig:
         self._witness = enter(Robots([]))
 
     def __enter__(self) -> Self:
-        """Return self; everything ends with the block."""
+        """Return self; all programs end with the block."""
         return self
 
     def __exit__(
@@ -178,7 +178,7 @@ class CutRig:
         return self._trial((queue,), seconds, f"cut {self.port(queue)}", share)[0]
 
     def drive_once(self, queue: int, life_s: float) -> None:
-        """Let a page drive a robot and release it; the page lives on, and keeps the controls."""
+        """Let a page drive and release a robot; the page keeps running, and keeps the controls."""
         began_ns = time.monotonic_ns()
         number = self._drive(queue, life_s)
         self._await_motion(queue, began_ns)
@@ -312,18 +312,18 @@ def _fault(
     stop = texts.index("M 0") if "M 0" in texts else len(texts)
     late = sum(age > LATE_MS for age in ages_ms)
     if any(text != "M 0" for text in texts[stop:]):
-        return "it moved again after the stop"
+        return "the robot moved again after the stop"
     if len(moved) != len(set(moved)):
-        return "the same motion came twice"
+        return "the same motion arrived twice"
     if bounds.most_late is not None and late > bounds.most_late:
-        return f"{late} late motions came"
+        return f"{late} late motions arrived"
     if not bounds.is_repeated and len(texts) - stop > 2:
         return f"{len(texts) - stop} stops came"  # one may be in the kernel, one on the new link
     if not was_held and len(moved) > (bounds.most_late or 0):
-        return "motion came that had been let go" if is_noticed else ""
+        return "motion arrived after its release" if is_noticed else ""
     if is_noticed and bounds.is_told and stop > (bounds.most_late or 0):
-        return "motion came before the stop"
+        return "motion arrived before the stop"
     is_last = late == stop < len(texts)  # no fresh motion in between
     if late and is_last and heard[stop].time_ns - heard[0].time_ns > burst_ms * 1e6:
-        return "the stop came long after late motion"
+        return "the stop arrived long after late motion"
     return ""

@@ -1,4 +1,4 @@
-"""The eight ways in which an operator vanishes, each many times, with the time until the stop.
+"""Times until the stop after an operator vanishes, for eight ways of vanishing.
 
 In a *bout*, one page drives each of the robots, all in parallel, and vanishes. Each value of the
 motion is the send time of its tick, so the robots' logs contain all results.
@@ -22,16 +22,16 @@ LEASE_MS = 250.0
 BOUND_MS = LEASE_MS + 50.0
 """Limit of the time from the last accepted tick to the first byte of the stop."""
 LINK_DEATHS = ("black-hole", "interface-down")
-"""Ways that need the relay."""
+"""Ways of vanishing that need the relay."""
 DEATHS = ("close", "kill", "freeze", "block", "reset", "kick", *LINK_DEATHS)
 HEALED_S = 0.4
-"""Time to watch for motion after the link is healed, in seconds."""
+"""Time to check for motion after the link is restored, in seconds."""
 STOP_WITHIN_S = 3.0
 LIFE_S = 600.0
 LOOK_NS = 25_000_000
-"""Delay until the wait of a process for a processor is known, in nanoseconds."""
+"""Delay until the processor wait of a process is known, in nanoseconds."""
 WITNESSES = 2
-"""Idle programs that measure late wake-ups of the machine, which also affect the server."""
+"""Number of idle programs that measure late wake-ups; the server has the same delays."""
 
 _PROFILE = """\
 urc: 1
@@ -56,7 +56,7 @@ def lane_profile(queue: int, host: str, port: int, kind: str = "tcp") -> str:
 
 
 class Trial(NamedTuple):
-    """Result of one vanished operator."""
+    """Result of a trial with one vanished operator."""
 
     death: str
     stop_ms: float
@@ -68,7 +68,7 @@ class Trial(NamedTuple):
     the server or a guard could not run."""
     bound_ms: float = BOUND_MS
     has_moved: bool = True
-    """Whether the robot moved before; otherwise the trial shows nothing."""
+    """Whether the robot moved before the failure; otherwise the trial is invalid."""
 
     @property
     def is_good(self) -> bool:
@@ -103,7 +103,7 @@ class Rig:
         Args:
             folder: folder for the documents and the server's data.
             lanes: number of robots, and of pages in parallel.
-            has_relay: whether a link that can be cut is between pages and server; needs root.
+            has_relay: whether a relay, which needs root, is between pages and server.
             options: further options of ``urc serve``.
             inside: command prefix that starts the server in another namespace.
         """
@@ -134,7 +134,7 @@ class Rig:
             raise
 
     def _watch(self) -> None:
-        """Watch whether the server and its guards get a processor."""
+        """Let the robots' process measure the processor waits of the server and its guards."""
         self._watcher = self._programs.enter_context(Robots([f"pid:{self.server.pid}"]))
 
     def __enter__(self) -> Self:
@@ -170,7 +170,7 @@ class Rig:
         return range(len(self.robots.heard))
 
     def weather(self, *orders: str) -> None:
-        """Make the relay slow or lossy, by its orders."""
+        """Send orders to the relay, which make it slow or lossy."""
         self._link().do(*orders)
 
     def drive(
@@ -200,7 +200,7 @@ class Rig:
             self._link().do("down a")
 
     def _heal(self, death: str, pages: Mapping[int, int]) -> None:
-        """Restore the link; the pages' queued data arrives now, and must move nothing."""
+        """Restore the link; the pages' queued data then arrives, and must not move a robot."""
         if death == "black-hole":
             self._link().do(*(f"heal {self.operators.news['port', one]}" for one in pages.values()))
         elif death == "interface-down":
@@ -249,6 +249,6 @@ class Rig:
 
 
 def _order(heard: Sequence[Heard]) -> str:
-    """Return "" if no value is older than one before it."""
+    """Return "" if no value is older than an earlier value; otherwise the fault."""
     sent = [int(one.text[2:]) for one in heard if one.text != "M 0"]
-    return "" if sent == sorted(sent) else "an older value came after a newer one"
+    return "" if sent == sorted(sent) else "an older value arrived after a newer value"

@@ -1,4 +1,4 @@
-"""Stops after the server hangs or dies, or after one of its guards is killed."""
+"""Trials of stops after the server hangs or dies, or after one of its guards is killed."""
 
 import os
 import signal
@@ -10,15 +10,15 @@ __all__ = ["ENGINE_DEATHS", "RESTART_MS", "EngineRig"]
 
 ENGINE_DEATHS = ("engine-stopped", "engine-killed", "engine-blocked")
 RESTART_MS = 500.0
-"""Limit for the replacement of a killed guard, whose first action is a stop, in ms."""
+"""Time limit for replacing a killed guard, in ms; the new guard sends a stop first."""
 OPEN_MS = 100.0
-"""Additional time to connect to the robot and to reach it, in ms."""
+"""Additional time for a new connection and for transfer, in ms."""
 AGAIN_S = 10.0
 BLOCKED_S = 30.0
 
 
 class EngineRig(Rig):
-    """Driven robots during a failure of the server."""
+    """A rig of robots that are driven during a failure of the server."""
 
     can_hang = True
 
@@ -59,7 +59,7 @@ class EngineRig(Rig):
             self._watch()
 
     def guard_bout(self) -> list[Trial]:
-        """Drive every robot, and kill the guards one after the other; return the results."""
+        """Drive every robot, and kill one guard after another; return the results."""
         began_ns = time.monotonic_ns()
         pages = dict(self._begin("outside"))
         for number in pages.values():
@@ -72,14 +72,14 @@ class EngineRig(Rig):
         return trials
 
     def _kill(self, guard: int) -> list[Trial]:
-        """Return one trial; none if the robot already stood still because of a busy machine."""
+        """Return one trial, or None if the robot already stood still because of a busy machine."""
         killed_ns = time.monotonic_ns()
         os.kill(guard, signal.SIGKILL)
         robots = self.robots
         lanes = range(len(robots.visits))
 
         def again() -> list[tuple[int, int]]:
-            """Return the lanes that were reconnected, and when."""
+            """Return the reconnected lanes, with times."""
             return [
                 (queue, at)
                 for queue in lanes
@@ -96,7 +96,7 @@ class EngineRig(Rig):
         if not moved(queue):
             return []
         first = robots.since(queue, opened_ns)[0]
-        fault = "" if first.text == "M 0" else f"{first.text} came before the stop"
+        fault = "" if first.text == "M 0" else f"{first.text} arrived before the stop"
         late_ms = self.late_ms(killed_ns, first.time_ns)
         took_ms = (first.time_ns - killed_ns) / 1e6
         return [Trial("guard-killed", took_ms, fault, late_ms, RESTART_MS + OPEN_MS)]

@@ -1,4 +1,4 @@
-"""Driven robots behind a counterpart that is frozen for seconds.
+"""Trials of driven robots whose counterpart is frozen for seconds.
 
 The counterpart is a separate program (`bench.rig.robot_process`). Signals suspend and resume it,
 while its kernel still accepts bytes. The driver is a session with its guard. Each motion frame
@@ -29,7 +29,7 @@ from urc.runtime.session import Session
 __all__ = ["HEARD_MS", "STOP_MS", "Freeze", "freeze"]
 
 HEARD_MS: Final = 500.0
-"""Limit of the send time of arriving motion, after the start of the freeze."""
+"""Latest send time of arriving motion, after the start of the freeze."""
 STOP_MS: Final = 200.0
 """Limit of the time from the end of the freeze to the stop."""
 _TICK_S: Final = 0.05
@@ -54,21 +54,21 @@ class Freeze(NamedTuple):
 
     lasted_s: float
     newest_ms: float
-    """Send time of the newest motion that arrived, after the start of the freeze; negative for
-    motion from before it."""
+    """Send time of the newest arrived motion, relative to the start of the freeze."""
     stop_ms: float
     """Time from the end of the freeze to the stop; `inf` without a stop."""
     is_last: bool
-    """Whether nothing came after the stop."""
+    """Whether nothing arrived after the stop."""
     late_ms: float
-    """Delay of the machine."""
+    """Delay of this machine during the trial."""
     was_moving: bool = True
-    """Whether the robot moved at the start of the freeze. A machine that was too slow for the lease
-    may have stopped it before."""
+    """Whether the robot moved at the start of the freeze. On a slow machine, an expired lease may
+    have stopped it before.
+    """
 
     @property
     def is_good(self) -> bool:
-        """Whether all bounds were kept."""
+        """Whether the trial kept all bounds."""
         return self.newest_ms <= HEARD_MS and self.stop_ms <= STOP_MS and self.is_last
 
     @property
@@ -123,7 +123,7 @@ def _profile(port: int) -> Profile:
 
 
 async def _one(session: Session, robots: Robots, moment_s: float, lasts_s: float) -> Freeze:
-    """Drive, freeze and resume the counterpart, and check the data that it received."""
+    """Drive a robot, freeze and resume its counterpart, and check the received data."""
     backend = session.backend
     assert backend is not None
     ends_s = time.monotonic() + _READY_S
@@ -149,7 +149,7 @@ async def _one(session: Session, robots: Robots, moment_s: float, lasts_s: float
 
 
 async def _hold(session: Session) -> None:
-    """Send ticks without end, as a hand that notices nothing."""
+    """Send ticks until cancelled, like an operator who does not notice the freeze."""
     assert session.backend is not None
     while True:
         now_ns = time.monotonic_ns()

@@ -1,4 +1,4 @@
-"""The kinds of transport of the rig's robots, with real programs in between.
+"""The kinds of transport of the rig's robots, with real third-party programs.
 
 Each kind has the robot's place (see `bench.rig.robot_process`), its document, and the bounds after
 a cut. For a connection that reopens at once, no motion older than 300 ms may arrive, and the stop
@@ -35,7 +35,7 @@ KINDS: Final = (
 )
 _AT_ONCE: Final = ("tcp", "telnet", "websocket", "http")
 FIRST_PORT: Final = {"ssh": 2200, "mqtt": 18830}
-"""First port of third-party programs, one for each robot, in a namespace of their own."""
+"""First port of third-party programs; each robot has its program, in a separate namespace."""
 
 
 class Bounds(NamedTuple):
@@ -48,9 +48,9 @@ class Bounds(NamedTuple):
     stop_ms: float
     """Limit of the time from the restored link to the stop."""
     unnoticed_s: float
-    """Length of a cut that a held control may not notice."""
+    """Length of a cut that may leave a held control unaffected."""
     is_told: bool = True
-    """Whether URC can detect the loss of data; otherwise a stop may be lost too."""
+    """Whether URC can detect lost data; otherwise even a stop may be lost."""
     is_repeated: bool = False
     """Whether a stop is sent several times."""
 
@@ -104,24 +104,24 @@ _ASIDE: Final = {
     "mqtt": "{ publish: { topic: aside, text: here } }",
     "ros": "{ publish: { topic: /aside, type: std_msgs/String, json: { data: here } } }",
 }
-"""A request other than motion that delays motion on the same connection."""
+"""A slow request that delays motion on the same connection."""
 
 
 class Counterpart(Program):
-    """A third-party program that a robot needs; it ends on request, or with its parent."""
+    """A third-party program for a robot; it ends on request or with its parent."""
 
     def __init__(self, command: list[str], *, inside: tuple[str, ...], port: int) -> None:
         """Run `command`, which listens on `port`."""
         self.port = port
         self.options: dict[str, str] = {}
-        """Values for the document."""
+        """Values to fill into the robot's document."""
         script = '"$@" & child=$!; cat > /dev/null; kill -9 $child; wait $child'
         # Killed by force, because unshare ignores other signals.
         super().__init__(["sh", "-c", script, "sh", *command], inside=inside)
 
 
 def place_of(kind: str, queue: int) -> str:
-    """Return the place of a robot of this kind, as `robot_process` takes it."""
+    """Return the place of a robot of this kind, as an argument of `robot_process`."""
     if kind == "mqtt":
         return f"mqtt:127.0.0.1:{FIRST_PORT[kind] + queue}"
     if kind == "ssh":
@@ -132,7 +132,7 @@ def place_of(kind: str, queue: int) -> str:
 
 
 def document(kind: str, queue: int, port: int, other: Counterpart | None) -> str:
-    """Return the document of a robot with its `port`, and the program between, if any."""
+    """Return the document of a robot with its `port`, and its third-party program, if any."""
     options = _OPTIONS[kind].replace("HOST", SERVER_ADDRESS).replace("PORT", str(port))
     if other is not None:
         options = options.replace("OTHER", str(other.port))
@@ -147,7 +147,7 @@ def document(kind: str, queue: int, port: int, other: Counterpart | None) -> str
 def start_counterpart(
     kind: str, queue: int, folder: Path, inside: tuple[str, ...]
 ) -> Counterpart | None:
-    """Start the program that a robot of this kind needs, or return None."""
+    """Start the third-party program for a robot of this kind; None if it needs none."""
     if kind == "mqtt":
         return _broker(FIRST_PORT[kind] + queue, folder / f"broker-{queue}.conf", inside)
     if kind == "ssh":
@@ -171,7 +171,7 @@ _ENTER: Final = (
 
 
 def _login(port: int, folder: Path, inside: tuple[str, ...]) -> Counterpart:
-    """Start OpenSSH's server with a user of its own, without changes to the machine."""
+    """Start OpenSSH's server with a separate user, without changes to the machine."""
     folder.mkdir(mode=0o755)
     for name in ("host", "user"):
         make = ["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(folder / name)]

@@ -1,8 +1,8 @@
-"""Operators at pages, and ways to vanish: a separate program, which imports nothing of URC.
+"""Operators at pages that vanish in several ways: a separate program that imports nothing of URC.
 
-It reads plans from standard input, one JSON object a line, and forks a process for each. The
-process is a page that takes the controls, ticks every 50 ms, and vanishes as planned. It prints one
-line for each event, with times of the monotonic clock in nanoseconds::
+The program reads plans from standard input, one JSON object a line, and forks a process for each.
+The process acts as a page that takes the controls, ticks every 50 ms, and vanishes as planned. For
+each event, it prints one line, with times of the monotonic clock in nanoseconds::
 
     pid NUMBER PID          the process of plan NUMBER
     port NUMBER PORT        its source port, for cuts by a relay
@@ -44,18 +44,20 @@ class Plan(NamedTuple):
     port: int
     robot: str
     death: str
-    """``close``, ``kill``, ``freeze``, ``block``, ``reset`` or ``kick``. ``outside``: it continues
-    to drive while another program cuts the link. ``flood``: a thousand ticks a second."""
+    """``close``, ``kill``, ``freeze``, ``block``, ``reset`` or ``kick``. ``outside``: the page
+    continues to drive while another program cuts the link. ``flood``: the page sends a thousand
+    ticks a second.
+    """
     drive_s: float
-    """Time of driving before it vanishes, in seconds."""
+    """Time of driving before the page vanishes, in seconds."""
     life_s: float = 120.0
-    """Limit of its life after that, in seconds."""
+    """Longest further life of the page's process, in seconds."""
     command: str = "go"
     argument: str = "t"
     key: str = ""
     """Start key of the server; "" for an unknown visitor."""
     has_spare: bool = False
-    """Whether it sends held controls on a second connection too."""
+    """Whether the page sends held controls on a second connection, too."""
 
 
 class Page:
@@ -131,7 +133,7 @@ class Page:
         return True
 
     def wait(self, until_ns: int) -> None:
-        """Handle messages until then."""
+        """Handle messages until `until`."""
         while not self.is_closed:
             left_s = (until_ns - time.monotonic_ns()) / 1e9
             lines = [one for one in (self, self.spare) if one is not None and not one.is_closed]
@@ -251,7 +253,7 @@ def _frame_of(data: bytes) -> tuple[int, bytes, bytes] | None:
 
 
 def tell(*words: object) -> None:
-    """Write one line at once, because the processes share the pipe."""
+    """Write one line in a single call, because the processes share the pipe."""
     os.write(1, (" ".join(map(str, words)) + "\n").encode())
 
 
@@ -271,7 +273,7 @@ def live(plan: Plan) -> None:
 
 
 def _drive(page: Page, next_ns: int, until_ns: int, every_ns: int = TICK_NS) -> None:
-    """Send ticks at fixed times until then."""
+    """Send ticks at fixed times until `until`."""
     while next_ns < until_ns:
         page.wait(next_ns)
         if not page.has_let_go:
@@ -342,7 +344,7 @@ def _kill(children: dict[int, int], number: int) -> None:
 def main() -> None:
     """Fork a page for every plan, until standard input ends; ``{"kill": NUMBER}`` ends one.
 
-    ``{"let_go": NUMBER}`` lets a page release its controls and live on.
+    ``{"let_go": NUMBER}`` lets a page release its controls and keep running.
     """
     children: dict[int, int] = {}
     try:

@@ -1,7 +1,7 @@
 """The programs of the test rig: robots, operators, the network between them, and a real server.
 
-Each is a separate process. All stamp events by the monotonic clock of the machine, so times of
-different programs can be compared. A program ends when its standard input does, so none outlives
+Each program is a separate process. All programs stamp events by the monotonic clock of the machine,
+so their times can be compared. A program ends when its standard input closes, so it never outlives
 the test that started it.
 
 Linux only. `Relay` needs root and /dev/net/tun; see `can_relay`.
@@ -39,7 +39,9 @@ READY_S = 40.0
 ANSWER_S = 10.0
 END_S = 5.0
 PATIENCE_S = 25.0
-"""Time for a page to get the controls and to drive, in seconds; it gives up earlier itself."""
+"""Timeout for a page to get the controls and to drive, in seconds; the page itself gives up
+earlier.
+"""
 
 
 class Program:
@@ -53,7 +55,7 @@ class Program:
             inside: command prefix for another namespace, from `Relay.inside`.
         """
         self.lines: list[str] = []
-        """All its output, with standard error."""
+        """Complete output of the program, including standard error."""
         self.changed = threading.Condition()
         self._has_ended = False
         self._ordering = threading.Lock()
@@ -74,7 +76,7 @@ class Program:
         self._reader.start()
 
     def __enter__(self) -> Self:
-        """Return self; it ends with the block."""
+        """Return self; the program ends with the block."""
         return self
 
     def __exit__(
@@ -88,22 +90,22 @@ class Program:
 
     @property
     def pid(self) -> int:
-        """Process id, while it runs."""
+        """Process id of the running program."""
         return self._process.pid
 
     @property
     def is_running(self) -> bool:
-        """Whether it still runs."""
+        """Whether the program still runs."""
         return self._process.poll() is None
 
     def order(self, text: str) -> None:
-        """Write one line to it, from any thread."""
+        """Write one line to the program, from any thread."""
         with self._ordering:
             self._orders.write(text + "\n")
             self._orders.flush()
 
     def wait_until(self, is_so: Callable[[], bool], timeout_s: float, what: str) -> None:
-        """Wait until its output makes `is_so` true; fail at the limit."""
+        """Wait until `is_so` accepts the output; fail at the limit."""
         with self.changed:
             self.changed.wait_for(lambda: is_so() or self._has_ended, timeout_s)
             if not is_so():
@@ -121,11 +123,11 @@ class Program:
         return found()
 
     def signal(self, number: int) -> None:
-        """Send it a signal."""
+        """Send a signal to the program."""
         self._process.send_signal(number)
 
     def close(self) -> None:
-        """End it, by force if necessary. May be called twice."""
+        """End the program, by force if necessary; a second call does nothing."""
         with contextlib.suppress(BrokenPipeError):  # it has already ended
             self._orders.close()
         self._end()
@@ -159,10 +161,10 @@ def _script(name: str, *arguments: str) -> list[str]:
 
 
 class Heard(NamedTuple):
-    """A line that a robot received."""
+    """A line received by a robot."""
 
     time_ns: int
-    """Time of its first byte."""
+    """Time of the line's first byte."""
     text: str
 
 
@@ -195,12 +197,12 @@ class Robots(Program):
             self.visits[int(words[1])].append((int(words[2]), words[0] == "open"))
 
     def since(self, robot: int, time_ns: int) -> list[Heard]:
-        """Return the lines that a robot received from then on."""
+        """Return the lines that a robot received from `since` on."""
         with self.changed:
             return [one for one in self.heard[robot] if one.time_ns >= time_ns]
 
     def latest_ms(self, from_ns: int, until_ns: int) -> float:
-        """Return the largest delay of their process between two times, in milliseconds."""
+        """Return the largest delay of the robots' process between two times, in milliseconds."""
         with self.changed:
             found = [late for time_ns, late in self.late if from_ns <= time_ns <= until_ns]
         return max(found, default=0.0)
@@ -296,15 +298,15 @@ class Server(Program):
         inside: Sequence[str] = (),
         can_hang: bool = False,
     ) -> None:
-        """Start it, and wait until it listens.
+        """Start the server, and wait until it listens.
 
         Args:
             profiles: the robots' documents.
-            data: its data folder.
+            data: data folder of the server.
             options: further options of ``urc serve``.
             host: address to listen on.
-            inside: as of `Program`.
-            can_hang: whether a signal can block it, see `bench.rig.server_process`.
+            inside: command prefix for another namespace, as of `Program`.
+            can_hang: whether a signal can block the server, see `bench.rig.server_process`.
         """
         script = ["-P", str(HERE / "server_process.py")] if can_hang else ["-m", "urc.cli.main"]
         command = [sys.executable, *script, "serve", *map(str, profiles)]
@@ -317,7 +319,7 @@ class Server(Program):
 
     @property
     def guards(self) -> list[int]:
-        """Process ids of its guards."""
+        """Process ids of the server's guards."""
         found = Path(f"/proc/{self.pid}/task/{self.pid}/children").read_text("ascii").split()
         return [int(child) for child in found if _is_guard(child)]
 

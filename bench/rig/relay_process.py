@@ -1,14 +1,14 @@
 """A link between two network namespaces that can be slow, lossy, or cut: a separate program.
 
-Linux and root only; it needs /dev/net/tun and nothing of URC. ``python relay_process.py`` creates
-two namespaces with a TUN device in each, and moves packets between them. Side ``a`` is 10.77.0.1,
-side ``b`` 10.77.0.2, and each has its own loopback. Other programs enter by
-``nsenter --net=/proc/PID/fd/FD``. Reports on standard output::
+The program needs Linux, root and /dev/net/tun, and nothing of URC. ``python relay_process.py``
+creates two namespaces with a TUN device in each, and moves packets between them. Side ``a`` is
+10.77.0.1, side ``b`` 10.77.0.2, and each has its own loopback. Other programs enter by ``nsenter
+--net=/proc/PID/fd/FD``. Reports on standard output::
 
     ready FD_A FD_B         descriptors of the two namespaces in this process
     done TIME               the last order was executed, monotonic nanoseconds
 
-Orders on standard input, one a line, times in milliseconds::
+Orders on standard input, one for each line, with times in milliseconds::
 
     delay MS | jitter MS | loss PERCENT
     cut | heal              the whole link
@@ -17,7 +17,7 @@ Orders on standard input, one a line, times in milliseconds::
     cut PORT a              the same, only from that side; `heal PORT` ends it too
     down a | up a           the network interface of a side
 
-It ends with its standard input; the namespaces end with the last program inside.
+The program ends when its standard input closes; a namespace ends with the last program inside.
 """
 
 import ctypes
@@ -41,7 +41,7 @@ SIDES = ("a", "b")
 ADDRESSES = {"a": "10.77.0.1", "b": "10.77.0.2"}
 DEVICE = b"tun0"
 MOST_WAITING = 4096
-"""Limit of packets in transit; further ones are lost, as on any link."""
+"""Limit of packets in transit; further packets are lost, as on any link."""
 
 
 @dataclass
@@ -50,10 +50,10 @@ class Side:
 
     name: str
     namespace: int
-    """Descriptor of its network namespace."""
+    """Descriptor of the end's network namespace."""
     tun: int
     control: socket.socket
-    """A socket inside, for settings of its interfaces."""
+    """A socket inside the namespace, for settings of its interfaces."""
 
 
 @dataclass
@@ -64,15 +64,15 @@ class Weather:
     jitter_ns: int = 0
     loss: float = 0.0
     is_cut: dict[str, bool] = field(default_factory=lambda: {"a": False, "b": False})
-    """Side → whether packets from it are lost."""
+    """Side → whether packets from this side are lost."""
     ports: dict[str, set[int]] = field(default_factory=lambda: {"a": set(), "b": set()})
-    """Side → ports; packets from this side, from or to one of them, are lost."""
+    """Side → ports; packets from this side, from or to these ports, are lost."""
 
 
 def made(name: str) -> Side:
-    """Put this process into a new namespace, and return it with its device up."""
+    """Move this process into a new namespace; return the end, with its device up."""
     if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNET) != 0:
-        raise OSError(ctypes.get_errno(), "a network namespace cannot be made; it needs root")
+        raise OSError(ctypes.get_errno(), "cannot create a network namespace; this needs root")
     tun = os.open("/dev/net/tun", os.O_RDWR | os.O_NONBLOCK)
     fcntl.ioctl(tun, TUNSETIFF, struct.pack("16sH", DEVICE, IFF_TUN_NO_PI))
     control = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

@@ -1,10 +1,10 @@
-"""Robots that stamp every received line: a separate program, which imports nothing of URC.
+"""Robots that stamp every received line: a separate program that imports nothing of URC.
 
 ``python robot_process.py tcp:127.0.0.1:0 udp:127.0.0.1:0 …`` plays one robot for each argument.
 ``ws`` is a WebSocket whose messages are the lines. ``bridge`` speaks the protocol of rosbridge, and
-receives ``M NUMBER`` for ``{"data": NUMBER}`` on ``/go``. ``http`` is a server that receives it by
-a request for ``/go?t=NUMBER``. ``mqtt:HOST:PORT`` subscribes to the topic ``go`` of that broker.
-It prints one line for each event, with times of the monotonic clock in nanoseconds::
+receives ``M NUMBER`` for ``{"data": NUMBER}`` on ``/go``. ``http`` is a server that receives ``M
+NUMBER`` by a request for ``/go?t=NUMBER``. ``mqtt:HOST:PORT`` subscribes to the topic ``go`` of
+that broker. It prints one line for each event, with times of the monotonic clock in nanoseconds::
 
     ready 40001 40002 …     their ports, once
     open ROBOT TIME         a connection opened, or a broker accepted the subscription
@@ -14,7 +14,7 @@ It prints one line for each event, with times of the monotonic clock in nanoseco
     waited TIME PID MICROSECONDS  another runnable process had to wait: the argument
                             ``pid:NUMBER`` watches a process and its children
 
-It ends with its standard input, and so with its parent.
+The program ends when its standard input closes, and so with its parent.
 """
 
 import base64
@@ -38,7 +38,7 @@ LATE_NS = 5_000_000
 """Shortest reported delay, in nanoseconds."""
 LONGEST_LINE = 65536
 BROKER_S = 20.0
-"""Time for a broker to start, in seconds."""
+"""Timeout for the start of a broker, in seconds."""
 _GUID = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 
 
@@ -46,7 +46,7 @@ class Ear:
     """A decoder of lines from one connection."""
 
     opening = b""
-    """First bytes to send."""
+    """First bytes to send on a new connection."""
 
     def __init__(self) -> None:
         self.rest = b""
@@ -54,7 +54,7 @@ class Ear:
         self.reply = b""
         """Reply to send."""
         self.is_ready = True
-        """Whether the connection can carry lines; otherwise it is reported as open later."""
+        """Whether the connection can carry lines; before that, it is not reported as open."""
 
     def take(self, data: bytes) -> list[str]:
         """Return the lines that end in `data`."""

@@ -59,7 +59,7 @@ class BringError(Exception):
 def bring_chromium() -> str:
     """Return the launcher of a Chromium in the user's cache; install it at the first use."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
-        raise BringError("it exists for Linux x64 only")
+        raise BringError("the package exists for Linux x64 only")
     folder = cache_folder()
     launcher = folder / "chromium"
     if not launcher.exists():
@@ -73,17 +73,17 @@ def bring_chromium() -> str:
 
 
 def cache_folder() -> Path:
-    """Return the folder for the version that the lock pins."""
+    """Return the folder for the version in the lock file."""
     lock = hashlib.sha256((HERE / "package-lock.json").read_bytes()).hexdigest()[:12]
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return cache / "urc" / f"chromium-{lock}"
 
 
 def install(work: Path) -> Path:
-    """Fetch and unpack into `work`; return the folder to keep."""
+    """Download and unpack into `work`; return the folder to keep."""
     node = node_executable()
     if node is None:
-        raise BringError("there is no Node to unpack it with")
+        raise BringError("unpacking needs Node, which is not installed")
     try:
         install_modules(HERE, work)
     except VendorError as error:
@@ -123,7 +123,7 @@ def unpack(archive: Path, folder: Path) -> None:
 
 
 def write_launcher(folder: Path) -> None:
-    """Write the launcher and the font configuration; the paths are those after the renaming."""
+    """Write the launcher and the font configuration, with the paths after the renaming."""
     final = cache_folder()
     (folder / "fonts.conf").write_text(FONTS_CONF.format(folder=final), encoding="utf-8")
     launcher = folder / "chromium"

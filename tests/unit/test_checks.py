@@ -104,7 +104,7 @@ def test_the_summary_names_the_command_that_brings_what_is_missing(
     """One line to paste."""
     check.summarise([OK], WITHOUT_NETCAT, "")
     lines = capsys.readouterr().out.splitlines()
-    assert "LEFT OUT  the tests against a client that is not URC: no netcat" in lines
+    assert "LEFT OUT  tests with netcat as the client: no netcat" in lines
     assert lines[-2].endswith("apt-get install -y netcat-openbsd")
 
 
@@ -120,8 +120,7 @@ def test_what_npm_brings_is_named_and_left_out_until_it_is_there(
     check.summarise([OK], brought, "")
     lines = capsys.readouterr().out.splitlines()
     assert (
-        "LEFT OUT  the tests of the schemas in an editor's language server: no language-server"
-        in lines
+        "LEFT OUT  tests of the schemas in an editor's language server: no language-server" in lines
     )
     assert lines[-2].endswith("npm ci --ignore-scripts")
     (tmp_path / "server").touch()

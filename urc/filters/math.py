@@ -1,7 +1,7 @@
 """Angles, roots and rounding for expressions.
 
-Private to `urc.filters.table`. Angles are in radians. An undefined result (the root of a negative
-number, the arc sine of 2) raises ValueError, as everywhere in expressions.
+Private to `urc.filters.table`. Angles are in radians. An undefined result, such as the root of a
+negative number, raises ValueError, as everywhere in expressions.
 """
 
 import math

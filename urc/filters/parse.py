@@ -110,7 +110,7 @@ def _signed(value: Any, bits: Any) -> int:
 
 
 class _Short(ValueError):
-    """The bytes contain no such number."""
+    """The bytes contain no number of this type."""
 
 
 @cache  # the type names are few
@@ -128,7 +128,7 @@ def _bytes(value: Any) -> bytes:
 
 
 def _unpack(value: Any, name: Any, at: Any = 0) -> int | float:
-    """Return the number of that type at an offset of the bytes."""
+    """Return the number of a type at an offset of the bytes."""
     read = _reader(_text(name))
     data, place = _bytes(value), _whole(at, "a place", 0, MAX_PARTS)
     try:
@@ -139,7 +139,7 @@ def _unpack(value: Any, name: Any, at: Any = 0) -> int | float:
 
 
 def _numbers(value: Any, name: Any) -> list[int | float]:
-    """Return all consecutive numbers of that type in the bytes."""
+    """Return all consecutive numbers of a type in the bytes."""
     read, data = _reader(_text(name)), _bytes(value)
     _check_count(len(data), "bytes")
     found, place = [], 0

@@ -215,7 +215,7 @@ class Filter(NamedTuple):
     function: Callable[..., Any]
     arity: tuple[int, int]
     gives_bytes: bool = False
-    """Whether it returns bytes, which only ``hex:`` and ``bytes:`` can send."""
+    """Whether the filter returns bytes, which only ``hex:`` and ``bytes:`` can send."""
     refuses: Callable[[str], str] | None = None
     """Check of a constant first argument: returns the error, or ""."""
 
@@ -279,12 +279,12 @@ _OPERATORS = (_add, _sub, _mul, _div, _floordiv, _mod, _pow, _item, _join)
 _TESTS = (_is_defined, _is_none, _is_number, _is_string)
 
 SCOPE: dict[str, Any] = {"__builtins__": {}}
-"""The only names that compiled templates can reach."""
+"""The only names accessible to compiled templates."""
 SCOPE |= {"_slice": lists.sliced, "_match": lists.is_match, "_search": lists.is_search}
 SCOPE |= {function.__name__: function for function in (*_OPERATORS, *_TESTS)}
 SCOPE |= {f"_filter_{name}": filter_.function for name, filter_ in FILTERS.items()}
 
 
 def filter_names() -> str:
-    """Return the names of all filters for messages, without the many that return bytes."""
+    """Return the filter names for messages, without the many filters that return bytes."""
     return ", ".join(sorted(name for name, one in FILTERS.items() if not one.gives_bytes))

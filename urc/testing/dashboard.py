@@ -103,7 +103,7 @@ def dashboard_profile(
         name=name,
         title=name.title(),
         file=f"{name}.yaml",
-        summary="A robot that is not there.",
+        summary="A robot that does not exist.",
         settings={"host": Setting("host", "host", default="127.0.0.1")}
         if settings is None
         else settings,
@@ -119,7 +119,7 @@ def dashboard_profile(
 
 
 class FakeRobot:
-    """A fake session under control of a test. It counts its openings."""
+    """A fake session under control of a test. The session counts calls of `open`."""
 
     def __init__(self, profile: Profile, clock: Clock | None = None) -> None:
         self.profile = profile
@@ -129,11 +129,11 @@ class FakeRobot:
         self.is_open = False
         self.commands: list[tuple[str, dict[str, Reading]]] = []
         self.confirmed_by: list[tuple[str, ...]] = []
-        """Confirming people of each command."""
+        """Names of the people who confirmed each command."""
         self.pulls: list[tuple[str, Pull]] = []
         """Requests to sequences."""
         self.latched: list[str] = []
-        """Reasons of all latches."""
+        """Reasons of all latched stops."""
         self.frames = FakeFrames(profile.driver)
         self.backend: MotionBackend | None = FakeMotionBackend(self.clock)
         self.on_command: Callable[[str, Mapping[str, Reading]], Mapping[str, Value]] | None = None
@@ -175,7 +175,7 @@ class FakeRobot:
         self.pulls.append((sequence, what))
 
     def latch(self, reason: str) -> None:
-        """Record the reason of a latch."""
+        """Record the reason of a latched stop."""
         self.latched.append(reason)
 
     def set_reading(
@@ -185,7 +185,7 @@ class FakeRobot:
         self.hub.publish([Sample(signal, value, self.clock.now() - age_s, alarm)])
 
     def link(self, state: LinkState, detail: str = "", *, age_s: float = 0.0) -> None:
-        """Set the state of the one transport, as of `age_s` ago."""
+        """Set the state of the only transport, as of `age_s` ago."""
         since_s = self.clock.now() - age_s
         self.hub.set_link(LinkStatus("wire", state, "tcp 127.0.0.1:6789", since_s, detail))
 

@@ -25,4 +25,4 @@ HERE_COOKIE = f"{ACCESS.cookie}={HERE[ACCESS.cookie]}"
 MANAGER = {ACCESS.cookie: str(ACCESS.admit(TOKEN))}
 """Cookies of a browser with the token of managers."""
 BEARER = {"authorization": f"Bearer {KEY}"}
-"""Header of a program."""
+"""Header for requests from a program."""

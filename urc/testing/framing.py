@@ -1,4 +1,4 @@
-"""Test of a framing with data split in several ways."""
+"""A test of a framing with data split in several ways."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol, TypeVar
@@ -18,7 +18,7 @@ class Feedable(Protocol[Frame]):
 def feed_three_ways(
     decoder: Callable[[], Feedable[Frame]], data: bytes, trailing: bytes = b"\x00trailing"
 ) -> list[Frame]:
-    """Feed `data` whole, byte by byte, and with `trailing` bytes after it; return the frames.
+    """Decode `data` whole, byte by byte, and followed by `trailing` bytes; return the frames.
 
     Args:
         decoder: returns a new decoder for each way.

@@ -25,21 +25,21 @@ class FakeFrames:
         self.on_ready: Callable[[str], None] = _unheard
         self.on_refused: Callable[[str, str], None] = _unrefused
         self.is_greeted = True
-        """Whether the steps of the connection are done."""
+        """Whether all steps of the connection have run."""
         self.number = 0
         """Counter of the newest frame; 0 for frames without counters."""
 
     def is_lasting(self, command: str) -> bool:
-        """Return whether its stop frame never changes."""
+        """Return whether the stop frame never changes."""
         self._known(command)
         return not self.number
 
     def has_stops(self, command: str) -> bool:
-        """Return whether its stop frames are enough for now."""
+        """Return whether no further stop frame is needed now."""
         return False
 
     def is_ready(self, command: str) -> bool:
-        """Return whether its transport is ready."""
+        """Return whether the transport is ready."""
         self._known(command)
         return self.is_greeted
 
@@ -48,7 +48,7 @@ class FakeFrames:
             raise KeyError(command)
 
     def send(self, line: str = "wire") -> int:
-        """Use up a counter for another frame, and return it."""
+        """Use a counter for another frame, and return it."""
         self.number = number = self.number + 1
         self.on_count(line)
         return number
@@ -57,11 +57,11 @@ class FakeFrames:
         return f"{self.number + 1} " if self.number else ""
 
     def stop_frame(self, command: str) -> Payload:
-        """Return its stop frame, without using up a counter."""
+        """Return the stop frame, without using a counter."""
         return f"{self._numbered()}{command} stop".encode()
 
     def motion_frame(self, command: str, arguments: Mapping[str, Reading], now: float) -> Payload:
-        """Return its arguments, after the checks of the engine."""
+        """Return the command's arguments, after the checks of the engine."""
         if self.refusal:
             raise UrcError(self.refusal)
         values = check_arguments(self.driver.commands[command], arguments)
@@ -110,16 +110,16 @@ class FakeMotionBackend:
         self.write_due()
 
     def renew(self, command: str, stop: Payload | FrameVariants) -> None:
-        """Replace the stop frame."""
+        """Replace the stop frame of a command."""
         hold_to_run = self._backend[command]
         hold_to_run.renew(hold_to_run.terms.stopped_by(stop))
 
     def is_stopping(self, command: str) -> bool:
-        """Return whether it moves."""
+        """Return whether the command moves the robot."""
         return command in self._backend and self._backend[command].state != "idle"
 
     def is_open(self, command: str) -> bool:
-        """Return whether its transport is connected."""
+        """Return whether the transport is connected."""
         return self.is_up
 
     def release(self, command: str) -> None:
@@ -137,7 +137,7 @@ class FakeMotionBackend:
         self.write_due()
 
     async def stops(self) -> Sequence[tuple[str, Reason]]:
-        """Wait for written stops."""
+        """Wait until the stops are written."""
         return [await self._stops.get()]
 
     def write_due(self) -> None:

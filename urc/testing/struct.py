@@ -17,7 +17,9 @@ __all__ = ["frame", "reader", "struct_read", "struct_write", "writer"]
 
 
 def struct_read(source: str) -> ReadSpec:
-    """Return the form of ``struct:`` in `source`, which may also have ``types:`` and ``enums:``.
+    """Return the form of ``struct:`` in `source`.
+
+    The source may also have ``types:`` and ``enums:``.
 
     Raises:
         AssertionError: the form has problems.
@@ -39,12 +41,12 @@ def struct_write(source: str) -> WriteSpec:
 
 
 def reader(source: str, encoding: str = "utf-8") -> PayloadReader:
-    """Return the reader of such frames."""
+    """Return the reader of frames of this form."""
     return build_reader(struct_read(source), CodecContext(encoding))
 
 
 def writer(source: str, encoding: str = "utf-8") -> PayloadWriter:
-    """Return the writer of such frames."""
+    """Return the writer of frames of this form."""
     return build_writer(struct_write(source), CodecContext(encoding))
 
 

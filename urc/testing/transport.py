@@ -45,7 +45,7 @@ class MemoryTransport:
     # -- the robot's side
 
     def feed(self, *chunks: bytes) -> None:
-        """Send `chunks` as the robot, each on its own."""
+        """Send each of `chunks` separately, as the robot."""
         self._arriving.extend(chunks)
         self._changed.set()
 
@@ -59,7 +59,7 @@ class MemoryTransport:
         self._refusals.extend([reason] * times)
 
     def stall_sends(self, is_stalled: bool = True) -> None:
-        """Make the robot accept no more bytes, or accept them again."""
+        """Make the robot refuse further bytes, or accept them again."""
         if is_stalled:
             self._flowing.clear()
         else:
