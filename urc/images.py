@@ -41,7 +41,7 @@ def media_type(data: bytes) -> str:
 def picture_size(data: bytes) -> tuple[int, int] | None:
     """Return width and height in pixels, or None if the first bytes do not contain them.
 
-    The result for AVIF is None, too: its size is in nested boxes, and browsers limit it themselves.
+    AVIF gives None, too: the size is in nested boxes, and browsers limit AVIF themselves.
     """
     read = _READERS.get(media_type(data))
     try:
