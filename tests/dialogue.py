@@ -13,6 +13,10 @@ from urc.protocol.events import (
     Close,
     Event,
     Failed,
+    MotionEvent,
+    MotionReady,
+    MotionRefused,
+    NumbersUsed,
     Open,
     Replied,
     Request,
@@ -78,6 +82,8 @@ class Dialogue:
         self.faults: list[str] = []
         self.links: list[str] = []
         """``open`` and ``close``, with the reason."""
+        self.motion: list[MotionEvent] = []
+        """Events of held commands."""
         self._sent: list[str] = []
         self._requests = 0
 
@@ -135,6 +141,8 @@ class Dialogue:
                 case Failed(number, _, code, message):
                     self._end(number, code)
                     self.messages.append(message)
+                case NumbersUsed() | MotionReady() | MotionRefused():
+                    self.motion.append(event)
                 case Violation(_, code, message):
                     self.faults.append(code)
                     self.messages.append(message)

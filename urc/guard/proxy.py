@@ -292,16 +292,23 @@ class GuardedTransport:
         self._stands(self._name, said.stand, is_settled)
 
     def _send_again(self, said: messages.SendStale) -> None:
-        """Make what was not sent again, with the numbers that are next now, in the same order."""
-        self._round += 1
+        """Render the unsent frames again with the next numbers, and send them in the same order."""
+        self._round = this_round = self._round + 1
         self._stands(self._name, said.stand, True)
+        again: list[tuple[_Sent, Numbered | None]] = []
         for sent in [one for one in self._under_way if one.number >= said.number]:
             numbered = None if sent.counted is None else sent.counted.again()
             if numbered is not None or sent.counted is None:
-                self._pass(sent, numbered)
+                again.append((sent, numbered))
                 continue
             log.warning("%s: a frame cannot be written with the next number", self._address)
-            sent.counted = sent.left = None  # it is done with what is handed over next
+            sent.counted = sent.left = None  # settled together with the next frame that is sent
+        # Stops with the numbers after these frames must reach the guard before the frames do.
+        self._stands(self._name, said.stand, False)
+        for sent, numbered in again:
+            if self._round != this_round:
+                return  # refused again at once: the newer round has sent the rest
+            self._pass(sent, numbered)
 
     def _sent(self, number: int, fault: TransportError | None = None) -> None:
         while self._under_way and self._under_way[0].number <= number:

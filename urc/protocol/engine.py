@@ -30,6 +30,9 @@ from urc.protocol.events import (
     Close,
     Event,
     Failed,
+    MotionReady,
+    MotionRefused,
+    NumbersUsed,
     Open,
     Ready,
     Replied,
@@ -68,7 +71,9 @@ from urc.protocol.values.time_and_nonce import FIXED, TimeAndNonce
 __all__ = ["Engine"]
 
 
-_PLAIN = frozenset((Send, Violation, Open, Ready, Replied, Failed))
+_PLAIN = frozenset(
+    (Send, Violation, Open, Ready, Replied, Failed, NumbersUsed, MotionReady, MotionRefused)
+)
 """Events that the engine passes on without acting."""
 
 

@@ -11,6 +11,10 @@ __all__ = [
     "Event",
     "Failed",
     "Violation",
+    "MotionEvent",
+    "MotionReady",
+    "MotionRefused",
+    "NumbersUsed",
     "Open",
     "Ready",
     "Replied",
@@ -101,4 +105,29 @@ class Violation(NamedTuple):
     message: str
 
 
-Event = Open | Send | Close | Ready | Samples | Replied | Failed | Violation
+class NumbersUsed(NamedTuple):
+    """Counters of this line advanced: the stop frames rendered so far have used numbers.
+
+    Only of a line whose counters are shared with motion (`MotionEncoder.share`).
+    """
+
+    transport: str
+
+
+class MotionReady(NamedTuple):
+    """This line of held commands is connected, and its start-up steps are done."""
+
+    transport: str
+
+
+class MotionRefused(NamedTuple):
+    """The robot refuses a held command."""
+
+    transport: str
+    command: str
+    why: str
+
+
+MotionEvent = NumbersUsed | MotionReady | MotionRefused
+"""Events for the controller of held commands."""
+Event = Open | Send | Close | Ready | Samples | Replied | Failed | Violation | MotionEvent

@@ -15,6 +15,7 @@ from urc.model.exchange import MOST_STOPS
 from urc.model.payload import CountedFrame, FrameVariants, Numbered, Payload
 from urc.model.values import Reading
 from urc.problems import UrcError
+from urc.protocol.events import MotionEvent, NumbersUsed
 from urc.protocol.requests.condition_scope import SignalState
 from urc.protocol.requests.conversation import Conversation
 from urc.protocol.requests.encode import BadArgument, check_arguments
@@ -72,21 +73,12 @@ class MotionEncoder:
         """Command → its rendered stops."""
         self._lengths: dict[str, int] = {}
         """Shared connection → number of stops rendered in advance for each control."""
-        self.on_count: Callable[[str], None] = _nobody
-        """Called with a connection after a counter has changed, which may outdate rendered
-        stops."""
-        self.on_ready: Callable[[str], None] = _nobody
-        """Called with a connection that has become ready."""
-        self.on_refused: Callable[[str, str], None] = _unrefused
-        """Called with a held command and the refusal of the robot."""
         for one, command in self._held.items():
             line = command.transport
-            lines[line].on_ready = partial(self._told_ready, line)
-            lines[line].on_refused = self._told_refused
+            lines[line].has_motion = True
             if asks[one].answers:
                 lines[line].held.add(one, asks[one].answers[0], asks[one].match)
             if asks[one].has_counters:
-                lines[line].counters.counted = partial(self._counted, line)
                 self._counting[line] = self._counting.get(line, 0) + 1
 
     def share(self, repeating: Container[str]) -> None:
@@ -99,7 +91,9 @@ class MotionEncoder:
             self._lines[line].counters.is_shared = True
             self._lengths[line] = controls * (MOST_STOPS if line in repeating else 1) + _SPARE_STOPS
 
-    def set_counters(self, line: str, stand: Mapping[str, int], is_settled: bool) -> None:
+    def set_counters(
+        self, line: str, stand: Mapping[str, int], *, is_settled: bool
+    ) -> list[MotionEvent]:
         """Update the shared counters of a connection.
 
         Args:
@@ -109,16 +103,17 @@ class MotionEncoder:
         """
         if line in self._lengths:
             self._lines[line].counters.set_counters(stand, is_settled=is_settled)
-            self.on_count(line)
+            return [NumbersUsed(line)]
+        return []
 
     def is_lasting(self, command: str) -> bool:
         """Return whether the stop of `command` always has the same bytes.
 
-        False for a stop with a counter, or with values from the robot or from settings. False in
-        half duplex, too, because each rendered frame may expect a reply.
+        False for a stop with a counter, or with values from the robot or from settings.
         """
-        ask, line = self._asks[command], self._lines[self._found(command).transport]
-        return ask.is_local and not (ask.has_counters or line.spec.is_half_duplex)
+        self._found(command)
+        ask = self._asks[command]
+        return ask.is_local and not ask.has_counters
 
     def has_stops(self, command: str) -> bool:
         """Return whether the rendered stops of `command` suffice for now.
@@ -228,25 +223,8 @@ class MotionEncoder:
             return None
         return made.numbered if isinstance(made, CountedFrame) else None
 
-    def _counted(self, line: str) -> None:
-        self.on_count(line)
-
-    def _told_ready(self, line: str) -> None:
-        self.on_ready(line)
-
-    def _told_refused(self, command: str, why: str) -> None:
-        self.on_refused(command, why)
-
     def _found(self, command: str) -> Command:
         found = self._held.get(command)
         if found is None:
             raise BadArgument(f"{command!r} is not a held command")
         return found
-
-
-def _unrefused(command: str, why: str) -> None:
-    """Ignore the call."""
-
-
-def _nobody(line: str) -> None:
-    """Ignore the call."""

@@ -17,6 +17,7 @@ from urc.protocol.events import (
     Close,
     Event,
     Failed,
+    MotionEvent,
     Open,
     Ready,
     Replied,
@@ -192,6 +193,7 @@ class Dispatcher:
         commands: Mapping[str, Command],
         limit_s: Callable[[str], float],
         sequence_control: Mapping[str, SequenceControl] = NOTHING,
+        motion: Callable[[MotionEvent], None] | None = None,
     ) -> None:
         """Take over an engine.
 
@@ -202,6 +204,7 @@ class Dispatcher:
             commands: the driver's commands.
             limit_s: command → seconds after which its wait ends, regardless of the engine.
             sequence_control: sequence → its control.
+            motion: receives the events of held commands; None: drops them.
         """
         self._engine = engine
         self._hub = hub
@@ -209,6 +212,7 @@ class Dispatcher:
         self._commands = commands
         self._ports: dict[str, LinkPort] = {}
         self._waiting = PendingCommands(clock, limit_s)
+        self._motion = motion
         self._sequence_control = dict(sequence_control)
         self._seen = dict.fromkeys(sequence_control, 0)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -340,6 +344,9 @@ class Dispatcher:
                 answers.append(event)
                 if isinstance(event, Replied) and heard_on is not None and not samples:
                     ports[heard_on].frame_received()
+            elif isinstance(event, MotionEvent):
+                if self._motion is not None:
+                    self._motion(event)
             else:
                 is_changed = True
                 self._change(event)

@@ -11,19 +11,21 @@ from urc.model.values import Reading
 from urc.motion.hold_to_run import HoldTerms, Reason
 from urc.motion.slew_rate import SlewRateLimiter
 from urc.motion.stall import STALLED_S
+from urc.protocol.events import MotionEvent
 
-__all__ = ["HeldControl", "MotionFrames", "MotionBackend", "control_of", "is_lossy", "period_of"]
+__all__ = [
+    "HeldControl",
+    "MotionFrames",
+    "MotionSession",
+    "MotionBackend",
+    "control_of",
+    "is_lossy",
+    "period_of",
+]
 
 
 class MotionFrames(Protocol):
     """The controller's interface to the engine: `urc.protocol.motion_encoder.MotionEncoder`."""
-
-    on_count: Callable[[str], None]
-    """Callback: a counter of this transport was used up, so later stops need new ones."""
-    on_ready: Callable[[str], None]
-    """Callback: this transport is connected, and its steps are done."""
-    on_refused: Callable[[str, str], None]
-    """Callback: the robot refuses a held command, with its message."""
 
     def is_lasting(self, command: str) -> bool:
         """Return whether the stop frame of a held command never changes."""
@@ -75,6 +77,21 @@ class MotionBackend(Protocol):
         """
 
 
+class MotionSession(Protocol):
+    """The part of a session that a desk needs."""
+
+    on_motion: Callable[[MotionEvent], None] | None
+    """Takes the engine's events of held commands: the desk sets it."""
+
+    @property
+    def frames(self) -> MotionFrames:
+        """The engine."""
+
+    @property
+    def backend(self) -> MotionBackend | None:
+        """The guard; None for a robot without held commands."""
+
+
 @dataclass(slots=True)
 class HeldControl:
     """One held command, from its page's point of view."""
@@ -86,8 +103,8 @@ class HeldControl:
     slew: SlewRateLimiter | None
     defaults: Mapping[str, Reading]
     """Defaults of the arguments that slew limits."""
-    is_greeted: bool
-    """Whether its transport has steps; frames before their end may not count."""
+    needs_ready_line: bool
+    """Whether a stop that was sent before its transport was ready is repeated."""
     is_armed: bool = False
     is_lasting: bool = False
     """Whether its stop frame stays the same while it is armed."""
@@ -138,8 +155,12 @@ def control_of(driver: Driver, command: Command) -> HeldControl:
         defaults = {name: arguments[name].default for name in hold.slew if name in arguments}
         rest = {name: one.default for name, one in command.arguments.items()} | dict(hold.release)
         slew = SlewRateLimiter(hold.slew, rest, hold.repeat_s)
-    greeted = bool(driver.transports[command.transport].on_connect)
-    return HeldControl(command.transport, hold, period_of(driver, command), slew, defaults, greeted)
+    line = driver.transports[command.transport]
+    # Before its start-up steps, a robot may take a stop for a part of its login. On a half-duplex
+    # line, the stop may collide with an answer that the robot still sends.
+    needs_ready_line = bool(line.on_connect) or line.is_half_duplex
+    period_s = period_of(driver, command)
+    return HeldControl(command.transport, hold, period_s, slew, defaults, needs_ready_line)
 
 
 def period_of(driver: Driver, command: Command) -> float:

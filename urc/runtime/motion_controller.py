@@ -26,7 +26,15 @@ from urc.motion.freshness import ControlInput, Freshness
 from urc.motion.hold_to_run import HoldTerms, Reason
 from urc.motion.lease import REQUEST_S, Lease, LeaseChanged, LeaseRefused, LeaseState, Operator
 from urc.problems import UrcError
-from urc.runtime.held_commands import HeldControl, MotionBackend, MotionFrames, control_of, is_lossy
+from urc.protocol.events import MotionEvent, MotionReady, MotionRefused, NumbersUsed
+from urc.runtime.held_commands import (
+    HeldControl,
+    MotionBackend,
+    MotionFrames,
+    MotionSession,
+    control_of,
+    is_lossy,
+)
 
 __all__ = ["MotionFrames", "MotionController", "MotionBackend", "Verb", "is_lossy"]
 
@@ -71,7 +79,6 @@ class MotionController:
         self._controls = {name: control_of(driver, one) for name, one in self._holds.items()}
         self._stops = tuple(name for name, one in driver.commands.items() if one.stops)
         self._moves = any(one.moves for one in driver.commands.values())
-        self._is_making = False
         self._screens: dict[str, _Screen] = {}
         self._unconfirmed = {*self._holds, *self._stops} if is_owed else set[str]()
         self.on_change: Callable[[LeaseState], None] = _ignore
@@ -123,11 +130,11 @@ class MotionController:
 
     # -- the robot
 
-    def attach(self, frames: MotionFrames, backend: MotionBackend | None) -> None:
-        """Connect a session's engine and its movers, if any; send an outstanding stop."""
-        self._frames, self._backend = frames, backend
-        frames.on_count, frames.on_ready = self._renew, self._ready
-        frames.on_refused = self._refused
+    def attach(self, session: MotionSession) -> None:
+        """Connect a session: its engine, movers and events. Send an outstanding stop."""
+        self._frames, self._backend = session.frames, session.backend
+        session.on_motion = self.hear
+        backend = self._backend
         if backend is not None and not self._unconfirmed.isdisjoint(self._holds):
             backend.stop(self._stop_frames(self._holds))
 
@@ -238,7 +245,6 @@ class MotionController:
             return _NO_ROBOT
         if control.slew is not None:
             arguments = control.limited(arguments, now)
-        self._is_making = True  # its stop frame is rendered after it
         try:
             data = frames.motion_frame(command, arguments, now)
             if not control.is_armed:
@@ -249,8 +255,6 @@ class MotionController:
         except UrcError as error:
             self._abandon(command, control, backend, str(error))
             return str(error)
-        finally:
-            self._is_making = False
         self.lease.touch(now)
         control.running_rule = "moving"
         backend.tick(command, data)
@@ -283,7 +287,17 @@ class MotionController:
         control.rest()
         if control.is_armed and self._backend is not None:
             self._backend.release(command)
-            self._renew(control.line)  # the counter of this stop frame is used up
+            self._renew_stops(control.line)  # the counter of this stop frame is used up
+
+    def hear(self, event: MotionEvent) -> None:
+        """Handle an event of the engine."""
+        match event:
+            case NumbersUsed(line):
+                self._renew_stops(line)
+            case MotionReady(line):
+                self._repeat_stops(line)
+            case MotionRefused(_, command, why):
+                self._refused(command, why)
 
     def _refused(self, command: str, why: str) -> None:
         """Stop a motion that the robot refuses, and report its message."""
@@ -315,11 +329,11 @@ class MotionController:
         frames, backend = self._frames, self._backend
         if frames is None or backend is None:
             return False
-        if not control.is_greeted and frames.is_lasting(command):
+        if not control.needs_ready_line and frames.is_lasting(command):
             return False
         return not (backend.is_open(command) and frames.is_ready(command))
 
-    def _ready(self, line: str) -> None:
+    def _repeat_stops(self, line: str) -> None:
         """Repeat stops that were sent before the steps of connection `line` were done."""
         owed = [
             name
@@ -331,12 +345,8 @@ class MotionController:
         if owed and self._backend is not None:
             self._backend.stop(self._stop_frames(owed))
 
-    def _renew(self, line: str) -> None:
-        """Render the stops of `line` again, with counters after the last sent frame."""
-        if not self._is_making:
-            self._renew_stops(line)
-
     def _renew_stops(self, line: str) -> None:
+        """Render the stops of `line` again, with counters after the last sent frame."""
         frames, backend = self._frames, self._backend
         if frames is None or backend is None:
             return

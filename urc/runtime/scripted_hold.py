@@ -55,7 +55,7 @@ async def hold(
     await _until_ready(session, backend, name)
     controller = MotionController(session.profile.driver)
     controller.join(_US)
-    controller.attach(session.frames, backend)
+    controller.attach(session)
     follower = asyncio.create_task(_follow(controller, backend))
     try:
         controller.drive(_US.id, "take", _now())

@@ -17,7 +17,7 @@ from urc.model.profile import Profile
 from urc.model.values import NOTHING, Reading, Value
 from urc.problems import UrcError
 from urc.protocol.engine import Engine
-from urc.protocol.events import Failed, Replied, Request
+from urc.protocol.events import Failed, MotionEvent, Replied, Request
 from urc.protocol.requests.bounds import GOOD_BYE_S, lines_of, longest_s
 from urc.protocol.sequences.sequence_control import PAUSE_S, Pull
 from urc.protocol.values.time_and_nonce import TimeAndNonce
@@ -145,6 +145,7 @@ class Session:
             driver.commands,
             partial(_limit_s, driver),
             {name: program.sequence_control for name, program in engine.programs.items()},
+            self._tell_motion,
         )
         self._links = self._made_links(
             make_transports(driver, self.settings, transports)
@@ -152,6 +153,8 @@ class Session:
             else self.backend.transports,
             random,
         )
+        self.on_motion: Callable[[MotionEvent], None] | None = None
+        """Takes the engine's events of held commands: set by `MotionController.attach`."""
         self._stops = 0
         self._untried = {name: FifoEvent(link.tried) for name, link in self._links.items()}
         """Links before the end of their first attempt: commands wait for it, in order."""
@@ -171,7 +174,7 @@ class Session:
             driver, self.settings, transports, self._clock, is_guarded=motion == "guarded"
         )
         engine.motions.share([name for name in driver.transports if is_lossy(driver, name)])
-        backend.on_stand = engine.motions.set_counters
+        backend.on_stand = partial(self._counters_told, engine)
         return backend
 
     def _made_links(
@@ -193,6 +196,16 @@ class Session:
         for name, link in links.items():
             self._dispatcher.attach(name, link)
         return links
+
+    def _tell_motion(self, event: MotionEvent) -> None:
+        if self.on_motion is not None:
+            self.on_motion(event)
+
+    def _counters_told(
+        self, engine: Engine, line: str, stand: Mapping[str, int], is_settled: bool
+    ) -> None:
+        for event in engine.motions.set_counters(line, stand, is_settled=is_settled):
+            self._tell_motion(event)
 
     async def __aenter__(self) -> "Session":
         await self._group.__aenter__()

@@ -18,6 +18,7 @@ from urc.protocol.events import (
     Close,
     Event,
     Failed,
+    MotionRefused,
     Open,
     Replied,
     Request,
@@ -109,7 +110,6 @@ class TestEngine:
         self.closed: set[str] = set()
         """Transports that the engine has closed, until a check reads them."""
         self._requests = 0
-        self.engine.motions.on_refused = self._refused
         self._numbers: dict[str, list[object]] = {}
         """Transport → numbers of the requests without a response."""
 
@@ -165,10 +165,6 @@ class TestEngine:
             self._failed(Failed(number, name, "not-allowed", text))
             return
         self.perform([Send(command.transport, data), Replied(number, name, {})])
-
-    def _refused(self, command: str, why: str) -> None:
-        """Note that the robot refuses motion."""
-        self._failed(Failed(self._requests, command, "refused", why))
 
     def _failed(self, failed: Failed) -> None:
         self.failures.append(f"{failed.code}: {failed.message}")
@@ -246,6 +242,8 @@ class TestEngine:
                     self.failures.append(f"{code}: {message}")
                 case Failed():
                     self._failed(event)
+                case MotionRefused(_, command, why):
+                    self._failed(Failed(self._requests, command, "refused", why))
                 case Replied():
                     self.ended.append(event)
                 case Close(transport, reason):

@@ -14,7 +14,7 @@ from urc.model.payload import Payload
 from urc.model.profile import Profile, Setting
 from urc.model.values import Alarm, AlarmLimits, Reading, Sample, Signal, Value
 from urc.model.widget import Widget, WidgetPort
-from urc.protocol.events import Replied
+from urc.protocol.events import MotionEvent, Replied
 from urc.protocol.sequences.sequence_control import Pull
 from urc.runtime.clock import Clock, LoopClock
 from urc.runtime.hub import Hub, LinkState, LinkStatus, LogEntry
@@ -136,6 +136,8 @@ class FakeRobot:
         """Reasons of all latched stops."""
         self.frames = FakeFrames(profile.driver)
         self.backend: MotionBackend | None = FakeMotionBackend(self.clock)
+        self.on_motion: Callable[[MotionEvent], None] | None = None
+        """Takes the events of held commands."""
         self.on_command: Callable[[str, Mapping[str, Reading]], Mapping[str, Value]] | None = None
         """Returns the values of a command's reply, or raises an error; None: no values."""
 

@@ -8,10 +8,12 @@ from urc.model.payload import CountedFrame, FrameVariants, Payload
 from urc.model.values import Reading
 from urc.motion.hold_to_run import HoldTerms, HoldToRun, Reason
 from urc.problems import UrcError
+from urc.protocol.events import MotionEvent, NumbersUsed
 from urc.protocol.requests.encode import check_arguments
 from urc.runtime.clock import Clock, Timer
+from urc.runtime.held_commands import MotionBackend
 
-__all__ = ["FakeFrames", "FakeMotionBackend"]
+__all__ = ["FakeFrames", "FakeMotionBackend", "FakeSession"]
 
 
 class FakeFrames:
@@ -21,9 +23,8 @@ class FakeFrames:
         self.driver = driver
         self.refusal = ""
         """Reason to refuse frames, or ""."""
-        self.on_count: Callable[[str], None] = _unheard
-        self.on_ready: Callable[[str], None] = _unheard
-        self.on_refused: Callable[[str, str], None] = _unrefused
+        self.on_motion: Callable[[MotionEvent], None] | None = None
+        """Takes the events of the engine."""
         self.is_greeted = True
         """Whether all steps of the connection have run."""
         self.number = 0
@@ -50,8 +51,13 @@ class FakeFrames:
     def send(self, line: str = "wire") -> int:
         """Use a counter for another frame, and return it."""
         self.number = number = self.number + 1
-        self.on_count(line)
+        self.tell(NumbersUsed(line))
         return number
+
+    def tell(self, event: MotionEvent) -> None:
+        """Tell an event of the engine."""
+        if self.on_motion is not None:
+            self.on_motion(event)
 
     def _numbered(self) -> str:
         return f"{self.number + 1} " if self.number else ""
@@ -69,8 +75,24 @@ class FakeFrames:
         data = f"{self._numbered()}{text}".encode()
         if self.number:
             self.number += 1
-            self.on_count(self.driver.commands[command].transport)
         return data
+
+
+class FakeSession:
+    """The part of a session that a desk needs."""
+
+    def __init__(self, frames: FakeFrames, backend: MotionBackend | None) -> None:
+        self.frames = frames
+        self.backend = backend
+
+    @property
+    def on_motion(self) -> Callable[[MotionEvent], None] | None:
+        """Takes the events of the engine."""
+        return self.frames.on_motion
+
+    @on_motion.setter
+    def on_motion(self, take: Callable[[MotionEvent], None] | None) -> None:
+        self.frames.on_motion = take
 
 
 class FakeMotionBackend:
@@ -165,11 +187,3 @@ class FakeMotionBackend:
             self.written.append((now, data.decode()))
             if self._write is not None:
                 self._write(data)
-
-
-def _unrefused(command: str, why: str) -> None:
-    """Ignore a refusal."""
-
-
-def _unheard(line: str) -> None:
-    """Ignore a transport."""

@@ -206,7 +206,7 @@ class World:
         self.controller.join(Operator("ann", "ann", "engineer"))
         assert session.backend is not None
         self.guard = session.backend
-        self.controller.attach(session.frames, session.backend)
+        self.controller.attach(session)
         self._ticks = 0
         self._asking: list[asyncio.Task[object]] = []
         self.failures: list[str] = []

@@ -312,11 +312,48 @@ async def test_frames_whose_numbers_were_used_up_are_sent_in_a_round_of_their_ow
         guard.tell(messages.SendStale("wire", 1, number, {"n": number}))
     rounds = [(one.number, one.round) for one in guard.said if isinstance(one, messages.SendBytes)]
     assert rounds == [(1, 0), (1, 1), (2, 1), (2, 2)]
-    assert stands == [("wire", {}, True), ("wire", {"n": 1}, True), ("wire", {"n": 2}, True)]
+    counts = [({}, True), ({"n": 1}, True), ({"n": 1}, False), ({"n": 2}, True), ({"n": 2}, False)]
+    assert stands == [("wire", *one) for one in counts]
     await guard.line.open(1.0)
     guard.said.clear()
     assert guard.line.offer(b"b")
     assert guard.said == [messages.SendBytes("wire", 2, 1, b"b")]
+
+
+async def test_stops_are_renewed_between_the_frames_of_a_round_and_their_sending() -> None:
+    """So the guard has stops with the numbers after these frames before it has the frames."""
+    guard, seen = Guard(), list[str]()
+    await guard.line.open(1.0)
+
+    def again() -> Numbered:
+        seen.append("render")
+        return Numbered(b"2 go", Count({"n": 1}, {"n": 2}))
+
+    for _ in range(2):
+        first = Numbered(b"1 go", Count({}, {"n": 1}))
+        assert guard.line.offer_counted(CountedFrame(first, again), lambda data: None)
+    guard.line._stands = lambda line, stand, is_settled: seen.append(f"settled {is_settled}")
+    guard.line._post = lambda said: seen.append("send")
+    guard.tell(messages.SendStale("wire", 1, 1, {"n": 1}))
+    assert seen == ["settled True", "render", "render", "settled False", "send", "send"]
+
+
+async def test_frames_that_are_refused_while_they_are_sent_again_are_sent_once_more() -> None:
+    """A guard in this process answers within the call; the newer round has them all."""
+    guard, rounds = Guard(), list[tuple[int, int]]()
+    await guard.line.open(1.0)
+    assert guard.line.offer(b"a")
+    assert guard.line.offer(b"b")
+
+    def post(said: messages.ToGuard) -> None:
+        assert isinstance(said, messages.SendBytes)
+        rounds.append((said.number, said.round))
+        if said.round == 1:
+            guard.tell(messages.SendStale("wire", 1, 1, {"n": 2}))
+
+    guard.line._post = post
+    guard.tell(messages.SendStale("wire", 1, 1, {"n": 1}))
+    assert rounds == [(1, 1), (1, 2), (2, 2)]
 
 
 async def test_numbers_count_when_their_frame_has_left() -> None:

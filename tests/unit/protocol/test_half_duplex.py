@@ -94,7 +94,3 @@ def test_on_other_lines_motion_waits_for_nothing() -> None:
     it = talk(DRIVER.replace("wire: duplex: half", ""))
     it.run("ask")
     assert give(it) == b"V 1\n"
-
-
-def test_a_stop_is_not_lasting_where_a_frame_may_owe_an_answer() -> None:
-    assert not talk().engine.motions.is_lasting("drive")

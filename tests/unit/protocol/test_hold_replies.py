@@ -6,7 +6,7 @@ from tests.dialogue import Dialogue
 from urc.config.load import check
 from urc.model.payload import Envelope
 from urc.protocol.engine import Engine
-from urc.protocol.events import Samples, Violation
+from urc.protocol.events import Event, MotionRefused, Samples, Violation
 from urc.runtime.registries import built_in_catalog
 
 DRIVER = """
@@ -35,13 +35,16 @@ messages:
 """
 
 
+def refusals(events: list[Event]) -> list[tuple[str, str]]:
+    return [(one.command, one.why) for one in events if isinstance(one, MotionRefused)]
+
+
 class Held(Dialogue):
     """A talk with a robot that is driven."""
 
     def __init__(self) -> None:
         super().__init__(DRIVER)
         self.refused: list[tuple[str, str]] = []
-        self.engine.motions.on_refused = lambda command, why: self.refused.append((command, why))
         self.connect()
 
     def give(self, command: str = "drive", v: float = 1) -> None:
@@ -51,7 +54,9 @@ class Held(Dialogue):
     def hear(self, text: str) -> list[object]:
         """Let the robot say something; return faults and readings."""
         events = self.engine.receive("wire", text.encode(), self.now)
-        return [one.code if isinstance(one, Violation) else one for one in events]
+        self.refused += refusals(events)
+        others = (one for one in events if not isinstance(one, MotionRefused))
+        return [one.code if isinstance(one, Violation) else one for one in others]
 
 
 def test_an_acknowledgement_is_no_stray_frame_and_sets_its_signals() -> None:
@@ -154,14 +159,11 @@ def test_a_response_with_a_refusal_is_told_in_the_words_of_the_server(tmp_path: 
     file.write_text(WEB, "utf-8")
     profile = check(file, built_in_catalog()).profile
     assert profile is not None
-    refused: list[tuple[str, str]] = []
     engine = Engine(profile.driver, {})
-    engine.motions.on_refused = lambda command, why: refused.append((command, why))
     engine.tick(0)
     engine.start("web", 0)
     engine.motions.motion_frame("drive", {"v": 1}, 0)
-    engine.receive("web", Envelope("response", {"id": None, "ok": True}, b""), 0.1)
-    assert refused == []
+    good = Envelope("response", {"id": None, "ok": True}, b"")
+    assert refusals(engine.receive("web", good, 0.1)) == []
     bad = Envelope("response", {"id": None, "ok": False, "reason": "409 Conflict"}, b"")
-    engine.receive("web", bad, 0.1)
-    assert refused == [("drive", "409 Conflict")]
+    assert refusals(engine.receive("web", bad, 0.1)) == [("drive", "409 Conflict")]

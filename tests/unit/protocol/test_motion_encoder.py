@@ -7,7 +7,7 @@ from urc.model.exchange import MOST_STOPS, Confirm
 from urc.model.payload import Count, CountedFrame, FrameVariants, Numbered, Payload
 from urc.problems import UrcError
 from urc.protocol.engine import Engine
-from urc.protocol.events import Request, Send
+from urc.protocol.events import MotionReady, NumbersUsed, Ready, Replied, Request, Samples, Send
 from urc.protocol.motion_encoder import MotionEncoder, MotionRefused
 from urc.protocol.requests.encode import BadArgument
 
@@ -116,7 +116,7 @@ def test_stops_are_made_for_each_repeat_and_for_a_new_connection() -> None:
     """Whoever stops alone has one for each number that may be next."""
     motions = Dialogue(DRIVER.replace("0, 9", "0, 999")).connect().engine.motions
     motions.share(["wire"])
-    motions.set_counters("wire", {"n": 499}, True)
+    motions.set_counters("wire", {"n": 499}, is_settled=True)
     made = [one for one in stops(motions) if isinstance(one, bytes)]
     length = len(made) // 2
     assert length >= MOST_STOPS
@@ -132,44 +132,51 @@ def test_numbers_of_a_shared_line_count_when_their_frames_have_left() -> None:
     first = motions.motion_frame("turn", {"v": 1}, 0.1)
     assert numbered(first) == Numbered(b"0 TURN 1\n", Count({}, {"n": 0}))
     assert numbered(motions.motion_frame("turn", {"v": -1}, 0.2)).data == b"0 TURN -1\n"
-    motions.set_counters("wire", {"n": 0}, True)
+    assert motions.set_counters("wire", {"n": 0}, is_settled=True) == [NumbersUsed("wire")]
     next_one = numbered(motions.motion_frame("turn", {"v": 1}, 0.3))
     assert next_one == Numbered(b"1 TURN 1\n", Count({"n": 0}, {"n": 1}))
-    (sent,) = talk.engine.command(Request(1, "ping"), 0.4)[:1]
+    used, sent = talk.engine.command(Request(1, "ping"), 0.4)[:2]
+    assert used == NumbersUsed("wire"), "before the frame: its stops come first"
     assert isinstance(sent, Send)
     assert sent.counted is not None
     assert sent.counted.numbered == Numbered(b"1 PING\n", Count({"n": 0}, {"n": 1}))
-    motions.set_counters("wire", {"n": 7}, True)
+    motions.set_counters("wire", {"n": 7}, is_settled=True)
     assert sent.counted.again() == Numbered(b"8 PING\n", Count({"n": 7}, {"n": 8}))
     assert isinstance(first, CountedFrame)
     assert first.again() == Numbered(b"8 TURN 1\n", Count({"n": 7}, {"n": 8})), "it overtakes"
 
 
-def test_whoever_keeps_a_stop_is_told_when_its_number_is_used_up() -> None:
-    """By motion, by a command, and on each connection anew; making a stop is no news."""
+def test_use_of_a_number_is_an_event_where_motion_shares_the_counters() -> None:
+    """On each connection; also of a frame that cannot be encoded. Rendering a stop uses none."""
     talk = Dialogue(DRIVER)
-    motions, used = talk.engine.motions, list[str]()
-    motions.on_count = used.append
+    motions = talk.engine.motions
     assert (motions.is_lasting("turn"), motions.is_lasting("drive")) == (False, True)
+    talk.connect()
+    talk.run("ping")
+    assert talk.motion == [MotionReady("wire")], "nothing shares them yet"
+    motions.share(["wire"])
     for _ in range(2):
+        talk.engine.closed("wire", "gone", 1)
+        talk.motion.clear()
         talk.connect()
         motions.motion_frame("turn", {"v": 1}, 0.1)
         stops(motions)
         talk.run("ping")
-        assert used == ["wire", "wire"]
-        used.clear()
-        talk.engine.closed("wire", "gone", 1)
+        assert talk.motion == [MotionReady("wire"), NumbersUsed("wire")]
 
 
-def test_a_line_with_start_up_steps_is_told_ready_when_they_are_done() -> None:
-    """Then what it did not count may be said again."""
+def test_line_with_start_up_steps_is_ready_for_motion_after_them() -> None:
+    """Told before any frame that waited for them: a stop that is repeated now goes first."""
     talk = Dialogue(DRIVER + "wire: on_connect: [{ send: LOGIN }, { expect: '^OK$' }]")
-    motions, ready = talk.engine.motions, list[str]()
-    motions.on_ready = ready.append
+    motions = talk.engine.motions
     talk.connect()
-    assert (ready, motions.is_ready("drive")) == ([], False)
-    talk.says("OK")
-    assert (ready, motions.is_ready("drive")) == (["wire"], True)
+    assert (talk.motion, motions.is_ready("drive")) == ([], False)
+    talk.run("ping")
+    heard, *events = talk.engine.receive("wire", b"OK\n", 0.1)
+    assert isinstance(heard, Samples)
+    assert events[:2] == [MotionReady("wire"), Ready("wire")]
+    assert [type(one) for one in events[2:]] == [Send, Replied]
+    assert motions.is_ready("drive")
 
 
 def test_its_errors_are_of_one_kind() -> None:

@@ -11,7 +11,7 @@ from urc.motion.freshness import ControlInput
 from urc.motion.hold_to_run import HoldTerms, Reason
 from urc.motion.lease import LeaseState, Operator
 from urc.runtime.motion_controller import MotionController
-from urc.testing.movers import FakeFrames
+from urc.testing.movers import FakeFrames, FakeSession
 
 __all__ = ["DRIVER", "Movers", "Scene", "held"]
 
@@ -87,7 +87,7 @@ class Scene:
         self.backend = Movers()
         self.frames = FakeFrames(driver)
         if is_attached:
-            self.controller.attach(self.frames, self.backend)
+            self.controller.attach(FakeSession(self.frames, self.backend))
         for name, role in {"ann": "driver", "bob": "driver", "eve": "engineer"}.items():
             self.controller.join(Operator(name, name, role))  # type: ignore[arg-type]
         self.controller.join(Operator("vic", "vic", "viewer"))

@@ -19,7 +19,7 @@ from urc.motion.freshness import ControlInput
 from urc.motion.hold_to_run import HoldTerms, HoldToRun, Reason
 from urc.motion.lease import Operator
 from urc.runtime.motion_controller import MotionController
-from urc.testing.movers import FakeFrames
+from urc.testing.movers import FakeFrames, FakeSession
 
 SPEED = Argument("speed", min=-1.0, max=1.0, default=0.0, is_required=False)
 STEPS = 10_000
@@ -128,7 +128,7 @@ class World:
         self.line = Line()
         self.frames = FakeFrames(DRIVER)
         self.controller = MotionController(DRIVER)
-        self.controller.attach(self.frames, self.line)
+        self.controller.attach(FakeSession(self.frames, self.line))
         self.is_attached = True
         for screen in SCREENS:
             self.controller.join(screen)
@@ -194,7 +194,7 @@ class World:
         """End the session, or begin another one; what moves is stopped by its movers."""
         self.is_attached = not self.is_attached
         if self.is_attached:
-            self.controller.attach(self.frames, self.line)
+            self.controller.attach(FakeSession(self.frames, self.line))
             return
         self.controller.detach()
         for hold_to_run in self.line.backend.values():

@@ -5,7 +5,16 @@ from collections.abc import Sequence
 
 import pytest
 
-from urc.protocol.events import Event, Failed, Replied, Request, Violation
+from urc.protocol.events import (
+    Event,
+    Failed,
+    MotionRefused,
+    NumbersUsed,
+    Replied,
+    Request,
+    Send,
+    Violation,
+)
 from urc.runtime.dispatcher import MAX_WAITING, Dispatcher
 from urc.runtime.hub import Hub
 from urc.testing.clock import FakeClock
@@ -101,6 +110,18 @@ async def test_engine_that_is_always_due_does_not_hold_the_loop() -> None:
     dispatcher.wind_up()
     await clock.advance(0.1)
     assert 50 < engine.calls <= 102
+
+
+async def test_events_of_motion_are_handed_on_in_their_order() -> None:
+    """Stops with the numbers after a frame go to the guard before the frame does."""
+    engine, port, told = GreedyEngine(), Port(), list[object]()
+    events = [NumbersUsed("wire"), Send("wire", b"7 ping"), MotionRefused("wire", "drive", "no")]
+    engine.start = lambda transport, now: events  # type: ignore[method-assign]
+    port.send = told.append  # type: ignore[method-assign, assignment]
+    dispatcher = Dispatcher(engine, Hub({}), FakeClock(), {}, limit_s, motion=told.append)
+    dispatcher.attach("wire", port)
+    dispatcher.start("wire")
+    assert told == events
 
 
 async def test_waiting_commands_are_bounded() -> None:

@@ -12,7 +12,9 @@ from urc.motion.freshness import ControlInput
 from urc.motion.hold_to_run import HoldTerms
 from urc.motion.lease import LeaseState, Operator
 from urc.problems import UrcError
+from urc.protocol.events import MotionReady, MotionRefused
 from urc.runtime.motion_controller import LET_GO, MOST_SCREENS
+from urc.testing.movers import FakeSession
 
 
 def test_the_first_tick_arms_with_the_stop_and_each_tick_is_a_frame() -> None:
@@ -172,7 +174,7 @@ def test_a_stop_without_a_robot_goes_out_when_there_is_one() -> None:
     it.controller.stop("ann")
     it.drive("ann", "reset")
     assert it.heard() == []
-    it.controller.attach(it.frames, it.backend)
+    it.controller.attach(FakeSession(it.frames, it.backend))
     assert it.heard() == ["stop drive lift"]
 
 
@@ -189,7 +191,7 @@ def test_a_stop_that_the_robot_did_not_hear_of_before_a_restart_is_its_first_new
     """Nobody was told that it had: it is confirmed when the line has taken it."""
     it = Scene(LeaseState(epoch=41, latched_by="ann"), is_attached=False, is_owed=True)
     assert not it.controller.is_confirmed
-    it.controller.attach(it.frames, it.backend)
+    it.controller.attach(FakeSession(it.frames, it.backend))
     assert it.heard() == ["stop drive lift"]
     for command in ("drive", "lift"):
         it.controller.stopped(command, "stopped")
@@ -204,7 +206,7 @@ def test_a_session_that_ends_leaves_nothing_armed() -> None:
     it.controller.detach()
     assert it.tick(speed=0.5) == LET_GO
     it.controller.release("ann", "drive")
-    it.controller.attach(it.frames, it.backend)
+    it.controller.attach(FakeSession(it.frames, it.backend))
     it.heard()
     assert it.tick(speed=0.5) == "it was stopped: take the controls anew"
     it.drive("ann", "take")
@@ -309,14 +311,28 @@ def test_a_stop_before_the_login_is_repeated_after_it() -> None:
     assert it.heard() == []
     assert not it.controller.is_confirmed
     it.frames.is_greeted = True
-    it.frames.on_ready("air")
+    it.controller.hear(MotionReady("air"))
     assert it.heard() == []
-    it.frames.on_ready("wire")
+    it.controller.hear(MotionReady("wire"))
     assert it.heard() == ["stop drive"]
     it.controller.stopped("drive", "stopped")
     assert it.controller.is_confirmed
-    it.frames.on_ready("wire")
+    it.controller.hear(MotionReady("wire"))
     assert it.heard() == [], "once is enough"
+
+
+def test_a_stop_on_a_half_duplex_line_is_repeated_when_the_line_is_ready() -> None:
+    """The robot may still have been sending: the two collide, and the stop is lost."""
+    lines = {**DRIVER.transports, "wire": DRIVER.transports["wire"]._replace(is_half_duplex=True)}
+    it = Scene(driver=DRIVER._replace(transports=lines))
+    it.controller.stop("ann")
+    it.frames.is_greeted = False
+    it.heard()
+    it.controller.stopped("drive", "revoked")
+    assert not it.controller.is_confirmed
+    it.frames.is_greeted = True
+    it.controller.hear(MotionReady("wire"))
+    assert it.heard() == ["stop drive"]
 
 
 def test_a_line_that_the_guard_lost_is_not_ready_whatever_the_engine_knows() -> None:
@@ -328,7 +344,7 @@ def test_a_line_that_the_guard_lost_is_not_ready_whatever_the_engine_knows() -> 
     it.backend.is_up = False
     it.controller.stopped("drive", "revoked")
     it.backend.is_up = True
-    it.frames.on_ready("wire")
+    it.controller.hear(MotionReady("wire"))
     assert it.heard() == ["stop drive"]
 
 
@@ -338,7 +354,7 @@ def test_a_stop_on_a_line_that_is_ready_is_not_repeated() -> None:
     it.tick(speed=0.5)
     it.controller.stopped("drive", "expired")
     it.heard()
-    it.frames.on_ready("wire")
+    it.controller.hear(MotionReady("wire"))
     assert it.heard() == []
 
 
@@ -388,7 +404,7 @@ def test_a_robot_of_which_only_something_moves_by_itself_can_be_stopped_without_
     """The stop is latched; nobody writes anything for it."""
     fold = Command("fold", "wire", WriteSpec("text", {}), moves=True)
     it = Scene(is_attached=False, driver=DRIVER._replace(commands={"fold": fold}))
-    it.controller.attach(it.frames, None)
+    it.controller.attach(FakeSession(it.frames, None))
     assert it.controller.can_move
     it.controller.stop("ann")
     assert it.controller.lease.interlock(Operator("bob")) == "stopped by ann: reset it first"
@@ -409,7 +425,7 @@ def test_a_robot_that_refuses_ends_the_motion_in_its_own_words() -> None:
     told: list[tuple[str, str]] = []
     it.controller.on_refused = lambda command, why: told.append((command, why))
     it.heard()
-    it.frames.on_refused("drive", "the guard is open")
+    it.controller.hear(MotionRefused("wire", "drive", "the guard is open"))
     assert it.heard() == ["release drive"]
     assert told == [("drive", "the guard is open")]
     assert it.tick(speed=0.5) == "the guard is open"
@@ -426,9 +442,9 @@ def test_a_refusal_of_what_does_not_move_changes_nothing() -> None:
     it.tick(speed=0.5)
     it.controller.release("ann", "drive")
     it.heard()
-    it.frames.on_refused("drive", "too late")
-    it.frames.on_refused("lift", "it never moved")
-    it.frames.on_refused("beep", "it is not held")
+    it.controller.hear(MotionRefused("wire", "drive", "too late"))
+    it.controller.hear(MotionRefused("wire", "lift", "it never moved"))
+    it.controller.hear(MotionRefused("wire", "beep", "it is not held"))
     assert it.heard() == []
     assert it.tick(speed=0.5) == ""
 

@@ -7,6 +7,8 @@ from urc.model.payload import Count, CountedFrame, Numbered, Payload
 from urc.model.sequence import WaitStep
 from urc.model.values import Reading
 from urc.motion.lease import Operator
+from urc.protocol.events import MotionReady
+from urc.testing.movers import FakeSession
 
 
 def test_a_request_lasts_as_long_as_it_says_and_may_be_declined() -> None:
@@ -22,8 +24,8 @@ def test_a_request_lasts_as_long_as_it_says_and_may_be_declined() -> None:
 def test_a_new_session_owes_no_stop_to_what_rests() -> None:
     it = Scene()
     it.controller.detach()
-    it.controller.attach(it.frames, it.backend)
-    it.frames.on_ready("wire")
+    it.controller.attach(FakeSession(it.frames, it.backend))
+    it.controller.hear(MotionReady("wire"))
     assert it.heard() == []
 
 
@@ -35,7 +37,7 @@ def test_a_session_without_movers_moves_nothing_and_goes_on() -> None:
         driver=DRIVER._replace(transports={**DRIVER.transports, "wire": wire}),
     )
     it.frames.number = 10
-    it.controller.attach(it.frames, None)
+    it.controller.attach(FakeSession(it.frames, None))
     it.drive("ann", "take")
     assert it.tick(speed=0.5) == "the robot is not connected"
     it.frames.send()

@@ -6,6 +6,8 @@ from tests.unit.runtime.desks import DRIVER, Scene, held
 from urc.model.payload import Payload
 from urc.model.values import Reading
 from urc.problems import UrcError
+from urc.protocol.events import MotionRefused
+from urc.testing.movers import FakeSession
 
 
 def test_stop_of_the_second_control_of_a_robot_is_made_anew_as_well() -> None:
@@ -54,7 +56,7 @@ def test_newest_stop_goes_out_when_none_can_be_made_any_more() -> None:
 
 def test_frame_of_a_robot_without_movers_renews_no_stop() -> None:
     it = Scene(is_attached=False)
-    it.controller.attach(it.frames, None)
+    it.controller.attach(FakeSession(it.frames, None))
     assert it.frames.send() == 1
     assert it.heard() == []
 
@@ -65,7 +67,7 @@ def test_stop_is_made_once_for_a_tick_after_all_its_numbers() -> None:
     whole = it.frames.motion_frame
 
     def double(command: str, arguments: Mapping[str, Reading], now: float) -> Payload:
-        it.frames.send()
+        it.frames.number += 1
         return whole(command, arguments, now)
 
     it.frames.motion_frame = double  # type: ignore[method-assign]
@@ -90,5 +92,5 @@ def test_refusal_ends_the_motion_also_without_a_listener() -> None:
     it.drive("ann", "take")
     it.tick(speed=0.5)
     it.heard()
-    it.frames.on_refused("drive", "too steep")
+    it.controller.hear(MotionRefused("wire", "drive", "too steep"))
     assert it.heard() == ["release drive"]

@@ -11,6 +11,7 @@ import pytest
 
 from tests.unit.runtime.desks import DRIVER
 from urc.motion.lease import Role
+from urc.protocol.events import MotionEvent, MotionRefused
 from urc.runtime.audit import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
 from urc.runtime.hub import Hub
@@ -33,6 +34,7 @@ class Scene:
         self.controls = ControlService(DRIVER, self.clock, file, recorder)
         self.frames = FakeFrames(DRIVER)
         self.backend = FakeMotionBackend(self.clock)
+        self.on_motion: Callable[[MotionEvent], None] | None = None
         self.hub = Hub({})
         self.told: dict[str, list[dict[str, Any]]] = {}
         self.beats: dict[str, int] = {}
@@ -396,7 +398,7 @@ async def test_the_words_of_a_robot_that_refuses_to_move_are_told_at_its_control
         it.say(ann, "take")
         it.tick(ann)
         it.read(bob)
-        it.frames.on_refused("drive", "the guard is open")
+        it.controls.controller.hear(MotionRefused("wire", "drive", "the guard is open"))
         for operator in (ann, bob):
             (told,) = [one for one in it.read(operator) if one["t"] == "refused"]
             assert (told["command"], told["message"]) == ("drive", "the guard is open")

@@ -3,12 +3,11 @@
 Pure. See `urc.protocol.requests.conversation` for the theory of operation.
 """
 
-from collections.abc import Callable
 from typing import Literal
 
 from urc.model.driver import TransportSpec
 from urc.model.payload import Envelope, Payload, traffic_of
-from urc.protocol.events import Close, Ready, Violation
+from urc.protocol.events import Close, MotionReady, Ready, Violation
 from urc.protocol.framing.base import Framing
 from urc.protocol.framing.table import build_framing
 from urc.protocol.requests.exchange import (
@@ -46,11 +45,8 @@ class Connection:
         self.counters = Counters()
         self.learnt: dict[str, object] = {}
         """Names read by the steps of this connection: ``_name`` → value."""
-        self.on_ready: Callable[[], None] | None = None
-        """Called when the connection is ready; must not call the conversation back."""
-        self.on_refused: Callable[[str, str], None] | None = None
-        """Called with a held command and the refusal of the robot; must not call the conversation
-        back."""
+        self.has_motion = False
+        """Whether it has held commands, whose frames are sent elsewhere."""
         self._pending_replies = PendingReplies()
         self._request_queue = RequestQueue(spec, self._pending_replies, self._size_of)
         self.receiver = FrameReceiver(spec, self.framing, messages)
@@ -85,18 +81,16 @@ class Connection:
         self.last_sent = now
         self._read_frames(now)
         if not self.spec.on_connect:
-            self._get_ready()
+            events += self._get_ready()
         return events + self._pump(now)
 
     def ready(self, now: float) -> list[LineEvent]:
         """Allow all requests: the login is complete."""
-        self._get_ready()
-        return [Ready(self.spec.name), *self._pump(now)]
+        return [*self._get_ready(), Ready(self.spec.name), *self._pump(now)]
 
-    def _get_ready(self) -> None:
+    def _get_ready(self) -> list[LineEvent]:
         self.is_ready = True
-        if self.on_ready is not None:
-            self.on_ready()
+        return [MotionReady(self.spec.name)] if self.has_motion else []
 
     def closed(self, reason: str, now: float) -> list[LineEvent]:
         """Record that the transport is not connected."""

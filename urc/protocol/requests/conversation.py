@@ -1,6 +1,6 @@
 """The conversation on one transport: queued requests, requests in flight, and received frames.
 
-Pure: time is passed in. Two callbacks, `on_ready` and `on_refused`, concern motion.
+Pure: time is passed in.
 
 Theory of operation. A connection is closed, opening or open. An open connection becomes *ready*
 after the steps of ``on_connect``, and stops being ready before those of ``on_close``. A connection
@@ -23,7 +23,7 @@ from functools import partial
 from urc.model.driver import TransportSpec
 from urc.model.payload import CountedFrame, Envelope, Numbered, Payload, size_of
 from urc.model.values import Sample
-from urc.protocol.events import Open, Send, Violation
+from urc.protocol.events import MotionRefused, NumbersUsed, Open, Send, Violation
 from urc.protocol.forms.http_head import is_redirect
 from urc.protocol.forms.topics import frame_of
 from urc.protocol.framing.base import FrameFault
@@ -191,12 +191,15 @@ class Conversation(Connection):
         if ask.is_numbered:
             number = self._number = self._number + 1
         count = None
+        sent: list[LineEvent] = []
         if exchange.data is None:
+            if ask.has_counters and self.counters.is_shared:
+                sent.append(NumbersUsed(self.spec.name))  # also by a frame that cannot be encoded
             try:
                 count = written(exchange, self.counters, self.learnt).takes
             except BadArgument as error:
                 why = untold(error) if exchange.is_secret else str(error)
-                return [ExchangeEnded(exchange, ExchangeOutcome("bad-argument", why))]
+                return [*sent, ExchangeEnded(exchange, ExchangeOutcome("bad-argument", why))]
         elif ask.is_fresh:
             render_retry(exchange, self.counters, self.learnt)
         data = self._as_sent(exchange, number)
@@ -210,7 +213,7 @@ class Conversation(Connection):
         if count is not None and count.after and self.counters.is_shared:
             again = partial(self._count_again, exchange, number)
             shared = CountedFrame(Numbered(data, count), again)
-        sent: list[LineEvent] = [new(Send, (self.spec.name, data, exchange.is_secret, shared))]
+        sent.append(new(Send, (self.spec.name, data, exchange.is_secret, shared)))
         if not ask.answers:
             if number is not None:
                 if len(self._askers) >= MOST_IN_FLIGHT:
@@ -473,15 +476,15 @@ class Conversation(Connection):
     def _motion_refused(
         self, refused: Sequence[HoldRejected], frame: Frame, now: float
     ) -> list[LineEvent]:
+        name, stops = self.spec.name, list[LineEvent]()  # motion ends before anything else happens
         events: list[LineEvent] = [*(self.receiver.message(frame, now) or ())]
         for command, offer in refused:
             if offer.told is not None:
                 events += self.receiver.samples(*offer.told, now)[0]
             why = self.receiver.secrets.hide(offer.refusal)
-            events.append(Violation(self.spec.name, "motion-refused", f"{command}: {why}"))
-            if self.on_refused is not None:
-                self.on_refused(command, why)
-        return events
+            stops.append(MotionRefused(name, command, why))
+            events.append(Violation(name, "motion-refused", f"{command}: {why}"))
+        return stops + events
 
     def _answer(
         self, pending: PendingReply, offer: MatchResult, frame: Frame | None, now: float

@@ -78,7 +78,7 @@ class Counters:
     engine only proposes numbers, and learns the true values later.
     """
 
-    __slots__ = ("_known", "_last", "ahead", "counted", "is_shared")
+    __slots__ = ("_known", "_last", "ahead", "is_shared")
 
     def __init__(self) -> None:
         self._last: Mapping[str, int] = {}
@@ -88,8 +88,6 @@ class Counters:
         self.ahead = 0
         """Frames counted since the last confirmation."""
         self.is_shared = False
-        self.counted: Callable[[], None] | None = None
-        """Callback after a counted frame; it must not count any."""
 
     def draw(self) -> FrameCounters:
         """Return the numbers of the next frame without counting it."""
@@ -108,8 +106,6 @@ class Counters:
             self.ahead += 1
         else:
             self._known = self._last
-        if self.counted is not None:
-            self.counted()
 
     def set_counters(self, stand: Mapping[str, int], *, is_settled: bool) -> None:
         """Update shared counters with confirmed values.

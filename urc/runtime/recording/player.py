@@ -19,7 +19,7 @@ from urc.model.profile import Profile
 from urc.model.values import Reading, Sample, Value
 from urc.problems import UrcError
 from urc.protocol.engine import Engine
-from urc.protocol.events import Replied
+from urc.protocol.events import MotionEvent, Replied
 from urc.protocol.sequences.sequence_control import Pull
 from urc.runtime.clock import Clock, LoopClock, within
 from urc.runtime.held_commands import MotionBackend, MotionFrames
@@ -274,6 +274,7 @@ class PlaybackSession:
         self.hub = Hub(profile.driver.signals)
         self.frames: MotionFrames = Engine(profile.driver, settings).motions
         self.backend: MotionBackend | None = None
+        self.on_motion: Callable[[MotionEvent], None] | None = None
 
     async def command(
         self,

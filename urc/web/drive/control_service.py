@@ -120,7 +120,7 @@ class ControlService:
         if self._file is not None and self._file.fault:
             self._latch_fault(self._file.fault)
         self.watch.start()
-        self.controller.attach(session.frames, session.backend)
+        self.controller.attach(session)
         try:
             async with asyncio.TaskGroup() as group:
                 group.create_task(self.once.serve(session))

@@ -14,8 +14,8 @@ from urc.motion.lease import LeaseState, Operator
 from urc.motion.rate_limiter import RateLimiter
 from urc.protocol.events import Replied
 from urc.runtime.clock import Timer
+from urc.runtime.held_commands import MotionSession
 from urc.runtime.hub import Hub
-from urc.runtime.motion_controller import MotionBackend, MotionFrames
 from urc.web.wire import drive as wire
 
 __all__ = ["FLOOD", "Drivable", "OperatorSession", "RedundantLine"]
@@ -34,16 +34,8 @@ class RedundantLine(Protocol):
         """Stop reading from the socket."""
 
 
-class Drivable(Protocol):
+class Drivable(MotionSession, Protocol):
     """The part of a session that the controls need."""
-
-    @property
-    def frames(self) -> MotionFrames:
-        """The encoder of the engine."""
-
-    @property
-    def backend(self) -> MotionBackend | None:
-        """The sender of motion; None for a robot without a held command."""
 
     @property
     def hub(self) -> Hub:

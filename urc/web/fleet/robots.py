@@ -21,9 +21,9 @@ from urc.protocol.events import Replied
 from urc.protocol.sequences.sequence_control import Pull
 from urc.runtime.audit_recorder import AuditRecorder
 from urc.runtime.clock import Clock, LoopClock
+from urc.runtime.held_commands import MotionSession
 from urc.runtime.hub import Hub
 from urc.runtime.latch import LatchStore
-from urc.runtime.motion_controller import MotionBackend, MotionFrames
 from urc.web.drive.control_service import ControlService
 from urc.web.drive.two_person import TwoPersonRule
 from urc.web.feed.client_socket import SocketPeer
@@ -90,20 +90,12 @@ _LOOK_S = 0.01
 log = logging.getLogger(__name__)
 
 
-class SessionLike(Protocol):
+class SessionLike(MotionSession, Protocol):
     """The part of an opened profile that the dashboard needs."""
 
     @property
     def hub(self) -> Hub:
         """Latest values and link states."""
-
-    @property
-    def frames(self) -> MotionFrames:
-        """The encoder of held commands."""
-
-    @property
-    def backend(self) -> MotionBackend | None:
-        """The sender of motion; None for a robot without a held command."""
 
     async def command(
         self,
