@@ -1,12 +1,10 @@
 """The conversation on one transport: queued requests, requests in flight, and received frames.
 
-Pure: time is passed in.
-
 Theory of operation. A connection is closed, opening or open. An open connection becomes *ready*
 after the steps of ``on_connect``, and stops being ready before those of ``on_close``. A connection
 that is not ready sends only the privileged exchanges of these steps. The session opens a persistent
 connection. A per-request conversation asks for a connection (`Open`) when a request waits, and for
-its end (`Close`) afterwards.
+its end (`Close`) afterwards. All of this is pure: time is passed in.
 
 Requests in flight are kept in the order of sending. A received frame is offered to each of them,
 the oldest first. A request with a correlation takes its own reply only. Of the other requests, only
@@ -191,10 +189,9 @@ class Conversation(Connection):
         if ask.is_numbered:
             number = self._number = self._number + 1
         count = None
-        sent: list[LineEvent] = []
+        uses = ask.has_counters and exchange.data is None and self.counters.is_shared
+        sent: list[LineEvent] = [NumbersUsed(self.spec.name)] if uses else []  # also if not encoded
         if exchange.data is None:
-            if ask.has_counters and self.counters.is_shared:
-                sent.append(NumbersUsed(self.spec.name))  # also by a frame that cannot be encoded
             try:
                 count = written(exchange, self.counters, self.learnt).takes
             except BadArgument as error:
