@@ -1,8 +1,8 @@
-"""What the engine's process and the guard say to each other.
+"""The messages between the engine's process and the guard.
 
-Each message is an array in MessagePack whose first element says what it is. `line` is the name of a
-transport, `control` that of a held command, and `turn` counts how often the engine has opened a
-line: what belongs to an earlier connection is nobody's.
+A message is a MessagePack array whose first element is its type. `line` is the name of a transport,
+`control` that of a held command. `turn` is the number of times that the engine has opened the line.
+Messages of an earlier turn are dropped.
 """
 
 from collections.abc import Mapping
@@ -45,7 +45,7 @@ __all__ = [
 
 
 class MakeTransport(msgspec.Struct, array_like=True, frozen=True, tag=1):
-    """Make a transport; it is not opened."""
+    """Create a transport without opening it."""
 
     line: str
     factory: str
@@ -53,14 +53,13 @@ class MakeTransport(msgspec.Struct, array_like=True, frozen=True, tag=1):
     options: dict[str, Any]
     subscriptions: list[tuple[str, dict[str, Any]]]
     tunnel: str
-    """Line that it goes through, made before; "": none."""
+    """Line that carries this one, created before; "" without one."""
     stalled_s: float
-    """Unsent motion of this age means that the line is stalled: it is reset and opened afresh."""
+    """Age of unsent motion at which the line counts as stalled, in seconds. It is then reset."""
     is_strict: bool
-    """Opening it is dear: nothing is written while anything is unsent, however young."""
+    """Whether the line is slow to open: then nothing is written while any byte is unsent."""
     silent_s: float | None = None
-    """While something moves, a robot that says nothing for so long stands still: the line is reset
-    and opened afresh. None: nothing is expected of it."""
+    """Silence of a moving robot after which the line is reset, in seconds; None: unlimited."""
 
 
 class OpenLine(msgspec.Struct, array_like=True, frozen=True, tag=2):
@@ -72,28 +71,28 @@ class OpenLine(msgspec.Struct, array_like=True, frozen=True, tag=2):
 
 
 class SendBytes(msgspec.Struct, array_like=True, frozen=True, tag=3):
-    """Send what is no motion; answered by `SendDone` or `SendRefused`."""
+    """Send a frame that is no motion; answered by `SendDone` or `SendRefused`."""
 
     line: str
     turn: int
     number: int
-    """Counts up with each of a connection."""
+    """Number of the frame on this connection."""
     data: Payload
     count: Count | None = None
-    """Where it carries numbers of counters: it is sent only while these are next."""
+    """Counter values of the frame, if any: it is sent only while these are the next ones."""
     round: int = 0
-    """How many `SendStale` of the connection it comes after; else it is not sent."""
+    """Number of `SendStale` messages before it on this connection; otherwise it is not sent."""
 
 
 class CloseLine(msgspec.Struct, array_like=True, frozen=True, tag=4):
-    """Close a line; what moves is stopped before. Answered by `LineClosed`."""
+    """Close a line; moving controls are stopped before. Answered by `LineClosed`."""
 
     line: str
     turn: int
 
 
 class FlowCredit(msgspec.Struct, array_like=True, frozen=True, tag=5):
-    """The engine has taken so much of what a line brought."""
+    """The engine has processed this many bytes from a line."""
 
     line: str
     turn: int
@@ -101,7 +100,7 @@ class FlowCredit(msgspec.Struct, array_like=True, frozen=True, tag=5):
 
 
 class ArmControl(msgspec.Struct, array_like=True, frozen=True, tag=6):
-    """Take ticks of a control."""
+    """Accept ticks of a control."""
 
     line: str
     control: str
@@ -109,16 +108,16 @@ class ArmControl(msgspec.Struct, array_like=True, frozen=True, tag=6):
 
 
 class RenewLease(msgspec.Struct, array_like=True, frozen=True, tag=7):
-    """Sampled input: renews the lease of a control."""
+    """A tick of sampled input: it renews the lease of a control."""
 
     control: str
     number: int
-    """Counts up with each of a control."""
+    """Number of the tick of this control."""
     data: Payload
     at_s: float
-    """When it was taken, on this machine's monotonic clock: one that waited here is as old."""
+    """Time of the sample on this machine's monotonic clock. A delayed tick keeps its age."""
     count: Count | None = None
-    """As with `SendBytes`."""
+    """Counter values, as in `SendBytes`."""
 
 
 class ReleaseControl(msgspec.Struct, array_like=True, frozen=True, tag=8):
@@ -128,13 +127,13 @@ class ReleaseControl(msgspec.Struct, array_like=True, frozen=True, tag=8):
 
 
 class StopMotion(msgspec.Struct, array_like=True, frozen=True, tag=9):
-    """Stop, whatever moves: line, control and terms of each."""
+    """Stop these controls, moving or not: line, control and terms of each."""
 
     controls: list[tuple[str, str, HoldTerms]]
 
 
 class RecoverStop(msgspec.Struct, array_like=True, frozen=True, tag=10):
-    """A control was moving when the guard before this one died: open its line, stop it first."""
+    """A control was moving when the previous guard died: open its line, and stop it first."""
 
     line: str
     control: str
@@ -142,7 +141,7 @@ class RecoverStop(msgspec.Struct, array_like=True, frozen=True, tag=10):
 
 
 class ReplaceStop(msgspec.Struct, array_like=True, frozen=True, tag=11):
-    """Stop a control with these bytes from now on: the number in those before is used up."""
+    """Replace the stop frame of a control: the counter value of the old one is used up."""
 
     control: str
     stop: Payload
@@ -155,9 +154,9 @@ class LineOpened(msgspec.Struct, array_like=True, frozen=True, tag=21):
     line: str
     turn: int
     address: str
-    """Where it leads, for people; may be known better now."""
+    """Address for people; it may be more precise than before."""
     stand: dict[str, int] = {}
-    """Counters that stops have used already."""
+    """Counter values that stops have used already."""
 
 
 class OpenFailed(msgspec.Struct, array_like=True, frozen=True, tag=22):
@@ -169,7 +168,7 @@ class OpenFailed(msgspec.Struct, array_like=True, frozen=True, tag=22):
 
 
 class BytesReceived(msgspec.Struct, array_like=True, frozen=True, tag=23):
-    """Something arrived."""
+    """Bytes or an envelope arrived."""
 
     line: str
     turn: int
@@ -177,7 +176,7 @@ class BytesReceived(msgspec.Struct, array_like=True, frozen=True, tag=23):
 
 
 class SendDone(msgspec.Struct, array_like=True, frozen=True, tag=24):
-    """Everything up to this number was handed over."""
+    """All frames up to this number were handed over."""
 
     line: str
     turn: int
@@ -185,7 +184,7 @@ class SendDone(msgspec.Struct, array_like=True, frozen=True, tag=24):
 
 
 class SendRefused(msgspec.Struct, array_like=True, frozen=True, tag=25):
-    """Something could not be sent."""
+    """A frame could not be sent."""
 
     line: str
     turn: int
@@ -196,7 +195,7 @@ class SendRefused(msgspec.Struct, array_like=True, frozen=True, tag=25):
 
 
 class LineLost(msgspec.Struct, array_like=True, frozen=True, tag=26):
-    """Nothing more will come from a line."""
+    """A line is lost: nothing more will arrive."""
 
     line: str
     turn: int
@@ -204,7 +203,7 @@ class LineLost(msgspec.Struct, array_like=True, frozen=True, tag=26):
 
 
 class LineClosed(msgspec.Struct, array_like=True, frozen=True, tag=27):
-    """A line that was to be closed is."""
+    """A line was closed on request."""
 
     line: str
     turn: int
@@ -216,36 +215,36 @@ class StopWritten(msgspec.Struct, array_like=True, frozen=True, tag=28):
     control: str
     reason: Reason
     number: int
-    """Of the newest tick by then."""
+    """Number of the newest tick at that time."""
 
 
 class Heartbeat(msgspec.Struct, array_like=True, frozen=True, tag=29):
     """The guard is alive."""
 
     late_s: float
-    """By how much its own timer was late."""
+    """Delay of the guard's own timer, in seconds."""
 
 
 class CountersAdvanced(msgspec.Struct, array_like=True, frozen=True, tag=30):
-    """Frames with counters have left."""
+    """Frames with counters have been sent."""
 
     line: str
     turn: int
     sent: int
-    """Number of the newest `SendBytes` with counters among them."""
+    """Number of the newest `SendBytes` with counters that was sent."""
     stand: dict[str, int]
-    """Counter → the last number that has left."""
+    """Counter → last value sent."""
     stale: list[tuple[str, int]]
-    """Control and number of ticks that cannot be written: another frame has used their numbers."""
+    """Control and number of ticks that cannot be sent: other frames used their counter values."""
 
 
 class SendStale(msgspec.Struct, array_like=True, frozen=True, tag=31):
-    """A `SendBytes` and all that follow it in its round were not sent: its numbers were used up."""
+    """A `SendBytes` and all later ones of its round were not sent: its counters are used up."""
 
     line: str
     turn: int
     number: int
-    """Of that one."""
+    """Number of the first frame that was not sent."""
     stand: dict[str, int]
 
 
@@ -286,17 +285,17 @@ def _plain(value: object) -> object:
 def encoder() -> msgspec.msgpack.Encoder:
     """Return an encoder of either side's messages.
 
-    It raises `TypeError`, `OverflowError` or `NotImplementedError` for a body that no message can
-    carry, and `msgspec.EncodeError` is none of them.
+    It raises `TypeError`, `OverflowError` or `NotImplementedError` for a body that cannot be
+    encoded, never `msgspec.EncodeError`.
     """
     return msgspec.msgpack.Encoder(enc_hook=_plain)
 
 
 def decoder_of_guard() -> msgspec.msgpack.Decoder[ToGuard]:
-    """Return what the guard reads with."""
+    """Return the decoder of the guard."""
     return msgspec.msgpack.Decoder(ToGuard)
 
 
 def decoder_of_server() -> msgspec.msgpack.Decoder[FromGuard]:
-    """Return what the engine's side reads with."""
+    """Return the decoder of the engine's side."""
     return msgspec.msgpack.Decoder(FromGuard)

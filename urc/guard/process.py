@@ -1,4 +1,4 @@
-"""Starts and buries the guard's process."""
+"""Start and end of the guard's process."""
 
 import asyncio
 import hmac
@@ -17,7 +17,7 @@ __all__ = ["CAN_INHERIT", "DOOR", "GuardAcceptor", "launch", "reap", "standing"]
 CAN_INHERIT: Final = os.name == "posix"
 """Whether this system can hand an open pipe to another process."""
 DOOR: Final = "door:"
-"""Before the port, where the guard comes to us instead."""
+"""Prefix of the port, on systems where the guard connects to the server."""
 TOKEN_BYTES: Final = 64
 _LOOPBACK: Final = "127.0.0.1"
 _ADMIT_S: Final = 10.0
@@ -25,10 +25,10 @@ _SAY_S: Final = 1.0
 
 
 class GuardAcceptor:
-    """Where the guard of a system without inherited pipes comes in: a port of this machine's own.
+    """A port of this machine for the guard, on systems without inherited pipes.
 
-    Anybody on this machine may knock. Who does not say the word that the guard alone was told, on
-    its standard input, is turned away.
+    Any program of this machine can connect. The guard alone gets the token, on its standard input.
+    A connection without the token is closed.
     """
 
     def __init__(self) -> None:
@@ -38,11 +38,11 @@ class GuardAcceptor:
 
     @property
     def port(self) -> int:
-        """Where it is."""
+        """Number of the port."""
         return int(self._listener.getsockname()[1])
 
     async def admitted(self) -> socket.socket:
-        """Return the guard's connection; raise `TimeoutError` when it does not come in time."""
+        """Return the guard's connection; raise `TimeoutError` after 10 s without one."""
         loop = asyncio.get_running_loop()
         try:
             async with asyncio.timeout(_ADMIT_S):
@@ -73,14 +73,14 @@ class GuardAcceptor:
         return hmac.compare_digest(said, self.token)
 
     def close(self) -> None:
-        """Let nobody in any more; may be called twice."""
+        """Close the port. May be called twice."""
         self._listener.close()
 
 
 def launch(
     *, is_inherited: bool = CAN_INHERIT
 ) -> tuple["subprocess.Popen[bytes]", socket.socket | GuardAcceptor]:
-    """Start the process; return it, and our end of the pipe or the door that it will come to."""
+    """Start the process; return it, and our end of the pipe or the port for its connection."""
     return _heir() if is_inherited else _visitor()
 
 
@@ -103,7 +103,7 @@ def _visitor() -> tuple["subprocess.Popen[bytes]", GuardAcceptor]:
         process = _started(f"{DOOR}{door.port}", stdin=subprocess.PIPE)
         assert process.stdin is not None  # noqa: S101 - it was asked for
         with process.stdin as told:
-            told.write(door.token)  # not as an argument: those everybody can read
+            told.write(door.token)  # not as an argument: every user can read those
     except BaseException:
         door.close()
         raise
@@ -111,27 +111,27 @@ def _visitor() -> tuple["subprocess.Popen[bytes]", GuardAcceptor]:
 
 
 def _started(place: str, **more: Any) -> "subprocess.Popen[bytes]":
-    # A terminal's Ctrl-C is for the server, which tells the guard.
+    # Ctrl-C of a terminal is for the server, which then ends the guard.
     if sys.platform == "win32":
         more["creationflags"] = subprocess.CREATE_NEW_PROCESS_GROUP
     else:
         more["process_group"] = 0
-    # -P: nothing is imported from the folder we happen to be in.
+    # -P: nothing is imported from the current folder.
     command = [sys.executable, "-P", "-m", "urc.guard", place, *OWN_DOORS.words()]
     return subprocess.Popen(command, **more)  # noqa: S603 - our own interpreter and module
 
 
 class ProcessState(NamedTuple):
-    """How a process stands with the system."""
+    """The state of a process, as the system reports it."""
 
     wants_to_run: bool = False
-    """It has a processor, or waits for one or for a disk; it does not sleep, and is not stopped."""
+    """Whether it runs, or waits for a processor or a disk: it neither sleeps nor is stopped."""
     ran_s: float = 0.0
-    """How much of a processor's time its first thread has had."""
+    """Processor time of its first thread, in seconds."""
 
 
 def standing(process: int, proc: Path = Path("/proc")) -> ProcessState:
-    """Return how a process stands, in files of Linux; elsewhere nothing is known of it."""
+    """Return the state of a process from files of Linux; a default on other systems."""
     try:
         # The name before the state may hold anything, brackets and spaces too.
         state = (proc / str(process) / "stat").read_text("latin-1").rpartition(")")[2].split()[0]
@@ -142,7 +142,7 @@ def standing(process: int, proc: Path = Path("/proc")) -> ProcessState:
 
 
 async def reap(process: "subprocess.Popen[bytes]") -> None:
-    """Wait for a process that ends by itself; kill one that does not."""
+    """Wait 1 s for the end of a process, then kill it."""
     for _ in range(100):
         if process.poll() is not None:
             return

@@ -1,8 +1,8 @@
-"""The counters of one connection, as the frames say that have left.
+"""The counter values that were sent on one connection.
 
-The guard knows no template: it is given frames with their numbers in them, and what they do to the
-counters. A frame leaves only while its numbers are the next ones, so numbers on the wire are
-gapless and rise, whatever was rendered in advance, and in whatever order it came here.
+The guard has no templates. It gets rendered frames, each with its effect on the counters. A frame
+is sent only while its values are the next ones. So the values on the wire rise without gaps, in any
+order of arrival here, and regardless of frames that were rendered in advance.
 """
 
 from collections.abc import Sequence
@@ -13,32 +13,32 @@ __all__ = ["SentCounters"]
 
 
 class SentCounters:
-    """Of one line. To be begun with each connection."""
+    """The sent counters of one line; `begin` starts each connection."""
 
     def __init__(self) -> None:
         self.stand: dict[str, int] = {}
-        """Counter → the last number that has left; none: not used so far."""
+        """Counter → last value sent; missing before the first one."""
         self.is_changed = False
-        """Whether numbers have left that the engine was not told of."""
+        """Whether values were sent that the engine does not know yet."""
 
     def reset(self) -> None:
-        """Begin anew: no number has left."""
+        """Start a connection, on which no value was sent."""
         self.stand = {}
         self.is_changed = False
 
     def fits(self, count: Count | None) -> bool:
-        """Return whether a frame may leave now; one without numbers always may."""
+        """Return whether a frame may be sent now; a frame without counters always may."""
         if count is None:
             return True
         stand, before = self.stand, count.before
         return all(stand.get(name) == before.get(name) for name in count.after)
 
     def left(self, count: Count | None) -> None:
-        """Take note that a frame has left."""
+        """Record a sent frame."""
         if count is not None and count.after:
             self.stand = {**self.stand, **count.after}
             self.is_changed = True
 
     def choose(self, stops: Sequence[Numbered]) -> Numbered:
-        """Return the stop whose turn it is. A stop with a wrong number is better than none."""
+        """Return the stop with the next values. A wrong value is better than no stop."""
         return next((one for one in stops if self.fits(one.takes)), stops[-1])

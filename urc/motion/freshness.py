@@ -1,8 +1,8 @@
-"""Is an input fresh? Without trusting anybody's clock.
+"""The freshness of control inputs, without trust in the clock of a page.
 
-The server numbers its own ticks and tells them to every page; an input echoes the newest number
-that its page has seen, the epoch of its lease, and counts itself. So one that lay in a buffer, was
-recorded and played back, or belongs to an earlier lease is refused, however the clocks stand.
+The server sends numbered beats to every page. An input carries the newest beat that its page has
+received, the epoch of its lease, and a number of its own. So the server refuses an input that was
+buffered, recorded and replayed, or sent under an earlier lease. No clocks are compared.
 """
 
 from collections import deque
@@ -11,50 +11,50 @@ from typing import Final, NamedTuple
 __all__ = ["OLDEST_S", "DuplicateElimination", "Freshness", "ControlInput"]
 
 OLDEST_S: Final = 0.4
-"""An input that echoes an older tick is refused."""
+"""Greatest age of the beat that an input echoes, in seconds."""
 _KEPT: Final = 64
 
 
 class ControlInput(NamedTuple):
-    """What a page sends with every tick of a held control."""
+    """The numbers that a page sends with every tick of a held control."""
 
     epoch: int
-    """Of the lease."""
+    """Epoch of the lease."""
     number: int
-    """Counts up with every tick of this page."""
+    """Number of the tick; it grows with every tick of this page."""
     echo: int
-    """Newest tick of the server that the page has seen."""
+    """Newest beat of the server that the page has received."""
 
 
 class Freshness:
-    """The server's ticks, and the newest input of one page."""
+    """The beats sent to one page, and its newest input for each control."""
 
     def __init__(self, first: int = 1) -> None:
-        """Begin with nothing issued.
+        """Begin without beats.
 
         Args:
-            first: number of the first tick; one that nobody can guess refuses what was recorded
+            first: number of the first beat. An unpredictable one refuses inputs that were recorded
                 before a restart.
         """
         self._issued: deque[float] = deque(maxlen=_KEPT)
-        """When the newest numbers were issued: each is one more than that before it."""
+        """Times at which the newest beats were sent. Their numbers are consecutive."""
         self._number = first - 1
         self._newest: dict[str, int] = {}
 
     def issue(self, now: float) -> int:
-        """Return the number of a tick that is told to the page now."""
+        """Return the number of a beat that is sent to the page now."""
         self._number += 1
         self._issued.append(now)
         return self._number
 
     def refusal(self, given: ControlInput, epoch: int, now: float, of: str = "") -> str:
-        """Return why an input is not taken, or "" and remember it.
+        """Return the reason to refuse an input; accept it and return "" if there is no reason.
 
         Args:
-            given: what the page sent with it.
-            epoch: of the lease that holds now.
+            given: the numbers that the page sent with the input.
+            epoch: epoch of the present lease.
             now: the time.
-            of: the control: the inputs of one may overtake those of another.
+            of: the control. Each control has an order of its own.
         """
         if given.epoch != epoch:
             return f"it belongs to lease {given.epoch}, and this is {epoch}"
@@ -71,18 +71,18 @@ class Freshness:
 
 
 class DuplicateElimination:
-    """What a page says twice, on two lines that lose packets independently: the first counts.
+    """A filter for messages that a page sends twice, on two lines that lose packets independently.
 
-    Its numbers only grow, and each line keeps their order. So what has a number that is not above
-    the newest was said on the other line already, or was overtaken there by something newer: a tick
-    that was held up must not move what the other line has let go of since.
+    The first copy counts. The numbers of a page only grow, and each line keeps their order. A
+    number that is not above the newest one arrived on the other line already, or a newer message
+    overtook it there. A delayed tick must not move a control that was released on the other line.
     """
 
     def __init__(self) -> None:
         self._newest: dict[str, int] = {}
 
     def accept(self, about: str, number: int) -> bool:
-        """Return whether `number` is above all that came about the same, and remember it."""
+        """Return whether `number` is the highest so far for `about`, and store it."""
         if number <= self._newest.get(about, 0):
             return False
         self._newest[about] = number

@@ -1,16 +1,16 @@
-"""One held command: what is written while it is held, and that it stops.
+"""One hold-to-run control: its frames while it is held, and its stop.
 
-Theory of operation. A `HoldToRun` is idle, moving or stopping. It moves only while *ticks of
-sampled input* come: each renews a short lease and replaces what waits to be written, so what goes
-out is always the newest value, never a queue. When the lease runs out, the hold is released, or
-somebody stops it, the stop frame that was rendered when the control was armed goes out before
-anything else; then there is silence, because repeated zeros would fight whoever else drives.
+Theory of operation. A `HoldToRun` is idle, moving or stopping. It moves only while it gets *ticks
+of sampled input*. Each tick renews a short lease and replaces the value that was not yet written:
+only the newest value is sent, never a queue. When the lease expires, the control is released, or a
+stop is requested, the stop frame goes out before anything else. It was rendered at the arming. Then
+there is silence, because repeated zeros would fight other sources of motion.
 
-It never resumes by itself. After every stop but a release it is not armed any more, and ticks that
-go on coming are refused: whoever drives lets go, makes a new gesture, and arms it anew.
+Motion never resumes by itself. Every stop but a release disarms the control, and further ticks are
+refused. The operator has to let go and make a new gesture, which arms the control again.
 
-A mover whose line is cut while the robot may still be moving owes a stop: that is the first thing
-written when the line is back. Nothing else that waited is kept.
+When a line is cut while the robot may be moving, the control owes a stop. It is the first frame on
+the restored line. All other unsent values are dropped.
 """
 
 from typing import Final, Literal, NamedTuple
@@ -24,27 +24,27 @@ SHORTEST_LEASE_S: Final = 0.1
 LEASE_S: Final = 0.25
 LONGEST_LEASE_S: Final = 1.0
 STOP_EVERY_S: Final = 0.05
-"""How often a stop is repeated on lines that may lose it."""
+"""Period of a repeated stop on lossy lines, in seconds."""
 STOP_FOR_S: Final = 0.5
-"""For how long."""
+"""Duration of the repeats, in seconds."""
 
 Reason = Literal["released", "expired", "stopped", "revoked"]
 
 
 class HoldTerms(NamedTuple):
-    """What is agreed when a control is armed; nothing in it but the stop changes while it moves."""
+    """The terms of an armed control. Only its stop changes while it moves."""
 
     stop: Payload
-    """Written to stop the motion, framing included; no bytes where the robot moves in steps, each
-    of which ends by itself: then nothing is written, and all else holds."""
+    """Frame that stops the motion, framing included. It is empty for a robot that moves in steps:
+    each step ends by itself, so no stop is written."""
     period_s: float
-    """Mean time between two writes, at least."""
+    """Shortest mean time between two writes, in seconds."""
     lease_s: float = LEASE_S
-    """How long the motion lasts after the last tick, 0.1 to 1.0."""
+    """Duration of the motion after the last tick, 0.1 to 1.0 seconds."""
     is_lossy: bool = False
-    """The line may lose what is written (datagrams, serial, topics): a stop is repeated there."""
+    """Whether the line may lose frames (datagrams, serial, topics): then the stop is repeated."""
     stops: tuple[Numbered, ...] = ()
-    """The stop with each number that it may have when it leaves; none: it carries no number."""
+    """The stop with each counter value that it may need when it leaves; empty: without counters."""
 
     def stopped_by(self, stop: Payload | FrameVariants) -> "HoldTerms":
         """Return the same terms with another stop."""
@@ -54,26 +54,26 @@ class HoldTerms(NamedTuple):
 
 
 class HoldToRun:
-    """One held command at work."""
+    """The state machine of one hold-to-run control."""
 
     def __init__(self, terms: HoldTerms) -> None:
         """Prepare for `terms`; nothing moves.
 
         Raises:
-            ValueError: a lease or period out of range: without them nothing would ever stop.
+            ValueError: a lease or period is out of range: the motion would never stop.
         """
         if not SHORTEST_LEASE_S <= terms.lease_s <= LONGEST_LEASE_S:
             raise ValueError(f"a lease lasts 0.1 to 1.0 s, not {terms.lease_s:g}")
         self.terms = terms
         self.state: Literal["idle", "moving", "stopping"] = "idle"
         self.is_armed = False
-        """Whether ticks are taken."""
+        """Whether ticks are accepted."""
         self.reason: Reason | None = None
-        """Why it stopped last."""
+        """Reason of the last stop."""
         self.is_told = True
-        """Whether whoever it concerns was told of that stop; kept for the owner of the line."""
+        """Whether the last stop was reported; kept for the owner of the line."""
         self.owes_stop = False
-        """The line was cut before the robot can have had the stop."""
+        """Whether the line was cut before the robot can have received the stop."""
         self._rate_limiter = RateLimiter(terms.period_s, is_strict=terms.stop == b"")
         self._waiting: Payload | None = None
         self._expires_at = 0.0
@@ -82,16 +82,16 @@ class HoldToRun:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether there is a value that was not written yet."""
+        """Whether a value was not yet written."""
         return self._waiting is not None
 
     def must_stop(self, now: float) -> bool:
-        """Return whether it is being stopped, or its lease has run out."""
+        """Return whether it is being stopped, or its lease has expired."""
         return self.state == "stopping" or (self.state == "moving" and now >= self._expires_at)
 
     @property
     def deadline(self) -> float | None:
-        """When `due` has something to say at the latest; None while idle."""
+        """Latest time of the next call of `due`; None while idle."""
         if self.state == "moving":
             if self._waiting is None:
                 return self._expires_at
@@ -99,7 +99,7 @@ class HoldToRun:
         return self._stop_at if self.state == "stopping" else None
 
     def renew(self, terms: HoldTerms) -> None:
-        """Take other terms, when it is armed anew; what is owed stays so, and so does the rate.
+        """Replace the terms. An owed stop and the state of the rate limit stay.
 
         Raises:
             ValueError: as above.
@@ -110,19 +110,19 @@ class HoldToRun:
         self.terms = terms
 
     def arm(self) -> None:
-        """Take ticks from now on; nothing moves before the first of them."""
+        """Accept ticks from now on; the first one begins the motion."""
         self.is_armed = True
 
     def tick(self, data: Payload | None, now: float) -> bool:
-        """Take a tick of sampled input: it renews the lease, and `data` is the newest value.
+        """Accept a tick of sampled input: renew the lease, and keep `data` as the newest value.
 
-        None renews the lease, and nothing is written: the value cannot be sent as it is.
+        None renews the lease without a value: the present one cannot be sent.
 
         Returns:
-            Whether it was taken; False when the control is to be armed anew.
+            Whether the tick was accepted. After False, the control has to be armed again.
         """
         if self.state == "moving" and now >= self._expires_at:
-            self.stop("expired", now)  # what comes after the lease belongs to no motion any more
+            self.stop("expired", now)  # a tick after the lease belongs to no motion
         if not self.is_armed or self.owes_stop:
             return False
         self.state = "moving"  # also from the repeats of the stop that a release began
@@ -131,13 +131,13 @@ class HoldToRun:
         return True
 
     def forget(self) -> None:
-        """Do not write the value that waits; the lease goes on."""
+        """Drop the unsent value; the lease goes on."""
         self._waiting = None
 
     def stop(self, reason: Reason, now: float) -> None:
-        """Stop; only a release asks whether anything moves, because STOP is never refused."""
+        """Stop. A release stops only a moving control; STOP is never refused."""
         if reason == "released" and self.state != "moving":
-            return  # nothing moves: there is nothing to stop, and idle is silent
+            return  # nothing moves, and an idle control is silent
         self.is_armed = self.is_armed and reason == "released"
         self.state = "stopping"
         self.reason = reason
@@ -148,12 +148,12 @@ class HoldToRun:
         self._stop_until = now + STOP_FOR_S if is_repeated else now
 
     def due(self, now: float, *, is_clear: bool) -> Payload | None:
-        """Return what is to be written now, or None.
+        """Return the frame to write now, or None.
 
         Args:
             now: the time.
-            is_clear: whether the line has no unsent bytes. Motion waits for that and is replaced by
-                newer values meanwhile; a stop does not wait.
+            is_clear: whether the line has no unsent bytes. Motion waits for a clear line, and newer
+                values replace it meanwhile. A stop does not wait.
         """
         if self.state == "moving" and now >= self._expires_at:
             self.stop("expired", now)
@@ -174,10 +174,10 @@ class HoldToRun:
         return self.terms.stop
 
     def cut(self, *, is_doubtful: bool = False) -> None:
-        """Take note that the line is gone: nothing that waited is kept, the stop is owed.
+        """Record the loss of the line: drop the unsent value, and owe a stop if it may be moving.
 
         Args:
-            is_doubtful: a stop was written, and may have been lost with the line.
+            is_doubtful: whether a written stop may have been lost with the line.
         """
         if self.state != "idle" or is_doubtful:
             self.owes_stop = True
@@ -186,7 +186,7 @@ class HoldToRun:
         self._waiting = None
 
     def restored(self, now: float) -> None:
-        """Take note that the line is back: what is owed goes first."""
+        """Record that the line is back: an owed stop goes first."""
         if self.owes_stop:
             self.state = "idle"
             self.stop("revoked", now)

@@ -1,9 +1,9 @@
-"""The lease of one robot: who may drive it.
+"""The lease of one robot: the right of one operator to drive it.
 
-Theory of operation. One client holds the lease or nobody does. Every change of the holder, and
-every stop, raises the epoch and begins with a stop on the wire; whatever carries an older epoch is
-refused, so that nobody drives on by accident. A holder who goes silent loses the lease. STOP needs
-no lease and latches: nothing moves until somebody resets it on purpose, and a reset moves nothing.
+Theory of operation. At most one operator holds the lease. Every change of the holder, and every
+stop, raises the epoch and begins with a stop on the wire. Inputs with an older epoch are refused,
+so that no motion continues by accident. A silent holder loses the lease. STOP needs no lease, and
+it latches: nothing moves until an operator resets it on purpose. A reset starts no motion.
 """
 
 from typing import Final, Literal, NamedTuple
@@ -16,71 +16,71 @@ Role = Literal["viewer", "driver", "engineer", "admin"]
 _RANK: Final = {"viewer": 0, "driver": 1, "engineer": 2, "admin": 3}
 WATCHES: Final = "this page only watches"
 SILENT_S: Final = 60.0
-"""A holder who does not touch anything for this long gives the lease back."""
+"""Time without input after which the holder loses the lease, in seconds."""
 SHORTEST_REQUEST_S: Final = 3.0
 REQUEST_S: Final = 10.0
 LONGEST_REQUEST_S: Final = 60.0
 
 
 class Operator(NamedTuple):
-    """Somebody at a screen."""
+    """A person at a page."""
 
     id: str
     """Unique while connected."""
     name: str = ""
-    """For the others."""
+    """Name for other operators."""
     role: Role = "driver"
 
 
 class LeaseState(NamedTuple):
-    """What everybody may see, and what survives a restart."""
+    """The public state of a lease. It survives a restart."""
 
     epoch: int = 0
     holder: Operator | None = None
     asked_by: Operator | None = None
-    """Who wants it next."""
+    """Operator who asks for the lease."""
     asked_until: float = 0.0
     latched_by: str = ""
-    """Who pressed STOP; "" while nothing is latched."""
+    """Name of the operator who pressed STOP; "" without a latch."""
     stops: int = 0
-    """How often STOP was pressed in this run of the server: what was wished before the last time is
-    over, also when it was reset since."""
+    """Number of stops in this run of the server. A request from before the last stop is void, even
+    after a reset."""
 
 
 class LeaseChanged(NamedTuple):
-    """The lease is another one now."""
+    """The lease changed."""
 
     state: LeaseState
     must_stop: bool
-    """A stop goes out before anything of the new state does."""
+    """Whether a stop must go out before the new state takes effect."""
 
 
 class LeaseRefused(NamedTuple):
-    """Nothing was changed."""
+    """The lease did not change."""
 
     message: str
-    """Why, for people; names the holder where that is the reason."""
+    """Reason for people; it names the holder when the holder is the reason."""
 
 
 class Lease:
     """The lease of one robot."""
 
     def __init__(self, state: LeaseState | None = None) -> None:
-        """Go on from `state`, as kept over a restart: the latch holds, the holder does not."""
+        """Start from `state`, as stored before a restart: the latch stays, the holder does not."""
         kept = state or LeaseState()
         self.state = LeaseState(kept.epoch + 1, latched_by=kept.latched_by, stops=kept.stops)
         self._touched_at = 0.0
 
     @property
     def deadline(self) -> float | None:
-        """When `expire` has something to do; None when time alone changes nothing."""
+        """Time of the next change by `expire`; None without one."""
         if self.state.holder is None:
             return None
         silent_at = self._touched_at + SILENT_S
         return min(silent_at, self.state.asked_until) if self.state.asked_by else silent_at
 
     def refusal(self, client: str, epoch: int) -> str:
-        """Return why motion of a client is refused, or ""."""
+        """Return the reason to refuse motion of a client, or ""."""
         state = self.state
         if state.latched_by:
             return self.latched
@@ -93,14 +93,14 @@ class Lease:
         return ""
 
     def interlock(self, client: Operator, stops: int | None = None) -> str:
-        """Return why a client may not begin what moves by itself, or "".
+        """Return the reason to refuse autonomous motion, or "".
 
-        It needs no lease: nothing is held. But it goes neither against a stop, nor against whoever
-        drives.
+        Autonomous motion needs no lease, because no control is held. A latched stop and the lease
+        of another operator prevent it.
 
         Args:
-            client: who gives it.
-            stops: of the state in which it was wished; None: it is wished now.
+            client: the operator who gives the command.
+            stops: number of stops at the time of the request; None: requested now.
         """
         state = self.state
         if _RANK[client.role] < _RANK["driver"]:
@@ -115,12 +115,12 @@ class Lease:
 
     @property
     def latched(self) -> str:
-        """Why nothing moves until somebody resets it, or ""."""
+        """Message about the latched stop, or ""."""
         by = self.state.latched_by
         return f"stopped by {by}: reset it first" if by else ""
 
     def touch(self, now: float) -> None:
-        """Take note that the holder is at work."""
+        """Record an input of the holder."""
         self._touched_at = now
 
     def acquire(self, client: Operator, now: float) -> LeaseChanged | LeaseRefused:
@@ -137,7 +137,7 @@ class Lease:
     def request(
         self, client: Operator, now: float, for_s: float = REQUEST_S
     ) -> LeaseChanged | LeaseRefused:
-        """Ask the holder for the lease; without an answer in time it is handed over."""
+        """Ask the holder for the lease; after a timeout, the lease is handed over."""
         state = self.state
         if state.holder is None or state.holder.id == client.id:
             return self.acquire(client, now)
@@ -150,7 +150,7 @@ class Lease:
         return LeaseChanged(self.state, must_stop=False)
 
     def answer(self, client: str, now: float, *, is_granted: bool) -> LeaseChanged | LeaseRefused:
-        """Let the holder hand the lease over, or keep it."""
+        """Hand the lease over, or keep it, as the holder answers."""
         state = self.state
         if state.holder is None or state.holder.id != client or state.asked_by is None:
             return LeaseRefused("nobody asks you for the controls")
@@ -160,7 +160,7 @@ class Lease:
         return LeaseChanged(self.state, must_stop=False)
 
     def force(self, client: Operator, now: float) -> LeaseChanged | LeaseRefused:
-        """Take the lease from whoever holds it; that is for engineers."""
+        """Take the lease from its holder. Only engineers may."""
         if _RANK[client.role] < _RANK["engineer"]:
             return LeaseRefused("taking the controls by force needs an engineer")
         if self.state.latched_by:
@@ -168,7 +168,7 @@ class Lease:
         return self._grant(client, now)
 
     def leave(self, client: str) -> LeaseChanged | None:
-        """Take note that a client gave the lease back, or is gone; None when it had no part."""
+        """Remove a client as the holder or asker; return None if it is neither."""
         state = self.state
         if state.holder is not None and state.holder.id == client:
             self.state = self._next(latched_by=state.latched_by)
@@ -179,14 +179,14 @@ class Lease:
         return None
 
     def stop(self, by: str) -> LeaseChanged:
-        """Stop and latch: never refused."""
+        """Stop and latch. This is never refused."""
         state = self.state
         by = state.latched_by or by
         self.state = self._next(latched_by=by)._replace(stops=state.stops + 1)
         return LeaseChanged(self.state, must_stop=True)
 
     def reset(self, client: Operator) -> LeaseChanged | LeaseRefused:
-        """Let the robot be driven again, by whoever takes the lease next; starts nothing."""
+        """Reset the latch: the next holder can drive the robot. Nothing starts to move."""
         if _RANK[client.role] < _RANK["driver"]:
             return LeaseRefused("viewers can stop the robot, and cannot reset it")
         if not self.state.latched_by:
@@ -195,7 +195,7 @@ class Lease:
         return LeaseChanged(self.state, must_stop=False)
 
     def expire(self, now: float) -> LeaseChanged | None:
-        """Do what time alone does: hand over to who asked, take it from who went silent."""
+        """Apply timeouts: hand the lease to the asker, or take it from a silent holder."""
         state = self.state
         if state.holder is None:
             return None
@@ -211,7 +211,7 @@ class Lease:
         return LeaseChanged(self.state, must_stop=True)
 
     def _next(self, holder: Operator | None = None, latched_by: str = "") -> LeaseState:
-        """Return a later epoch, in which nobody has asked for anything yet."""
+        """Return the state of the next epoch, without an asker."""
         return LeaseState(
             self.state.epoch + 1, holder, latched_by=latched_by, stops=self.state.stops
         )

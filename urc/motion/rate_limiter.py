@@ -1,8 +1,8 @@
-"""How often something may be written: a rate that delays nothing at its own rate.
+"""A rate limiter that delays no value that arrives at the rate.
 
-The generic cell rate algorithm (ITU-T I.371, annex A) with one period of tolerance: values that
-come at exactly the rate, with the jitter of a network, pass at once; in any second there is at most
-one more than the rate allows. A shortest gap would delay every second one of them.
+This is the generic cell rate algorithm (ITU-T I.371, annex A) with a tolerance of one period.
+Values that arrive at the rate, with the jitter of a network, pass at once. In any second, at most
+one value more than the rate passes. A minimum gap would delay every second value instead.
 """
 
 from typing import Final
@@ -13,7 +13,7 @@ _ROUNDING_S: Final = 1e-9
 
 
 class RateLimiter:
-    """At most one every `period_s` seconds on average, and two in a row unless it `is_strict`."""
+    """A limit of one value per `period_s` on average, and of two in a row unless `is_strict`."""
 
     __slots__ = ("_due", "_early_s", "_period_s")
 
@@ -22,17 +22,17 @@ class RateLimiter:
             raise ValueError(f"a period is more than 0 s, not {period_s:g}")
         self._period_s = period_s
         self._early_s = 0.0 if is_strict else period_s
-        """How much earlier than at exactly this rate one may go."""
+        """Tolerance: how much earlier than at the exact rate a value may pass, in seconds."""
         self._due = float("-inf")
-        """When the next one would come at exactly this rate."""
+        """Time of the next value at the exact rate."""
 
     @property
     def free_at(self) -> float:
-        """When the next one may go."""
+        """Earliest time of the next value."""
         return self._due - self._early_s
 
     def allow(self, now: float) -> bool:
-        """Count one that goes now, if it may."""
+        """Return whether a value may pass now, and count it if so."""
         due, period_s = self._due, self._period_s
         if now < due - self._early_s - _ROUNDING_S:
             return False

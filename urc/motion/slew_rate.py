@@ -1,8 +1,8 @@
-"""How fast the values of a held command may grow: a limit on speeding up, never on stopping.
+"""The slew rate of held commands: a limit on speeding up, never on stopping.
 
-A value is measured from its rest, the one that stops the motion. Coming nearer to rest is always
-allowed at once; going away from it takes time. Crossing it is both: down to rest at once, and up
-from there at the rate.
+A value is measured from rest, the value that stops the motion. A change towards rest is allowed at
+once. A change away from rest is limited. A change through rest reaches rest at once, and is limited
+from there.
 """
 
 import math
@@ -14,11 +14,11 @@ from urc.model.values import Reading
 __all__ = ["SlewRateLimiter"]
 
 _LONGEST_S: Final = 1.0
-"""No lease is longer: what comes later belongs to another motion."""
+"""Longest step in time that counts, in seconds: no lease is longer."""
 
 
 class SlewRateLimiter:
-    """The limits of one held command, and how far it has got."""
+    """The limits of one held command, and its present distance from rest."""
 
     __slots__ = ("_first_s", "_last_s", "_per_s", "_reached", "_rest")
 
@@ -28,26 +28,26 @@ class SlewRateLimiter:
         """Begin at rest.
 
         Args:
-            per_s: argument → most that it may grow in a second, in its own unit.
-            rest: argument → value that means standstill; 0 where there is none.
-            first_s: time that the first value of a motion is worth.
+            per_s: argument → greatest growth per second, in the unit of the argument.
+            rest: argument → value at standstill; 0 if left out.
+            first_s: time credited to the first value of a motion, in seconds.
         """
         self._per_s = per_s
         self._rest = {name: rest.get(name) for name in per_s}
         self._first_s = first_s
         self._reached: dict[str, tuple[float, ...]] = {}
-        """Argument → how far each of its elements is from rest."""
+        """Argument → distance of each of its elements from rest."""
         self._last_s: float | None = None
 
     def reset(self) -> None:
-        """Take note that it stands: the next motion begins at rest."""
+        """Reset to standstill: the next motion begins at rest."""
         self._reached.clear()
         self._last_s = None
 
     def limit(self, values: Mapping[str, Reading], now: float) -> dict[str, Reading]:
-        """Return `values` with each at most as far from rest as it may be at `now`.
+        """Return `values`, each limited to its greatest distance from rest at `now`.
 
-        What is no number is left as it is; whoever checks the arguments refuses it.
+        Values that are not numbers stay unchanged: the check of arguments refuses them.
         """
         last_s, self._last_s = self._last_s, now
         passed_s = self._first_s if last_s is None else min(max(0.0, now - last_s), _LONGEST_S)
@@ -82,13 +82,13 @@ class SlewRateLimiter:
 
 
 def _grown(wanted: float, was: float, room: float) -> float:
-    """Return how far from rest it may be, where it was `was` and may grow by `room`."""
+    """Return the allowed distance from rest, after a distance of `was` and a growth of `room`."""
     start = abs(was) if was * wanted > 0 else 0.0
     return math.copysign(min(abs(wanted), start + room), wanted)
 
 
 def _written(wanted: float, rest: float, far: float) -> float:
-    """Return the value at `far` from rest: as it was given where nothing was cut off."""
+    """Return the value at the distance `far` from rest; unchanged if it was not limited."""
     if abs(wanted - rest) <= abs(far):
         return wanted
     return int(rest) + math.trunc(far) if isinstance(wanted, int) else rest + far

@@ -1,8 +1,8 @@
-"""Does a line still take what is written? Told by the bytes that have not left for good.
+"""Detection of stalled lines, by the age of the oldest unsent byte.
 
-Only their number is known. It grows by what is written and shrinks by what the other side has
-acknowledged, in that order; so from its course follows when the oldest of them was written. That is
-what counts: on a line that is written to all the time there may always be some.
+Only the number of unsent bytes is known. It grows with each write, and shrinks with each
+acknowledgement, in the same order. So its course gives the time at which the oldest unsent byte was
+written. The number alone says nothing: a busy line may always have unsent bytes.
 """
 
 import sys
@@ -21,51 +21,52 @@ __all__ = [
 ]
 
 SHORTEST_CUT_S: Final = 0.2
-"""A cut of the link that lasts as long as this, or longer, ..."""
+"""Shortest cut of the link that the promise of `STOP_WITHIN_S` covers, in seconds."""
 STOP_WITHIN_S: Final = 0.1
-"""... is followed by the stop within this time of its end."""
+"""Longest time from the end of such a cut to the stop, in seconds."""
 TICK_S: Final = 0.05
-"""Of a hand that holds a control: as long may it take after a cut until anything is written."""
+"""Period of the ticks of a held control, in seconds. The first write after the begin of a cut may
+be this late."""
 AFRESH_S: Final = 0.03
-"""What it takes to reset a line near by, to open it, and to write the stop."""
+"""Time to reset a nearby line, to open it, and to write the stop, in seconds."""
 STALLED_S: Final = round(SHORTEST_CUT_S + STOP_WITHIN_S - TICK_S - AFRESH_S, 3)
-"""Unsent bytes that stay for this long mean that the line is stalled: it is to be reset, and opened
-afresh, because what waits in the kernel would be delivered later, however old it is then. A byte
-that was written as late as a tick after the shortest cut began has just this time."""
+"""Age of unsent bytes at which a line counts as stalled, in seconds. A stalled line is reset and
+opened again: otherwise the kernel would deliver the old bytes later. A byte that was written one
+tick after the begin of the shortest cut reaches this age just in time."""
 WAITED_S: Final = 1.0
-"""The same where opening afresh is dear."""
+"""The same age for lines that are slow to open, in seconds."""
 IN_FLIGHT_S: Final = 0.15
-"""Bytes may be unacknowledged for this long without anything being wrong: systems put an
-acknowledgement off, for up to 40 ms (Linux) or until a second segment comes (small stacks)."""
+"""Age of unacknowledged bytes on a healthy line, in seconds. Systems delay acknowledgements: Linux
+by up to 40 ms, small stacks until a second segment arrives."""
 _TOGETHER_S: Final = 0.005
 _MOST: Final = 256
 
 
 class StallWatch:
-    """Watches one line."""
+    """The watch over one line."""
 
     __slots__ = ("_marks", "_taken", "_written", "limit_s")
 
     def __init__(self, limit_s: float = STALLED_S) -> None:
         self.limit_s = limit_s
         self._marks: deque[tuple[float, int]] = deque()
-        """When bytes were written, and how many had been by then."""
+        """Times of writes, each with the number of bytes written by then."""
         self._written = 0
         self._taken = 0
 
     @property
     def deadline(self) -> float | None:
-        """When the line is stalled, unless the bytes leave before."""
+        """Time at which the line is stalled, unless the bytes leave before."""
         return self._marks[0][0] + self.limit_s if self._marks else None
 
     def age_s(self, now: float) -> float:
-        """Return how old the oldest unsent bytes are; 0 when there are none."""
+        """Return the age of the oldest unsent bytes in seconds; 0 without unsent bytes."""
         return now - self._marks[0][0] if self._marks else 0.0
 
     def saw(self, unsent: int, now: float) -> bool:
-        """Take how many bytes are unsent; return whether the line is stalled.
+        """Record the number of unsent bytes; return whether the line is stalled.
 
-        To be told right before each write, and now and then.
+        Call it right before each write, and from time to time.
         """
         if not unsent:
             self.reset()
@@ -81,12 +82,12 @@ class StallWatch:
         return self.age_s(now) >= self.limit_s
 
     def wrote(self, size: int, now: float) -> None:
-        """Take note that so many bytes were written; `saw` puts right what is not known better."""
+        """Record a write of `size` bytes; the next `saw` corrects the estimate."""
         self._written += size
         self._mark(now)
 
     def gave_up(self) -> None:
-        """Take note that what is unsent never leaves: what follows it counts as old as that."""
+        """Record that the unsent bytes never leave: later bytes inherit their age."""
         if self._marks:
             began = self._marks[0][0]
             self._marks.clear()
@@ -94,7 +95,7 @@ class StallWatch:
         self._written = self._taken = 0
 
     def reset(self) -> None:
-        """Begin anew: nothing is unsent."""
+        """Reset to a line without unsent bytes."""
         self._marks.clear()
         self._written = self._taken = 0
 
