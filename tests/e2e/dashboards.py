@@ -94,3 +94,15 @@ async def until_attribute(page: Page, selector: str, name: str, value: str) -> N
         " document.querySelector(selector)?.getAttribute(name) === value",
         arg=[selector, name, value],
     )
+
+
+async def turned(page: Page, size: tuple[int, int]) -> None:
+    """Set the width and height of the screen, and wait until the page is laid out for them."""
+    width, height = size
+    await page.set_viewport_size({"width": width, "height": height})
+    await page.wait_for_function(
+        "([width, height]) => innerWidth === width && innerHeight === height", arg=[width, height]
+    )
+    await page.evaluate(
+        "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    )

@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
-from playwright.async_api import Page
+from playwright.async_api import Page, expect
 from websockets.asyncio.client import connect
 from websockets.typing import Origin
 
@@ -97,7 +97,7 @@ async def test_a_tap_is_one_command_to_the_byte(
     bell.answer = b"ERR no clapper\r\n"
     await button.click()
     await page.wait_for_selector(".button[data-phase='failed']")
-    assert "ERR no clapper" in await page.inner_text(NOTE)
+    await expect(page.locator(NOTE)).to_contain_text("ERR no clapper")
     assert bell.received == b"RING 1\r\n" * 2
     server.close()
     bell.cut()
@@ -156,12 +156,12 @@ async def test_a_command_under_way_locks_its_button(
     async with shown(page, ASKED) as robot:
         await page.click(MAIN)
         await until_text(page, NOTE, "… waiting for the robot")
-        assert await page.get_attribute(MAIN, "aria-busy") == "true"
+        await expect(page.locator(MAIN)).to_have_attribute("aria-busy", "true")
         await page.click(MAIN, force=True)
         await page.keyboard.press("Enter")
         answered.set()
         await until_text(page, NOTE, "▲ no answer to ring")
-        assert await page.get_attribute(MAIN, "aria-disabled") == "false"
+        await expect(page.locator(MAIN)).to_have_attribute("aria-disabled", "false")
         assert len(robot.commands) == 1
 
 
@@ -189,13 +189,11 @@ async def test_a_question_is_asked_in_place(new_page: PageMaker) -> None:
     page.on("dialog", lambda dialog: pytest.fail(f"a dialog opened: {dialog.message}"))
     async with shown(page, ASKED, {"label": "Erase", "confirm": "Erase the map?"}) as robot:
         await page.click(MAIN)
-        assert await page.get_by_role("group", name="Erase the map?").is_visible()
-        assert await page.get_by_role("button", name="Cancel").evaluate(
-            "el => el === document.activeElement"
-        )
+        await expect(page.get_by_role("group", name="Erase the map?")).to_be_visible()
+        await expect(page.get_by_role("button", name="Cancel")).to_be_focused()
         await page.keyboard.press("Enter")
         await page.wait_for_selector(MAIN)
-        assert await page.locator(MAIN).evaluate("el => el === document.activeElement")
+        await expect(page.locator(MAIN)).to_be_focused()
         await page.keyboard.press("Enter")
         await page.wait_for_selector(".button-yes:disabled")
         await page.keyboard.press("Escape")

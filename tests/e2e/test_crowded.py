@@ -5,7 +5,7 @@ from playwright.async_api import expect
 
 from tests.e2e.browser import running_browser
 from tests.e2e.conftest import PageMaker
-from tests.e2e.dashboards import running_dashboard, until, until_attribute
+from tests.e2e.dashboards import running_dashboard, turned, until, until_attribute
 from tests.e2e.keys import known_here
 from tests.e2e.motion.driving import CALM_LEASE_S, driven, held, number
 from urc.model.driver import Command
@@ -79,7 +79,7 @@ async def test_the_robots_name_keeps_its_room_on_narrow_screens(
         robot.link("live" if is_live else "lost")
         await until_attribute(page, "[data-badge]", "data-state", "good" if is_live else "bad")
         for width in NARROW_PX:
-            await page.set_viewport_size({"width": width, "height": 900})
+            await turned(page, (width, 900))
             bar = await page.evaluate(BAR)
             assert bar["title"] >= LEAST_TITLE_PX, width
             assert bar["isSecondRow"] is (width < 600), width
@@ -104,7 +104,7 @@ async def test_large_text_leaves_stop_whole_and_room_for_widgets(size_px: int) -
         await page.goto(address)
         await page.locator("[data-stop-button]").wait_for()
         for width, height in SCREENS:
-            await page.set_viewport_size({"width": width, "height": height})
+            await turned(page, (width, height))
             bars = await page.evaluate(BARS)
             assert bars["isWhole"], (width, height)
             assert bars["lines"] == 1, (width, height)

@@ -44,6 +44,7 @@ async def test_hostile_texts_are_shown_as_they_are(new_page: PageMaker) -> None:
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
         robot.set_reading("b", 50)
+        await until_text(page, ".battery-digits", "50")
         elements = await page.locator("*").count()
         for text in HOSTILE:
             robot.set_reading("__proto__", text)

@@ -8,7 +8,7 @@ import pytest
 from playwright.async_api import Browser, FrameLocator, Page, expect
 
 from tests.e2e.conftest import PageMaker
-from tests.e2e.dashboards import running_dashboard, until, until_text
+from tests.e2e.dashboards import running_dashboard, turned, until, until_text
 from tests.e2e.motion.driving import CALM_LEASE_S, STOP, Wire, commands, moved, push
 from urc.model.driver import Command
 from urc.model.interface import OutputBinding, WidgetUse
@@ -227,8 +227,8 @@ async def test_a_foreign_widget_gets_its_cell_and_nothing_else(
         assert page.url.endswith("/robots/puppet/")
         assert len(page.context.pages) == 1
         for number in range(30):  # of screens, from small to large, upright and across
-            size = {"width": 320 + number * 37 % 1300, "height": 400 + number * 53 % 900}
-            await page.set_viewport_size(size)  # type: ignore[arg-type]
+            size = 320 + number * 37 % 1300, 400 + number * 53 % 900
+            await turned(page, size)
             for mine in (STOP, "[data-badge]"):
                 assert await page.evaluate(ON_TOP, mine), (mine, size)
         assert await page.locator(".urc-fault").count() == 0

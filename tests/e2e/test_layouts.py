@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -9,7 +10,14 @@ import pytest
 from playwright.async_api import FloatRect, Locator, Page, expect
 
 from tests.e2e.conftest import PageMaker
-from tests.e2e.dashboards import WAIT_S, running_dashboard, until, until_attribute, until_text
+from tests.e2e.dashboards import (
+    WAIT_S,
+    running_dashboard,
+    turned,
+    until,
+    until_attribute,
+    until_text,
+)
 from tests.e2e.dev_pages import served
 from tests.e2e.motion.driving import (
     CALM_LEASE_S,
@@ -83,15 +91,6 @@ async def is_on_top(page: Page, selector: str) -> bool:
             }""",
             selector,
         )
-    )
-
-
-async def turned(page: Page, size: tuple[int, int]) -> None:
-    """Give the page another screen, and wait until it has been laid out for that."""
-    await page.set_viewport_size({"width": size[0], "height": size[1]})
-    await page.wait_for_function("(width) => innerWidth === width", arg=size[0])
-    await page.evaluate(
-        "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
     )
 
 
@@ -217,7 +216,7 @@ async def test_another_interface_keeps_the_connection(new_page: PageMaker) -> No
         await robot.until_stopped()
         await expect(page.locator(".urc-cell")).to_have_count(1)
         await expect(page.locator("#cell-0-main")).to_contain_text("Lift")
-        assert page.url.endswith("interface=lift")
+        await expect(page).to_have_url(re.compile("interface=lift$"))
         await expect(page.locator("[data-badge-text]")).to_have_text("Live")
         assert robot.opened == 1
         await page.mouse.up()

@@ -220,7 +220,7 @@ def test_a_run_that_was_stopped_says_that_there_is_more(
 
 
 def test_mutants_that_hung_can_be_tried_again(tmp_path: Path) -> None:
-    """On a busy machine a test may be too slow for another reason."""
+    """A test may be too slow for another reason."""
     ran(tmp_path, _1=36, _2=1)
     assert mutate.hung(mutants_in(tmp_path, SETTINGS)) == [f"{TICK}1"]
 

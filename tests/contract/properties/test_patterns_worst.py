@@ -31,9 +31,9 @@ REPEATED = ("a", "ab", "1", "a ", "a.", " ", '"', "x", "é", "0,", "b", "aA", '\
 
 
 def seconds(pattern: Pattern, text: str) -> float:
-    begin = time.perf_counter()
+    begin = time.process_time()
     pattern.search(text)
-    return time.perf_counter() - begin
+    return time.process_time() - begin
 
 
 @pytest.mark.parametrize("source", WORST)

@@ -6,7 +6,7 @@ import pytest
 
 from bench.rig.cuts import Cut, CutRig
 from bench.rig.kinds import KINDS
-from tests.e2e.motion.verdict import judged
+from tests.e2e.verdict import judged
 
 pytestmark = [
     pytest.mark.alone,

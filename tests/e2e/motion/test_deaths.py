@@ -6,7 +6,7 @@ import pytest
 
 from bench.rig.deaths import DEATHS, LEASE_MS, LINK_DEATHS, Rig, Trial
 from bench.rig.programs import can_relay
-from tests.e2e.motion.verdict import judged
+from tests.e2e.verdict import judged
 
 EACH = 100
 LANES = 20

@@ -14,7 +14,7 @@ from bench.rig.deaths import Rig, Trial, lane_profile
 from bench.rig.engine import ENGINE_DEATHS, EngineRig
 from bench.rig.operator_process import Page, Plan
 from bench.rig.programs import Operators, Robots, Server
-from tests.e2e.motion.verdict import judged
+from tests.e2e.verdict import judged
 from tests.effort import IS_THOROUGH
 
 LANES = 8

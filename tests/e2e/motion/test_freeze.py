@@ -2,15 +2,14 @@
 
 import pytest
 
-from bench.rig.freeze import freeze
+from bench.rig.freeze import Freeze, freeze
+from tests.e2e.verdict import judged
 
 pytestmark = [pytest.mark.anyio, pytest.mark.alone]
 
 
 async def test_nothing_old_arrives_after_a_freeze_and_the_stop_is_last() -> None:
     """All of it, a hundred times: `bench/motion_freeze.py`."""
-    freezes = await freeze(2, lanes=2, lasts_s=5.0, seed=3)
-    assert len(freezes) == 4
-    said = [one for one in freezes if not one.is_excused]
-    assert said, f"the machine was too busy: {freezes}"
-    assert [one for one in said if not one.is_good] == []
+    freezes: list[Freeze] = []
+    while not judged(freezes, 3):
+        freezes += await freeze(2, lanes=2, lasts_s=5.0, seed=3 + len(freezes))

@@ -17,8 +17,8 @@ from typing import NamedTuple
 import pytest
 
 from bench.rig.programs import Heard, Program, Robots
-from tests.e2e.motion.verdict import judged
 from tests.e2e.transports.packets import Loss
+from tests.e2e.verdict import judged
 from tests.effort import IS_THOROUGH
 
 pytestmark = [

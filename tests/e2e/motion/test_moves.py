@@ -104,7 +104,7 @@ async def test_stop_holds_back_what_moves_by_itself_and_ends_sequences(
         await until(lambda: heard == ["FOLD", "A"])
         await page.click(STOP)
         await until_text(page, "[data-stop-note]", "✓ sent ✓ latched")
-        before = list(heard)  # a busy machine may have sent B, too
+        before = list(heard)  # the next step, B, may have come before the stop
         assert "C" not in before
         await expect(page.locator(note(0))).to_have_text(LOCKED)
         await expect(page.locator(note(2))).to_contain_text("reset it first")

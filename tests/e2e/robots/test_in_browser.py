@@ -136,12 +136,19 @@ async def is_whole(page: Page) -> None:
     )
 
 
+async def choose(page: Page, interface: str) -> None:
+    """Open an interface, and wait until every widget of it is in place."""
+    # Without the mark, the cells of the interface before would pass for those of this one.
+    await page.locator("[data-stage] > *").first.evaluate("(el) => el.dataset.before = ''")
+    await page.get_by_label("Interface").select_option(interface)
+    await expect(page.locator("[data-before]")).to_have_count(0)
+    await is_whole(page)
+
+
 async def each_interface(page: Page, robot: Overheard) -> None:
     """Open every interface, on screens of all sizes, and with either hand."""
-    choice = page.get_by_label("Interface")
     for name in robot.profile.interfaces:
-        await choice.select_option(name)
-        await is_whole(page)
+        await choose(page, name)
         for size in SIZES:
             await page.set_viewport_size(size)
             await page.evaluate(DRAWN)
@@ -152,7 +159,7 @@ async def each_interface(page: Page, robot: Overheard) -> None:
         await page.locator("[data-hand-choice]").select_option(hand)
         await is_whole(page)
     await page.get_by_role("button", name="This device").click()
-    await choice.select_option("debug")
+    await choose(page, "debug")
     await page.locator("[data-debug]").wait_for()
 
 
@@ -232,15 +239,13 @@ NOT_LIVE = """(names) => {
 
 async def sees_itself_turn(page: Page, readings: Readings) -> None:
     """Wait for several different pictures of a camera that nobody drives."""
-    await page.get_by_label("Interface").select_option("default")
-    await is_whole(page)
+    await choose(page, "default")
     await until(lambda: len(readings.pictures.get("picture", ())) > 3, lambda: "the same picture")
 
 
 async def driven(page: Page, robot: Overheard, stick: Stick, readings: Readings) -> None:
     """Push the stick until the robot has moved, let go, and see the stop at its socket."""
-    await page.get_by_label("Interface").select_option("default")
-    await is_whole(page)
+    await choose(page, "default")
     before, mark = readings.values.get(stick.moves), robot.mark()
     if stick.sees:
         await until(lambda: bool(readings.pictures.get(stick.sees)), lambda: "no picture came")

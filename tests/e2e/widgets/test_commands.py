@@ -133,7 +133,7 @@ async def test_each_control_gives_exactly_its_command(
         await page.keyboard.press("Space")
         await robot.until_got("LAMP 0")
         await until_attribute(page, ".switch", "data-wish", "missed")
-        assert await page.inner_text(".switch-word") == "on ≠"
+        await until_text(page, ".switch-word", "on ≠")
         await robot.tell("off", "idle", "2.5")
         await until_attribute(page, ".switch", "data-wish", "")
 

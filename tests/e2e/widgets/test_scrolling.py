@@ -2,7 +2,7 @@
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from playwright.async_api import Page
@@ -10,6 +10,7 @@ from playwright.async_api import Page
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until, until_text
 from tests.e2e.motion.driving import SEND, Fingers, centre, drawn, driven, fingers_on, fire, fresh
+from tests.e2e.verdict import judged
 from tests.e2e.widgets.inputs import Inputs
 from urc.model.driver import Argument, Command
 from urc.model.interface import WidgetUse
@@ -36,7 +37,6 @@ for (const name of ["pointerdown", "pointermove", "pointercancel"]) {
 }
 """
 """The browser cancels a touch as soon as the page scrolls with it."""
-TRIES = 20
 
 
 @asynccontextmanager
@@ -63,6 +63,26 @@ async def ready(page: Page) -> None:
         "() => document.documentElement.scrollHeight > innerHeight"
         " && document.querySelector('[data-cell=\"0\"] [aria-disabled=false]')"
     )
+
+
+class Swipe(NamedTuple):
+    """Result of one swipe over a control."""
+
+    rested_ms: float
+    is_same: bool
+    """Whether the control shows the same value as before."""
+    commands: list[Any]
+    """Commands that the robot got."""
+
+    @property
+    def is_good(self) -> bool:
+        """Whether nothing was set."""
+        return self.is_same and not self.commands
+
+    @property
+    def is_excused(self) -> bool:
+        """Whether a busy machine was so slow with the swipe that the finger rested."""
+        return self.rested_ms >= QUICK_MS
 
 
 async def swipe(page: Page, hands: Fingers, selector: str, right: float, up: float) -> float:
@@ -97,16 +117,17 @@ async def test_a_swipe_scrolls_the_page_and_sets_nothing(
     """Neither is anything shown as if it had been set."""
     async with phone(new_page, widget, output, **options) as (robot, page, hands):
         before = await page.inner_text(f".{widget}")
-        for _ in range(TRIES):
-            if await swipe(page, hands, selector, 5, 150) < QUICK_MS:
-                break
-            # The machine was busy: for the page this finger has rested.
-            await page.reload()
-            await ready(page)
-            robot.commands.clear()
-        await page.wait_for_function("() => scrollY > 50")
-        assert await page.inner_text(f".{widget}") == before
-        assert robot.commands == []
+        swipes: list[Swipe] = []
+        while not judged(swipes, 1):
+            if swipes:
+                await page.reload()
+                await ready(page)
+                robot.commands.clear()
+            rested_ms = await swipe(page, hands, selector, 5, 150)
+            if rested_ms < QUICK_MS:
+                await page.wait_for_function("() => scrollY > 50")
+            is_same = await page.inner_text(f".{widget}") == before
+            swipes.append(Swipe(rested_ms, is_same, list(robot.commands)))
         await hands.put(0, *await centre(page, selector))
         if output == "change":
             await hands.lift(0)

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from PIL import Image
+from playwright.async_api import expect
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until, until_attribute, until_text
@@ -250,7 +251,7 @@ async def test_a_place_on_the_map_is_asked_for_before_it_is_sent(new_page: PageM
         await area.focus()
         await page.keyboard.press("Enter")
         await page.wait_for_selector(".map-bar[data-mode='place']:not([hidden])")
-        assert "Go to 46°31′12.0″ N" in await page.inner_text(".map-words")
+        await expect(page.locator(".map-words")).to_contain_text("Go to 46°31′12.0″ N")
         assert robot.commands == []
         await page.get_by_role("button", name="Go there").click()
         await until(lambda: len(robot.commands) == 1)
@@ -267,7 +268,7 @@ async def test_a_place_on_the_map_is_asked_for_before_it_is_sent(new_page: PageM
             "() => /^2 /.test(document.querySelector('.map-words').textContent)"
         )
         await page.get_by_role("button", name="Send …").click()
-        assert "Send the robot along 2 places" in await page.inner_text(".map-words")
+        await expect(page.locator(".map-words")).to_contain_text("Send the robot along 2 places")
         await page.get_by_role("button", name="Send", exact=True).click()
         await until(lambda: len(robot.commands) == 2)
         way = robot.commands[1][1]

@@ -311,7 +311,7 @@ async def test_two_controls_stop_before_either_moves(rig: Rig) -> None:
 
 
 async def test_opening_that_took_long_once_does_not_make_the_next_attempts_slow(rig: Rig) -> None:
-    """A busy machine may take long; what the way takes is what the quickest of them took."""
+    """The quickest opening counts, not the slowest."""
     robot = rig.robot
     await rig.drive()
     patience: list[float] = []

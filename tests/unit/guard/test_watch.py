@@ -108,7 +108,7 @@ async def test_one_that_speaks_now_and_then_is_alive(stands: list[ProcessState])
 
 @pytest.mark.anyio
 async def test_one_that_starts_has_ten_seconds(stands: list[ProcessState]) -> None:
-    """A busy machine may take long until Python runs."""
+    """Python may need this long to start."""
     guard = Watched()
     guard._was_heard = False
     guard.looks(100)
