@@ -1,4 +1,4 @@
-"""Sends one thing after the other where sending has to wait."""
+"""A queue before a transport whose `send` has to wait."""
 
 import asyncio
 import logging
@@ -17,14 +17,14 @@ _Tag = TypeVar("_Tag")
 
 
 class TimerHandle(Protocol):
-    """A call that is due later."""
+    """A timer."""
 
     def cancel(self) -> None:
-        """Call it off; harmless when it has been made."""
+        """Cancel the timer; harmless after it has fired."""
 
 
 class LaneClock(Protocol):
-    """Time; `urc.runtime.clock` has the same."""
+    """The source of time, like `urc.runtime.clock.Clock`."""
 
     def now(self) -> float:
         """Return monotonic seconds."""
@@ -33,18 +33,18 @@ class LaneClock(Protocol):
         """Return after `seconds`."""
 
     def call_at(self, time_s: float, action: Callable[[], None]) -> TimerHandle:
-        """Make `action` run at `time_s`, or at once when that is past."""
+        """Run `action` at `time_s`, or at once if that is past."""
 
 
 class Sender(Protocol):
-    """The member of a transport that is needed here."""
+    """The part of a transport that the queue needs."""
 
     async def send(self, data: Payload) -> None:
         """Hand `data` over."""
 
 
 class SendQueue(Generic[_Tag]):
-    """A short queue before a transport, with one task for as long as it is open."""
+    """A short queue before a transport, with one task from its first frame to its end."""
 
     def __init__(
         self,
@@ -57,10 +57,10 @@ class SendQueue(Generic[_Tag]):
         """Prepare a lane.
 
         Args:
-            sender: takes what is put in.
+            sender: the transport.
             clock: the time.
-            done: told of each thing with its tag; with what went wrong, if anything did.
-            after: another lane, of which everything goes before anything of this one.
+            done: called for each frame with its tag, and with the error, if any.
+            after: another queue, whose frames all go before those of this one.
         """
         self._sender = sender
         self._clock = clock
@@ -72,23 +72,23 @@ class SendQueue(Generic[_Tag]):
         self._is_free.set()
         self._task: asyncio.Task[None] | None = None
         self.busy_since_s: float | None = None
-        """When the first of what waits was put in; None while nothing does."""
+        """Time since which the first frame waits; None for an empty queue."""
 
     @property
     def is_idle(self) -> bool:
-        """Whether everything was handed over."""
+        """Whether all frames were handed over."""
         return not self._waiting
 
     async def until_idle(self) -> None:
-        """Return when everything was handed over."""
+        """Return after all frames were handed over."""
         await self._is_free.wait()
 
     def push(self, make: Callable[[], Payload | None], tag: _Tag) -> None:
-        """Send something after what waits.
+        """Add a frame to the queue.
 
         Args:
-            make: asked for it when its turn has come; None: it is not to be sent any more.
-            tag: what `done` is told; not where nothing was sent.
+            make: renders the frame at its turn; None drops it.
+            tag: argument of `done`, which is not called for a dropped frame.
         """
         if not self._waiting:
             self.busy_since_s = self._clock.now()
@@ -99,7 +99,7 @@ class SendQueue(Generic[_Tag]):
             self._task = asyncio.get_running_loop().create_task(self._run())
 
     def end(self) -> list[_Tag]:
-        """Send nothing more; return the tags of what was not handed over."""
+        """Stop sending; return the tags of frames that were not handed over."""
         task, self._task = self._task, None
         if task is not None:
             task.cancel()
@@ -141,6 +141,6 @@ class SendQueue(Generic[_Tag]):
 
 
 def why_broken(bug: Exception) -> str:
-    """Log what no transport should raise, and return the line for people."""
+    """Log an unexpected error of a transport, and return a message for people."""
     log.error("a transport failed in an unexpected way", exc_info=bug)
     return f"the transport failed in an unexpected way ({type(bug).__name__}: {bug})"

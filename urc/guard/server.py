@@ -1,4 +1,4 @@
-"""What happens in the guard: lines by name, and what is said about them."""
+"""The guard's server: the lines by name, and the handling of messages."""
 
 import asyncio
 from collections.abc import Callable
@@ -14,14 +14,14 @@ from urc.transports.base import TopicSubscription, Transport, TransportSetup
 __all__ = ["FINISH_S", "GuardServer"]
 
 FINISH_S: Final = 2.0
-"""What stopping and closing may take at the end."""
+"""Longest time for the last stops and the closing of lines, in seconds."""
 
 
 class GuardServer:
-    """All lines of one robot. Everything happens on one loop, nothing in it waits."""
+    """All lines of one robot. All runs on one event loop, and no handler waits."""
 
     def __init__(self, emit: Emit, clock: LaneClock) -> None:
-        """Begin with no line; `emit` passes messages to the engine's side."""
+        """Begin without lines; `emit` sends messages to the engine's side."""
         self._emit = emit
         self._clock = clock
         self._lines: dict[str, GuardedConnection] = {}
@@ -42,7 +42,7 @@ class GuardServer:
         }
 
     def handle(self, said: messages.ToGuard) -> None:
-        """Do what the engine's side says; `settle` follows."""
+        """Handle a message of the engine's side; `settle` follows."""
         if type(said) is messages.RenewLease and not self._is_finishing:
             line = self._controls.get(said.control)
             if line is not None:
@@ -52,14 +52,14 @@ class GuardServer:
             self._handlers[type(said)](said)
 
     def settle(self) -> None:
-        """Write what is due after all that was said together."""
+        """Write due frames, after messages that arrived together."""
         while self._stirred:
             line = self._stirred.pop()
             line.scheduler.write_due()
             line.settle()
 
     async def finish(self) -> None:
-        """Stop everything, close everything. Takes `FINISH_S` and little more at most."""
+        """Stop all controls and close all lines, within little more than `FINISH_S`."""
         self._is_finishing = True
         ends = [line.finish(FINISH_S) for line in self._lines.values()]
         await asyncio.gather(*ends)
@@ -73,7 +73,7 @@ class GuardServer:
         self.add(said, transport)
 
     def add(self, said: messages.MakeTransport, transport: Transport) -> None:
-        """Keep a line whose transport is made."""
+        """Add a line with its transport."""
         self._lines[said.line] = GuardedConnection(said, transport, self._emit, self._clock)
 
     def _send(self, said: messages.SendBytes) -> None:
@@ -101,7 +101,7 @@ class GuardServer:
             line = self._controls[control] = self._lines[name]
             line.scheduler.stop(control, terms)
             self._stirred.add(line)
-        self.settle()  # before anything else that came with it
+        self.settle()  # before other messages that arrived with it
 
     def _owe(self, said: messages.RecoverStop) -> None:
         line = self._controls[said.control] = self._lines[said.line]
