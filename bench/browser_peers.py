@@ -2,7 +2,7 @@
 
 One robot sends its clock 50 times a second, over TCP, to each of the four. A real Chromium opens
 each in turn. After the drawing of every frame, the age of a new value on the screen is measured.
-The other dashboards come from npm and PyPI at their first use. Missing dashboards are left out,
+Node-RED and NiceGUI come from npm and PyPI at their first use. Missing dashboards are left out,
 with a message.
 """
 

@@ -1,8 +1,9 @@
 """Cost of a binary frame of 24 bytes, 8 fields and a CRC, against tidy hand-written code.
 
-Both convert a frame from its bytes to a mapping of named, scaled values, and back. The declaration
-is from a normal profile. The hand-written code is what an author would write without URC. The code
-uses one precompiled `struct.Struct`, and the CRC of the standard library, which is written in C.
+URC and that code convert a frame from its bytes to a mapping of named, scaled values, and back. The
+declaration is from a normal profile. The hand-written code is what an author would write without
+URC. The code uses one precompiled `struct.Struct`, and the CRC of the standard library, which is
+written in C.
 """
 
 import platform

@@ -2,8 +2,8 @@
 
 Each robot is driven once and released, while its page keeps the controls and continues to get
 beats. After the stop and its repetitions, not one byte may arrive, because zeros would disturb
-another driver of the robot. Real programs run over a relay between two network namespaces. It needs
-root and /dev/net/tun; otherwise it is left out, with a message.
+another driver of the robot. Real programs run over a relay between two network namespaces. The
+benchmark needs root and /dev/net/tun; otherwise it is left out, with a message.
 """
 
 import json

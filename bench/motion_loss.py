@@ -2,8 +2,8 @@
 
 Pages drive over a relay with a round trip of 100 ms and random loss in both directions. After each
 stop, a page starts a new gesture. One run has a single connection, for comparison; the other run
-has URC's second connection for lossy links. It needs root and /dev/net/tun; otherwise it is left
-out, with a message.
+has URC's second connection for lossy links. The benchmark needs root and /dev/net/tun; otherwise it
+is left out, with a message.
 """
 
 import json

@@ -61,8 +61,8 @@ PYTEST = (PYTHON, "-m", "pytest")
 def halves(tests: str, *half: str, timeout_s: float) -> Step:
     """Return a step that runs the folders `half` of `tests`, in parallel with all other tests.
 
-    The two processes do not communicate. A third one that distributed thousands of small tests
-    would need a fifth of the processors.
+    The processes of these two groups do not communicate. A third one that distributed thousands of
+    small tests would need a fifth of the processors.
     """
     half = tuple(f"{tests}/{name}" for name in half)
     others = (*PYTEST, tests, *(f"--ignore={path}" for path in half))

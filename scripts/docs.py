@@ -1,6 +1,6 @@
 """The command `./dev docs`: check that every link and picture of the Markdown files exists.
 
-It follows only links inside the tree, so it needs no network.
+The check follows only links inside the tree, so it needs no network.
 """
 
 import re

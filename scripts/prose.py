@@ -5,9 +5,9 @@
     python -m scripts.prose --update        write the baseline after hits were reworded or moved
 
 The rules keep sentences short and plain: subject and verb first, nouns instead of relative clauses,
-and the words of docs/glossary.md. The baseline has the remaining hits, by file and rule. It can
-only shrink. `--update` refuses a rule with a larger total, so hits may move between files, but new
-text has none. After a merge conflict in the baseline, `--update` restores it.
+and the words of docs/glossary.md. The baseline has the remaining hits, by file and rule. The
+baseline can only shrink. `--update` refuses a rule with a larger total, so hits may move between
+files, but new text has none. After a merge conflict in the baseline, `--update` restores it.
 """
 
 import argparse

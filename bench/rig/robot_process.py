@@ -4,7 +4,8 @@
 ``ws`` is a WebSocket whose messages are the lines. ``bridge`` speaks the protocol of rosbridge, and
 receives ``M NUMBER`` for ``{"data": NUMBER}`` on ``/go``. ``http`` is a server that receives ``M
 NUMBER`` by a request for ``/go?t=NUMBER``. ``mqtt:HOST:PORT`` subscribes to the topic ``go`` of
-that broker. It prints one line for each event, with times of the monotonic clock in nanoseconds::
+that broker. The program prints one line for each event, with times of the monotonic clock in
+nanoseconds::
 
     ready 40001 40002 …     their ports, once
     open ROBOT TIME         a connection opened, or a broker accepted the subscription

@@ -1,6 +1,7 @@
-"""`urc validate`: the problems of documents, and their own tests. Needs no robot, no network.
+"""`urc validate`: the problems of documents, and their own tests.
 
-It imports little, because people run it on every save.
+The command needs no robot and no network. This module imports little, because people run it on
+every save.
 """
 
 import argparse

@@ -1,8 +1,8 @@
 """Items of a binary frame, in the order of the frame, for both directions.
 
 The loader makes them from ``struct:`` and resolves every named type. The readers and writers of
-`urc.protocol` compile them. Both sides share the rules of this module: names of nested fields, and
-items that give the sizes of others.
+`urc.protocol` compile them. The loader and these readers share the rules of this module: names of
+nested fields, and items that give the sizes of others.
 """
 
 from collections.abc import Iterator, Mapping

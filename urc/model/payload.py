@@ -2,7 +2,7 @@
 
 A *form* is one notation for the content of a frame (``regex``, ``struct``, ``json`` …). Each form
 has a parser in `urc.config`, which fills `options`, and a factory in `urc.protocol`, which reads
-them. The two agree on the content of `options`; no other module reads it.
+them. Parser and factory agree on the content of `options`; no other module reads it.
 
 Decoding gives *fields*: name → raw value. A field with the name of a signal sets that signal. A
 field whose name starts with ``_`` stays inside the document (conditions, correlation, command

@@ -67,7 +67,7 @@ class IndexEntry(msgspec.Struct, frozen=True):
 
     @property
     def number(self) -> Version:
-        """Its version in comparable form."""
+        """Version of the package in comparable form."""
         return parse_version(self.version)
 
     @property

@@ -70,7 +70,7 @@ def plan_file(
 ) -> InstallPlan:
     """Return the plan of the package in a file or folder.
 
-    The other sources are asked only for needs that it does not include.
+    Other sources are asked only for missing dependencies.
     """
     root = source.roots[0]
     own = merged([source], complain)

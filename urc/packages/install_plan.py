@@ -20,7 +20,8 @@ class InstallPlan(NamedTuple):
     signatures: Mapping[str, Signature]
     """Digest → signature, for signed archives."""
     own: frozenset[str] = frozenset()
-    """Packages from a folder that the user named. They are accepted without a check of the pinned
-    key."""
+    """Packages from a folder that the user named. These packages are accepted without a check of
+    the pinned key.
+    """
     remarks: Mapping[str, str] = {}
     """Digest → remark of its repository, about a withdrawal or the origin."""

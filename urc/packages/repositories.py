@@ -41,10 +41,11 @@ class _Tags(msgspec.Struct, frozen=True):
 
 
 class Repository:
-    """One repository. Its last index is stored, and used while the repository is unreachable.
+    """One repository. The last index is stored, and used while the repository is unreachable.
 
-    Its number only grows: an index with a lower number is rejected, and the stored one is used. The
-    first signing key is pinned; an index with another key, or without a signature, is rejected.
+    The number of the index only grows: an index with a lower number is rejected, and the stored one
+    is used. The first signing key is pinned; an index with another key, or without a signature, is
+    rejected.
     """
 
     def __init__(

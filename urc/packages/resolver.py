@@ -1,8 +1,8 @@
 """The choice of versions, so that every need of every package is satisfied.
 
-`resolvelib`, the resolver of pip, does the search. It backtracks after a conflict, and reports the
-conflict if there is no solution. This module defines packages, needs and the best version, which is
-the newest matching one.
+`resolvelib`, the resolver of pip, does the search. The resolver backtracks after a conflict, and
+reports the conflict if there is no solution. This module defines packages, needs and the best
+version, which is the newest matching one.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -19,8 +19,9 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     installed: tuple[Lock, ...]
     keys: dict[str, str] = {}
-    """``drivers/puppet`` → public key of its first installation. It stays after a removal, which
-    would otherwise bypass the check of keys."""
+    """``drivers/puppet`` → public key of its first installation. The key stays after a removal,
+    which would otherwise bypass the check of keys.
+    """
     before: dict[str, Lock] = {}
     """Digest of an installed lock → the lock that an update replaced, for one step back."""
 

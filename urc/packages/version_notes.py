@@ -1,6 +1,6 @@
 """Notes of a repository about a version: its origin, and its withdrawal.
 
-They are stored in a small file next to the archive, and in the index.
+The notes are stored in a small file next to the archive, and in the index.
 """
 
 import re

@@ -1,6 +1,6 @@
 """Versions by Semantic Versioning 2.0, and the ranges of a package's needs.
 
-`semver` parses and compares versions. It has no ranges, so URC parses them here:
+`semver` parses and compares versions. The library has no ranges, so URC parses them here:
 ``^1.2``, ``~1.2.3``, ``>=1.2, <2``, ``1.2.3`` and ``*``.
 """
 

@@ -1,8 +1,8 @@
 """The audit log: the motion commands of each operator, with times and results, in an SQLite file.
 
-Theory of operation. `AuditLog.note` puts an entry into a short queue and returns. It never waits
-for a disk, because motion and STOP call it. A separate thread writes the queue in batches, one
-transaction each. When the queue or the disk is full, entries are lost and counted; the next
+Theory of operation. `AuditLog.note` puts an entry into a short queue and returns. The call never
+waits for a disk, because motion and STOP call it. A separate thread writes the queue in batches,
+one transaction each. When the queue or the disk is full, entries are lost and counted; the next
 written entry has the count. When the file reaches its limit, the oldest entries are deleted.
 
 Each row has a hash over itself and the row before it, so `check` finds a changed, removed or
@@ -123,7 +123,7 @@ class AuditLog:
         self._thread.start()
 
     def add(self, entry: AuditEntry) -> None:
-        """Queue an entry and return at once. Any thread may call it; it never raises."""
+        """Queue an entry and return at once. Safe to call from any thread; never raises."""
         with self._wakes:
             if len(self._waiting) >= self._most_waiting:
                 self._lost += 1

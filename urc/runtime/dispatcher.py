@@ -151,7 +151,10 @@ class EngineLike(Protocol):
 
 
 class LinkPort(Protocol):
-    """The dispatcher's interface to a `Link`. Its methods must not call the dispatcher."""
+    """The dispatcher's interface to a `Link`.
+
+    Methods of this interface must not call the dispatcher.
+    """
 
     @property
     def is_full(self) -> bool:

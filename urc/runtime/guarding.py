@@ -81,8 +81,8 @@ def _is_dear(spec: TransportSpec, driver: Driver) -> bool:
 def _silent_s(spec: TransportSpec) -> float | None:
     """Return the silence after which a transport is reset during motion, or None for never.
 
-    It is a little shorter than the engine's timeout, because the engine's output would queue up
-    behind the motion. A connectionless transport has no buffer that a reset could discard.
+    This time is a little shorter than the engine's timeout, because the engine's output would queue
+    up behind the motion. A connectionless transport has no buffer that a reset could discard.
     """
     if spec.stale_after_s is None or spec.type in ("udp", "serial"):
         return None

@@ -72,8 +72,9 @@ class MotionBackend(Protocol):
     async def stops(self) -> Sequence[tuple[str, Reason]]:
         """Wait for the next written stop frames; return command and reason of each.
 
-        They come in order, at least one. A cancellation loses none. A control that `stop` stopped
-        is reported as ``stopped`` even without motion, because its transport has accepted the stop.
+        The list is in order, and has at least one entry. A cancellation loses none. A control that
+        `stop` stopped is reported as ``stopped`` even without motion, because its transport has
+        accepted the stop.
         """
 
 
@@ -111,7 +112,7 @@ class HeldControl:
     running_rule: Literal["rest", "moving", "ending"] = "rest"
     """``ending``: released, and its stop is not reported as written yet."""
     stop: Payload | FrameVariants | None = None
-    """Its stop frame, as the movers have it."""
+    """Stop frame of the command, as stored by the movers."""
     is_owed_again: bool = False
     """Whether its stop was sent before the transport was ready, and must be repeated."""
     needs_release: bool = False

@@ -1,10 +1,10 @@
 """The link to a robot: one transport, and its part of the driver's engine.
 
-Theory of operation. `run` is a loop of three waits. It waits for a reason to connect: a persistent
-link always has one; else the engine sends `Open`, or each request opens the link. Then it waits for
-the backoff, and for the end of the connection. A reader and a writer run while the connection is
-open. Every end (by the robot, the engine or a rule below) goes through `_end`, and one place stops
-both tasks.
+Theory of operation. `run` is a loop of three waits. The loop waits for a reason to connect: a
+persistent link always has one; else the engine sends `Open`, or each request opens the link. Then
+it waits for the backoff, and for the end of the connection. A reader and a writer run while the
+connection is open. Every end (by the robot, the engine or a rule below) goes through `_end`, and
+one place stops both tasks.
 
 A connection is good from its first good frame, and only that resets the backoff. So URC does not
 hammer a robot that accepts connections and closes them. With steps of a connection

@@ -1,7 +1,7 @@
 """Detection of hosts that mean this machine itself, or a device plugged into it.
 
-A package with such a fixed host would talk to local programs of the person who installs it. It may
-use this machine only through a setting, which a person sees and fills in.
+A package with such a fixed host would talk to local programs of the person who installs it. A
+package may use this machine only through a setting, which a person sees and fills in.
 """
 
 import ipaddress

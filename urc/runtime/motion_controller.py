@@ -2,9 +2,9 @@
 
 Theory of operation. Pages send ticks of sampled input, and releases. For each tick, the controller
 checks three things: the lease of the page, the age of the tick, and the arguments, by the engine.
-It then hands the frame to the movers, which own the connection and its time limits. The first tick
-of a gesture arms the control. It also renders the stop frame, so that a stop needs neither the
-engine nor the document.
+The controller then hands the frame to the movers, which own the connection and its time limits. The
+first tick of a gesture arms the control. The same tick also renders the stop frame, so that a stop
+needs neither the engine nor the document.
 
 A control that stopped without a release stays closed until its page releases it. So a stick that is
 still held after the link reconnects moves nothing.

@@ -1,7 +1,7 @@
 """A check of a package's document for a repository: its errors, including failed tests.
 
-``python -m urc.runtime.package_check DOCUMENT`` prints the errors as a JSON list. It limits its own
-memory and time, so that a third-party document cannot block the repository.
+``python -m urc.runtime.package_check DOCUMENT`` prints the errors as a JSON list. The process
+limits its own memory and time, so that a third-party document cannot block the repository.
 """
 
 import json

@@ -1,8 +1,8 @@
 """A connection test of a robot: each transport is tried once.
 
 Layer 4. The test opens a session as a page does, so it uses the driver's logins, polls and
-timeouts. It sends no motion. A transport that only opens for a request, and that no poll uses, is
-opened and closed once.
+timeouts. The test sends no motion. A transport that only opens for a request, and that no poll
+uses, is opened and closed once.
 """
 
 import asyncio

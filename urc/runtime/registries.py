@@ -1,6 +1,6 @@
 """The built-in tables of transports and framings.
 
-It imports no transport, no framing and no event loop; each is imported at its first use.
+The module imports no transport, framing or event loop; each is imported at its first use.
 """
 
 from urc.registry import Registries

@@ -1,6 +1,6 @@
 """Conversion of the operator's settings from text to typed values.
 
-Each command that opens a robot uses it. It needs no network and no event loop.
+Each command that opens a robot uses this module. The module needs no network and no event loop.
 """
 
 import math

@@ -115,8 +115,8 @@ def names_kept(folder: Path, removed: Iterable[Lock], left: Iterable[Lock]) -> l
 def in_use(folder: Path, name: str, installed: Iterable[Lock]) -> Lock | None:
     """Return the installed package that a robot's name refers to, or None.
 
-    It is the chosen version, or else the newest. If a robot and a driver have the same name, it is
-    the robot.
+    The result is the chosen version, or else the newest version. If a robot and a driver have the
+    same name, it is the robot.
 
     Args:
         folder: folder of the files.

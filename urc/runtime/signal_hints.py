@@ -1,6 +1,6 @@
 """Hints why a test set no signal, and how to correct the test.
 
-Layer 4, pure. It runs only after a failed test.
+Layer 4, pure. The module runs only after a failed test.
 """
 
 from collections.abc import Iterator

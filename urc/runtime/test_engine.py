@@ -1,6 +1,6 @@
 """An engine under test, with a simulated clock and a transport that always connects.
 
-Layer 4, without I/O and asyncio. It collects all output of the engine for the test.
+Layer 4, without I/O and asyncio. The module collects all output of the engine for the test.
 """
 
 import json

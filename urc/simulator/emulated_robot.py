@@ -87,7 +87,7 @@ class EmulatedRobot:
     def picture(self, transport: str, topics: Iterable[str], now_s: float) -> bytes | None:
         """Return the image of the robot's world for one of `topics`, or None.
 
-        It is b"" while the sensor has dropped out.
+        The image is b"" while the sensor has dropped out.
 
         Args:
             transport: name of the transport of the subscription.

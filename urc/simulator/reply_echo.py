@@ -1,7 +1,7 @@
 """Fields of a reply that repeat the request, and fields that identify a frame.
 
-Pure. It inverts equalities and lists of constants in ``when`` and ``match``, and no other part of
-an expression.
+Pure. The module inverts equalities and lists of constants in ``when`` and ``match``, and no other
+part of an expression.
 """
 
 import re

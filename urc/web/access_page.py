@@ -36,7 +36,7 @@ class Stoppable(NamedTuple):
     """A robot with a STOP."""
 
     name: str
-    """Its name in URLs."""
+    """Name of the robot in URLs."""
     title: str
 
     @property

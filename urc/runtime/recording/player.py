@@ -1,8 +1,8 @@
 """Playback of a recording: its readings go to a hub as if the robot sent them now.
 
 Layer 4. `Player` keeps its position and state even without viewers. A dashboard opens its `session`
-in place of a robot. It plays decoded values, not bytes. A reply can only be decoded together with
-its request, and a new session would send its requests at other times.
+in place of a robot. The player plays decoded values, not bytes. A reply can only be decoded
+together with its request, and a new session would send its requests at other times.
 """
 
 import asyncio
@@ -41,7 +41,7 @@ log = logging.getLogger(__name__)
 
 
 class Player:
-    """The position and state of a playback. It runs on one event loop."""
+    """The position and state of a playback. The playback runs on one event loop."""
 
     def __init__(
         self,

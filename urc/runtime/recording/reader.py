@@ -1,7 +1,7 @@
 """A reader of recordings, which also reads the file of a killed process.
 
-Layer 4. It provides the parts that a player needs: the document, the time range, and the messages
-in order from any time on. It reads files of any length piece by piece.
+Layer 4. The reader provides the parts that a player needs: the document, the time range, and the
+messages in order from any time on. The reader processes files of any length piece by piece.
 """
 
 import json

@@ -1,7 +1,7 @@
 """The recorder of one session, which writes an MCAP file.
 
-Layer 4. Theory of operation. `Recorder.put` queues events and returns. It never waits for a disk,
-because motion uses the same event loop. A separate thread does all slow work: it reads the
+Layer 4. Theory of operation. `Recorder.put` queues events and returns. The call never waits for a
+disk, because motion uses the same event loop. A separate thread does all slow work: it reads the
 document, creates the file, and writes. Once a second it flushes, so a killed process loses that
 second and the end of the file. When the queue is full, new events are lost, and the file has their
 count. When the disk is full, the recording ends, and `fault` has the reason.

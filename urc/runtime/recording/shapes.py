@@ -1,8 +1,8 @@
 """The content of a recording: topics, and events as JSON messages.
 
-Layer 4, pure. A recording is an MCAP file (https://mcap.dev/spec) of JSON messages. It contains
-their JSON Schemas, so any MCAP program can show it. Images and the log use message types that such
-programs know by name (``foxglove.CompressedImage``, ``foxglove.Log``; see
+Layer 4, pure. A recording is an MCAP file (https://mcap.dev/spec) of JSON messages. The file
+contains their JSON Schemas, so any MCAP program can show it. Images and the log use message types
+that such programs know by name (``foxglove.CompressedImage``, ``foxglove.Log``; see
 https://docs.foxglove.dev/docs/visualization/message-schemas/introduction).
 """
 

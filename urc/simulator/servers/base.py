@@ -35,7 +35,9 @@ class Endpoint(NamedTuple):
     text: str
     """For people and ``urc simulate``: ``tcp 127.0.0.1:6789``, ``serial /dev/pts/3``."""
     options: Mapping[str, object] = NOTHING
-    """Options that the driver's transport needs to connect here. They override its own."""
+    """Options that the driver's transport needs to connect here. These options override those of
+    the driver.
+    """
     path: str = ""
     """Path of the device file, for serial ports."""
 
@@ -45,7 +47,7 @@ class LastPeer:
 
     def __init__(self) -> None:
         self.host = ""
-        """Its address, or "" before the first message."""
+        """Address of the client, or "" before its first message."""
 
 
 class ServerContext(NamedTuple):

@@ -105,8 +105,8 @@ async def converse(
     Args:
         context: context of the server.
         client: its line replies.
-        take: returns the next payload of the client; None or b"" at its end. It may be cancelled
-            and called again without loss.
+        take: returns the next payload of the client; None or b"" at its end. The call may be
+            cancelled and repeated without loss.
         put: sends the robot's payloads, and waits while the client's buffer is full.
 
     Raises:

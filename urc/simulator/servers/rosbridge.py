@@ -223,7 +223,7 @@ class BridgeClient:
         self.wanted.pop(_text(operation, "topic"), None)
 
     def advertise(self, operation: Mapping[str, Any], now_s: float) -> None:
-        """Note the type of a topic."""
+        """Record the type of a topic."""
         self._learn(_text(operation, "topic"), operation)
 
     def publish(self, operation: Mapping[str, Any], now_s: float) -> Envelope | None:

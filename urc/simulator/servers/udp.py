@@ -1,8 +1,8 @@
 """The emulated robot behind a UDP port.
 
 A client is the source address of a datagram. If the driver listens on a port (``listen``), the
-robot sends there from the start. It sends to this machine until one of its UDP ports receives a
-datagram from another host.
+robot sends there from the start. The robot sends to this machine until one of its UDP ports
+receives a datagram from another host.
 """
 
 import asyncio

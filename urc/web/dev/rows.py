@@ -45,7 +45,7 @@ class TrafficRow(msgspec.Struct, omit_defaults=True):
     verb: str = ""
     address: str = ""
     more: str = ""
-    """The other attributes of a message."""
+    """Further attributes of a message."""
     text: str = ""
     level: str = ""
     picture: str = ""

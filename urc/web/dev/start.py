@@ -122,7 +122,7 @@ class DevStart:
 
 
 def no_dev_start() -> list[Route]:
-    """Return the route of a server without ``--dev``: it says how to turn the page on."""
+    """Return the route of a server without ``--dev``, which explains how to enable the page."""
 
     async def tell(_: Request) -> Response:
         raise HTTPException(404, t("The dev interface is off. Start URC with --dev to turn it on."))

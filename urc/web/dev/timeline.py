@@ -1,7 +1,8 @@
 """The audit log of one robot, as JSON for the developer page: why did it move?
 
-Layer 5. It contains traffic of the robot, so it needs the start key, like the developer page.
-``?last=`` is the number of entries, newest first; ``?since=`` is the earliest time (UTC, seconds).
+Layer 5. The timeline contains traffic of the robot, so it needs the start key, like the developer
+page. ``?last=`` is the number of entries, newest first; ``?since=`` is the earliest time (UTC,
+seconds).
 """
 
 import asyncio

@@ -52,10 +52,10 @@ class ParsedPiece(NamedTuple):
     """One frame, or bytes outside any frame."""
 
     start: int
-    """Offset of its first byte in the input."""
+    """Offset of the frame's first byte in the input."""
     end: int
     data: bytes
-    """Its payload: without delimiter, length or checksum."""
+    """Payload of the frame, without delimiter, length or checksum."""
     fault: str
     """Why the bytes are no frame; "" for a frame."""
     takers: tuple[FrameConsumer, ...] = ()

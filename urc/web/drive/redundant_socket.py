@@ -5,8 +5,8 @@ delay doubles when the repeat is lost too, and is then longer than a lease. Two 
 lose packets at the same time. On such a link a page sends everything about held controls on both,
 and gets heartbeats on both. The first copy counts: each message carries the page's number.
 
-A redundant socket has no rights of its own. It joins the page by a key that only that page has, and
-closes with it.
+A redundant socket has no rights of its own. The socket joins the page by a key that only that page
+has, and closes with it.
 """
 
 import msgspec

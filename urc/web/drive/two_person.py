@@ -3,9 +3,9 @@
 Layer 5. Users do not sign in, so each page that may drive counts as a person. The asking page can
 never be the second one. The number of questions and their waiting time are bounded.
 
-A token of the server stands for a confirmation. It counts once, for a few seconds, on that page,
-and only for the same command with the same arguments. A recorded, changed or delayed confirmation
-is therefore void.
+A token of the server stands for a confirmation. A token counts once, for a few seconds, on that
+page, and only for the same command with the same arguments. A recorded, changed or delayed
+confirmation is therefore void.
 """
 
 import asyncio

@@ -42,7 +42,8 @@ class FlowControl(Protocol):
     def listen(self, sink: Callable[[bytes], bool]) -> None:
         """Hand each whole text to `sink` before `ClientSocket.receive` gets it.
 
-        It saves two task switches. A text for which `sink` returns False goes to `receive`.
+        The direct call saves two task switches. A text for which `sink` returns False goes to
+        `receive`.
         """
 
     def hold_back(self, is_held: bool) -> None:

@@ -2,7 +2,7 @@
 
 Layer 5. No client has a queue. A flush wakes every client. Each client takes everything newer than
 its last frame as soon as its own line is free. A frame is encoded once for all clients at the same
-place. A client that fell behind gets the newest values in one frame, and delays no other client.
+place. A slow client gets the newest values in one frame, and delays no other client.
 """
 
 import asyncio
@@ -61,8 +61,8 @@ class _Update(NamedTuple):
 class Pacer:
     """A rate limiter that passes the first event of a burst at once, then a steady rate.
 
-    It tolerates one period of jitter, so a source at exactly this rate is never delayed. No second
-    has more than one event above the rate.
+    The limiter tolerates one period of jitter, so a source at exactly this rate is never delayed.
+    No second has more than one event above the rate.
     """
 
     def __init__(self, rate_hz: float) -> None:

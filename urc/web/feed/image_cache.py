@@ -16,8 +16,9 @@ from urc.web.wire.picture import as_frame, encode_picture
 __all__ = ["EncodedImage", "ImageSubscription", "ImageCache", "is_picture"]
 
 SHARED_FOR_S = 0.05
-"""Reuse of an encoded image, in seconds. Its age counts from the encoding, and a few milliseconds
-are not worth another copy of some ten kilobytes."""
+"""Reuse of an encoded image, in seconds. The age of an image counts from the encoding, and a few
+milliseconds are not worth another copy of some ten kilobytes.
+"""
 
 
 class EncodedImage(NamedTuple):

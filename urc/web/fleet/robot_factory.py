@@ -1,7 +1,7 @@
 """Makes the robots of a dashboard: from documents, settings and installed packages.
 
-Layer 5. It reads files and stores settings; it has no session. Reading takes a while, so the event
-loop calls it in a thread.
+Layer 5. The factory reads files and stores settings; it has no session. Reading takes a while, so
+the event loop calls it in a thread.
 """
 
 import logging

@@ -1,7 +1,7 @@
 """A robot as the dashboard sees it, and the lifetime of its session.
 
-Layer 5. The session opens for the first client. It closes a short while after the last one has
-gone, so that a reload keeps the robot connected, and Back disconnects it.
+Layer 5. The session opens for the first client. The session closes a short while after the last
+client has disconnected, so that a reload keeps the robot connected, and Back disconnects it.
 """
 
 import asyncio

@@ -61,7 +61,10 @@ class _Planned(NamedTuple):
 
 @dataclass
 class Job:
-    """One install, from the request to its end. Its thread only writes texts and numbers."""
+    """One install, from the request to its end.
+
+    The thread of an install only writes texts and numbers.
+    """
 
     number: int
     title: str

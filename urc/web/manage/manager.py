@@ -1,6 +1,6 @@
 """Keeps the robots of the menu in step with the installed packages.
 
-Layer 5. It has no route and no page: `urc.web.manage.routes` uses it.
+Layer 5. The manager has no route and no page: `urc.web.manage.routes` uses it.
 """
 
 import asyncio

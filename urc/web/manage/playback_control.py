@@ -1,7 +1,7 @@
 """Requests that read or change the playback of a recording.
 
-Layer 5. Its pages are those of a robot that is only watched. Any visitor may change the playback,
-because no real robot is connected.
+Layer 5. The pages of a playback are those of a robot that is only watched. Any visitor may change
+the playback, because no real robot is connected.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Routes of the managers: their pages, and their requests under ``/api/v1``.
 
 Layer 5. Each change is a POST with a JSON body from this server's own pages; `urc.web.serve.policy`
-checks that. It needs the start key or the token of --manage.
+checks that. Each request needs the start key or the token of --manage.
 """
 
 import asyncio

@@ -104,7 +104,7 @@ class JobNews(ManageMessage, frozen=True):
     may: tuple[str, ...] = ()
     """Permissions of the package, one a line."""
     risks: tuple[str, ...] = ()
-    """Its own access to this machine; for an update, only new access."""
+    """Access of the package itself to this machine; for an update, only new access."""
     gained: tuple[str, ...] = ()
     """Permissions that an update adds."""
     lost: tuple[str, ...] = ()
@@ -144,7 +144,7 @@ class Installed(ManageMessage, frozen=True):
     licence: str
     authors: tuple[str, ...]
     brings: tuple[str, ...]
-    """Its dependencies, as ``widgets/dial 1.0.0``."""
+    """Dependencies of the package, as ``widgets/dial 1.0.0``."""
     newer: str
     """Newer version in a repository, or ""."""
     before: str

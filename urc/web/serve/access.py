@@ -41,7 +41,7 @@ STRANGER = Visitor()
 
 
 class Access:
-    """The keys of one start of the server, and the browsers that have handed one in."""
+    """The keys of one start of the server, and the browsers admitted by a key."""
 
     def __init__(
         self, *, is_open: bool = False, key: str = "", instance: str = "", token: str = ""
@@ -72,7 +72,7 @@ class Access:
     def address_once(self, url: str) -> str:
         """Return an address for the first browser only, without the start key.
 
-        It may appear in public, for example in the command line of a browser.
+        This address may appear in public, for example in the command line of a browser.
         """
         code = secrets.token_urlsafe(24)
         self._codes[code] = None

@@ -25,8 +25,9 @@ address with the most idle connections."""
 RESERVE = 64
 """Further connections while none is idle, for STOP only."""
 REQUEST_S = 5.0
-"""Time limit for a whole request with its body, in seconds. It runs from the opening of the
-connection for the first request, and from the first byte for later ones."""
+"""Time limit for a whole request with its body, in seconds. The time runs from the opening of the
+connection for the first request, and from the first byte for later ones.
+"""
 
 
 def refusal(status: HTTPStatus, text: str) -> bytes:
@@ -52,10 +53,10 @@ def _stops(data: bytes) -> bool:
 class HttpConnection(H11Protocol):
     """uvicorn's HTTP/1.1 protocol with a time limit on the arrival of a request.
 
-    WARNING: it depends on asyncio's protocol methods and on parts of the base class. These are the
-    arguments of the constructor, `send_400_response`, and the attributes `conn`, `connections`,
-    `loop` and `transport`. The tests in tests/e2e/test_dashboard_server.py fail when one of them
-    changes.
+    WARNING: it depends on asyncio's protocol methods and on parts of the base class. The used parts
+    are the arguments of the constructor, `send_400_response`, and the attributes `conn`,
+    `connections`, `loop` and `transport`. The tests in tests/e2e/test_dashboard_server.py fail when
+    one of them changes.
     """
 
     def __init__(

@@ -34,7 +34,7 @@ class WebSocketFrames:
         """Whether a fragmented message is incomplete."""
         self.spans: list[tuple[int, int]] = []
         """Start and end of each whole text frame at the beginning of the last received bytes, for
-        `text_of`. It is empty if they were a single text."""
+        `text_of`. The list is empty for a single text."""
 
     def whole(self, data: bytes) -> bytes | None:
         """Return the text if `data` is exactly one whole text frame, else None."""

@@ -1,9 +1,9 @@
 """Access checks and page policy for every request, before any route is looked up.
 
 Layer 5. Pure ASGI middleware around the whole application, so that error responses pass through it
-too. It checks Host against foreign names that resolve to this machine. It checks Origin against
-foreign pages that open a WebSocket or post a form. Its policy headers stop injected markup. It
-knows no route, no robot and no template.
+too. The policy checks Host against foreign names that resolve to this machine. The policy checks
+Origin against foreign pages that open a WebSocket or post a form. The response headers stop
+injected markup. The module knows no route, robot or template.
 """
 
 import ipaddress
@@ -169,8 +169,8 @@ def is_origin_ours(origin: str, scheme: str, authority: Authority) -> bool:
 def frame_policy(scope: Scope, widget: str, digest: str, place: str) -> str:
     """Return the policy of a frame: code of URC and of one widget, and nothing else.
 
-    It has no nonce: a nonce would allow scripts and styles of any address, and a request to an
-    address can carry data out. The digest allows the import map alone.
+    The policy has no nonce, because a nonce would allow scripts and styles of any address. A
+    request to a foreign address can leak data. The digest allows the import map alone.
 
     Args:
         scope: of the request for the frame; its host is allowed already.
@@ -190,7 +190,7 @@ def frame_policy(scope: Scope, widget: str, digest: str, place: str) -> str:
 
 
 class Policy:
-    """The middleware. It puts ``nonce`` and ``visitor`` into the state of the request."""
+    """The middleware, which puts ``nonce`` and ``visitor`` into the state of the request."""
 
     def __init__(self, app: ASGIApp, access: Access, *, allowed_hosts: Iterable[str] = ()) -> None:
         self._app = app

@@ -1,7 +1,7 @@
 """One cell of a page: the widget's markup, and the configuration for its module.
 
-Layer 5. Widget templates come from packages. They run in a sandbox, and a failure only affects
-their own cell.
+Layer 5. Widget templates come from packages. These templates run in a sandbox, and a failure only
+affects their own cell.
 """
 
 import json

@@ -1,7 +1,8 @@
 """The document of a frame with a third-party widget: an empty cell and an import map.
 
-Layer 5. It holds no data of a robot: the page passes markup and values in (``warden.js``). Its
-policy allows code from a few paths; it has no other access to the network.
+Layer 5. The document holds no data of a robot: the page passes markup and values in
+(``warden.js``). The policy of the document allows code from a few paths; it has no other access to
+the network.
 """
 
 import base64

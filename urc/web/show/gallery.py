@@ -40,7 +40,7 @@ class Found(NamedTuple):
 
     folder: Path
     widget: Widget | None
-    """None if its manifest is broken."""
+    """Manifest of the widget, or None for a broken manifest."""
     problems: tuple[Problem, ...] = ()
     """Problems of the manifest."""
 

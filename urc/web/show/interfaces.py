@@ -35,8 +35,9 @@ DEBUGGING: Final = Interface(DEBUG, "Debug")
 """Stand-in for the debug interface: it has no grid."""
 DEBUG_STYLES: Final = ("/static/dev/dev.css", "/static/dev/debug.css")
 KEPT: Final = "urc-interface"
-"""Cookie with the robot's last shown interface on this device. Its path is the robot's page, and
-``interfaces.js`` writes it."""
+"""Cookie with the robot's last shown interface on this device. The cookie's path is the robot's
+page, and ``interfaces.js`` writes it.
+"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ _USED_COLUMN, _USED_ROW, _MARGIN = "minmax(0,1fr)", "minmax(8rem,1fr)", "minmax(
 _LOW_ROW = "minmax(6.5rem,1fr)"
 """Height of a row on a phone in landscape: two rows fit."""
 _WINDOW = ("minmax(5rem,1fr)", "minmax(0,1fr)")
-"""Sizes of a row and a column that show the background."""
+"""Sizes of rows and columns in which the background is visible."""
 
 
 def grid_css(interface: Interface, slots: Sequence[str]) -> str:

@@ -55,7 +55,7 @@ class Card:
     """One robot on the menu."""
 
     name: str
-    """Its name in URLs."""
+    """Name of the robot in URLs."""
     title: str
     summary: str
     url: str
@@ -67,7 +67,7 @@ class Card:
     missing: tuple[str, ...]
     """Titles of the settings that keep Connect disabled."""
     missing_names: tuple[str, ...]
-    """Their names, for a command line."""
+    """Names of the missing settings, for a command line."""
     settings_url: str = ""
     """URL of its settings; "" where they are fixed."""
     dev_url: str = ""

@@ -1,6 +1,6 @@
 """The sandboxed Jinja environment for the templates of widgets, with few globals.
 
-Layer 5. It limits neither time nor memory; for third-party widgets
+Layer 5. The sandbox limits neither time nor memory; for third-party widgets
 `urc.web.show.isolated_markup` does.
 """
 
