@@ -98,9 +98,9 @@ def decode_by_hand(frame: bytes) -> Mapping[str, object] | None:
 
 def driver_of(text: str) -> Driver:
     document = parse_document(text, "bench.yaml")
-    findings = Problems()
-    driver = parse_driver(Node(document, (), document.data), findings, built_in_catalog())
-    assert not findings.problems, findings.problems
+    problems = Problems()
+    driver = parse_driver(Node(document, (), document.data), problems, built_in_catalog())
+    assert not problems.problems, problems.problems
     return driver
 
 

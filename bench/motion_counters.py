@@ -23,7 +23,7 @@ SHORTEST_S, LONGEST_S, LONGEST_IF_FULL_S = 5.0, 10.0, 60.0
 
 def run(*, full: bool) -> Sequence[Result]:
     """Run gestures until enough have counted."""
-    wanted, lanes = (GESTURES_IF_FULL, LANES_IF_FULL) if full else (GESTURES, LANES)
+    wanted, queues = (GESTURES_IF_FULL, LANES_IF_FULL) if full else (GESTURES, LANES)
     longest_s = LONGEST_IF_FULL_S if full else LONGEST_S
     dice = random.Random(5)  # noqa: S311 - the same gestures in every run
     times = [round(dice.uniform(SHORTEST_S, longest_s), 1) for _ in range(wanted)]
@@ -31,7 +31,9 @@ def run(*, full: bool) -> Sequence[Result]:
     for row in kept.rows:
         times.remove(float(str(row["lasted_s"])))
     asyncio.run(
-        gestures(times, lanes=lanes, seed=len(kept.rows), told=lambda one: kept.add(one._asdict()))
+        gestures(
+            times, queues=queues, seed=len(kept.rows), told=lambda one: kept.add(one._asdict())
+        )
     )
     return _told(kept.end())
 

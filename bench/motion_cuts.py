@@ -35,9 +35,9 @@ def run(*, full: bool) -> Sequence[Result]:
     if not can_relay():
         print(json.dumps({"left_out": "motion_cuts: needs root and /dev/net/tun"}))
         return []
-    each, lanes = (EACH_IF_FULL, LANES_IF_FULL) if full else (EACH, LANES)
+    each, queues = (EACH_IF_FULL, LANES_IF_FULL) if full else (EACH, LANES)
     longest_s = LONGEST_IF_FULL_S if full else LONGEST_S
-    kinds = KINDS * lanes
+    kinds = KINDS * queues
     dice = random.Random(3)  # noqa: S311 - the same cuts in every run
     plans = {kind: _spread(each, longest_s, dice) for kind in KINDS}
     with (
@@ -46,7 +46,7 @@ def run(*, full: bool) -> Sequence[Result]:
         ThreadPoolExecutor(len(kinds)) as threads,
     ):
         rig.cut(SHORTEST_S)  # starts the guards
-        done = [threads.submit(_queue, rig, queue, plans[kinds[queue]]) for queue in rig.lanes]
+        done = [threads.submit(_queue, rig, queue, plans[kinds[queue]]) for queue in rig.queues]
         cuts = [cut for one in done for cut in one.result()]
     return [_told(kind, [one for one in cuts if one.kind == kind], each) for kind in KINDS]
 

@@ -28,7 +28,7 @@ def run(*, full: bool) -> Sequence[Result]:
     """Disturb the server; compare the slowest stop with the bound."""
     wanted = EACH_IF_FULL if full else EACH
     results: list[Result] = []
-    with tempfile.TemporaryDirectory() as folder, EngineRig(Path(folder), lanes=LANES) as rig:
+    with tempfile.TemporaryDirectory() as folder, EngineRig(Path(folder), queues=LANES) as rig:
         rig.bout("close")  # starts the guards
         for death in ENGINE_DEATHS:
             trials = repeated(partial(rig.engine_bout, death), wanted, LANES)
@@ -36,10 +36,10 @@ def run(*, full: bool) -> Sequence[Result]:
     return results
 
 
-def repeated(bout: Callable[[], list[Trial]], wanted: int, lanes: int) -> list[Trial]:
+def repeated(bout: Callable[[], list[Trial]], wanted: int, queues: int) -> list[Trial]:
     """Repeat until enough trials are valid, or the machine is too busy."""
     trials: list[Trial] = []
-    for _ in range(MOST_BOUTS * wanted // lanes):
+    for _ in range(MOST_BOUTS * wanted // queues):
         trials += bout()
         if sum(not one.is_excused for one in trials) >= wanted:
             break

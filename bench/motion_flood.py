@@ -69,11 +69,11 @@ def run(*, full: bool) -> Sequence[Result]:
 
 def _profiles(folder: Path, ports: Sequence[int]) -> tuple[list[Path], list[Path]]:
     """Write the documents of the measured server and the other server."""
-    path, *lanes = folder / "path.yaml", folder / "lane-1.yaml", folder / "lane-2.yaml"
+    path, *queues = folder / "path.yaml", folder / "lane-1.yaml", folder / "lane-2.yaml"
     path.write_text(PROFILE.format(port=ports[0]), "utf-8")
-    for number, queue in enumerate(lanes, 1):
+    for number, queue in enumerate(queues, 1):
         queue.write_text(lane_profile(number, "127.0.0.1", ports[number]), "utf-8")
-    return [path, lanes[0]], [lanes[1]]
+    return [path, queues[0]], [queues[1]]
 
 
 def _result(taken: dict[str, list[list[float]]], rounds: int) -> Result:

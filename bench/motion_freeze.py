@@ -24,17 +24,17 @@ BIN_MS = 10
 
 def run(*, full: bool) -> Sequence[Result]:
     """Freeze until enough trials have counted."""
-    wanted, lanes = (TRIALS_IF_FULL, LANES_IF_FULL) if full else (TRIALS, LANES)
+    wanted, queues = (TRIALS_IF_FULL, LANES_IF_FULL) if full else (TRIALS, LANES)
     kept = Kept(f"motion_freeze-{wanted}")
     while (left := wanted - len(_counted(kept.rows))) > 0:
         if len(kept.rows) >= 2 * wanted:
             break  # the machine is too busy
-        at_once = min(lanes, left)
+        at_once = min(queues, left)
         rounds = -(-left // at_once)
         asyncio.run(
             freeze(
                 rounds,
-                lanes=at_once,
+                queues=at_once,
                 seed=len(kept.rows),
                 told=lambda one: kept.add({**one._asdict(), "excused": one.is_excused}),
             )

@@ -21,7 +21,7 @@ BIN_MS = 50
 def run(*, full: bool) -> Sequence[Result]:
     """Kill guards; compare the slowest stop with the bound."""
     wanted = KILLED_IF_FULL if full else KILLED
-    with tempfile.TemporaryDirectory() as folder, EngineRig(Path(folder), lanes=LANES) as rig:
+    with tempfile.TemporaryDirectory() as folder, EngineRig(Path(folder), queues=LANES) as rig:
         rig.bout("close")
         trials = repeated(rig.guard_bout, wanted, LANES)
     return [said("motion_guard", "guard-killed", trials, wanted, BIN_MS)]

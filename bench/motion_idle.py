@@ -34,12 +34,12 @@ def run(*, full: bool) -> Sequence[Result]:
         return []
     lasts_s = LASTS_IF_FULL_S if full else LASTS_S
     with tempfile.TemporaryDirectory() as folder, CutRig(Path(folder), KINDS) as rig:
-        for queue in rig.lanes:
+        for queue in rig.queues:
             rig.drive_once(queue, lasts_s + SPARE_S)
         time.sleep(SETTLED_S)
         from_ns = time.monotonic_ns()
         time.sleep(lasts_s)
-        return [_told(rig, queue, from_ns) for queue in rig.lanes]
+        return [_told(rig, queue, from_ns) for queue in rig.queues]
 
 
 def _told(rig: CutRig, queue: int, from_ns: int) -> Result:

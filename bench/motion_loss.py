@@ -41,7 +41,7 @@ def run(*, full: bool) -> Sequence[Result]:
     results: list[Result] = []
     with (
         tempfile.TemporaryDirectory() as folder,
-        Rig(Path(folder), lanes=LANES, has_relay=True) as rig,
+        Rig(Path(folder), queues=LANES, has_relay=True) as rig,
     ):
         rig.bout("close")
         for loss, most in MOST.items():
@@ -61,7 +61,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 def _calm(rig: Rig) -> None:
     """Wait until the last pages are forgotten, so that their stops do not count later."""
-    for queue in rig.lanes:
+    for queue in rig.queues:
         rig.robots.wait_until(partial(_is_still, rig, queue), CALM_S, "a robot at rest")
     time.sleep(LOOK_S)
 
@@ -76,7 +76,7 @@ def _drive(rig: Rig, seconds: float, *, has_spare: bool) -> tuple[float, int, in
     The third number counts the stops after a delay of the machine.
     """
     until_s = time.monotonic() + seconds
-    pages = {queue: rig.drive(queue, has_spare=has_spare) for queue in rig.lanes}
+    pages = {queue: rig.drive(queue, has_spare=has_spare) for queue in rig.queues}
     began_ns = {queue: time.monotonic_ns() for queue in pages}
     moved_ns = stops = excused = 0
     while time.monotonic() < until_s:

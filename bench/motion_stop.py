@@ -32,7 +32,7 @@ def run(*, full: bool) -> Sequence[Result]:
     has_relay = can_relay()
     with (
         tempfile.TemporaryDirectory() as folder,
-        Rig(Path(folder), lanes=LANES, has_relay=has_relay) as rig,
+        Rig(Path(folder), queues=LANES, has_relay=has_relay) as rig,
     ):
         rig.bout("close")  # starts the guards
         for death in DEATHS:

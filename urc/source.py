@@ -46,7 +46,7 @@ class Document:
     Parts of the data may come from other documents; their marks name the origin (`source_of`).
     """
 
-    __slots__ = ("data", "file", "findings", "lines", "mark", "text")
+    __slots__ = ("data", "file", "lines", "mark", "problems", "text")
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class Document:
         lines: Sequence[str],
         data: object,
         mark: Mark,
-        findings: tuple[Problem, ...] = (),
+        problems: tuple[Problem, ...] = (),
     ) -> None:
         self.file = file
         """Original text, for messages and references."""
@@ -65,7 +65,7 @@ class Document:
         """Mappings with text keys, lists, text, numbers, booleans and None."""
         self.mark = mark
         """Marks of the whole document; `at` finds one of them."""
-        self.findings = findings
+        self.problems = problems
         """Warnings of the reader; errors raise an exception."""
 
     def at(self, path: Path) -> Mark | None:

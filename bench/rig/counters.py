@@ -85,11 +85,11 @@ class _Robot(asyncio.DatagramProtocol):
 async def gestures(
     lasts_s: Sequence[float],
     *,
-    lanes: int,
+    queues: int,
     seed: int = 1,
     told: Callable[[Gesture], None] | None = None,
 ) -> Sequence[Gesture]:
-    """Hold a control for each of these times, with `lanes` robots in parallel."""
+    """Hold a control for each of these times, with `queues` robots in parallel."""
     dice = random.Random(seed)  # noqa: S311 - the same gestures in every run
     left, done = list(lasts_s), list[Gesture]()
 
@@ -101,7 +101,7 @@ async def gestures(
                 told(gesture)
 
     async with asyncio.TaskGroup() as group:
-        for _ in range(lanes):
+        for _ in range(queues):
             group.create_task(work())
     return done
 

@@ -122,7 +122,7 @@ class CutRig:
                 enter(other)
         places = [place_of(kind, queue) for queue, kind in enumerate(self.kinds)]
         self.robots = enter(Robots(places, inside=there))
-        files = [folder / f"lane-{queue}.yaml" for queue in self.lanes]
+        files = [folder / f"lane-{queue}.yaml" for queue in self.queues]
         for queue, (kind, file) in enumerate(zip(self.kinds, files, strict=True)):
             text = document(kind, queue, self.robots.ports[queue], others[queue])
             file.write_text(text, "utf-8")
@@ -144,7 +144,7 @@ class CutRig:
         self._programs.close()
 
     @property
-    def lanes(self) -> range:
+    def queues(self) -> range:
         """Indexes of the robots."""
         return range(len(self.kinds))
 
@@ -160,7 +160,7 @@ class CutRig:
             seconds: length of the cut.
             order: ``cut``, or ``cut a`` or ``cut b`` for one direction, or ``down a``.
         """
-        return self._trial(self.lanes, seconds, order, self._share())
+        return self._trial(self.queues, seconds, order, self._share())
 
     def cut_one(self, queue: int, seconds: float, share: float) -> Cut:
         """Cut the link of one robot; safe to call from its own thread.
@@ -191,11 +191,11 @@ class CutRig:
     def _share(self) -> float:
         return 0.1 + self._dice.random() * 0.8
 
-    def _trial(self, lanes: Sequence[int], seconds: float, order: str, share: float) -> list[Cut]:
+    def _trial(self, queues: Sequence[int], seconds: float, order: str, share: float) -> list[Cut]:
         began_ns = time.monotonic_ns()
-        pages = {queue: self._drive(queue) for queue in lanes}
+        pages = {queue: self._drive(queue) for queue in queues}
         try:
-            for queue in lanes:
+            for queue in queues:
                 self._await_motion(queue, began_ns)
         except NotDrivenError:
             for number in pages.values():
@@ -211,7 +211,8 @@ class CutRig:
         healed_ns = self.relay.do(order.replace("cut", "heal").replace("down", "up"))
         self._watch(pages, released, cut_ns, healed_ns)
         cuts = [
-            self._judge(queue, cut_ns, healed_ns, was_held=queue not in released) for queue in lanes
+            self._judge(queue, cut_ns, healed_ns, was_held=queue not in released)
+            for queue in queues
         ]
         for number in pages.values():
             self.operators.kill(number)

@@ -93,7 +93,7 @@ class Rig:
         self,
         folder: Path,
         *,
-        lanes: int = 20,
+        queues: int = 20,
         has_relay: bool = False,
         options: Sequence[str] = (),
         inside: Sequence[str] = (),
@@ -102,7 +102,7 @@ class Rig:
 
         Args:
             folder: folder for the documents and the server's data.
-            lanes: number of robots, and of pages in parallel.
+            queues: number of robots, and of pages in parallel.
             has_relay: whether a relay, which needs root, is between pages and server.
             options: further options of ``urc serve``.
             inside: command prefix that starts the server in another namespace.
@@ -116,8 +116,8 @@ class Rig:
             here = self.relay.inside("a") if self.relay else ()
             there = self.relay.inside("b") if self.relay else ()
             self.host = SERVER_ADDRESS if self.relay else "127.0.0.1"
-            self.robots = enter(Robots(["tcp:127.0.0.1:0"] * lanes, inside=there))
-            files = [folder / f"lane-{queue}.yaml" for queue in range(lanes)]
+            self.robots = enter(Robots(["tcp:127.0.0.1:0"] * queues, inside=there))
+            files = [folder / f"lane-{queue}.yaml" for queue in range(queues)]
             for queue, file in enumerate(files):
                 text = lane_profile(queue, "127.0.0.1", self.robots.ports[queue])
                 file.write_text(text, "utf-8")
@@ -165,7 +165,7 @@ class Rig:
         ]
 
     @property
-    def lanes(self) -> range:
+    def queues(self) -> range:
         """Indexes of the robots."""
         return range(len(self.robots.heard))
 
@@ -188,7 +188,7 @@ class Rig:
     def _begin(self, death: str) -> Mapping[int, int]:
         how = "outside" if death in LINK_DEATHS else death
         return {
-            queue: self.drive(queue, how, 0.3 + self._dice.random() * 0.2) for queue in self.lanes
+            queue: self.drive(queue, how, 0.3 + self._dice.random() * 0.2) for queue in self.queues
         }
 
     def _let_die(self, death: str, pages: Mapping[int, int]) -> None:

@@ -76,13 +76,13 @@ class EngineRig(Rig):
         killed_ns = time.monotonic_ns()
         os.kill(guard, signal.SIGKILL)
         robots = self.robots
-        lanes = range(len(robots.visits))
+        queues = range(len(robots.visits))
 
         def again() -> list[tuple[int, int]]:
             """Return the reconnected lanes, with times."""
             return [
                 (queue, at)
-                for queue in lanes
+                for queue in queues
                 for at, is_open in robots.visits[queue]
                 if is_open and at > killed_ns and (robots.since(queue, at) or not moved(queue))
             ]

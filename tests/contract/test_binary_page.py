@@ -28,9 +28,9 @@ def test_struct_of_the_page_can_be_used(block: str) -> None:
 def test_send_of_the_page_can_be_used(block: str) -> None:
     """Without a finding."""
     document = parse_document(block, "page.yaml")
-    findings = Problems()
-    spec = parse_write(Node(document, (), document.data).must("send"), findings, FormContext())
-    assert [to_text(one) for one in findings] == []
+    problems = Problems()
+    spec = parse_write(Node(document, (), document.data).must("send"), problems, FormContext())
+    assert [to_text(one) for one in problems] == []
     assert spec.names
 
 

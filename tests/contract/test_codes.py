@@ -145,7 +145,7 @@ def document_of(example: str) -> str:
     return "".join(text for key, text in SECTIONS.items() if key not in own) + example
 
 
-def findings(example: str, folder: Path) -> dict[str, str]:
+def problems(example: str, folder: Path) -> dict[str, str]:
     """Return the codes, with their severity, of what `urc validate` says about an example."""
     for part in (BROKEN / "parts").glob("*.yaml"):
         target = folder / "parts" / part.name
@@ -188,7 +188,7 @@ def test_example_shows_its_code_and_the_other_does_not(
     code: str, text: str, is_fault: bool, tmp_path: Path
 ) -> None:
     """Each is checked as `urc validate` checks it; the remedy may have warnings, but no error."""
-    found = findings(text, tmp_path)
+    found = problems(text, tmp_path)
     assert (code in found) == is_fault, found
     assert is_fault or "error" not in found.values(), found
 

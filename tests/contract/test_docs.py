@@ -17,7 +17,7 @@ from urc.config.load import WidgetFolder, check
 from urc.model.values import AlarmLimits, Signal
 from urc.runtime.document_tests import exercise
 from urc.runtime.registries import built_in_catalog
-from urc.runtime.widget_registry import shelf_of
+from urc.runtime.widget_registry import widget_folder_of
 from urc.web.show.cells import WidgetContext, render_widget
 
 COMMANDS = [
@@ -70,7 +70,7 @@ def test_there_is_something_to_check() -> None:
 def test_a_document_of_the_pages_is_without_a_finding(folder: Path, block: Block) -> None:
     """It loads with the widgets that the pages show, not even a warning, and its tests pass."""
     path = f"widgets/{block.file}" if block.file else f"{yaml.safe_load(block.text)['name']}.yaml"
-    checked = check(path, built_in_catalog(), shelf_of(folder / "robot.yaml"))
+    checked = check(path, built_in_catalog(), widget_folder_of(folder / "robot.yaml"))
     assert checked.problems == ()
     if checked.kind == "robot":
         assert checked.profile is not None

@@ -13,8 +13,8 @@ from tests.e2e.processes import UrcProcess
 from tests.unit.packages.made import keep_settings, write_package
 from urc.cli.dashboard import DashboardAddress, workshop_of
 from urc.model.profile import Profile
-from urc.packages.install import plan_wish
-from urc.packages.names import parse_wish
+from urc.packages.install import plan_requirement
+from urc.packages.names import parse_requirement
 from urc.packages.repositories import Repositories
 from urc.packages.store import Store
 from urc.testing.entry import ACCESS
@@ -137,7 +137,7 @@ def install(data: Path, url: str, *packages: str) -> None:
     known.add(url)
     store = Store(data / "packages")
     for package in packages:
-        plan = plan_wish(parse_wish(package), known.all(), store, print)
+        plan = plan_requirement(parse_requirement(package), known.all(), store, print)
         with store.changing() as change:
             change.stage(plan)
             change.commit(plan)

@@ -20,7 +20,7 @@ from urc.packages import atomic_files
 from urc.packages.index import INDEX, read_index
 from urc.packages.index_builder import make_index
 from urc.packages.index_head import HEAD, read_head
-from urc.packages.names import PackageError, parse_wish
+from urc.packages.names import PackageError, parse_requirement
 from urc.packages.package import Package, sha256
 from urc.packages.signature import Signature, new_signer
 from urc.packages.sources import FileSource
@@ -43,7 +43,7 @@ def add(store: Store) -> None:
 
 def update(store: Store) -> None:
     """Do as `urc update` does, where the older version is there."""
-    old = store.find(parse_wish("bot@1.0.0"))
+    old = store.find(parse_requirement("bot@1.0.0"))
     if old is None:
         return
     source = FileSource("lab", [BOT_2, DIAL, DIAL_2], [BOT.manifest.key])
@@ -65,7 +65,7 @@ def back(store: Store) -> None:
 def remove(store: Store) -> None:
     with store.changing() as change:
         try:
-            change.remove(parse_wish("bot"))
+            change.remove(parse_requirement("bot"))
         except PackageError as error:
             if "is not installed" not in str(error):
                 raise

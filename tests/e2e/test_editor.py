@@ -71,7 +71,7 @@ class LanguageServer:
         """Send a notification."""
         self._send({"method": method, "params": params})
 
-    def findings(self, address: str) -> list[dict[str, Any]]:
+    def problems(self, address: str) -> list[dict[str, Any]]:
         """Return what the server finds in a document, once it has said anything about it."""
         while address not in self.found:
             self._take(self._messages.get(timeout=TIMEOUT_S))
@@ -206,7 +206,7 @@ def test_empty_line_is_completed_with_the_keys_of_its_place(server: LanguageServ
 def test_misspelt_key_is_found_and_the_right_one_offered(server: LanguageServer) -> None:
     """Underlined where it stands; completion at its place has the key that was meant."""
     opened = Opened(server, ROBOT.replace("    |\n", ""))
-    (finding,) = opened.server.findings(opened.address)
+    (finding,) = opened.server.problems(opened.address)
     assert "presicion" in finding["message"]
     start = opened.at("presicion")["position"]
     assert finding["range"]["start"] == start

@@ -181,9 +181,9 @@ async def test_add_an_interface(
     data = has["full"]
     set_up(data, 1)
     with Store(data / "packages").changing() as change:
-        from urc.packages.names import parse_wish
+        from urc.packages.names import parse_requirement
 
-        change.remove(parse_wish("interfaces/wide"))
+        change.remove(parse_requirement("interfaces/wide"))
     async with running_managed(data) as address:
         page = await new_page()
         new_page.allow(page, lambda text: "422" in text)

@@ -226,7 +226,7 @@ def test_findings_of_one_text_are_bounded() -> None:
 def test_comment_that_cuts_a_value_short_is_a_warning(text: str) -> None:
     """``send: MOVE #3`` would send MOVE."""
     document = parse_document(text, "f.yaml")
-    assert [(one.code, one.severity) for one in document.findings] == [("cut-value", "warning")]
+    assert [(one.code, one.severity) for one in document.problems] == [("cut-value", "warning")]
 
 
 @pytest.mark.parametrize(
@@ -234,7 +234,7 @@ def test_comment_that_cuts_a_value_short_is_a_warning(text: str) -> None:
 )
 def test_ordinary_comments_are_no_finding(text: str) -> None:
     """A blank after the sign, a number or quotes before it: nobody meant a text."""
-    assert parse_document(text, "f.yaml").findings == ()
+    assert parse_document(text, "f.yaml").problems == ()
 
 
 def test_missing_file_suggests_its_neighbour(tmp_path: Path) -> None:
@@ -342,7 +342,7 @@ def test_both_parsers_of_pyyaml_are_understood(monkeypatch: pytest.MonkeyPatch) 
             document = parse_document(text, "f.yaml")
         except ProblemsError as error:
             return [to_text(problem) for problem in error.problems]
-        return [repr(document.data), *map(to_text, document.findings)]
+        return [repr(document.data), *map(to_text, document.problems)]
 
     by_c = [outcome(text) for text in texts]
     monkeypatch.setattr(urc.source, "_parser", urc.source._pure_parser)

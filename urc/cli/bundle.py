@@ -57,9 +57,9 @@ def _planned(word: str, store: "Store") -> "InstallPlan":
     """Return the packages; installed versions come first, because they are tested."""
     from urc.cli.packages import is_path, planned
     from urc.packages.install_plan import InstallPlan
-    from urc.packages.names import parse_wish
+    from urc.packages.names import parse_requirement
 
-    lock = None if is_path(word) else store.find(parse_wish(word))
+    lock = None if is_path(word) else store.find(parse_requirement(word))
     if lock is None:
         return planned(word)
     digests = [pin.sha256 for pin in lock.packages.values()]

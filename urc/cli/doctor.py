@@ -59,18 +59,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print a line per check; return 1 when a requirement is missing."""
-    findings = list(_findings(arguments.port))
-    width = max(len(finding.name) for finding in findings)
-    for finding in findings:
+    problems = list(_problems(arguments.port))
+    width = max(len(finding.name) for finding in problems)
+    for finding in problems:
         mark = "ok     " if finding.is_good else "MISSING" if finding.is_required else "note   "
         print(printable(f"{mark} {finding.name:<{width}}  {finding.text}"))
-    missing = sum(finding.is_required and not finding.is_good for finding in findings)
+    missing = sum(finding.is_required and not finding.is_good for finding in problems)
     if missing:
-        complain(f"urc doctor: {missing} of {len(findings)} checks failed")
+        complain(f"urc doctor: {missing} of {len(problems)} checks failed")
     return int(missing > 0)
 
 
-def _findings(port: int) -> Iterator[_Finding]:
+def _problems(port: int) -> Iterator[_Finding]:
     yield _Finding("urc", True, f"{__version__} on Python {platform.python_version()}")
     for name, purpose in REQUIRED.items():
         yield _package(name, purpose, is_required=True)

@@ -72,10 +72,10 @@ def installed_document(word: str) -> Path | None:
     """
     if not (data_folder() / "packages" / "state.json").is_file():
         return None
-    from urc.packages.names import PackageError, parse_wish
+    from urc.packages.names import PackageError, parse_requirement
 
     try:
-        required = parse_wish(word)
+        required = parse_requirement(word)
     except PackageError:
         return None  # a path, for example
     from urc.runtime.settings_store import in_use
@@ -101,8 +101,8 @@ def planned(
     word: str, pinned: "Lock | None" = None, *, takes_withdrawn: bool = False
 ) -> "InstallPlan":
     """Return the install plan of a package's name, file or folder, with all archives fetched."""
-    from urc.packages.install import plan_file, plan_wish
-    from urc.packages.names import parse_wish
+    from urc.packages.install import plan_file, plan_requirement
+    from urc.packages.names import parse_requirement
     from urc.packages.sources import open_source
 
     store, known = open_store(), repositories().all()
@@ -111,8 +111,8 @@ def planned(
         return plan_file(source, known, store, complain)
     if not known:
         raise Misuse("no repository is known; 'urc repo add URL' adds one")
-    return plan_wish(
-        parse_wish(word), known, store, complain, pinned, takes_withdrawn=takes_withdrawn
+    return plan_requirement(
+        parse_requirement(word), known, store, complain, pinned, takes_withdrawn=takes_withdrawn
     )
 
 

@@ -104,11 +104,11 @@ def _look(source: "FileSource", document: Path, arguments: argparse.Namespace) -
     """
     from urc.packages.names import PackageError
     from urc.problems import has_errors
-    from urc.runtime.package_check import findings
+    from urc.runtime.package_check import problems
 
     if not source.is_folder:
         return
-    found = findings(document)
+    found = problems(document)
     if document.name == "widget.yaml" and not has_errors(found):
         found += _of_files(document)
     if arguments.allow_warnings:

@@ -21,12 +21,12 @@ def run(arguments: argparse.Namespace) -> int:
     """Remove it; keep what another package needs."""
     from urc._folders import data_folder
     from urc.cli.packages import open_store
-    from urc.packages.names import parse_wish
+    from urc.packages.names import parse_requirement
     from urc.runtime.settings_store import SettingsStore, names_kept
 
     store, folder = open_store(), data_folder() / "robots"
     with store.changing() as change:
-        removed, gone = change.remove(parse_wish(arguments.package))
+        removed, gone = change.remove(parse_requirement(arguments.package))
     for line in gone:
         print(f"removed {line}")
     if not gone:

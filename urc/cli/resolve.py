@@ -20,10 +20,10 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.config.load import check
     from urc.config.resolve import resolve
     from urc.runtime.registries import built_in_catalog
-    from urc.runtime.widget_registry import shelf_of
+    from urc.runtime.widget_registry import widget_folder_of
 
     path = profile_path(arguments.profile)
-    registry = shelf_of(path)
+    registry = widget_folder_of(path)
     checked = check(path, built_in_catalog(), registry)
     resolved = resolve(path, registry, checked.profile)
     if not resolved.text:

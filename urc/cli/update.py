@@ -61,9 +61,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _installed(store: "Store", word: str) -> "tuple[Lock, str]":
     """Return the installed package of a name, and its wanted range."""
-    from urc.packages.names import PackageError, parse_wish
+    from urc.packages.names import PackageError, parse_requirement
 
-    required = parse_wish(word)
+    required = parse_requirement(word)
     lock = store.find(required._replace(range="*"))
     if lock is None:
         raise PackageError(f"{required} is not installed; 'urc install {word}' installs it")

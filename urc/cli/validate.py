@@ -112,7 +112,7 @@ def _examine(paths: list[str], *, with_tests: bool) -> _Report:
     report, catalog, registry = _Report(), built_in_catalog(), WidgetFolder(shipped("widgets"))
     for path in paths:
         report.files += 1
-        checked = check(path, catalog, _shelf_of_package(path) or registry)
+        checked = check(path, catalog, _widgets_of_package(path) or registry)
         report.add(list(checked.problems))
         report.is_cut_short |= checked.is_cut_short
         report.looked_at |= dict.fromkeys(checked.files)
@@ -164,15 +164,15 @@ def _document_in(path: str) -> str:
     return path
 
 
-def _shelf_of_package(path: str) -> "WidgetFolder | None":
+def _widgets_of_package(path: str) -> "WidgetFolder | None":
     """Return the widgets in the folder or package of a document, or None."""
     home = os.path.dirname(path)
     is_package = os.path.isfile(os.path.join(home, "package.yaml"))
     if not is_package and not os.path.isdir(os.path.join(home, "widgets")):
         return None
-    from urc.runtime.widget_registry import shelf_of
+    from urc.runtime.widget_registry import widget_folder_of
 
-    return shelf_of(path)
+    return widget_folder_of(path)
 
 
 def _print(report: _Report, arguments: argparse.Namespace, indent: int | None = None) -> None:

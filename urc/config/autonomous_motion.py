@@ -12,21 +12,21 @@ from urc.model.values import Reading
 __all__ = ["link_moves", "parse_moves", "refuse_moving", "runs_what_moves", "with_moving_steps"]
 
 
-def parse_moves(part: Node, findings: Problems) -> tuple[bool, Template | None]:
+def parse_moves(part: Node, problems: Problems) -> tuple[bool, Template | None]:
     """Return whether a command starts autonomous motion, and the condition for it, if any."""
     said = part.get("moves")
     if said is None or isinstance(said.data, bool):
         return bool(said and said.data), None
-    return True, findings.expression(said)
+    return True, problems.expression(said)
 
 
-def link_moves(findings: Problems, part: Node, command: Command) -> None:
+def link_moves(problems: Problems, part: Node, command: Command) -> None:
     """Report names in the condition under ``moves`` that are no arguments."""
     condition = command.moves_if
     if condition is None:
         return
     for name in sorted(condition.names - command.arguments.keys()):
-        findings.error(
+        problems.error(
             part.must("moves"),
             "unknown-name",
             f"{name!r} is not an argument of {command.name!r}",
@@ -63,14 +63,14 @@ def with_moving_steps(commands: Mapping[str, Command]) -> dict[str, Command]:
 
 
 def refuse_moving(
-    findings: Problems,
+    problems: Problems,
     part: Node,
     command: Command,
     arguments: Mapping[str, Template | Reading],
 ) -> None:
     """Report autonomous motion of a command at a place where it runs automatically."""
     if runs_what_moves(command, arguments):
-        findings.error(
+        problems.error(
             part,
             "wrong-command",
             f"{command.name!r} starts autonomous motion, and would run automatically here",

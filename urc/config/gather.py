@@ -41,8 +41,8 @@ def gather(path: str) -> LoadedSources:
     except ProblemsError as error:
         return LoadedSources(None, list(error.problems), "", tuple(library.files))
     kind = kind_of(document)
-    findings = library.findings
-    findings.problems += document.findings
+    problems = library.problems
+    problems.problems += document.problems
     root = _prepared(document, library)
     sources = None
     if root is not None and not _is_part(root):
@@ -51,12 +51,10 @@ def gather(path: str) -> LoadedSources:
             _gather_robot(sources, library)
         elif kind == "driver":
             sources.add(sources.root)
-    if has_errors(findings):
+    if has_errors(problems):
         sources = None
-    problems = list(dict.fromkeys(findings))
-    return LoadedSources(
-        sources, problems, "" if has_errors(problems) else kind, tuple(library.files)
-    )
+    found = list(dict.fromkeys(problems))
+    return LoadedSources(sources, found, "" if has_errors(found) else kind, tuple(library.files))
 
 
 def _is_part(document: Document) -> bool:
@@ -71,23 +69,23 @@ def _prepared(
     `given` is the robot's mapping with `params` and `overrides`. `use` is its reference to the
     driver.
     """
-    findings = library.findings
+    problems = library.problems
     whole, sources = compose(document, library)
     for source in sources:
-        findings.problems += check_source(source)
+        problems.problems += check_source(source)
     if whole is None:
         return None
-    told = len(findings.problems)
+    told = len(problems.problems)
     if kind_of(whole) == "driver":
         overrides = given.get("overrides") if given is not None else None
         params = given.get("params") if given is not None else None
         if overrides is not None:
             whole = override(whole, overrides)
-        whole = fill_params(whole, params, use, findings)
-    whole = expand(whole, findings)
-    known = {_place(problem) for problem in findings}
-    findings.problems += [one for one in check_shape(whole) if _place(one) not in known]
-    return None if has_errors(findings.problems[told:]) else whole
+        whole = fill_params(whole, params, use, problems)
+    whole = expand(whole, problems)
+    known = {_place(problem) for problem in problems}
+    problems.problems += [one for one in check_shape(whole) if _place(one) not in known]
+    return None if has_errors(problems.problems[told:]) else whole
 
 
 def _place(problem: Problem) -> tuple[str, str, int, int]:
@@ -96,13 +94,13 @@ def _place(problem: Problem) -> tuple[str, str, int, int]:
 
 
 def _gather_robot(sources: Sources, library: Library) -> None:
-    root, findings = sources.root, library.findings
+    root, problems = sources.root, library.problems
     driver = root.get("driver")
     if driver is not None:
-        _check_placement(root, findings)
+        _check_placement(root, problems)
         sources.driver = _driver(driver, sources, library)
     elif "transports" not in root.data:
-        findings.error(
+        problems.error(
             root,
             "missing-key",
             "a robot needs 'driver' or 'transports'",
@@ -119,11 +117,11 @@ def _gather_robot(sources: Sources, library: Library) -> None:
             sources.interfaces[name] = inner
 
 
-def _check_placement(root: Node, findings: Problems) -> None:
+def _check_placement(root: Node, problems: Problems) -> None:
     """Report keys of a driver in a robot that names its driver."""
     for key in read_schema("robot.schema.json")["$defs"]["inlineDriver"]["properties"]:
         if key in root.data:
-            findings.error(
+            problems.error(
                 root,
                 "misplaced-key",
                 f"'{key}' is a key of the driver",
@@ -156,7 +154,7 @@ def _follow(reference: Node, kind: str, library: Library, given: Node | None = N
     if prepared is None:
         return None
     if _is_part(prepared):
-        library.findings.error(
+        library.problems.error(
             reference,
             "partial-document",
             f"{prepared.file} is a partial {kind}",

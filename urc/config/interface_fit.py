@@ -64,14 +64,14 @@ def fit_interface(path: str, profile: Profile, registry: WidgetFolder) -> Interf
     if sources is None or sources.kind != "interface":
         faults = [one.message for one in gathered.problems if one.severity == "error"]
         return InterfaceFit(None, fault=next(iter(faults), "it is not an interface"))
-    findings = Problems()
-    interface = parse_interface(sources.root, sources.root.text("name"), findings)
+    problems = Problems()
+    interface = parse_interface(sources.root, sources.root.text("name"), problems)
     known = _Known(profile.widgets, registry)
-    if not has_errors(findings):
+    if not has_errors(problems):
         interface = link_interface(
-            sources.root, interface, profile.slots, profile.driver, known, findings
+            sources.root, interface, profile.slots, profile.driver, known, problems
         )
-    errors = [one.message for one in (*findings, *registry.problems) if one.severity == "error"]
+    errors = [one.message for one in (*problems, *registry.problems) if one.severity == "error"]
     if errors:
         return InterfaceFit(None, fault=errors[0])
     uses = {

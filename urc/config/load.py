@@ -91,36 +91,36 @@ def check(
             With one registry for several calls, each manifest is read once.
     """
     path = fspath(path)
-    sources, problems, kind, files = gather(path)
+    sources, reported, kind, files = gather(path)
     if sources is None:
-        is_short = any(one.severity == "error" and one.code != "no-such-file" for one in problems)
-        return CheckResult(None, tuple(_told_once(problems)), kind, files, is_cut_short=is_short)
+        is_short = any(one.severity == "error" and one.code != "no-such-file" for one in reported)
+        return CheckResult(None, tuple(_told_once(reported)), kind, files, is_cut_short=is_short)
     registry = registry or WidgetFolder(shipped("widgets"))
-    findings = Problems()
+    problems = Problems()
     profile: Profile | None = None
     widget: Widget | None = None
     uses: list[WidgetUse] = []
     if sources.kind == "widget":
-        widget = parse_widget(sources.root.document, findings)
+        widget = parse_widget(sources.root.document, problems)
     elif sources.kind == "interface":
-        interface = parse_interface(sources.root, sources.root.text("name"), findings)
-        if not has_errors(findings):
-            interface = link_interface(sources.root, interface, {}, None, registry, findings)
+        interface = parse_interface(sources.root, sources.root.text("name"), problems)
+        if not has_errors(problems):
+            interface = link_interface(sources.root, interface, {}, None, registry, problems)
             uses += interface.widgets.values()
     else:
-        profile = _profile(sources, catalog, registry, findings)
+        profile = _profile(sources, catalog, registry, problems)
     if profile is not None:
         uses += profile.slots.values()
         uses += [use for each in profile.interfaces.values() for use in each.widgets.values()]
-    problems += sorted(findings, key=lambda one: (one.file != path, one.file, one.line, one.column))
-    problems += registry.problems
-    problems = _told_once(problems)
-    is_short = has_errors(problems)
+    reported += sorted(problems, key=lambda one: (one.file != path, one.file, one.line, one.column))
+    reported += registry.problems
+    reported = _told_once(reported)
+    is_short = has_errors(reported)
     if is_short:
         profile, widget = None, None
     every = (*files, *registry.files)
     return CheckResult(
-        profile, tuple(problems), sources.kind, every, _pages(uses), widget, is_short
+        profile, tuple(reported), sources.kind, every, _pages(uses), widget, is_short
     )
 
 
@@ -152,48 +152,48 @@ class _Parsed(NamedTuple):
 
 
 def _profile(
-    sources: Sources, catalog: Registries, registry: WidgetFolder, findings: Problems
+    sources: Sources, catalog: Registries, registry: WidgetFolder, problems: Problems
 ) -> Profile | None:
-    driver = parse_driver(sources.driver, findings, catalog)
+    driver = parse_driver(sources.driver, problems, catalog)
     if sources.kind == "robot":
-        check_names(sources.root, findings)
+        check_names(sources.root, problems)
     parsed = _Parsed(
         driver=driver,
-        settings={name: parse_setting(part, findings) for name, part in sources.settings.items()},
+        settings={name: parse_setting(part, problems) for name, part in sources.settings.items()},
         interfaces={
-            name: parse_interface(part, name, findings) for name, part in sources.interfaces.items()
+            name: parse_interface(part, name, problems) for name, part in sources.interfaces.items()
         },
-        tests=[parse_test(part, findings) for part in sources.tests],
+        tests=[parse_test(part, problems) for part in sources.tests],
         simulated=(
-            parse_simulator(sources, driver, catalog, findings)
+            parse_simulator(sources, driver, catalog, problems)
             if sources.simulator or sources.rules
             else SimulatorSpec()
         ),
     )
-    if has_errors(findings):
+    if has_errors(problems):
         return None
-    return _link(sources, parsed, registry, findings)
+    return _link(sources, parsed, registry, problems)
 
 
 def _link(
-    sources: Sources, parsed: _Parsed, registry: WidgetFolder, findings: Problems
+    sources: Sources, parsed: _Parsed, registry: WidgetFolder, problems: Problems
 ) -> Profile | None:
     driver = parsed.driver
-    uses = link_driver(sources.driver, driver, parsed.settings, findings)
+    uses = link_driver(sources.driver, driver, parsed.settings, problems)
     simulated = parsed.simulated
-    emulated, world = link_simulator(sources, driver, simulated, parsed.settings, findings)
+    emulated, world = link_simulator(sources, driver, simulated, parsed.settings, problems)
     tests = [
-        link_test(part, test, driver, parsed.settings, findings)
+        link_test(part, test, driver, parsed.settings, problems)
         for part, test in zip(sources.tests, parsed.tests, strict=True)
     ]
-    slots = link_slots(sources, driver, registry, findings)
+    slots = link_slots(sources, driver, registry, problems)
     interfaces = {
-        name: link_interface(sources.interfaces[name], interface, slots, driver, registry, findings)
+        name: link_interface(sources.interfaces[name], interface, slots, driver, registry, problems)
         for name, interface in parsed.interfaces.items()
     }
-    if has_errors(findings) or has_errors(registry.problems):
+    if has_errors(problems) or has_errors(registry.problems):
         return None
-    check_profile(sources, driver, interfaces, uses, findings)
+    check_profile(sources, driver, interfaces, uses, problems)
     root = sources.root
     name = root.text("name")
     title = root.text("title", spoken_name(name))

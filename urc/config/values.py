@@ -83,7 +83,7 @@ def fit_argument(value: Any, kind: str, of: str, size: int | None) -> tuple[Valu
     return tuple(fit(one, of) for one in value)
 
 
-def element_of(part: Node, kind: str, findings: Problems) -> str:
+def element_of(part: Node, kind: str, problems: Problems) -> str:
     """Return the type of the elements of an argument; of an array, its ``items``."""
     if kind == "array":
         return part.text("items", "number")
@@ -91,7 +91,7 @@ def element_of(part: Node, kind: str, findings: Problems) -> str:
         if key in part.data:
             text = f"'{key}' has no effect for {kind}"
             hint = "write type: array"
-            findings.error(part, "misplaced-key", text, at=key, key=True, hint=hint)
+            problems.error(part, "misplaced-key", text, at=key, key=True, hint=hint)
     return kind
 
 
@@ -110,13 +110,13 @@ def fit_hint(value: Value, kind: str) -> str:
     return ""
 
 
-def check_range(part: Node, kind: str, findings: Problems) -> tuple[float | None, float | None]:
+def check_range(part: Node, kind: str, problems: Problems) -> tuple[float | None, float | None]:
     """Return ``min`` and ``max`` of a signal, argument or setting of type `kind`."""
     low, high = part.number("min"), part.number("max")
     if kind not in ("integer", "number"):
         for key in ("min", "max"):
             if key in part.data:
-                findings.error(
+                problems.error(
                     part,
                     "misplaced-key",
                     f"'{key}' has no effect for {kind}",
@@ -127,29 +127,29 @@ def check_range(part: Node, kind: str, findings: Problems) -> tuple[float | None
     elif low is not None and high is not None and low >= high:
         hint = "swap them" if low > high else "remove one, or make the range wider"
         text = f"min {low:g} is not below max {high:g}"
-        findings.error(part, "wrong-order", text, at="min", hint=hint)
+        problems.error(part, "wrong-order", text, at="min", hint=hint)
     return low, high
 
 
 def check_within(
-    value: Value, low: float | None, high: float | None, part: Node, findings: Problems
+    value: Value, low: float | None, high: float | None, part: Node, problems: Problems
 ) -> None:
     """Report a number at `part` that is outside ``min`` and ``max``."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return
     if low is not None and value < low:
-        findings.error(part, "out-of-range", f"{value:g} is below min {low:g}")
+        problems.error(part, "out-of-range", f"{value:g} is below min {low:g}")
     elif high is not None and value > high:
-        findings.error(part, "out-of-range", f"{value:g} is above max {high:g}")
+        problems.error(part, "out-of-range", f"{value:g} is above max {high:g}")
 
 
 def known_argument(
-    name: str, part: Node, command: Command, findings: Problems, *, key: bool = True
+    name: str, part: Node, command: Command, problems: Problems, *, key: bool = True
 ) -> Argument | None:
     """Return the argument with this name, or report its absence at `part` or its key."""
     argument = command.arguments.get(name)
     if argument is None:
-        findings.error(
+        problems.error(
             part,
             "unknown-argument",
             f"command {command.name!r} has no argument {name!r}",

@@ -76,7 +76,7 @@ class GuardedConnection:
         self.transport = transport
         self._emit = emit
         self._clock = clock
-        self._is_dear = make.is_strict
+        self._is_slow_to_open = make.is_strict
         self._sent_counters = SentCounters()
         self.scheduler = MotionScheduler(
             transport,
@@ -386,14 +386,14 @@ class GuardedConnection:
 
     async def _rescue(self) -> None:
         self._is_rescuing = True
-        every_s = 5 * _EVERY_S if self._is_dear else _EVERY_S
+        every_s = 5 * _EVERY_S if self._is_slow_to_open else _EVERY_S
         until_s = self._clock.now() + _RESCUE_S
         hurry = HURRY.set(self._hurry)
         try:
             while self.scheduler.owes and self._clock.now() < until_s:
                 began_s = self._clock.now()
                 # Where tries overlap, a way that has become long is no reason to give up.
-                enough_s = _LOG_IN_S if self._is_dear else _LONGEST_S
+                enough_s = _LOG_IN_S if self._is_slow_to_open else _LONGEST_S
                 is_hurried = self._hurry.is_used
                 self._fault = await self._attempt(enough_s if is_hurried else self._patience_s)
                 if not self._fault:

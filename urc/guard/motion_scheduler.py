@@ -79,7 +79,7 @@ class MotionScheduler:
         self._watch = StallWatch(stalled_s)
         self.queue: SendQueue[tuple[str, bool]] = SendQueue(transport, clock, self._sent)
         """For what cannot be handed over at once."""
-        self._backend: dict[str, HoldToRun] = {}
+        self._holds: dict[str, HoldToRun] = {}
         self._numbers: dict[str, int] = {}
         self._doubtful: set[str] = set()
         self._is_stop_under_way = False
@@ -92,17 +92,17 @@ class MotionScheduler:
     @property
     def owes(self) -> bool:
         """Whether a control is to be stopped as soon as the line is open again."""
-        return any(hold_to_run.owes_stop for hold_to_run in self._backend.values())
+        return any(hold_to_run.owes_stop for hold_to_run in self._holds.values())
 
     @property
     def is_moving(self) -> bool:
         """Whether a control is held."""
-        return any(hold_to_run.state == "moving" for hold_to_run in self._backend.values())
+        return any(hold_to_run.state == "moving" for hold_to_run in self._holds.values())
 
     @property
     def is_settled(self) -> bool:
         """Whether nothing moves, and every stop was handed over, as often as it is to be."""
-        return self.queue.is_idle and all(one.state == "idle" for one in self._backend.values())
+        return self.queue.is_idle and all(one.state == "idle" for one in self._holds.values())
 
     @property
     def is_in_doubt(self) -> bool:
@@ -119,7 +119,7 @@ class MotionScheduler:
         self, control: str, number: int, data: Payload, at_s: float, count: Count | None = None
     ) -> None:
         """Take sampled input of the time `at_s`; no bytes renew the lease and write nothing."""
-        hold_to_run = self._backend.get(control)
+        hold_to_run = self._holds.get(control)
         if hold_to_run is None:
             return
         self._numbers[control] = number
@@ -133,13 +133,13 @@ class MotionScheduler:
 
     def renew(self, control: str, stop: Payload, stops: tuple[Numbered, ...] = ()) -> None:
         """Stop `control` with `stop` from now on."""
-        hold_to_run = self._backend.get(control)
+        hold_to_run = self._holds.get(control)
         if hold_to_run is not None:
             hold_to_run.renew(hold_to_run.terms._replace(stop=stop, stops=stops))
 
     def release(self, control: str) -> None:
         """Stop what was let go."""
-        hold_to_run = self._backend.get(control)
+        hold_to_run = self._holds.get(control)
         if hold_to_run is not None:
             hold_to_run.stop("released", self._clock.now())
 
@@ -157,15 +157,15 @@ class MotionScheduler:
     def stop_all(self) -> None:
         """Stop what moves, because the line is to be closed."""
         now = self._clock.now()
-        for hold_to_run in self._backend.values():
+        for hold_to_run in self._holds.values():
             if hold_to_run.state == "moving":
                 hold_to_run.stop("revoked", now)
             hold_to_run.is_armed = False
 
     def _hold_to_run(self, control: str, terms: HoldTerms) -> HoldToRun:
-        hold_to_run = self._backend.get(control)
+        hold_to_run = self._holds.get(control)
         if hold_to_run is None:
-            hold_to_run = self._backend[control] = HoldToRun(terms)
+            hold_to_run = self._holds[control] = HoldToRun(terms)
         else:
             hold_to_run.renew(terms)
         return hold_to_run
@@ -188,7 +188,7 @@ class MotionScheduler:
         self._stale.clear()
         self._watch.reset()
         now = self._clock.now()
-        for hold_to_run in self._backend.values():
+        for hold_to_run in self._holds.values():
             hold_to_run.restored(now)
         self.write_due()
 
@@ -198,7 +198,7 @@ class MotionScheduler:
         for control, is_stop in self.queue.end():
             if is_stop:
                 self._doubtful.add(control)
-        for control, hold_to_run in self._backend.items():
+        for control, hold_to_run in self._holds.items():
             hold_to_run.cut(is_doubtful=control in self._doubtful)
         self._all_arrived()
         if self._alarm is not None:
@@ -211,7 +211,7 @@ class MotionScheduler:
             return
         now = self._clock.now()
         waiting: list[tuple[str, HoldToRun]] = []
-        for control, hold_to_run in self._backend.items():
+        for control, hold_to_run in self._holds.items():
             if hold_to_run.must_stop(now):
                 data = hold_to_run.due(now, is_clear=False)
                 if data is not None:
@@ -229,7 +229,7 @@ class MotionScheduler:
     def tell_counted(self) -> None:
         """Tell how the counters stand, where they have changed, and what cannot be written now."""
         if self._sent_counters.is_changed:
-            for control, hold_to_run in self._backend.items():
+            for control, hold_to_run in self._holds.items():
                 if hold_to_run.is_waiting and not self._sent_counters.fits(
                     self._counts.get(control)
                 ):
@@ -288,7 +288,7 @@ class MotionScheduler:
         """Return what is written now, and what it does to the counters."""
         if not is_stop:
             return data, self._counts.get(control)
-        stops = self._backend[control].terms.stops
+        stops = self._holds[control].terms.stops
         return self._sent_counters.choose(stops) if stops else (data, None)
 
     def _leave_stop(self, control: str, data: Payload) -> Payload:
@@ -325,7 +325,7 @@ class MotionScheduler:
         self.write_due()
 
     def _report_stop(self, control: str) -> None:
-        hold_to_run = self._backend[control]
+        hold_to_run = self._holds[control]
         if hold_to_run.reason is not None and not hold_to_run.is_told:
             hold_to_run.is_told = True
             self._told(control, hold_to_run.reason, self._numbers.get(control, 0))
@@ -334,7 +334,7 @@ class MotionScheduler:
 
     def _set_alarm(self, now: float) -> None:
         # What is due already waits for the line to be clear.
-        dues = [one.deadline for one in self._backend.values() if one.state != "idle"]
+        dues = [one.deadline for one in self._holds.values() if one.state != "idle"]
         at_s = min((due for due in dues if due is not None), default=float("inf"))
         at_s = max(at_s, now + _LOOK_S)
         if self._is_watched or not self.queue.is_idle:
@@ -379,7 +379,7 @@ class MotionScheduler:
     @property
     def _is_wanted(self) -> bool:
         """Whether motion waits to be written."""
-        return any(hold_to_run.is_waiting for hold_to_run in self._backend.values())
+        return any(hold_to_run.is_waiting for hold_to_run in self._holds.values())
 
     @property
     def _is_watched(self) -> bool:

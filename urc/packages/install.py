@@ -20,7 +20,7 @@ __all__ = [
     "origin_lines",
     "plan_file",
     "plan_root",
-    "plan_wish",
+    "plan_requirement",
     "settle",
     "withdrawn_lines",
 ]
@@ -28,7 +28,7 @@ __all__ = [
 Found = dict[PackageId, list[tuple[IndexEntry, Source]]]
 
 
-def plan_wish(
+def plan_requirement(
     required: PackageRequirement,
     sources: Sequence[Source],
     store: Store,
@@ -101,7 +101,7 @@ def plan_root(
         pinned: expected result.
 
     Raises:
-        PackageError: as `plan_wish`.
+        PackageError: as `plan_requirement`.
     """
     chosen = settle(root, wanted, found)
     lock = lock_of(root, chosen)

@@ -13,7 +13,7 @@ __all__ = [
     "PackageError",
     "PackageRequirement",
     "parse_key",
-    "parse_wish",
+    "parse_requirement",
 ]
 
 KINDS: Final = ("driver", "interface", "widget", "robot")
@@ -61,7 +61,7 @@ def parse_key(text: str) -> PackageId:
     return PackageId(FOLDERS[folder], name)
 
 
-def parse_wish(text: str) -> PackageRequirement:
+def parse_requirement(text: str) -> PackageRequirement:
     """Return the requirement in ``puppet``, ``drivers/puppet`` or ``puppet@^1.2``."""
     package, at, wanted = text.partition("@")
     if "/" in package:

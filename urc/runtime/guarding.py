@@ -19,9 +19,9 @@ from urc.runtime.clock import Clock
 from urc.runtime.held_commands import is_lossy, period_of
 from urc.runtime.transport_chain import BuiltTransport, make_lines
 
-__all__ = ["take_reins"]
+__all__ = ["start_guard_client"]
 
-_DEAR: Final = frozenset(("ssh", "serial", "mqtt", "ros"))
+_SLOW_TO_OPEN: Final = frozenset(("ssh", "serial", "mqtt", "ros"))
 """Transports that open slowly or maybe not again, so they are not reset at once."""
 
 _SOONER: Final = 0.9
@@ -29,7 +29,7 @@ _SOONER: Final = 0.9
 log = logging.getLogger(__name__)
 
 
-def take_reins(
+def start_guard_client(
     driver: Driver,
     settings: Mapping[str, Value],
     table: Table,
@@ -66,7 +66,7 @@ def _held(command: Command, driver: Driver) -> HeldSpec:
     return HeldSpec(line, terms)
 
 
-def _is_dear(spec: TransportSpec, driver: Driver) -> bool:
+def _is_slow_to_open(spec: TransportSpec, driver: Driver) -> bool:
     """Return whether a stalled transport gets time, instead of a reset at once."""
     said = {
         one.hold.on_stall
@@ -75,7 +75,7 @@ def _is_dear(spec: TransportSpec, driver: Driver) -> bool:
     }
     if "abort" in said:  # the safer of two different values
         return False
-    return "wait" in said or spec.type in _DEAR or bool(spec.tunnel)
+    return "wait" in said or spec.type in _SLOW_TO_OPEN or bool(spec.tunnel)
 
 
 def _silent_s(spec: TransportSpec) -> float | None:
@@ -91,7 +91,7 @@ def _silent_s(spec: TransportSpec) -> float | None:
 
 def _line(made: BuiltTransport, driver: Driver) -> GuardedLineSpec:
     setup, spec = made.setup, made.spec
-    is_dear = _is_dear(spec, driver)
+    is_dear = _is_slow_to_open(spec, driver)
     make = messages.MakeTransport(
         line=setup.name,
         factory=made.factory,

@@ -109,7 +109,7 @@ class HeldControl:
     is_armed: bool = False
     is_lasting: bool = False
     """Whether its stop frame stays the same while it is armed."""
-    running_rule: Literal["rest", "moving", "ending"] = "rest"
+    motion_state: Literal["rest", "moving", "ending"] = "rest"
     """``ending``: released, and its stop is not reported as written yet."""
     stop: Payload | FrameVariants | None = None
     """Stop frame of the command, as stored by the movers."""
@@ -134,7 +134,7 @@ class HeldControl:
         if not self.needs_release:
             self.why = why
         self.rest()
-        self.running_rule = "rest"
+        self.motion_state = "rest"
         self.is_armed = False
         self.needs_release = True
         self.closed_epoch = epoch

@@ -269,8 +269,10 @@ class Link:
         self.publish()
         alarms = self._set_alarms()
         try:
-            async with asyncio.TaskGroup() as lanes:
-                tasks = [lanes.create_task(self._queue(work)) for work in (self._read, self._write)]
+            async with asyncio.TaskGroup() as queues:
+                tasks = [
+                    queues.create_task(self._queue(work)) for work in (self._read, self._write)
+                ]
                 reason = await self._ended
                 for task in tasks:
                     task.cancel()

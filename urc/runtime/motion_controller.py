@@ -116,7 +116,7 @@ class MotionController:
 
     def rests(self, command: str) -> bool:
         """Return whether a held command is at rest and its last stop was reported."""
-        return self._controls[command].running_rule == "rest"
+        return self._controls[command].motion_state == "rest"
 
     @property
     def is_confirmed(self) -> bool:
@@ -212,7 +212,7 @@ class MotionController:
     def _moving(self) -> list[str]:
         """Return the commands with ticks since their last reported stop."""
         controls = self._controls.items()
-        return [name for name, one in controls if one.is_armed and one.running_rule != "rest"]
+        return [name for name, one in controls if one.is_armed and one.motion_state != "rest"]
 
     def expire(self, now: float) -> None:
         """Handle the timeouts of the lease."""
@@ -256,7 +256,7 @@ class MotionController:
             self._abandon(command, control, backend, str(error))
             return str(error)
         self.lease.touch(now)
-        control.running_rule = "moving"
+        control.motion_state = "moving"
         backend.tick(command, data)
         if data == b"":
             return ""  # it waits for a reply that the robot owes
@@ -279,8 +279,8 @@ class MotionController:
         if control is None or holder is None or holder.id != client:
             return
         control.needs_release = False
-        if control.running_rule == "moving":
-            control.running_rule = "ending"
+        if control.motion_state == "moving":
+            control.motion_state = "ending"
         self._let_go(command, control)
 
     def _let_go(self, command: str, control: HeldControl) -> None:
@@ -302,7 +302,7 @@ class MotionController:
     def _refused(self, command: str, why: str) -> None:
         """Stop a motion that the robot refuses, and report its message."""
         control, backend = self._controls.get(command), self._backend
-        if control is None or backend is None or control.running_rule != "moving":
+        if control is None or backend is None or control.motion_state != "moving":
             return
         self._abandon(command, control, backend, why)
         self.on_refused(command, why)
@@ -312,8 +312,8 @@ class MotionController:
         control = self._controls.get(command)
         if control is None:
             return
-        if control.running_rule == "ending":  # else it already moves again
-            control.running_rule = "rest"
+        if control.motion_state == "ending":  # else it already moves again
+            control.motion_state = "rest"
         if reason not in ("released", "stopped"):
             self._close(control, _CUT if reason == "revoked" else LET_GO)
         if self._is_too_early(command, control):
@@ -385,7 +385,7 @@ class MotionController:
                 self._stop_what_moves()
             for control in self._controls.values():
                 control.is_armed = control.needs_release = False
-                control.running_rule = "rest"
+                control.motion_state = "rest"
                 control.rest()
         self.on_change(outcome.state)
 

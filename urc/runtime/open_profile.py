@@ -13,7 +13,7 @@ from urc.config.load import load_profile
 from urc.model.profile import Profile
 from urc.packages.store import ecosystem_of
 from urc.runtime.registries import built_in_catalog
-from urc.runtime.widget_registry import shelf_of
+from urc.runtime.widget_registry import widget_folder_of
 
 __all__ = ["open_document"]
 
@@ -28,13 +28,13 @@ def open_document(path: str | PathLike[str]) -> Profile:
     Raises:
         ProblemsError: the document has errors, which the exception lists.
     """
-    profile = load_profile(path, built_in_catalog(), shelf_of(path))
+    profile = load_profile(path, built_in_catalog(), widget_folder_of(path))
     home = ecosystem_of(Path(path))
     if home is None or Path(path).name != _DRIVER:
         return profile
     interfaces, widgets = dict(profile.interfaces), dict(profile.widgets)
     for document in sorted(home.glob("interfaces/*/interface.yaml")):
-        found = fit_interface(str(document), profile, shelf_of(document))
+        found = fit_interface(str(document), profile, widget_folder_of(document))
         name = document.parent.name
         if found.interface is not None and name not in interfaces:
             interfaces[name] = found.interface._replace(name=name)

@@ -18,7 +18,7 @@ from urc.runtime.registries import built_in_catalog
 from urc.runtime.widget_registry import WidgetRegistry
 from urc.shipped import shipped
 
-__all__ = ["examine", "examine_apart", "findings"]
+__all__ = ["examine", "examine_apart", "problems"]
 
 _MEMORY_BYTES: Final = 2 << 30
 _PROCESSOR_S: Final = 60
@@ -51,7 +51,7 @@ def examine(document: Path) -> list[str]:
     return [problem.headline for problem in found if problem.severity == "error"]
 
 
-def findings(document: Path) -> list[Problem]:
+def problems(document: Path) -> list[Problem]:
     """Return the output of `urc validate`, including warnings and failed tests, worst first.
 
     Args:

@@ -19,7 +19,7 @@ from urc.model.profile import Profile
 from urc.problems import ProblemsError, UrcError
 from urc.runtime.local_hosts import check_hosts
 from urc.runtime.registries import built_in_catalog
-from urc.runtime.widget_registry import shelf_of
+from urc.runtime.widget_registry import widget_folder_of
 from urc.shipped import shipped
 from urc.source import parse_document
 
@@ -38,7 +38,7 @@ def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[st
         ProblemsError: the document has errors.
         UrcError: it refers to a file outside.
     """
-    checked = check(document, built_in_catalog(), shelf_of(document))
+    checked = check(document, built_in_catalog(), widget_folder_of(document))
     _check_inside(checked, folder)  # first, because a problem would show a line of an outside file
     errors = [problem for problem in checked.problems if problem.severity == "error"]
     if errors:
@@ -231,7 +231,7 @@ def look(document: Path, folder: Path, widgets: Sequence[str]) -> PackagePreview
         UrcError: it refers to a file outside.
     """
     allowed = permissions(document, folder, widgets)
-    registry = shelf_of(document)
+    registry = widget_folder_of(document)
     checked = check(document, built_in_catalog(), registry)
     if checked.profile is None:
         return PackagePreview(allowed, {}, [])

@@ -136,7 +136,7 @@ class Session:
         engine = Engine(driver, self.settings, fresh=fresh, is_compiled=True)
         self.frames: MotionFrames = engine.motions
         """Renders the frames of held commands."""
-        self.backend = self._made_movers(engine, transports, motion)
+        self.backend = self._make_backend(engine, transports, motion)
         """Writer of the frames; None without motion."""
         self._dispatcher = Dispatcher(
             engine,
@@ -162,15 +162,15 @@ class Session:
         self._group = asyncio.TaskGroup()
         self._tasks: list[asyncio.Task[None]] = []
 
-    def _made_movers(
+    def _make_backend(
         self, engine: Engine, transports: Table, motion: Motion
     ) -> "GuardClient | None":
         driver = self.profile.driver
         if motion == "none" or all(one.hold is None for one in driver.commands.values()):
             return None
-        from urc.runtime.guarding import take_reins  # takes 20 ms, so only with motion
+        from urc.runtime.guarding import start_guard_client  # takes 20 ms, so only with motion
 
-        backend = take_reins(
+        backend = start_guard_client(
             driver, self.settings, transports, self._clock, is_guarded=motion == "guarded"
         )
         engine.motions.share([name for name in driver.transports if is_lossy(driver, name)])

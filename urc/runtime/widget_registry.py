@@ -11,10 +11,10 @@ from urc.packages.store import ecosystem_of
 from urc.problems import Problem
 from urc.shipped import shipped
 
-__all__ = ["WidgetRegistry", "hidden_beside", "hidden_widget", "shelf_of"]
+__all__ = ["WidgetRegistry", "hidden_beside", "hidden_widget", "widget_folder_of"]
 
 
-def shelf_of(document: str | PathLike[str]) -> WidgetFolder:
+def widget_folder_of(document: str | PathLike[str]) -> WidgetFolder:
     """Return the widgets for a document.
 
     An installed package uses the widgets of its own ecosystem. A package in development uses the
@@ -30,7 +30,7 @@ def shelf_of(document: str | PathLike[str]) -> WidgetFolder:
 
 def hidden_beside(document: str | PathLike[str]) -> list[Path]:
     """Return the folders of a document's widgets that are never used."""
-    registry = shelf_of(document)
+    registry = widget_folder_of(document)
     return registry.hidden() if isinstance(registry, WidgetRegistry) else []
 
 

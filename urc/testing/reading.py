@@ -20,11 +20,11 @@ def read_spec(text: str, signals: Collection[str] = (), encoding: str = "utf-8")
         ProblemsError: the form has errors.
     """
     document = parse_document(text, "reply.yaml")
-    findings = Problems()
+    problems = Problems()
     context = FormContext(encoding, frozenset(signals))
-    spec = parse_read(Node(document, (), document.data), findings, context)
-    if findings.problems:
-        raise ProblemsError(findings.problems)
+    spec = parse_read(Node(document, (), document.data), problems, context)
+    if problems.problems:
+        raise ProblemsError(problems.problems)
     return spec
 
 

@@ -24,18 +24,18 @@ def struct_read(source: str) -> ReadSpec:
     Raises:
         AssertionError: the form has problems.
     """
-    part, context, findings = _context(source)
-    spec = parse_read(part.must("struct"), findings, context)
-    _assert_none(findings)
+    part, context, problems = _context(source)
+    spec = parse_read(part.must("struct"), problems, context)
+    _assert_none(problems)
     assert spec is not None  # noqa: S101  # the purpose of this function
     return spec
 
 
 def struct_write(source: str) -> WriteSpec:
     """Return the same form for sending."""
-    part, context, findings = _context(source)
-    spec = parse_write(part.must("struct"), findings, context)
-    _assert_none(findings)
+    part, context, problems = _context(source)
+    spec = parse_write(part.must("struct"), problems, context)
+    _assert_none(problems)
     assert spec is not None  # noqa: S101  # the purpose of this function
     return spec
 
@@ -57,14 +57,14 @@ def frame(data: bytes | str) -> Frame:
 
 def _context(source: str) -> tuple[Node, FormContext, Problems]:
     document = parse_document(source, "test.yaml")
-    findings = Problems()
+    problems = Problems()
     assert isinstance(document.data, Mapping)  # noqa: S101  # a mistake in the test
     part = Node(document, (), document.data)
-    enums = parse_enums(part, findings)
-    types = parse_types(part, enums, findings)
-    return part, FormContext(types=types, enums=enums), findings
+    enums = parse_enums(part, problems)
+    types = parse_types(part, enums, problems)
+    return part, FormContext(types=types, enums=enums), problems
 
 
-def _assert_none(findings: Problems) -> None:
-    told = "".join(map(to_text, findings))
+def _assert_none(problems: Problems) -> None:
+    told = "".join(map(to_text, problems))
     assert not told, told  # noqa: S101  # the purpose of this module

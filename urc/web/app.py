@@ -43,7 +43,7 @@ from urc.web.load.assets import Assets, import_map
 from urc.web.load.file_routes import FileRoutes
 from urc.web.load.widget_trust import WidgetTrust
 from urc.web.manage.manager import Manager
-from urc.web.manage.playback_control import move_tape, tape_state
+from urc.web.manage.playback_control import move_playback, playback_state
 from urc.web.manage.routes import ManageRoutes
 from urc.web.manage.settings_routes import SettingsRoutes
 from urc.web.page_socket import BrowserClient
@@ -299,7 +299,7 @@ class _Routes:
             interface,
             self.modules,
             is_watching="watch" in query or robot.playback is not None,
-            playback=_tape_url(name) if robot.playback is not None else "",
+            playback=_playback_url(name) if robot.playback is not None else "",
             tab=query.get("tab", ""),
             wire=dev_url(name) if is_dev else "",
             is_part="part" in query,
@@ -338,11 +338,11 @@ class _Routes:
 
     async def recording(self, request: Request) -> Response:
         """Return the state of a playback."""
-        return tape_state(self._playback(request))
+        return playback_state(self._playback(request))
 
     async def move(self, request: Request) -> Response:
         """Change a playback."""
-        return await move_tape(request, self._playback(request))
+        return await move_playback(request, self._playback(request))
 
     def _playback(self, request: Request) -> Playback | None:
         robot = self.robots.get(request.path_params["name"])
@@ -374,7 +374,7 @@ class _Routes:
         return service
 
 
-def _tape_url(name: str) -> str:
+def _playback_url(name: str) -> str:
     return f"/api/v1/robots/{quote(name, safe='')}/recording"
 
 

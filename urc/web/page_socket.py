@@ -80,7 +80,7 @@ class BrowserClient:
             await self._refuse(wire.CLOSE_NOT_READY, f"not set yet: {names}")
         elif self._service.is_full:
             await self._refuse(wire.CLOSE_FULL, "too many clients watch this robot")
-        elif not self._service.has_seat_for(self._peer):
+        elif not self._service.has_place_for(self._peer):
             await self._refuse(wire.CLOSE_FULL, "too many screens of yours watch this robot")
         else:
             with self._service.visit(self._peer.who):
@@ -109,7 +109,7 @@ class BrowserClient:
         self._place = live.fanout.join(self._flushed)
         controls = self._service.controls
         try:
-            self._operator = controls.sit(self._peer.place, self._peer.role, self._news.set)
+            self._operator = controls.add_page(self._peer.place, self._peer.role, self._news.set)
             self._service.consent.welcome(self._operator)
             async with asyncio.TaskGroup() as group:
                 writing = group.create_task(self._write(live))
@@ -126,7 +126,7 @@ class BrowserClient:
             self._flow.abort()
         finally:
             if self._operator is not None:
-                controls.rise(self._operator)
+                controls.remove_page(self._operator)
             live.fanout.leave(self._flushed)
 
     async def _refuse(self, code: int, reason: str) -> None:

@@ -57,7 +57,7 @@ def test_any_yamlish_text_is_a_document_or_findings(text: str) -> None:
 
 def assert_told(content: bytes | str) -> None:
     try:
-        problems = parse_document(content, "f.yaml").findings
+        problems = parse_document(content, "f.yaml").problems
     except ProblemsError as error:
         problems = error.problems
         assert problems

@@ -36,7 +36,7 @@ pytestmark = [
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[EngineRig]:
     """Robots that are driven by way of a server that can be held up."""
-    with EngineRig(tmp_path_factory.mktemp("engine"), lanes=LANES) as made:
+    with EngineRig(tmp_path_factory.mktemp("engine"), queues=LANES) as made:
         made.bout("close")
         yield made
 
@@ -132,7 +132,7 @@ def test_full_disk_delays_no_stop_and_loses_no_latch(tmp_path: Path) -> None:
     data.mkdir()
     script = 'mount -t tmpfs -o size=1m tmpfs "$0" && exec "$@"'
     inside = ("unshare", "--mount", "sh", "-c", script, str(data))
-    with Rig(tmp_path, lanes=4, inside=inside) as rig:
+    with Rig(tmp_path, queues=4, inside=inside) as rig:
         rig.bout("close")
         there = Path(f"/proc/{rig.server.pid}/root") / data.relative_to("/")
         fill(there / "filler")

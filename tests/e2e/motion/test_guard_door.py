@@ -103,13 +103,13 @@ async def test_a_stranger_is_turned_away(word: bytes) -> None:
     """And the guard is let in after it."""
     door = GuardAcceptor()
     admitted = asyncio.ensure_future(door.admitted())
-    with socket.create_connection(("127.0.0.1", door.port)) as stranger:
-        stranger.sendall(word)
-        stranger.shutdown(socket.SHUT_WR)
+    with socket.create_connection(("127.0.0.1", door.port)) as unknown_visitor:
+        unknown_visitor.sendall(word)
+        unknown_visitor.shutdown(socket.SHUT_WR)
         loop = asyncio.get_running_loop()
-        stranger.setblocking(False)
+        unknown_visitor.setblocking(False)
         async with asyncio.timeout(BOUND_S):
-            assert await loop.sock_recv(stranger, 1) == b""
+            assert await loop.sock_recv(unknown_visitor, 1) == b""
     with socket.create_connection(("127.0.0.1", door.port)) as guard:
         guard.sendall(door.token)
         line = await admitted

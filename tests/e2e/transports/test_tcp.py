@@ -223,14 +223,14 @@ async def test_only_the_robots_host_is_let_in() -> None:
     transport = listener(host="127.0.0.2")
     with pytest.raises(ConnectFailed):
         await transport.open(0.05)
-    stranger = await asyncio.open_connection("127.0.0.1", transport.port)
+    unknown_visitor = await asyncio.open_connection("127.0.0.1", transport.port)
     with pytest.raises(ConnectFailed):
         await transport.open(0.3)
-    assert await asyncio.wait_for(stranger[0].read(1), WAIT_S) == b""
+    assert await asyncio.wait_for(unknown_visitor[0].read(1), WAIT_S) == b""
     robot = await asyncio.open_connection("127.0.0.1", transport.port, local_addr=("127.0.0.2", 0))
     await transport.open(20.0)
     await transport.close()
-    for _, writer in (stranger, robot):
+    for _, writer in (unknown_visitor, robot):
         writer.close()
 
 
@@ -274,8 +274,8 @@ async def test_robot_connects_to_us_with_tls(authority: Authority) -> None:
         await transport.open(20.0)
         await says_back(transport, b"hello")
         await transport.close()
-    stranger = f"OPENSSL:127.0.0.1:{transport.port},verify=0,retry=20,interval=0.1"
-    async with program("socat", "-b4096", stranger, "PIPE"):
+    unknown_visitor = f"OPENSSL:127.0.0.1:{transport.port},verify=0,retry=20,interval=0.1"
+    async with program("socat", "-b4096", unknown_visitor, "PIPE"):
         with pytest.raises(TransportError):
             await hears_something(transport)
         await transport.close()

@@ -69,11 +69,11 @@ async def test_robot_sends_to_a_port_of_ours() -> None:
 async def test_only_the_robots_host_is_heard() -> None:
     """From any of its ports; a stranger's datagram is no frame of the robot."""
     port = free_port()
-    with robot("127.0.0.2") as stranger, robot() as drone, robot() as other_port:
+    with robot("127.0.0.2") as unknown_visitor, robot() as drone, robot() as other_port:
         async with opened(
             line(host="127.0.0.1", port=drone.getsockname()[1], listen=port)
         ) as transport:
-            stranger.sendto(b"I am the robot", ("127.0.0.1", port))
+            unknown_visitor.sendto(b"I am the robot", ("127.0.0.1", port))
             other_port.sendto(b"from another port", ("127.0.0.1", port))
             drone.sendto(b"", ("127.0.0.1", port))  # says nothing, and ends nothing
             drone.sendto(b"from the robot", ("127.0.0.1", port))
@@ -83,7 +83,7 @@ async def test_only_the_robots_host_is_heard() -> None:
             assert drone.recv(100) == b"go"
         options = {"host": "127.0.0.1", "listen": port, "from": "any"}
         async with opened(line(**options)) as transport:
-            stranger.sendto(b"anybody", ("127.0.0.1", port))
+            unknown_visitor.sendto(b"anybody", ("127.0.0.1", port))
             assert await heard(transport) == b"anybody"
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from tests.unit.packages.made import assert_whole, install, package
 from urc.packages.install import plan_file
-from urc.packages.names import PackageError, PackageId, parse_wish
+from urc.packages.names import PackageError, PackageId, parse_requirement
 from urc.packages.package import Package
 from urc.packages.signature import Signature, Signer, new_signer, read_signer
 from urc.packages.sources import FileSource
@@ -129,7 +129,7 @@ def test_another_key_is_refused_in_one_line(store: Store, anna: Signer, mallory:
     """With both fingerprints and what to do; also after the package was removed."""
     install(store, DIAL, signatures=sign(anna, DIAL))
     with store.changing() as change:
-        change.remove(parse_wish("dial"))
+        change.remove(parse_requirement("dial"))
     with pytest.raises(PackageError) as refused:
         install(store, DIAL_2, signatures=sign(mallory, DIAL_2))
     told = str(refused.value)

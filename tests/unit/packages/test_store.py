@@ -13,7 +13,7 @@ from tests.unit.packages.made import assert_whole, install, package
 from urc.packages import atomic_files
 from urc.packages.install_plan import InstallPlan
 from urc.packages.lock import LOCK, read_lock
-from urc.packages.names import PackageError, parse_wish
+from urc.packages.names import PackageError, parse_requirement
 from urc.packages.sources import FileSource
 from urc.packages.store import Store, ecosystem_of
 from urc.packages.update import plan_update
@@ -32,7 +32,7 @@ def store(tmp_path: Path) -> Store:
 
 def remove(store: Store, word: str) -> list[str]:
     with store.changing() as change:
-        return change.remove(parse_wish(word))[1]
+        return change.remove(parse_requirement(word))[1]
 
 
 def files_below(folder: Path) -> list[str]:
@@ -42,7 +42,7 @@ def files_below(folder: Path) -> list[str]:
 def test_a_new_store_is_empty_and_makes_nothing(store: Store) -> None:
     """Looking leaves no trace."""
     assert store.installed() == ()
-    assert store.find(parse_wish("bot")) is None
+    assert store.find(parse_requirement("bot")) is None
     assert not store.folder.exists()
 
 
@@ -68,8 +68,8 @@ def test_versions_live_side_by_side_each_with_its_own(store: Store) -> None:
     """The newest is meant where none is named."""
     old, new = install(store, BOT, DIAL, DIAL_2), install(store, BOT_2, DIAL, DIAL_2)
     assert assert_whole(store) == ["drivers/bot 1.0.0", "drivers/bot 2.0.0"]
-    assert store.find(parse_wish("bot")) == new
-    assert store.find(parse_wish("bot@1.0.0")) == old
+    assert store.find(parse_requirement("bot")) == new
+    assert store.find(parse_requirement("bot@1.0.0")) == old
     assert (store.place(old) / "widgets/dial/package.yaml").read_bytes() == DIAL.files[
         "package.yaml"
     ]
@@ -216,7 +216,7 @@ class _FullDisk:
 
 
 def update(store: Store) -> None:
-    old = store.find(parse_wish("bot"))
+    old = store.find(parse_requirement("bot"))
     assert old is not None
     plan = plan_update(old, [FileSource("lab", [BOT_2, DIAL_2], [old.key])], store, print)
     assert plan is not None
@@ -226,7 +226,7 @@ def update(store: Store) -> None:
 
 
 def back(store: Store) -> None:
-    new = store.find(parse_wish("bot"))
+    new = store.find(parse_requirement("bot"))
     assert new is not None
     with store.changing() as change:
         change.back(new)

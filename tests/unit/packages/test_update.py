@@ -9,9 +9,9 @@ import pytest
 
 from tests.unit.packages.made import assert_whole, install, package
 from urc.packages.index import IndexEntry
-from urc.packages.install import plan_wish
+from urc.packages.install import plan_requirement
 from urc.packages.lock import Lock
-from urc.packages.names import PackageError, parse_wish
+from urc.packages.names import PackageError, parse_requirement
 from urc.packages.package import Package
 from urc.packages.sources import FileSource
 from urc.packages.store import Store
@@ -162,7 +162,7 @@ def test_only_the_last_step_is_kept(store: Store) -> None:
     assert not store.has(BOT.digest)
     assert not store.place(first).exists()
     with store.changing() as change:
-        change.remove(parse_wish("bot"))
+        change.remove(parse_requirement("bot"))
     assert not store.has(BOT_11.digest)
     assert not store.has(BOT_2.digest)
 
@@ -194,7 +194,7 @@ def test_an_index_that_tells_other_needs_than_the_package_is_found_out(store: St
             return tuple(msgspec.structs.replace(one, needs={}) for one in super().entries())
 
     liar = Liar("lab", [BOT], [BOT.manifest.key])
-    plan = plan_wish(parse_wish("bot"), [liar], store, silent)
+    plan = plan_requirement(parse_requirement("bot"), [liar], store, silent)
     with (
         pytest.raises(PackageError, match=r"needs widgets/dial \^1, which does not come with it"),
         store.changing() as change,

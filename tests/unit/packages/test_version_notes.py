@@ -11,9 +11,9 @@ from tests.unit.packages.made import install, package
 from tests.unit.packages.test_door import BOT, DIAL, DIAL_2, Lab, fine
 from urc.packages.index import INDEX, IndexEntry, entry_of, read_index, search
 from urc.packages.index_builder import make_index, notes_of, withdraw
-from urc.packages.install import origin_lines, plan_wish, withdrawn_lines
+from urc.packages.install import origin_lines, plan_requirement, withdrawn_lines
 from urc.packages.install_plan import InstallPlan
-from urc.packages.names import PackageError, parse_wish
+from urc.packages.names import PackageError, parse_requirement
 from urc.packages.package import Package
 from urc.packages.store import Store
 from urc.packages.update import newer, plan_update
@@ -44,7 +44,9 @@ class Noted:
 
 def planned(store: Store, required: str, there: Noted, *, takes: bool = False) -> InstallPlan:
     """Return what a wish comes to."""
-    return plan_wish(parse_wish(required), [there], store, lambda line: None, takes_withdrawn=takes)
+    return plan_requirement(
+        parse_requirement(required), [there], store, lambda line: None, takes_withdrawn=takes
+    )
 
 
 @pytest.fixture
@@ -70,8 +72,8 @@ def test_what_is_withdrawn_is_not_taken_unless_it_is_asked_for(store: Store) -> 
 def test_a_package_of_which_nothing_is_offered_comes_from_nowhere_else(store: Store) -> None:
     """A second repository does not slip one in under its name."""
     with pytest.raises(PackageError, match=r"widgets/dial 1.0.0 was withdrawn"):
-        plan_wish(
-            parse_wish("dial"),
+        plan_requirement(
+            parse_requirement("dial"),
             [Noted(DIAL, withdrawn=[DIAL]), Noted(DIAL_2)],
             store,
             lambda line: None,
@@ -82,7 +84,7 @@ def test_a_lock_takes_what_it_names(store: Store) -> None:
     """Else a robot could not be set up again as it was."""
     lock = planned(store, "dial", Noted(DIAL)).lock
     there = Noted(DIAL, withdrawn=[DIAL])
-    plan = plan_wish(parse_wish("dial"), [there], store, lambda line: None, lock)
+    plan = plan_requirement(parse_requirement("dial"), [there], store, lambda line: None, lock)
     assert plan.lock == lock
     assert plan.archives
 

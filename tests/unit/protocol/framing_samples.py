@@ -23,11 +23,11 @@ CATALOG = Registries(transports=Table("none", {}), framings=FRAMINGS)
 def spec(text: str, encoding: str = "latin-1") -> FramingSpec:
     """Return the framing that a document declares with `text`; it must have no finding."""
     document = parse_document(f"framing: {text}\n", "sample.yaml")
-    findings = Problems()
+    problems = Problems()
     data: Any = document.data
     part = Node(document, ("framing",), data["framing"])
-    parsed = parse_framing(part, encoding, findings, CATALOG)
-    assert [to_text(one) for one in findings] == []
+    parsed = parse_framing(part, encoding, problems, CATALOG)
+    assert [to_text(one) for one in problems] == []
     return parsed
 
 

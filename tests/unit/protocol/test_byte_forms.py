@@ -24,10 +24,10 @@ def writer(source: str, encoding: str = "utf-8") -> PayloadWriter:
     """Return what writes the form in `source`: ``hex: …``, ``bytes: …`` or ``json: …``."""
     document = parse_document(source, "test.yaml")
     part = Node(document, (), document.data)
-    findings = Problems()
+    problems = Problems()
     ((key, inner),) = part.entries().items()
-    spec = FORMS[key].parse_write(inner, findings, FormContext(encoding))
-    assert spec is not None, list(findings)
+    spec = FORMS[key].parse_write(inner, problems, FormContext(encoding))
+    assert spec is not None, list(problems)
     return build_writer(spec, CodecContext(encoding))
 
 

@@ -30,11 +30,11 @@ CHECK = b"123456789"
 def algorithm(text: str) -> CrcSpec | FoldSpec | str:
     """Return the algorithm that a document declares with `text`; it must have no finding."""
     document = parse_document(f"checksum: {{ algorithm: {text} }}\n", "sample.yaml")
-    findings = Problems()
+    problems = Problems()
     assert isinstance(document.data, dict)
     part = Node(document, ("checksum",), document.data["checksum"])
-    written = parse_checksum(part, "latin-1", findings)
-    assert [to_text(one) for one in findings] == []
+    written = parse_checksum(part, "latin-1", problems)
+    assert [to_text(one) for one in problems] == []
     assert written is not None
     return written.algorithm
 

@@ -13,7 +13,7 @@ from urc.motion.hold_to_run import LEASE_S, HoldTerms
 from urc.motion.stall import STALLED_S, WAITED_S
 from urc.registry import Table
 from urc.runtime import guarding
-from urc.runtime.guarding import take_reins
+from urc.runtime.guarding import start_guard_client
 from urc.testing.clock import FakeClock
 from urc.transports.base import TransportSetup
 
@@ -36,7 +36,7 @@ TABLE = Table("urc.transports", dict.fromkeys(KINDS, f"{__name__}:Stub"))
 
 
 def scheduler(driver: Driver, *, is_guarded: bool = False) -> GuardClient:
-    return take_reins(driver, {}, TABLE, FakeClock(), is_guarded=is_guarded)
+    return start_guard_client(driver, {}, TABLE, FakeClock(), is_guarded=is_guarded)
 
 
 def robot(kind: str, *on_stall: str, tunnel: str = "") -> Driver:
@@ -99,7 +99,7 @@ def test_guard_is_told_the_settings_and_what_is_listened_to() -> None:
         {"wire": TransportSpec("wire", "ros", options={"port": port})},
         messages={"odom": Message("odom", "wire", read)},
     )
-    backend = take_reins(driver, {"port": 9090}, TABLE, FakeClock(), is_guarded=False)
+    backend = start_guard_client(driver, {"port": 9090}, TABLE, FakeClock(), is_guarded=False)
     make = backend.lines[0].make
     assert make.options == {"port": 9090}
     assert make.subscriptions == [("/odom", {"type": "Odometry"})]
@@ -107,7 +107,7 @@ def test_guard_is_told_the_settings_and_what_is_listened_to() -> None:
 
 def test_guard_in_this_process_goes_by_the_clock_of_the_session() -> None:
     clock = FakeClock()
-    backend = take_reins(robot("tcp"), {}, TABLE, clock, is_guarded=False)
+    backend = start_guard_client(robot("tcp"), {}, TABLE, clock, is_guarded=False)
     assert backend.channel.now() == clock.now()
 
 

@@ -9,7 +9,7 @@ from urc.config.load import check
 from urc.problems import ProblemsError, UrcError
 from urc.runtime.package_preview import look
 from urc.runtime.registries import built_in_catalog
-from urc.runtime.widget_registry import shelf_of
+from urc.runtime.widget_registry import widget_folder_of
 
 LOOK = "widgets:\n  battery: { use: dial, bind: { level: battery } }\n"
 
@@ -67,12 +67,12 @@ def test_a_package_that_is_being_written_sees_what_stands_beside_it(tmp_path: Pa
     document = driver(tmp_path)
     robot = write_package(tmp_path, "robot", "my-puppet") / "robot.yaml"
     for path in (document, robot):
-        checked = check(str(path), built_in_catalog(), shelf_of(path))
+        checked = check(str(path), built_in_catalog(), widget_folder_of(path))
         assert {problem.code for problem in checked.problems} == {"unused-setting"}
         assert checked.profile is not None
         assert "dial" in checked.profile.widgets
-    assert shelf_of(tmp_path / "else" / "driver.yaml").get("dial") is None
-    assert shelf_of(document).get("battery") is not None
+    assert widget_folder_of(tmp_path / "else" / "driver.yaml").get("dial") is None
+    assert widget_folder_of(document).get("battery") is not None
 
 
 def test_a_robots_file_of_another_name_is_still_warned_of(tmp_path: Path) -> None:
@@ -81,5 +81,5 @@ def test_a_robots_file_of_another_name_is_still_warned_of(tmp_path: Path) -> Non
     driver(tmp_path)
     home = write_package(tmp_path, "robot", "my-puppet")
     other = home.rename(home.with_name("other")) / "robot.yaml"
-    problems = check(str(other), built_in_catalog(), shelf_of(other)).problems
+    problems = check(str(other), built_in_catalog(), widget_folder_of(other)).problems
     assert "name-mismatch" in {problem.code for problem in problems}

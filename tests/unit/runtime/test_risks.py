@@ -12,7 +12,7 @@ from urc.packages.store import Store
 from urc.runtime.isolation import look_apart
 from urc.runtime.package_preview import risks_of
 from urc.runtime.registries import built_in_catalog
-from urc.runtime.widget_registry import shelf_of
+from urc.runtime.widget_registry import widget_folder_of
 
 ATTACK = Path(__file__).parents[2] / "attacks" / "drivers" / "key-user"
 RISKS = [
@@ -39,7 +39,7 @@ def risks(folder: Path, transport: str, settings: str = "{}") -> list[str]:
         f"transports:\n  wire: {transport.replace('F }', FRAMING)}\n",
         encoding="utf-8",
     )
-    checked = check(file, built_in_catalog(), shelf_of(file))
+    checked = check(file, built_in_catalog(), widget_folder_of(file))
     assert checked.profile is not None, checked.problems
     return risks_of(checked.profile)
 

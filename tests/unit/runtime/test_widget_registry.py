@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from urc.cli.main import main
-from urc.runtime.widget_registry import shelf_of
+from urc.runtime.widget_registry import widget_folder_of
 from urc.shipped import shipped
 from urc.web.load.widget_trust import WidgetTrust
 
@@ -29,7 +29,7 @@ def test_a_document_finds_the_widgets_beside_it_and_they_are_foreign(tmp_path: P
     """They come after those that ship, and never take their place."""
     write(tmp_path, "lamp")
     write(tmp_path, "battery")
-    registry = shelf_of(tmp_path / "robot.yaml")
+    registry = widget_folder_of(tmp_path / "robot.yaml")
     lamp, battery = registry.get("lamp"), registry.get("battery")
     assert lamp is not None, registry.problems
     assert battery is not None, registry.problems
@@ -41,8 +41,10 @@ def test_a_document_finds_the_widgets_beside_it_and_they_are_foreign(tmp_path: P
 def test_a_document_without_such_a_folder_has_what_ships(tmp_path: Path) -> None:
     """So has one that stands beside URC's own folder."""
     for document in (tmp_path / "robot.yaml", shipped("widgets").parent / "robot.yaml"):
-        assert shelf_of(document).names() == shelf_of(tmp_path / "other.yaml").names()
-        assert shelf_of(document).get("lamp") is None
+        assert (
+            widget_folder_of(document).names() == widget_folder_of(tmp_path / "other.yaml").names()
+        )
+        assert widget_folder_of(document).get("lamp") is None
 
 
 def test_a_new_widget_stands_where_the_robot_beside_it_finds_it(
@@ -51,4 +53,4 @@ def test_a_new_widget_stands_where_the_robot_beside_it_finds_it(
     """`urc new widget` makes it in the folder that is looked into."""
     monkeypatch.chdir(tmp_path)
     assert main(["new", "widget", "lamp"]) == 0
-    assert shelf_of(tmp_path / "robot.yaml").get("lamp") is not None
+    assert widget_folder_of(tmp_path / "robot.yaml").get("lamp") is not None

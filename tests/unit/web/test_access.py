@@ -1,6 +1,6 @@
 """Who asks: the start key, sessions of browsers, and addresses that work once."""
 
-from urc.web.serve.access import SESSIONS, STRANGER, Access, Visitor
+from urc.web.serve.access import SESSIONS, UNKNOWN_VISITOR, Access, Visitor
 
 URL = "http://127.0.0.1:8080/"
 
@@ -46,8 +46,8 @@ def test_a_program_sends_the_key_with_each_request() -> None:
     access = Access()
     said = [(b"authorization", f"Bearer {access.key}".encode())]
     assert access.visitor(said) == Visitor("here", "program here", True)
-    assert access.visitor([(b"authorization", b"Bearer guessed")]) == STRANGER
-    assert access.visitor([(b"authorization", f"Basic {access.key}".encode())]) == STRANGER
+    assert access.visitor([(b"authorization", b"Bearer guessed")]) == UNKNOWN_VISITOR
+    assert access.visitor([(b"authorization", f"Basic {access.key}".encode())]) == UNKNOWN_VISITOR
 
 
 def test_nothing_of_one_start_opens_the_next() -> None:
@@ -56,8 +56,8 @@ def test_nothing_of_one_start_opens_the_next() -> None:
     session = old.admit(old.key)
     assert session is not None
     assert old.cookie != new.cookie
-    assert new.visitor(cookie(old, session)) == STRANGER
-    assert new.visitor(cookie(new, session)) == STRANGER
+    assert new.visitor(cookie(old, session)) == UNKNOWN_VISITOR
+    assert new.visitor(cookie(new, session)) == UNKNOWN_VISITOR
     assert new.admit(old.key) is None
     assert new.admit(word_of(old.address_once(URL))) is None
     assert new.admit("") is None
@@ -95,7 +95,7 @@ def test_the_token_of_managers_makes_no_engineer() -> None:
     access = Access(token="given-to-the-lab")  # noqa: S106
     assert admitted(access, access.address_of_managers(URL)).standing == "manager"
     assert Access().address_of_managers(URL) == ""
-    assert Access().visitor([(b"authorization", b"Bearer ")]) == STRANGER
+    assert Access().visitor([(b"authorization", b"Bearer ")]) == UNKNOWN_VISITOR
 
 
 def test_the_number_of_sessions_is_bounded() -> None:
@@ -106,11 +106,11 @@ def test_the_number_of_sessions_is_bounded() -> None:
         last = access.admit(access.key)
     assert first is not None
     assert last is not None
-    assert access.visitor(cookie(access, first)) == STRANGER
+    assert access.visitor(cookie(access, first)) == UNKNOWN_VISITOR
     assert access.visitor(cookie(access, last)).standing == "here"
 
 
 def test_letters_outside_ascii_are_no_fault() -> None:
     """A header may hold any byte."""
-    assert Access().visitor([(b"authorization", b"Bearer \xff\xfe")]) == STRANGER
+    assert Access().visitor([(b"authorization", b"Bearer \xff\xfe")]) == UNKNOWN_VISITOR
     assert Access().admit("schlüssel\udce4".encode("utf-8", "replace").decode()) is None

@@ -43,9 +43,9 @@ class Scene:
     def latch(self, reason: str) -> None:
         """Take why nothing may be begun that moves by itself."""
 
-    def sit(self, place: str = "", role: Role = "driver") -> OperatorSession:
+    def add_page(self, place: str = "", role: Role = "driver") -> OperatorSession:
         """Sit down, and read what is told at once."""
-        operator = self.controls.sit(place, role, lambda: None)
+        operator = self.controls.add_page(place, role, lambda: None)
         self.told[operator.client.id] = []
         self.read(operator)
         return operator
@@ -89,7 +89,7 @@ async def scene(file: LatchStore | None = None) -> AsyncIterator[Scene]:
 async def test_everybody_is_told_of_every_change_and_only_the_holder_hears_beats() -> None:
     """The newest lease only, however many there were since it was read."""
     async with scene() as it:
-        ann, bob = it.sit(), it.sit("192.168.1.7")
+        ann, bob = it.add_page(), it.add_page("192.168.1.7")
         it.say(ann, "take")
         (lease,) = it.read(bob)
         assert lease["holder"] == {"id": "s1", "name": "screen 1"}
@@ -110,7 +110,7 @@ async def test_everybody_is_told_of_every_change_and_only_the_holder_hears_beats
 async def test_a_flood_is_thinned_and_its_last_value_arrives() -> None:
     """A thousand ticks a second: at most the thinned rate is looked at, the newest of them."""
     async with scene() as it:
-        ann = it.sit()
+        ann = it.add_page()
         it.say(ann, "take")
         looked: list[float] = []
         tick: Callable[..., str] = it.controls.controller.tick
@@ -133,7 +133,7 @@ async def test_a_flood_is_thinned_and_its_last_value_arrives() -> None:
 async def test_a_flood_is_neither_read_nor_received_until_its_turn() -> None:
     """Its line is held back for some milliseconds, and then brings the newest."""
     async with scene() as it:
-        ann = it.sit()
+        ann = it.add_page()
         it.say(ann, "take")
         held: list[bool] = []
         ann.hold_back = held.append
@@ -164,7 +164,7 @@ async def test_a_flood_is_neither_read_nor_received_until_its_turn() -> None:
 async def test_a_tick_that_waits_unread_and_is_none_is_told() -> None:
     """It took the place of a good one, and moves nothing."""
     async with scene() as it:
-        ann = it.sit()
+        ann = it.add_page()
         it.say(ann, "take")
         for speed in (0.1, 0.2, 0.3):
             it.tick(ann, speed)
@@ -180,7 +180,7 @@ async def test_what_waits_is_forgotten_by_a_release_a_stop_and_a_page_that_goes(
     """A thinned tick that comes after the hand has gone would move the robot again."""
     async with scene() as it:
         for end in ("release", "stop", "rise"):
-            ann = it.sit()
+            ann = it.add_page()
             it.say(ann, "reset")
             it.say(ann, "take")
             it.tick(ann, 0.1)
@@ -191,17 +191,17 @@ async def test_what_waits_is_forgotten_by_a_release_a_stop_and_a_page_that_goes(
             elif end == "stop":
                 it.controls.handle(ann, wire.Stop())
             else:
-                it.controls.rise(ann)
+                it.controls.remove_page(ann)
             count = len(it.backend.texts)
             await it.clock.advance(1)
             assert [text for text in it.backend.texts[count:] if "stop" not in text] == []
-            it.controls.rise(ann)
+            it.controls.remove_page(ann)
 
 
 async def test_a_stop_that_nobody_made_is_told_once_to_all() -> None:
     """The lease ran out: the holder's page must let go, and the others may know."""
     async with scene() as it:
-        ann, bob = it.sit(), it.sit()
+        ann, bob = it.add_page(), it.add_page()
         it.say(ann, "take")
         it.tick(ann)
         await it.clock.advance(0.35)
@@ -214,7 +214,7 @@ async def test_a_stop_that_nobody_made_is_told_once_to_all() -> None:
 async def test_a_refused_tick_is_told_unless_the_control_moves_all_the_same() -> None:
     """One that came late among good ones is no news."""
     async with scene() as it:
-        ann = it.sit()
+        ann = it.add_page()
         it.say(ann, "take")
         it.tick(ann)
         await it.clock.advance(0.02)
@@ -234,7 +234,7 @@ async def test_a_refused_tick_is_told_unless_the_control_moves_all_the_same() ->
 async def test_a_hostile_page_makes_nothing_grow() -> None:
     """Any number of names, wishes and ticks: what waits for a screen stays small."""
     async with scene() as it:
-        ann = it.sit()
+        ann = it.add_page()
         for step in range(5000):
             it.controls.handle(ann, wire.Tick(f"drive{step}", 1, step, 1))
             it.controls.handle(ann, wire.Drive("ask"))
@@ -247,7 +247,7 @@ async def test_a_hostile_page_makes_nothing_grow() -> None:
 async def test_a_silent_holder_loses_the_controls_and_a_request_is_granted() -> None:
     """By time alone; the desk is asked at the right moment."""
     async with scene() as it:
-        ann, bob = it.sit(), it.sit()
+        ann, bob = it.add_page(), it.add_page()
         it.say(ann, "take")
         it.controls.handle(bob, wire.Drive("ask", 3))
         await it.clock.advance(3.1)
@@ -264,7 +264,7 @@ def audited(it: Scene) -> list[str]:
 async def test_the_audit_says_who_moved_what_and_why_it_stopped() -> None:
     """The frame, the arguments and the lease are in it; a release is a reason."""
     async with scene() as it:
-        ann = it.sit(role="engineer")
+        ann = it.add_page(role="engineer")
         it.say(ann, "take")
         it.tick(ann, 0.5)
         await it.clock.advance(0.05)
@@ -288,7 +288,7 @@ async def test_the_audit_says_who_moved_what_and_why_it_stopped() -> None:
 async def test_the_audit_names_whoever_was_refused_and_why() -> None:
     """A tick without the controls, a wish that is not granted, and what is no control."""
     async with scene() as it:
-        ann, bob = it.sit(), it.sit("192.168.1.7")
+        ann, bob = it.add_page(), it.add_page("192.168.1.7")
         it.say(ann, "take")
         it.tick(bob)
         it.say(bob, "force")
@@ -304,7 +304,7 @@ async def test_the_audit_names_whoever_was_refused_and_why() -> None:
 async def test_the_audit_ends_a_motion_whose_robot_was_disconnected() -> None:
     """Nobody reports its stop any more."""
     async with scene() as it:
-        ann = it.sit()
+        ann = it.add_page()
         it.say(ann, "take")
         it.tick(ann)
     assert audited(it)[-1] == "stopped screen 1 drive the robot was disconnected"
@@ -318,7 +318,7 @@ async def test_an_audit_that_breaks_keeps_nobody_from_driving_and_stopping() -> 
             raise OSError("the disk is on fire")
 
         it.controls.recorder._note = broken
-        ann = it.sit()
+        ann = it.add_page()
         it.say(ann, "take")
         it.tick(ann, 0.5)
         assert it.backend.texts[-1] == "drive speed=0.5"
@@ -334,7 +334,7 @@ async def test_a_latch_that_cannot_be_written_is_told_and_stops_all_the_same(
     file = LatchStore(tmp_path / "latches", "rover")
     async with scene(file) as it:
         (tmp_path / "latches").write_text("a file where the folder should be")
-        ann, bob = it.sit(), it.sit()
+        ann, bob = it.add_page(), it.add_page()
         it.say(ann, "take")
         it.tick(ann)
         await file.settle()
@@ -373,7 +373,7 @@ async def test_a_stop_that_is_owed_stays_so_with_another_driver_and_after_a_rest
 async def test_a_flood_costs_no_more_than_its_thinned_rate() -> None:
     """What is too much is counted and dropped before anything is made of it."""
     async with scene() as it:
-        ann = it.sit()
+        ann = it.add_page()
         it.say(ann, "take")
         made = 0
         frame = it.frames.motion_frame
@@ -394,7 +394,7 @@ async def test_a_flood_costs_no_more_than_its_thinned_rate() -> None:
 async def test_the_words_of_a_robot_that_refuses_to_move_are_told_at_its_control() -> None:
     """At once, to every screen; the audit has them, too."""
     async with scene() as it:
-        ann, bob = it.sit(), it.sit()
+        ann, bob = it.add_page(), it.add_page()
         it.say(ann, "take")
         it.tick(ann)
         it.read(bob)

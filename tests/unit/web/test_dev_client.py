@@ -206,7 +206,7 @@ async def test_a_latched_stop_holds_over_a_new_version() -> None:
     """Nothing moves because somebody saved a file; the screens are still known."""
     async with scene(with_commands("go", is_held=True)) as it:
         controls = it.service.controls
-        operator = controls.sit("", "engineer", lambda: None)
+        operator = controls.add_page("", "engineer", lambda: None)
         controls.stop("screen 1")
         await settle()
         assert it.service.is_at_rest

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.anyio
 async def test_a_server_that_was_held_up_stops_what_moves() -> None:
     """A short time is told alone; after half a second whoever drives begins anew."""
     async with scene() as it:
-        ann = it.sit()
+        ann = it.add_page()
         it.say(ann, "take")
         it.tick(ann)
         await it.clock.advance(0.05)
@@ -32,7 +32,7 @@ async def test_a_server_that_was_held_up_stops_what_moves() -> None:
 async def test_a_server_that_was_held_up_says_no_stop_twice() -> None:
     """The movers have stopped by themselves when the lease was over; at rest there is silence."""
     async with scene() as it:
-        ann = it.sit()
+        ann = it.add_page()
         it.say(ann, "take")
         it.tick(ann)
         await it.clock.hold_up(0.9)

@@ -8,7 +8,7 @@ from anyio import to_thread
 
 from tests.unit.packages.made import package
 from urc.packages.index import IndexEntry, entry_of
-from urc.packages.names import parse_wish
+from urc.packages.names import parse_requirement
 from urc.packages.package import Package
 from urc.packages.sources import FileSource
 from urc.packages.store import Store
@@ -60,7 +60,7 @@ async def test_a_stalled_repository_holds_up_nobody(tmp_path: Path) -> None:
     """It can be given up at once, another job begins, and what comes late changes nothing."""
     store, stalled = Store(tmp_path), Stalled(package("widget", "dial"))
     jobs = Jobs(store, lambda _: [stalled])
-    job = jobs.begin(parse_wish("widgets/dial"))
+    job = jobs.begin(parse_requirement("widgets/dial"))
     try:
         assert await to_thread.run_sync(stalled.asked.wait, 10)
         assert job.news().line.startswith("fetching widgets/dial 1.0.0")

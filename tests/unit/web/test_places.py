@@ -8,13 +8,13 @@ from urc.testing.clock import FakeClock
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.web.feed.client_socket import SocketPeer
 from urc.web.fleet.robots import KNOWN_SEATS, SEATS, Robot, RobotService
-from urc.web.serve.access import STRANGER, Visitor
+from urc.web.serve.access import UNKNOWN_VISITOR, Visitor
 from urc.web.serve.connection_quota import KNOWN_PLACES, PLACES, ConnectionQuota, is_stop
 
 HOLDER = Visitor("here", "browser 1")
 
 
-@pytest.mark.parametrize(("visitor", "most"), [(STRANGER, PLACES), (HOLDER, KNOWN_PLACES)])
+@pytest.mark.parametrize(("visitor", "most"), [(UNKNOWN_VISITOR, PLACES), (HOLDER, KNOWN_PLACES)])
 def test_one_visitor_has_a_bounded_number_of_places(visitor: Visitor, most: int) -> None:
     """Those of others are not touched, and what ends makes room."""
     places = ConnectionQuota()
@@ -23,7 +23,7 @@ def test_one_visitor_has_a_bounded_number_of_places(visitor: Visitor, most: int)
             assert open_ones.enter_context(places.taken(visitor, "192.0.2.7"))
         with places.taken(visitor, "192.0.2.7") as has_place:
             assert not has_place
-        for other in (STRANGER, HOLDER._replace(name="browser 2")):
+        for other in (UNKNOWN_VISITOR, HOLDER._replace(name="browser 2")):
             with places.taken(other, "192.0.2.8") as has_place:
                 assert has_place
     with places.taken(visitor, "192.0.2.7") as has_place:
@@ -35,7 +35,7 @@ def test_who_has_a_key_is_counted_by_it_and_not_by_the_address() -> None:
     places = ConnectionQuota()
     with ExitStack() as open_ones:
         for _ in range(PLACES):
-            open_ones.enter_context(places.taken(STRANGER, "192.0.2.7"))
+            open_ones.enter_context(places.taken(UNKNOWN_VISITOR, "192.0.2.7"))
         with places.taken(HOLDER, "192.0.2.7") as has_place:
             assert has_place
 
@@ -54,11 +54,11 @@ def test_one_visitor_has_a_bounded_number_of_seats_at_a_robot(
     service = RobotService(Robot(profile, {}, FakeRobot(profile).open), clock=FakeClock())
     with ExitStack() as open_ones:
         for _ in range(operators):
-            assert service.has_seat_for(peer)
+            assert service.has_place_for(peer)
             open_ones.enter_context(service.visit(peer.who))
-        assert not service.has_seat_for(peer)
-        assert service.has_seat_for(peer._replace(who="at 192.0.2.8", is_known=False))
-    assert service.has_seat_for(peer)
+        assert not service.has_place_for(peer)
+        assert service.has_place_for(peer._replace(who="at 192.0.2.8", is_known=False))
+    assert service.has_place_for(peer)
 
 
 @pytest.mark.parametrize(

@@ -70,7 +70,7 @@ async def opened(it: Scene) -> AsyncIterator[FakeLine]:
 async def doubled() -> AsyncIterator[Doubled]:
     """Let somebody drive with two lines."""
     async with scene() as it, opened(it) as line:
-        ann = it.sit()
+        ann = it.add_page()
         it.say(ann, "take")
         line.say({"t": "spare", "key": ann.key})
         await settle()
@@ -143,7 +143,7 @@ async def test_a_second_line_ends_with_its_page_and_with_the_next_one() -> None:
         assert it.line.was_aborted
         await it.on_spare(it.tick_of(1))
         assert it.backend.texts == []
-        it.controls.rise(it.ann)
+        it.controls.remove_page(it.ann)
         assert other.was_aborted
 
 
@@ -151,7 +151,7 @@ async def test_a_second_line_ends_with_its_page_and_with_the_next_one() -> None:
 async def test_who_does_not_know_the_key_is_turned_away(first: dict[str, str]) -> None:
     """Whatever is said first; no seat has a second line then."""
     async with scene() as it, opened(it) as line:
-        ann = it.sit()
+        ann = it.add_page()
         line.say(first)
         await settle()
         assert line.closed is not None
@@ -200,6 +200,6 @@ async def test_a_flood_closes_it() -> None:
 async def test_viewers_are_told_no_key() -> None:
     """They drive nothing."""
     async with scene() as it:
-        operator = it.controls.sit("", "viewer", lambda: None)
+        operator = it.controls.add_page("", "viewer", lambda: None)
         (lease,) = it.read(operator)
         assert lease["spare"] == ""

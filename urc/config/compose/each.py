@@ -43,9 +43,9 @@ class _Copy(NamedTuple):
 class Expander:
     """An expander for the `each` of all items of one document."""
 
-    def __init__(self, document: Document, findings: Problems, budget: ExpansionBudget) -> None:
+    def __init__(self, document: Document, problems: Problems, budget: ExpansionBudget) -> None:
         self.document = document
-        self.findings = findings
+        self.problems = problems
         self.budget = budget
         self.path: Path = ()
         """Path of the current item."""
@@ -107,7 +107,7 @@ class Expander:
     def _expand_copy(self, made: dict[str, Tree], copy: _Copy, path: Path) -> None:
         name = str(copy.name)
         if name in made:
-            self.findings.error(
+            self.problems.error(
                 Node(self.document, path, None),
                 "duplicate-key",
                 f"'each' creates {name!r} twice",
@@ -147,7 +147,7 @@ class Expander:
         part = Node(self.document, (*path, "each"), each)
         unlike = [variable for variable, values in each.items() if not _are_alike(values)]
         if unlike:
-            self.findings.error(
+            self.problems.error(
                 part,
                 "incompatible-values",
                 f"the values of {unlike[0]!r} are of different kinds",
@@ -158,7 +158,7 @@ class Expander:
         self._check_variables(part)
         unused = [one for one in each if name is not None and not _uses(name, one)]
         if unused:
-            self.findings.error(
+            self.problems.error(
                 part,
                 "same-name",
                 f"{name!r} is the same for every {unused[0]!r}",
@@ -172,7 +172,7 @@ class Expander:
     def _check_variables(self, part: Node) -> None:
         for variable in part.data:
             if variable in _RESERVED:
-                self.findings.error(
+                self.problems.error(
                     part,
                     "bad-name",
                     f"a variable of 'each' cannot have the name {variable!r}",
@@ -193,7 +193,7 @@ class _First:
         first: Any = self._each[name][0]
         is_mapping = isinstance(first, dict)
         plain = f"its values are plain: write {{{name}}}"
-        self._expander.findings.error(
+        self._expander.problems.error(
             Node(self._expander.document, path, None),
             "unknown-variable",
             f"{name!r} has no {word!r}" if word else f"{name!r} has several values; name one",
@@ -204,7 +204,7 @@ class _First:
 
     def unquoted(self, path: Path, text: str) -> None:
         """Report a name in braces that YAML reads as a mapping."""
-        report_unquoted(Node(self._expander.document, path, None), text, self._expander.findings)
+        report_unquoted(Node(self._expander.document, path, None), text, self._expander.problems)
 
 
 class _Rest:
@@ -269,21 +269,21 @@ _LISTED: Final = ("polls", "tests")
 _BY_NAME: Final = ("simulator", "rules")
 
 
-def expand(document: Document, findings: Problems) -> Document:
+def expand(document: Document, problems: Problems) -> Document:
     """Return the document with every `each` expanded."""
     everywhere = list(_places(document.data))
-    _check_names(document, everywhere, findings)
+    _check_names(document, everywhere, problems)
     places = [path for path in everywhere if _has_each(_at(document.data, path))]
     if places:
         expander = Expander(
-            document, findings, ExpansionBudget(_NODES_MOST - count_nodes(document.data))
+            document, problems, ExpansionBudget(_NODES_MOST - count_nodes(document.data))
         )
         tree = Tree(document.data, document.mark, document)
         try:
             for path in places:
                 tree = _replaced(tree, path, expander.collection)
         except ExpansionTooLarge:
-            findings.error(
+            problems.error(
                 Node(document, expander.path, None),
                 "too-many-nodes",
                 f"more than {_NODES_MOST} keys and values after expansion of every 'each'",
@@ -291,10 +291,10 @@ def expand(document: Document, findings: Problems) -> Document:
             )
         else:
             document = _document(document, tree)
-    return _without_removals(document, everywhere, findings)
+    return _without_removals(document, everywhere, problems)
 
 
-def _without_removals(document: Document, places: list[Path], findings: Problems) -> Document:
+def _without_removals(document: Document, places: list[Path], problems: Problems) -> Document:
     """Report and drop removals of missing items; the merge has applied the other removals."""
     tree = Tree(document.data, document.mark, document)
     for path in places:
@@ -305,7 +305,7 @@ def _without_removals(document: Document, places: list[Path], findings: Problems
             else []
         )
         for place in idle:
-            findings.error(
+            problems.error(
                 Node(document, (*path, place), None),
                 "nothing-to-remove",
                 f"there is no {item_name(item_at(document.data, (*path, place)))!r} to remove",
@@ -328,17 +328,17 @@ def _without_idle(tree: Tree, path: Path) -> Tree:
 
 def _document(document: Document, tree: Tree) -> Document:
     return Document(
-        document.file, document.text, document.lines, tree.value, tree.mark, document.findings
+        document.file, document.text, document.lines, tree.value, tree.mark, document.problems
     )
 
 
-def _check_names(document: Document, places: list[Path], findings: Problems) -> None:
+def _check_names(document: Document, places: list[Path], problems: Problems) -> None:
     """Report names with braces that remain; the schemas allow braces."""
     for path in places:
         named = _at(document.data, path)
         for name, item in named.items() if isinstance(named, dict) else ():
             if "{" in name and not (isinstance(item, dict) and "each" in item):
-                findings.error(
+                problems.error(
                     Node(document, (*path, name), item),
                     "bad-name",
                     f"{name!r} is not a valid name here",

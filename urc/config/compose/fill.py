@@ -186,9 +186,9 @@ def fill_key(key: str, names: Names, budget: ExpansionBudget) -> str:
     return str(_Filler(names, budget, None).text(key, ())[0])
 
 
-def report_unquoted(part: Node, text: str, findings: Problems) -> None:
+def report_unquoted(part: Node, text: str, problems: Problems) -> None:
     """Report a name in braces that YAML reads as a mapping."""
-    findings.error(
+    problems.error(
         part,
         "unquoted-name",
         "YAML reads a value that starts with '{' as a mapping",

@@ -63,7 +63,7 @@ def override(document: Document, overrides: Node) -> Document:
     merged = merge(Tree(document.data, document.mark, document), over)
     mark = document.mark.copy(dict(merged.mark.children))
     return Document(
-        document.file, document.text, document.lines, merged.value, mark, document.findings
+        document.file, document.text, document.lines, merged.value, mark, document.problems
     )
 
 
@@ -74,7 +74,7 @@ class _Composer:
         self.sources: dict[str, Document] = {}
         """File → merged document."""
         self._library = library
-        self._findings = library.findings
+        self._problems = library.problems
         self._whole: dict[str, Document | None] = {}
 
     def compose(self, document: Document, chain: tuple[str, ...]) -> Document | None:
@@ -108,14 +108,14 @@ class _Composer:
         if not is_sound:
             return None
         if count_nodes(whole.value) > _NODES_MOST:
-            self._findings.error(
+            self._problems.error(
                 root, "too-many-nodes", f"more than {_NODES_MOST} keys and values after the merge"
             )
             return None
         mark = whole.mark.copy()
         mark.origin, mark.span = None, document.mark.span
         return Document(
-            document.file, document.text, document.lines, whole.value, mark, document.findings
+            document.file, document.text, document.lines, whole.value, mark, document.problems
         )
 
     def _sources(
@@ -142,12 +142,12 @@ class _Composer:
         real = os.path.realpath(target.file)
         if real in chain:
             names = [os.path.basename(name) for name in (*chain[chain.index(real) :], real)]
-            self._findings.error(
+            self._problems.error(
                 reference, "reference-loop", f"documents build on each other: {' → '.join(names)}"
             )
             return None
         if len(chain) >= _DEEPEST:
-            self._findings.error(
+            self._problems.error(
                 reference,
                 "too-many-files",
                 f"more than {_DEEPEST} documents build on each other",
@@ -178,7 +178,7 @@ class _Composer:
                 f"{place} has another value for it",
                 hint="set it in the document that includes both",
             )
-            self._findings.problems.append(found._replace(path=".".join(map(str, path))))
+            self._problems.problems.append(found._replace(path=".".join(map(str, path))))
         return [merged]
 
 

@@ -32,7 +32,7 @@ class Library:
     def __init__(self) -> None:
         self.files: dict[str, None] = {}
         """Each requested file, existing or not."""
-        self.findings = Problems()
+        self.problems = Problems()
         self._documents: dict[str, Document | None] = {}
 
     def read(self, path: str) -> Document:
@@ -57,11 +57,11 @@ class Library:
             target = os.path.normpath(os.path.join(os.path.dirname(here), reference.data))
         real = os.path.realpath(target)
         if real == os.path.realpath(here):
-            self.findings.error(reference, "refers-to-itself", "this document refers to itself")
+            self.problems.error(reference, "refers-to-itself", "this document refers to itself")
             return None
         if real not in self._documents:
             if len(self._documents) >= _FILES_MOST:
-                self.findings.error(
+                self.problems.error(
                     reference, "too-many-files", f"more than {_FILES_MOST} documents are required"
                 )
                 return None
@@ -71,7 +71,7 @@ class Library:
         if document is None or not found or found in kinds:
             return document
         wanted = " or ".join(_ARTICLES.get(kind, f"a {kind}") for kind in kinds)
-        self.findings.error(
+        self.problems.error(
             reference,
             "wrong-kind",
             f"{target} is {_ARTICLES.get(found, f'a {found}')}, expected {wanted} here",
@@ -83,7 +83,7 @@ class Library:
         hint = did_you_mean(reference.data, known, f"{kinds[0]}s that ship")
         if not hint.startswith("did"):
             hint = f"the path of a document ends with .yaml; {hint}"
-        self.findings.error(
+        self.problems.error(
             reference,
             "no-such-file",
             f"no {' or '.join(kinds)} named {reference.data!r} ships with URC",
@@ -96,18 +96,18 @@ class Library:
         except ProblemsError as error:
             first = error.problems[0]
             if first.code not in _FILE_CODES:
-                self.findings.problems += error.problems
+                self.problems.problems += error.problems
                 return None
             near = similar_file(target) if first.code == "no-such-file" else ""
             hint = os.path.join(os.path.dirname(reference.data), near) if near else ""
-            self.findings.error(
+            self.problems.error(
                 reference,
                 first.code,
                 f"{target}: {first.message}",
                 hint=f"did you mean '{hint}'?" if hint else "",
             )
             return None
-        self.findings.problems += document.findings
+        self.problems.problems += document.problems
         return document
 
 

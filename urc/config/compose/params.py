@@ -24,7 +24,7 @@ _SAMPLES: Final[Mapping[str, Value]] = {
 
 
 def fill_params(
-    document: Document, given: Node | None, use: Node | None, findings: Problems
+    document: Document, given: Node | None, use: Node | None, problems: Problems
 ) -> Document:
     """Return a driver's document with its params filled in.
 
@@ -37,17 +37,17 @@ def fill_params(
     if "params" not in data:
         if given is not None:
             for inner in given.entries().values():
-                _report_unknown(inner, (), findings)
+                _report_unknown(inner, (), problems)
         return document
     if not fits("driver.schema.json#/$defs/params", data["params"]):
         return document  # the shape pass reports it
     part = Node(document, (), data).must("params")
-    values = _values(part, given, use, findings)
-    filler = _Filler(document, values, findings)
+    values = _values(part, given, use, problems)
+    filler = _Filler(document, values, problems)
     result = filler.document()
     for name, inner in part.entries().items():
         if name not in filler.used:
-            findings.warn(
+            problems.warn(
                 inner,
                 "unused-param",
                 f"nothing uses the param {name!r}",
@@ -58,29 +58,29 @@ def fill_params(
 
 
 def _values(
-    part: Node, given: Node | None, use: Node | None, findings: Problems
+    part: Node, given: Node | None, use: Node | None, problems: Problems
 ) -> dict[str, Value]:
     gifts = given.entries() if given is not None else {}
     for name, gift in gifts.items():
         if name not in part.data:
-            _report_unknown(gift, part.data, findings)
+            _report_unknown(gift, part.data, problems)
     values = {}
     for name, inner in part.entries().items():
         kind = inner.text("type", "string")
-        bounds = check_range(inner, kind, findings)
+        bounds = check_range(inner, kind, problems)
         choices = [choice.data for choice in inner.listed("choices")]
         default = inner.get("default")
         if default is not None:
-            _checked(default, kind, bounds, choices, findings)
+            _checked(default, kind, bounds, choices, problems)
         own = gifts.get(name)
         if own is not None:
-            values[name] = _checked(own, kind, bounds, choices, findings)
+            values[name] = _checked(own, kind, bounds, choices, problems)
         elif default is not None:
             values[name] = default.data
         else:
             values[name] = _sample(kind, bounds, choices)
             if use is not None:
-                findings.error(
+                problems.error(
                     use,
                     "missing-param",
                     f"this driver needs the param {name!r}",
@@ -90,8 +90,8 @@ def _values(
     return values
 
 
-def _report_unknown(gift: Node, known: Mapping[str, Any] | tuple[()], findings: Problems) -> None:
-    findings.error(
+def _report_unknown(gift: Node, known: Mapping[str, Any] | tuple[()], problems: Problems) -> None:
+    problems.error(
         gift,
         "unknown-param",
         f"the driver has no param {gift.name!r}",
@@ -105,18 +105,18 @@ def _checked(
     kind: str,
     bounds: tuple[float | None, float | None],
     choices: list[Value],
-    findings: Problems,
+    problems: Problems,
 ) -> Value:
     if any(type(part.data) is type(one) and part.data == one for one in choices):
         return part.data  # type: ignore[no-any-return]  # choices may have several types
     try:
         value = fit(part.data, kind)
     except ValueError as error:
-        findings.error(part, "wrong-type", str(error), hint=fit_hint(part.data, kind))
+        problems.error(part, "wrong-type", str(error), hint=fit_hint(part.data, kind))
         return _SAMPLES[kind]
-    check_within(value, *bounds, part, findings)
+    check_within(value, *bounds, part, problems)
     if choices and value not in choices:
-        findings.error(
+        problems.error(
             part,
             "unknown-word",
             f"{value!r} is not one of the choices",
@@ -141,11 +141,11 @@ def _sample(kind: str, bounds: tuple[float | None, float | None], choices: list[
 class _Filler:
     """A filler for the params of one document, which records their use."""
 
-    def __init__(self, document: Document, values: Mapping[str, Value], findings: Problems) -> None:
+    def __init__(self, document: Document, values: Mapping[str, Value], problems: Problems) -> None:
         self.used: set[str] = set()
         self._document = document
         self._values = values
-        self._findings = findings
+        self._problems = problems
 
     def document(self) -> Document:
         """Return the document with everything filled in."""
@@ -161,7 +161,7 @@ class _Filler:
                     names = {"params": _Watched(self._values, self.used)}
                     tree = fill(tree, (key,), names, budget, self)
                 except ExpansionTooLarge:
-                    self._findings.error(
+                    self._problems.error(
                         Node(document, (key,), item),
                         "too-large",
                         "this is too long after the params are filled in",
@@ -170,17 +170,17 @@ class _Filler:
             value[key], marks[key] = tree.value, tree.mark
         mark = document.mark.copy(marks)
         return Document(
-            document.file, document.text, document.lines, value, mark, document.findings
+            document.file, document.text, document.lines, value, mark, document.problems
         )
 
     def unquoted(self, path: Path, text: str) -> None:
         """Report a name in braces that YAML reads as a mapping."""
-        report_unquoted(Node(self._document, path, None), text, self._findings)
+        report_unquoted(Node(self._document, path, None), text, self._problems)
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
         """Report a param that the driver does not declare."""
         place: dict[str, Any] = {"offset": offset, "length": len(name) + len(word) + bool(word)}
-        self._findings.error(
+        self._problems.error(
             Node(self._document, path, None),
             "unknown-param",
             f"there is no param {word!r}" if word else "'params' has all params; name one of them",

@@ -38,7 +38,7 @@ _NUMBERS: Final = ("port", "integer", "number")
 
 
 def check_option(
-    part: Node, kind: str, template: Template, settings: Mapping[str, Setting], findings: Problems
+    part: Node, kind: str, template: Template, settings: Mapping[str, Setting], problems: Problems
 ) -> None:
     """Report a setting of the wrong type.
 
@@ -57,7 +57,7 @@ def check_option(
         wanted, hint = "a name or an address", "host"
     else:
         return
-    findings.error(
+    problems.error(
         part,
         "wrong-type",
         f"'{part.name}' is {wanted}, and the setting {found[1]!r} has the type {setting.type}",
@@ -76,10 +76,10 @@ class NameUses:
 
 
 class _Linker:
-    def __init__(self, driver: Driver, settings: Mapping[str, Setting], findings: Problems) -> None:
+    def __init__(self, driver: Driver, settings: Mapping[str, Setting], problems: Problems) -> None:
         self.driver = driver
         self.settings = settings
-        self.findings = findings
+        self.problems = problems
         self.uses = NameUses()
 
     def transport(self, part: Node, key: str, name: str) -> None:
@@ -89,9 +89,9 @@ class _Linker:
             return
         names = self.driver.transports
         if key in part.data:
-            self.findings.unknown(part, "unknown-transport", name, names, at=key)
+            self.problems.unknown(part, "unknown-transport", name, names, at=key)
         else:
-            self.findings.error(
+            self.problems.error(
                 part,
                 "missing-key",
                 f"'{key}' is missing, and there are {len(names)} transports",
@@ -122,7 +122,7 @@ class _Linker:
         if name in self.driver.signals:
             self.uses.signals.add(name)
         elif not name.startswith("_"):
-            self.findings.error(
+            self.problems.error(
                 part,
                 "unknown-signal",
                 f"{name!r} is not a signal",
@@ -137,7 +137,7 @@ class _Linker:
         ]
         for name, inner in part.named("fields").items():
             if name not in known:
-                self.findings.error(
+                self.problems.error(
                     inner,
                     "unknown-field",
                     f"{name!r} is not a field of this frame",
@@ -181,11 +181,11 @@ class _Linker:
         if any(name in signals and signals[name].states for name in template.names & allowed):
             from urc.config.link.states import check_words
 
-            check_words(self.findings, part, template, signals)
+            check_words(self.problems, part, template, signals)
         if "world" in template.names and "world" not in self.driver.signals:
             from urc.config.link.world import check_readings
 
-            check_readings(self.findings, part, template)
+            check_readings(self.problems, part, template)
         self.uses.settings |= template.settings
         for name in sorted(template.settings - self.settings.keys()):
             self._unknown(
@@ -232,39 +232,39 @@ class _Linker:
     ) -> None:
         found = re.search(pattern, template.source)
         offset = found.end() - len(name) if found else 0
-        self.findings.error(part, code, message, offset=offset, length=len(name), hint=hint)
+        self.problems.error(part, code, message, offset=offset, length=len(name), hint=hint)
 
 
 def link_driver(
-    part: Node, driver: Driver, settings: Mapping[str, Setting], findings: Problems
+    part: Node, driver: Driver, settings: Mapping[str, Setting], problems: Problems
 ) -> NameUses:
     """Check every name in the driver at `part`; return the names in use."""
-    linker = _Linker(driver, settings, findings)
+    linker = _Linker(driver, settings, problems)
     answered = {one.transport for one in driver.commands.values() if one.reply}
     answered |= {one.transport for one in driver.polls if one.reply}
     for name, inner in part.named("transports").items():
         link_refusals(linker, inner, driver.transports[name].faults)
         if name not in answered:
-            refuse(inner, ("errors",), "has no effect: this transport has no replies", findings)
+            refuse(inner, ("errors",), "has no effect: this transport has no replies", problems)
         for place, template in option_templates(inner, driver.transports[name]):
             linker.template(place, template)
-            check_option(place, driver.transports[name].type, template, settings, findings)
-    linker.uses.transports |= check_via(part.named("transports"), driver.transports, findings)
+            check_option(place, driver.transports[name].type, template, settings, problems)
+    linker.uses.transports |= check_via(part.named("transports"), driver.transports, problems)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
         link_poll(linker, inner, poll)
-    _check_poll_names(part, driver, findings)
-    link_signals(part, driver, linker.template, findings)
+    _check_poll_names(part, driver, problems)
+    link_signals(part, driver, linker.template, problems)
     for name, inner in part.named("commands").items():
         command = driver.commands[name]
         linker.transport(inner, "to", command.transport)
         known = (*command.arguments, *said_on(driver, command.transport))
         linker.templates(inner.must("send"), command.send, known)
-        _check_arguments_used(inner, command.send, findings)
+        _check_arguments_used(inner, command.send, problems)
         link_command(linker, inner, command)
     link_keepalives(linker, part)
     link_sequences(linker, part)
-    check_frames(part, driver, findings)
-    check_messages(part, driver, findings)
+    check_frames(part, driver, problems)
+    check_messages(part, driver, problems)
     for name, inner in part.named("messages").items():
         message = driver.messages[name]
         linker.transport(inner, "from", message.transport)
@@ -275,13 +275,13 @@ def link_driver(
     return linker.uses
 
 
-def _check_poll_names(part: Node, driver: Driver, findings: Problems) -> None:
+def _check_poll_names(part: Node, driver: Driver, problems: Problems) -> None:
     """Report a name of two polls, or of a poll and a command, which a test could not tell apart."""
     seen: set[str] = set(driver.commands)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
         if poll.name in seen:
             other = "a command" if poll.name in driver.commands else "another poll"
-            findings.error(
+            problems.error(
                 inner,
                 "duplicate-name",
                 f"{other} has the name {poll.name!r}, too",
@@ -291,10 +291,10 @@ def _check_poll_names(part: Node, driver: Driver, findings: Problems) -> None:
         seen.add(poll.name)
 
 
-def _check_arguments_used(part: Node, send: WriteSpec, findings: Problems) -> None:
+def _check_arguments_used(part: Node, send: WriteSpec, problems: Problems) -> None:
     for name, inner in part.named("args").items():
         if name not in send.names:
-            findings.warn(
+            problems.warn(
                 inner,
                 "unused-argument",
                 f"nothing sends the argument {name!r}",
@@ -308,14 +308,14 @@ def link_simulator(
     driver: Driver,
     simulated: SimulatorSpec,
     settings: Mapping[str, Setting],
-    findings: Problems,
+    problems: Problems,
 ) -> tuple[Mapping[str, Reading], WorldSpec | None]:
     """Check every name in the emulated robot; return its initial values and its world."""
     if not sources.simulator and not sources.rules:
         return NOTHING, None
     from urc.config.link.rules import link_rules, link_values
 
-    linker = _Linker(driver, settings, findings)
+    linker = _Linker(driver, settings, problems)
     parts, world = sources.simulator, simulated.world
     state = parts["state"].data if "state" in parts else ()
     if world is not None:
@@ -325,7 +325,7 @@ def link_simulator(
     for name, found in simulated.rules.items():
         part = sources.rules[name]
         if name not in driver.transports:
-            findings.unknown(part, "unknown-transport", name, driver.transports, key=True)
+            problems.unknown(part, "unknown-transport", name, driver.transports, key=True)
             continue
         link_rules(linker, part, found, state, world)
-    return link_values(parts, driver, findings), world
+    return link_values(parts, driver, problems), world

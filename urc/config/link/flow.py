@@ -30,7 +30,7 @@ class Linker(Protocol):
     """The parts of the link pass that flow needs."""
 
     driver: Driver
-    findings: Problems
+    problems: Problems
 
     def transport(self, part: Node, key: str, name: str) -> None:
         """Check the transport that `part` names under `key`, or omits."""
@@ -54,16 +54,16 @@ def link_command(linker: Linker, part: Node, command: Command) -> None:
     if command.reply is not None and "reply" in part.data:
         link_reply(linker, part.must("reply"), command.reply, command.arguments, command.send)
     link_requirements(linker, part, command)
-    link_moves(linker.findings, part, command)
+    link_moves(linker.problems, part, command)
     if command.verify is not None:
         linker.template(part.must("verify").must("expr"), command.verify.condition, known)
     if command.hold is not None:
         release = part.must("hold").get("release")
         if release is not None:
-            link_arguments(linker.findings, release, command, release.entries(), "release")
-        _link_slew(linker.findings, part.must("hold").named("slew"), command)
+            link_arguments(linker.problems, release, command, release.entries(), "release")
+        _link_slew(linker.problems, part.must("hold").named("slew"), command)
         if _needs_two(command):
-            linker.findings.error(
+            linker.problems.error(
                 part.must("hold"),
                 "wrong-command",
                 "a second person cannot confirm every new value of a held command",
@@ -72,10 +72,10 @@ def link_command(linker: Linker, part: Node, command: Command) -> None:
             )
 
 
-def _link_slew(findings: Problems, slew: Mapping[str, Node], command: Command) -> None:
+def _link_slew(problems: Problems, slew: Mapping[str, Node], command: Command) -> None:
     """Check that `slew` limits only numbers without choices."""
     for name, inner in slew.items():
-        argument = known_argument(name, inner, command, findings)
+        argument = known_argument(name, inner, command, problems)
         if argument is None:
             continue
         kind = argument.items if argument.type == "array" else argument.type
@@ -83,7 +83,7 @@ def _link_slew(findings: Problems, slew: Mapping[str, Node], command: Command) -
             what = "has choices" if argument.choices else f"is {kind}"
             text = f"argument {name!r} {what}, and has no values in between"
             hint = "limit arguments that are numbers without choices"
-            findings.error(inner, "wrong-type", text, key=True, hint=hint)
+            problems.error(inner, "wrong-type", text, key=True, hint=hint)
 
 
 def link_requirements(linker: Linker, part: Node, command: Command) -> None:
@@ -96,7 +96,7 @@ def link_requirements(linker: Linker, part: Node, command: Command) -> None:
 def refuse_two_person(linker: Linker, part: Node, command: Command) -> None:
     """Report a command that needs two people at a place where it runs automatically."""
     if _needs_two(command):
-        linker.findings.error(
+        linker.problems.error(
             part,
             "wrong-command",
             f"{command.name!r} needs two people, and it would run automatically here",
@@ -125,14 +125,14 @@ def link_poll(linker: Linker, part: Node, poll: Poll) -> None:
         return
     if command.steps or command.hold is not None or runs_what_moves(command, poll.arguments):
         what = "a sequence" if command.steps else "a motion"
-        linker.findings.error(
+        linker.problems.error(
             part.must("run"),
             "wrong-command",
             f"{poll.run!r} is {what}, and a poll must only read",
             hint="run a command that only reads",
         )
         return
-    link_arguments(linker.findings, part, command, part.named("args"), "run")
+    link_arguments(linker.problems, part, command, part.named("args"), "run")
     refuse_two_person(linker, part.must("run"), command)
 
 
@@ -159,7 +159,7 @@ def link_reply(
     shared = set.intersection(*(set(read.fields) - set(read.sets) for read in reads))
     linker.template(match, reply.match, {*shared, *arguments, "seq"})
     if "seq" in reply.match.names and COUNTERS not in send.names:
-        linker.findings.error(
+        linker.problems.error(
             match,
             "unknown-counter",
             "the request has no counter",
@@ -206,9 +206,9 @@ def link_keepalives(linker: Linker, part: Node) -> None:
             continue
         command = find_command(linker, place.must("run"), keepalive.run)
         if command is not None:
-            link_arguments(linker.findings, place, command, {}, "run")
+            link_arguments(linker.problems, place, command, {}, "run")
             refuse_two_person(linker, place.must("run"), command)
-            refuse_moving(linker.findings, place.must("run"), command, {})
+            refuse_moving(linker.problems, place.must("run"), command, {})
 
 
 def _link_counting(linker: Linker, part: Node, transport: str) -> None:
@@ -216,7 +216,7 @@ def _link_counting(linker: Linker, part: Node, transport: str) -> None:
     command = find_command(linker, part, str(part.data))
     if command is not None and (command.steps or command.transport != transport):
         what = "is a sequence" if command.steps else f"goes to {command.transport!r}"
-        linker.findings.error(
+        linker.problems.error(
             part,
             "wrong-command",
             f"{command.name!r} {what}, so it cannot keep {transport!r} alive",
@@ -228,21 +228,21 @@ def find_command(linker: Linker, part: Node, name: str) -> Command | None:
     """Return the command or sequence that `part` names, or report its absence."""
     command = linker.driver.commands.get(name)
     if command is None:
-        linker.findings.unknown(part, "unknown-command", name, linker.driver.commands)
+        linker.problems.unknown(part, "unknown-command", name, linker.driver.commands)
     return command
 
 
 def link_arguments(
-    findings: Problems, part: Node, command: Command, given: Mapping[str, Node], at: str
+    problems: Problems, part: Node, command: Command, given: Mapping[str, Node], at: str
 ) -> None:
     """Check plain values for the arguments of `command`.
 
     A missing argument is reported at the key `at` of `part`.
     """
     for name, inner in given.items():
-        argument = known_argument(name, inner, command, findings)
+        argument = known_argument(name, inner, command, problems)
         if argument is not None and not (isinstance(inner.data, str) and "{{" in inner.data):
-            check_value(inner, argument, findings)  # a template has its value only at runtime
+            check_value(inner, argument, problems)  # a template has its value only at runtime
     missing = [
         name
         for name, one in command.arguments.items()
@@ -250,7 +250,7 @@ def link_arguments(
     ]
     if missing:
         where = {"at": at} if isinstance(part.data, dict) and at in part.data else {"key": True}
-        findings.error(
+        problems.error(
             part,
             "missing-argument",
             f"command {command.name!r} needs {missing[0]!r}",
@@ -259,21 +259,21 @@ def link_arguments(
         )
 
 
-def check_value(part: Node, argument: Argument, findings: Problems) -> None:
+def check_value(part: Node, argument: Argument, problems: Problems) -> None:
     """Check a plain value at `part` for an argument."""
     value = part.data
     try:
         elements = fit_argument(value, argument.type, argument.items, argument.size)
     except ValueError as error:
         text = f"argument {argument.name!r}: {error}"
-        findings.error(part, "wrong-type", text, hint=fit_hint(value, argument.type))
+        problems.error(part, "wrong-type", text, hint=fit_hint(value, argument.type))
         return
     for one in elements:
-        check_within(one, argument.min, argument.max, part, findings)
+        check_within(one, argument.min, argument.max, part, problems)
         if argument.choices and one not in argument.choices:
             text = f"{one!r} is not one of the choices of {argument.name!r}"
             hint = did_you_mean(str(one), map(str, argument.choices), "choices")
-            findings.error(part, "unknown-word", text, hint=hint)
+            problems.error(part, "unknown-word", text, hint=hint)
 
 
 def _refusal_parts(part: Node) -> list[Node]:

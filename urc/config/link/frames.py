@@ -16,29 +16,29 @@ from urc.model.payload import WriteSpec, each_of
 __all__ = ["check_frames"]
 
 
-def check_frames(part: Node, driver: Driver, findings: Problems) -> None:
+def check_frames(part: Node, driver: Driver, problems: Problems) -> None:
     """Report constant texts under ``send:`` that would become two frames, or none."""
     for name, inner in part.named("commands").items():
         command = driver.commands.get(name)
         if command is not None:
-            _check(inner, command.send, driver.transports.get(command.transport), findings)
+            _check(inner, command.send, driver.transports.get(command.transport), problems)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
-        _check(inner, poll.send, driver.transports.get(poll.transport), findings)
+        _check(inner, poll.send, driver.transports.get(poll.transport), problems)
 
 
-def _check(part: Node, send: WriteSpec, spec: TransportSpec | None, findings: Problems) -> None:
+def _check(part: Node, send: WriteSpec, spec: TransportSpec | None, problems: Problems) -> None:
     written = part.get("send")
     if spec is None or written is None:
         return
     places = written.items() if send.form == "frames" else [written]
     for place, one in zip(places, each_of(send), strict=True):
-        _check_one(place, one, spec, findings)
+        _check_one(place, one, spec, problems)
 
 
-def _check_one(part: Node, send: WriteSpec, spec: TransportSpec, findings: Problems) -> None:
+def _check_one(part: Node, send: WriteSpec, spec: TransportSpec, problems: Problems) -> None:
     inner, form = write_form(part)
     if send.form == "text":
-        _check_end(inner, findings)
+        _check_end(inner, problems)
         data = _text(form.templates(inner, send), spec.encoding)
     else:
         data = _bytes(send)
@@ -48,7 +48,7 @@ def _check_one(part: Node, send: WriteSpec, spec: TransportSpec, findings: Probl
     layout = cast("FrameLayout | None", framing.options.get("layout")) or FrameLayout()
     for mark in _marks(framing, layout):
         if mark and mark in data:
-            findings.error(
+            problems.error(
                 inner,
                 "contains-delimiter",
                 f"{_what(send)} {_shown(mark)} inside, which the framing adds to each frame:"
@@ -58,7 +58,7 @@ def _check_one(part: Node, send: WriteSpec, spec: TransportSpec, findings: Probl
             return
     wanted = None if layout.size is None else layout.size - layout.head - layout.tail
     if wanted is not None and wanted != len(data):
-        findings.error(
+        problems.error(
             inner,
             "wrong-size",
             f"{_what(send)} {len(data)} bytes, and a frame of this transport has exactly {wanted}",
@@ -87,10 +87,10 @@ def _what(send: WriteSpec) -> str:
     return "the text has" if send.form == "text" else "the frame has"
 
 
-def _check_end(part: Node, findings: Problems) -> None:
+def _check_end(part: Node, problems: Problems) -> None:
     """Warn of a text that ends with a backslash and a letter, as if it were a line end."""
     if isinstance(part.data, str) and part.data.endswith(("\\n", "\\r")):
-        findings.warn(
+        problems.warn(
             part,
             "literal-backslash",
             f"this ends with the 2 characters {part.data[-2:]}, not with a control character",

@@ -23,14 +23,14 @@ _T = TypeVar("_T")
 
 
 def link_slots(
-    sources: Sources, driver: Driver, registry: WidgetFolder, findings: Problems
+    sources: Sources, driver: Driver, registry: WidgetFolder, problems: Problems
 ) -> dict[str, WidgetUse]:
     """Return the widget of each slot, before the changes of an interface."""
     slots: dict[str, WidgetUse] = {}
     for slot, parts in sources.slots.items():
         use: WidgetUse | None = None
         for part in parts:
-            use = _use(part, use, driver, registry, findings) or use
+            use = _use(part, use, driver, registry, problems) or use
         if use is not None:
             slots[slot] = use
     return slots
@@ -42,7 +42,7 @@ def link_interface(
     slots: Mapping[str, WidgetUse],
     driver: Driver | None,
     registry: WidgetFolder,
-    findings: Problems,
+    problems: Problems,
 ) -> Interface:
     """Return the interface with its own changes to the slots.
 
@@ -52,27 +52,27 @@ def link_interface(
     uses = {}
     for slot, inner in part.named("widgets").items():
         if slot not in shown:
-            findings.warn(
+            problems.warn(
                 inner,
                 "slot-not-shown",
                 f"no grid of this interface has a slot {slot!r}",
                 key=True,
                 hint=did_you_mean(slot, shown, "slots"),
             )
-        use = _use(inner, slots.get(slot), driver, registry, findings)
+        use = _use(inner, slots.get(slot), driver, registry, problems)
         if use is not None:
             uses[slot] = use
     if interface.background and driver is not None:
-        _check_background(part, interface, {**slots, **uses}, findings)
+        _check_background(part, interface, {**slots, **uses}, problems)
     return interface._replace(widgets=uses)
 
 
 def _check_background(
-    part: Node, interface: Interface, slots: Mapping[str, WidgetUse], findings: Problems
+    part: Node, interface: Interface, slots: Mapping[str, WidgetUse], problems: Problems
 ) -> None:
     name = interface.background
     if name not in slots:
-        findings.warn(
+        problems.warn(
             part,
             "slot-not-filled",
             f"no widget fills the background {name!r}",
@@ -86,13 +86,13 @@ def _use(
     base: WidgetUse | None,
     driver: Driver | None,
     registry: WidgetFolder,
-    findings: Problems,
+    problems: Problems,
 ) -> WidgetUse | None:
     """Return the slot `base` with the changes at `part`; None when they were reported."""
     name = part.text("use", base.widget if base else "")
     if not name:
         if driver is not None:
-            findings.error(
+            problems.error(
                 part,
                 "missing-key",
                 f"'use' is missing: no widget fills {part.name!r}",
@@ -103,7 +103,7 @@ def _use(
     widget = registry.get(name)
     if widget is None:
         if not registry.has(name):
-            findings.error(
+            problems.error(
                 part,
                 "unknown-widget",
                 f"there is no widget {name!r}",
@@ -111,8 +111,8 @@ def _use(
                 hint=registry.hint(name),
             )
         return None  # a broken manifest is reported in its own file
-    bound = _bindings(part, widget, base, driver, findings)
-    options, files, pages = _options(part, widget, base, findings)
+    bound = _bindings(part, widget, base, driver, problems)
+    options, files, pages = _options(part, widget, base, problems)
     use = WidgetUse(
         slot=part.name,
         widget=name,
@@ -126,7 +126,7 @@ def _use(
         pages=pages,
     )
     if driver is not None:
-        link_together(part, use, widget, driver, findings)
+        link_together(part, use, widget, driver, problems)
     return use
 
 
@@ -140,7 +140,7 @@ class _Bound(NamedTuple):
 
 
 def _bindings(
-    part: Node, widget: Widget, base: WidgetUse | None, driver: Driver | None, findings: Problems
+    part: Node, widget: Widget, base: WidgetUse | None, driver: Driver | None, problems: Problems
 ) -> _Bound:
     old = base or WidgetUse("", "")
     outputs = _kept(old.outputs, widget.outputs)
@@ -155,9 +155,9 @@ def _bindings(
     )
     for key, inner in part.named("bind").items():
         if key in widget.inputs:
-            _bind_input(inner, widget, bound, driver, findings)
+            _bind_input(inner, widget, bound, driver, problems)
         elif key not in widget.outputs:
-            findings.error(
+            problems.error(
                 inner,
                 "unknown-input",
                 f"widget {widget.name!r} has no input {key!r}",
@@ -165,7 +165,7 @@ def _bindings(
                 hint=did_you_mean(key, (*widget.inputs, *widget.outputs), "inputs"),
             )
         elif isinstance(inner.data, list):
-            findings.error(
+            problems.error(
                 inner,
                 "wrong-type",
                 f"{key!r} is an output, so it needs the name of a command",
@@ -173,26 +173,26 @@ def _bindings(
             )
         else:
             port = widget.outputs[key]
-            outputs[key], given[key] = link_output(inner, port, widget, driver, findings)
+            outputs[key], given[key] = link_output(inner, port, widget, driver, problems)
     if driver is not None:
-        _check_required(part, widget, {**bound.inputs, **bound.lists, **outputs}, driver, findings)
+        _check_required(part, widget, {**bound.inputs, **bound.lists, **outputs}, driver, problems)
     return bound
 
 
 def _bind_input(
-    part: Node, widget: Widget, bound: _Bound, driver: Driver | None, findings: Problems
+    part: Node, widget: Widget, bound: _Bound, driver: Driver | None, problems: Problems
 ) -> None:
     """Add the signal, or the signals, of one input."""
     port = widget.inputs[part.name]
     if isinstance(part.data, dict):
-        findings.error(
+        problems.error(
             part,
             "wrong-type",
             f"{port.name!r} is an input, so it needs the name of a signal",
             hint="only outputs take a command with its arguments",
         )
     elif isinstance(part.data, list) and not port.is_multiple:
-        findings.error(
+        problems.error(
             part,
             "wrong-type",
             f"{port.name!r} of widget {widget.name!r} takes one signal, not a list",
@@ -202,20 +202,20 @@ def _bind_input(
         bound.lists[port.name] = tuple(inner.data for inner in each)
         if driver is not None:
             for inner in each:
-                _check_signal(inner, widget, port, driver, findings)
+                _check_signal(inner, widget, port, driver, problems)
     else:
         bound.inputs[port.name] = part.data
         if driver is not None:
-            _check_signal(part, widget, port, driver, findings)
+            _check_signal(part, widget, port, driver, problems)
 
 
 def _check_required(
-    part: Node, widget: Widget, bound: Mapping[str, object], driver: Driver, findings: Problems
+    part: Node, widget: Widget, bound: Mapping[str, object], driver: Driver, problems: Problems
 ) -> None:
     tried = part.named("bind")  # their problems are already reported
     for port in (*widget.inputs.values(), *widget.outputs.values()):
         if port.is_required and port.name not in bound and port.name not in tried:
-            findings.error(
+            problems.error(
                 part,
                 "unbound-input",
                 f"{port.name!r} of widget {widget.name!r} is not bound",
@@ -245,16 +245,16 @@ def _output_hint(port: WidgetPort, driver: Driver) -> str:
 
 
 def _check_signal(
-    part: Node, widget: Widget, port: WidgetPort, driver: Driver, findings: Problems
+    part: Node, widget: Widget, port: WidgetPort, driver: Driver, problems: Problems
 ) -> None:
     signal = driver.signals.get(part.data)
     if signal is None:
-        findings.unknown(part, "unknown-signal", part.data, driver.signals)
+        problems.unknown(part, "unknown-signal", part.data, driver.signals)
         return
     wrong = misfit(port, signal)
     if wrong:
         code = "wrong-unit" if wrong.startswith("unit") else "wrong-type"
-        findings.error(
+        problems.error(
             part,
             code,
             f"signal {signal.name!r} does not fit {port.name!r} of widget {widget.name!r}: {wrong}",
@@ -283,7 +283,7 @@ def misfit(port: WidgetPort, signal: Signal) -> str:
 
 
 def _options(
-    part: Node, widget: Widget, base: WidgetUse | None, findings: Problems
+    part: Node, widget: Widget, base: WidgetUse | None, problems: Problems
 ) -> tuple[dict[str, object], dict[str, str], dict[str, tuple[str, ...]]]:
     """Return the options with the manifest's defaults, and the files and pages in them."""
     options: dict[str, object] = {
@@ -299,10 +299,10 @@ def _options(
         pages |= base.pages
     given = part.get("options")
     if given is not None:
-        problems = check_options(given.document, given.path, given.data, widget.options)
-        findings.problems += problems
+        wrong = check_options(given.document, given.path, given.data, widget.options)
+        problems.problems += wrong
         options |= given.data
-        if not problems:
-            files |= link_files(given, widget, findings)
-            pages |= link_pages(given, widget, findings)
+        if not wrong:
+            files |= link_files(given, widget, problems)
+            pages |= link_pages(given, widget, problems)
     return options, files, pages

@@ -14,37 +14,37 @@ _VERBS = {verb for one in MESSAGING.values() for verb in one.verbs}
 _ANSWERED = ("call", "goal", "request")
 
 
-def check_messages(part: Node, driver: Driver, findings: Problems) -> None:
+def check_messages(part: Node, driver: Driver, problems: Problems) -> None:
     """Report messages that a transport cannot carry, and messages without a source."""
     for name, inner in part.named("messages").items():
         spec = driver.transports.get(driver.messages[name].transport)
-        _check_read(inner, spec, findings, wants_topic=True)
-        _check_answer(inner.get("acknowledge"), spec, findings)
+        _check_read(inner, spec, problems, wants_topic=True)
+        _check_answer(inner.get("acknowledge"), spec, problems)
     for place, inner in _requests(part):
         spec = driver.transports.get(_target(place, driver))
-        verb = _check_send(inner.get("send"), spec, findings)
+        verb = _check_send(inner.get("send"), spec, problems)
         reply = inner.get("reply")
         if reply is not None:
-            _check_read(reply, spec, findings, wants_topic=verb not in _ANSWERED)
+            _check_read(reply, spec, problems, wants_topic=verb not in _ANSWERED)
     for name, inner in part.named("transports").items():
         keepalive, spec = inner.get("keepalive"), driver.transports.get(name)
         if keepalive is not None:
-            _check_send(keepalive.get("send"), spec, findings)
+            _check_send(keepalive.get("send"), spec, problems)
         for key in ("on_connect", "on_close"):
             is_asked = False  # the step before makes a request with a reply
             for step in inner.listed(key):
-                _check_step(step, spec, findings, wants_topic=not is_asked)
+                _check_step(step, spec, problems, wants_topic=not is_asked)
                 send = step.get("send")
                 if send is not None:
                     data = send.data
                     is_asked = isinstance(data, dict) and not data.keys().isdisjoint(_ANSWERED)
 
 
-def _check_answer(part: Node | None, spec: TransportSpec | None, findings: Problems) -> None:
+def _check_answer(part: Node | None, spec: TransportSpec | None, problems: Problems) -> None:
     """Report a reply whose form expects a reply itself."""
-    verb = _check_send(part, spec, findings)
+    verb = _check_send(part, spec, problems)
     if part is not None and verb in _ANSWERED:
-        findings.error(
+        problems.error(
             part,
             "wrong-form",
             f"a reply cannot be a {verb!r}, which expects a reply itself",
@@ -69,15 +69,15 @@ def _target(place: tuple[str, int | str], driver: Driver) -> str:
 
 
 def _check_step(
-    part: Node, spec: TransportSpec | None, findings: Problems, *, wants_topic: bool
+    part: Node, spec: TransportSpec | None, problems: Problems, *, wants_topic: bool
 ) -> None:
-    _check_send(part.get("send"), spec, findings)
+    _check_send(part.get("send"), spec, problems)
     expect = part.get("expect")
     if expect is not None and isinstance(expect.data, dict):
-        _check_read(expect, spec, findings, wants_topic=wants_topic)
+        _check_read(expect, spec, problems, wants_topic=wants_topic)
 
 
-def _check_send(part: Node | None, spec: TransportSpec | None, findings: Problems) -> str:
+def _check_send(part: Node | None, spec: TransportSpec | None, problems: Problems) -> str:
     """Report a form that the transport cannot carry; return the form's key."""
     if part is None or spec is None:
         return ""
@@ -86,14 +86,14 @@ def _check_send(part: Node | None, spec: TransportSpec | None, findings: Problem
     kind = MESSAGING.get(spec.type)
     if kind is not None and form not in kind.verbs:
         verbs = ", ".join(kind.verbs)
-        findings.error(
+        problems.error(
             part,
             "wrong-form",
             f"{spec.type} carries messages, and {form or 'text'} has no address",
             hint=f"on {spec.type} use: {verbs}; put the text inside, as text: …",
         )
     elif kind is None and form in _VERBS and spec.type not in MESSAGING:
-        findings.error(
+        problems.error(
             part,
             "wrong-form",
             f"{spec.type} carries bytes and has no {form!r}",
@@ -102,15 +102,15 @@ def _check_send(part: Node | None, spec: TransportSpec | None, findings: Problem
             hint="write text, or one of the forms hex, bytes, struct and json",
         )
     elif form and spec.type == "ros":
-        _check_ros(part.must(form), findings)
+        _check_ros(part.must(form), problems)
     return form
 
 
-def _check_ros(part: Node, findings: Problems) -> None:
+def _check_ros(part: Node, problems: Problems) -> None:
     """Report messages that a ROS bridge cannot pass on: it carries JSON, and needs the type."""
     for key in ("text", "hex", "bytes", "struct"):
         if key in part.data:
-            findings.error(
+            problems.error(
                 part,
                 "wrong-form",
                 f"ros carries JSON and has no {key!r}",
@@ -119,7 +119,7 @@ def _check_ros(part: Node, findings: Problems) -> None:
                 hint="write the message's fields: json: { data: … }",
             )
     if part.name == "publish" and "type" not in part.data:
-        findings.error(
+        problems.error(
             part,
             "missing-key",
             "'type' is missing, and the topic may not be advertised yet",
@@ -129,16 +129,16 @@ def _check_ros(part: Node, findings: Problems) -> None:
 
 
 def _check_read(
-    part: Node, spec: TransportSpec | None, findings: Problems, *, wants_topic: bool
+    part: Node, spec: TransportSpec | None, problems: Problems, *, wants_topic: bool
 ) -> None:
     if spec is None:
         return
     subscribe, kind = part.get("subscribe"), MESSAGING.get(spec.type)
     for inner in _answers(part):
-        _check_head(inner, spec, findings)
+        _check_head(inner, spec, problems)
     if kind is None:
         if subscribe is not None:
-            findings.error(
+            problems.error(
                 part,
                 "misplaced-key",
                 f"{spec.type} has no topics to subscribe to",
@@ -149,7 +149,7 @@ def _check_read(
         return
     if subscribe is None:
         if wants_topic and "stages" not in part.data:
-            findings.error(
+            problems.error(
                 part,
                 "missing-key",
                 f"'subscribe' is missing: a message on {spec.type} needs a topic",
@@ -160,7 +160,7 @@ def _check_read(
     for name, inner in subscribe.entries().items():
         if name != "topic" and name not in kind.listen:
             known = ", ".join(("topic", *kind.listen))
-            findings.error(
+            problems.error(
                 inner,
                 "misplaced-key",
                 f"{name!r} has no effect on {spec.type}",
@@ -177,10 +177,10 @@ def _answers(part: Node) -> list[Node]:
     return [part, *stages, *(inner for inner in refusals if isinstance(inner.data, dict))]
 
 
-def _check_head(part: Node, spec: TransportSpec, findings: Problems) -> None:
+def _check_head(part: Node, spec: TransportSpec, problems: Problems) -> None:
     """Report headers on a transport whose replies have none."""
     if "head" in part.data and spec.type != "http" and spec.type in (*MESSAGING, *BYTE_LINES):
-        findings.error(
+        problems.error(
             part,
             "misplaced-key",
             f"replies over {spec.type} have no headers and no status",
@@ -191,7 +191,7 @@ def _check_head(part: Node, spec: TransportSpec, findings: Problems) -> None:
 
 
 def check_via(
-    parts: Mapping[str, Node], transports: Mapping[str, TransportSpec], findings: Problems
+    parts: Mapping[str, Node], transports: Mapping[str, TransportSpec], problems: Problems
 ) -> set[str]:
     """Report each `tunnel` that cannot carry its transport; return all tunnels."""
     carriers: set[str] = set()
@@ -203,14 +203,14 @@ def check_via(
         if carrier is None:
             hint = did_you_mean(spec.tunnel, transports, "transports")
             text = f"there is no transport {spec.tunnel!r}"
-            findings.error(part, "unknown-transport", text, at="tunnel", hint=hint)
+            problems.error(part, "unknown-transport", text, at="tunnel", hint=hint)
         elif carrier.type not in CARRIERS:
             text = f"{spec.tunnel!r} has the type {carrier.type}, which cannot be a tunnel"
             hint = f"possible types: {', '.join(sorted(CARRIERS))}"
-            findings.error(part, "wrong-form", text, at="tunnel", hint=hint)
+            problems.error(part, "wrong-form", text, at="tunnel", hint=hint)
         elif _is_circular(name, transports):
             text = f"{name!r} is a tunnel through itself"
-            findings.error(part, "wrong-form", text, at="tunnel", hint="break the circle")
+            problems.error(part, "wrong-form", text, at="tunnel", hint="break the circle")
         else:
             carriers.add(spec.tunnel)
     return carriers

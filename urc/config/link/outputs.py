@@ -25,7 +25,7 @@ _GIVERS: Final = {
 
 
 def link_output(
-    part: Node, port: WidgetPort, widget: Widget, driver: Driver | None, findings: Problems
+    part: Node, port: WidgetPort, widget: Widget, driver: Driver | None, problems: Problems
 ) -> tuple[str, OutputBinding]:
     """Return the command that an output is bound to, and the arguments for its values.
 
@@ -34,27 +34,27 @@ def link_output(
     """
     is_short = isinstance(part.data, str)
     name = part.data if is_short else part.text("command")
-    given = OutputBinding() if is_short else _given(part, port, widget, findings)
+    given = OutputBinding() if is_short else _given(part, port, widget, problems)
     if driver is None:
         return name, given
     command = driver.commands.get(name)
     if command is None:
-        findings.unknown(
+        problems.unknown(
             part, "unknown-command", name, driver.commands, at="" if is_short else "command"
         )
         return name, given
-    is_right = _check_hold(part, port, widget, command, findings)
-    is_right &= is_short or _check_targets(part, command, findings)
+    is_right = _check_hold(part, port, widget, command, problems)
+    is_right &= is_short or _check_targets(part, command, problems)
     if is_right:
-        _check_values(part, port, widget, command, given, findings)
+        _check_values(part, port, widget, command, given, problems)
     return name, given
 
 
-def _given(part: Node, port: WidgetPort, widget: Widget, findings: Problems) -> OutputBinding:
+def _given(part: Node, port: WidgetPort, widget: Widget, problems: Problems) -> OutputBinding:
     names: dict[str, str] = {}
     for source, inner in part.named("args").items():
         if source not in port.arguments:
-            findings.error(
+            problems.error(
                 inner,
                 "unknown-argument",
                 f"output {port.name!r} of widget {widget.name!r} gives no value {source!r}",
@@ -62,7 +62,7 @@ def _given(part: Node, port: WidgetPort, widget: Widget, findings: Problems) -> 
                 hint=f"it gives: {listed(port.arguments)}" if port.arguments else "",
             )
         elif inner.data in names:
-            findings.error(
+            problems.error(
                 inner,
                 "given-twice",
                 f"{source!r} goes to {inner.data!r}, which already takes {names[inner.data]!r}",
@@ -72,7 +72,7 @@ def _given(part: Node, port: WidgetPort, widget: Widget, findings: Problems) -> 
     fixed = part.named("set")
     for name, inner in fixed.items():
         if name in names:
-            findings.error(
+            problems.error(
                 inner,
                 "given-twice",
                 f"{name!r} is set here, and {names[name]!r} of {port.name!r} sets it too",
@@ -83,11 +83,11 @@ def _given(part: Node, port: WidgetPort, widget: Widget, findings: Problems) -> 
 
 
 def _check_hold(
-    part: Node, port: WidgetPort, widget: Widget, command: Command, findings: Problems
+    part: Node, port: WidgetPort, widget: Widget, command: Command, problems: Problems
 ) -> bool:
     """Return whether a hold-to-run output has a held command."""
     if port.is_held and command.hold is None:
-        findings.error(
+        problems.error(
             part,
             "not-held",
             f"{port.name!r} of widget {widget.name!r} is a hold-to-run control, and command"
@@ -95,7 +95,7 @@ def _check_hold(
             hint="give the command 'hold: { repeat: 50ms, release: … }'",
         )
     elif command.hold is not None and not port.is_held:
-        findings.warn(
+        problems.warn(
             part,
             "not-held",
             f"command {command.name!r} is a held command, and {port.name!r} of widget"
@@ -105,17 +105,17 @@ def _check_hold(
     return port.is_held is (command.hold is not None)
 
 
-def _check_targets(part: Node, command: Command, findings: Problems) -> bool:
+def _check_targets(part: Node, command: Command, problems: Problems) -> bool:
     """Check the named arguments and their constants; return whether all of them exist."""
     is_known = True
     for inner in part.named("args").values():
-        is_known &= known_argument(inner.data, inner, command, findings, key=False) is not None
+        is_known &= known_argument(inner.data, inner, command, problems, key=False) is not None
     for name, inner in part.named("set").items():
-        argument = known_argument(name, inner, command, findings)
+        argument = known_argument(name, inner, command, problems)
         if argument is None:
             is_known = False
         else:
-            check_value(inner, argument, findings)
+            check_value(inner, argument, problems)
     return is_known
 
 
@@ -125,7 +125,7 @@ def _check_values(
     widget: Widget,
     command: Command,
     given: OutputBinding,
-    findings: Problems,
+    problems: Problems,
 ) -> None:
     """Report required arguments without a value, and values that do not fit their argument."""
     if port.types and not port.arguments:
@@ -137,7 +137,7 @@ def _check_values(
         if one.is_required and name not in taken and name not in given.fixed
     ]
     if missing:
-        findings.error(
+        problems.error(
             part,
             "missing-argument",
             f"{port.name!r} of widget {widget.name!r} does not give all that {command.name!r}"
@@ -145,11 +145,11 @@ def _check_values(
             hint=_remedy(command, port, taken, missing),
         )
     elif port.arguments and not taken:
-        _check_nothing(part, port, widget, command, given, findings)
+        _check_nothing(part, port, widget, command, given, problems)
     for target, source in taken.items():
         wrong = _misfit(port, command.arguments[target])
         if wrong and source in port.arguments:
-            findings.error(
+            problems.error(
                 _place(part, source),
                 "wrong-unit" if wrong.startswith("unit") else "wrong-type",
                 f"{source!r} of widget {widget.name!r} does not fit argument {target!r} of command"
@@ -192,7 +192,7 @@ def _check_nothing(
     widget: Widget,
     command: Command,
     given: OutputBinding,
-    findings: Problems,
+    problems: Problems,
 ) -> None:
     """Report an output whose values all have no effect."""
     what = f"{port.name!r} of widget {widget.name!r} gives {listed(port.arguments)}"
@@ -205,9 +205,9 @@ def _check_nothing(
         plain = "hold-button" if port.is_held else "button"
         hint = f"use a widget without values: {plain}"
     if not port.is_held or _stands_still(command, given):
-        findings.error(part, "nothing-given", f"{what}, {where}", hint=hint)
+        problems.error(part, "nothing-given", f"{what}, {where}", hint=hint)
     elif len(port.arguments) > 1:
-        findings.warn(part, "nothing-given", f"{what}, {where}", hint=hint)
+        problems.warn(part, "nothing-given", f"{what}, {where}", hint=hint)
 
 
 def _stands_still(command: Command, given: OutputBinding) -> bool:

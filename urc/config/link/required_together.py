@@ -21,24 +21,24 @@ _LOCAL: Final = re.compile(r"/(?![/\\])")
 
 
 def link_together(
-    part: Node, use: WidgetUse, widget: Widget, driver: Driver, findings: Problems
+    part: Node, use: WidgetUse, widget: Widget, driver: Driver, problems: Problems
 ) -> None:
     """Check bindings and options that depend on each other.
 
     `part` is the slot in this document, with some keys of `use`, the complete slot.
     """
     bound = {**use.inputs, **use.lists, **use.outputs}
-    _check_needs(part, use, widget, bound, findings)
-    _check_groups(part, widget, bound, findings)
-    _check_instead(part, widget, bound, findings)
-    _check_units(part, use, widget, driver, findings)
-    _check_order(part, use, widget, findings)
-    _check_local(part, widget, findings)
-    _check_given(part, use, widget, driver, findings)
+    _check_needs(part, use, widget, bound, problems)
+    _check_groups(part, widget, bound, problems)
+    _check_instead(part, widget, bound, problems)
+    _check_units(part, use, widget, driver, problems)
+    _check_order(part, use, widget, problems)
+    _check_local(part, widget, problems)
+    _check_given(part, use, widget, driver, problems)
 
 
 def _check_needs(
-    part: Node, use: WidgetUse, widget: Widget, bound: Mapping[str, object], findings: Problems
+    part: Node, use: WidgetUse, widget: Widget, bound: Mapping[str, object], problems: Problems
 ) -> None:
     tried = part.named("bind")  # their problems are already reported
     given = {name for name, value in use.options.items() if value not in ("", None)}
@@ -47,7 +47,7 @@ def _check_needs(
         ports = [name for name in widget.at_least_one_of if name not in widget.options]
         ways = [f"bind {_one_of(ports)}"] if ports else []
         ways += [f"give the option {_one_of(options)}"] if options else []
-        findings.error(
+        problems.error(
             part,
             "unbound-input",
             f"widget {widget.name!r} has no bindings, so it would be empty",
@@ -61,7 +61,7 @@ def _one_of(names: list[str]) -> str:
 
 
 def _check_groups(
-    part: Node, widget: Widget, bound: Mapping[str, object], findings: Problems
+    part: Node, widget: Widget, bound: Mapping[str, object], problems: Problems
 ) -> None:
     tried = part.named("bind")
     for group in widget.required_together:
@@ -69,7 +69,7 @@ def _check_groups(
         missing = [name for name in group if name not in there]
         mine = [name for name in there if name in tried]
         if mine and missing:
-            findings.error(
+            problems.error(
                 tried[mine[0]],
                 "half-bound",
                 f"{mine[0]!r} of widget {widget.name!r} needs {listed(missing)}",
@@ -79,7 +79,7 @@ def _check_groups(
 
 
 def _check_instead(
-    part: Node, widget: Widget, bound: Mapping[str, object], findings: Problems
+    part: Node, widget: Widget, bound: Mapping[str, object], problems: Problems
 ) -> None:
     """Warn of a binding in this document that another binding of the slot overrides.
 
@@ -89,7 +89,7 @@ def _check_instead(
     for port in widget.inputs.values():
         lost = [inner for name, inner in said if port.name in bound and name in port.replaces]
         for inner in lost:
-            findings.warn(
+            problems.warn(
                 inner,
                 "unused-binding",
                 f"{inner.name!r} of widget {widget.name!r} has no effect with {port.name!r}",
@@ -102,7 +102,7 @@ def _check_instead(
 
 
 def _check_units(
-    part: Node, use: WidgetUse, widget: Widget, driver: Driver, findings: Problems
+    part: Node, use: WidgetUse, widget: Widget, driver: Driver, problems: Problems
 ) -> None:
     """Report two bindings with different units where the widget compares them."""
     mine = part.named("bind")
@@ -114,7 +114,7 @@ def _check_units(
         wanted = next(_units(use, other, driver), ("", ""))
         for what, unit in _units(use, port, driver):
             if are_apart(unit, wanted[1]):
-                findings.error(
+                problems.error(
                     place,
                     "wrong-unit",
                     f"{port.name!r} and {other.name!r} of widget {widget.name!r} need the same"
@@ -147,7 +147,7 @@ def _arguments(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[Arg
 # ---- options
 
 
-def _check_order(part: Node, use: WidgetUse, widget: Widget, findings: Problems) -> None:
+def _check_order(part: Node, use: WidgetUse, widget: Widget, problems: Problems) -> None:
     """Report an option that is not below the option that limits it."""
     own = part.named("options")
     for name, schema in widget.options.items():
@@ -156,7 +156,7 @@ def _check_order(part: Node, use: WidgetUse, widget: Widget, findings: Problems)
             continue
         low, high = use.options.get(name), use.options.get(above)
         if isinstance(low, (int, float)) and isinstance(high, (int, float)) and low >= high:
-            findings.error(
+            problems.error(
                 own.get(name) or own[above],
                 "wrong-order",
                 f"option {name!r} is {low:g}, and must be below {above!r}, {high:g}",
@@ -164,12 +164,12 @@ def _check_order(part: Node, use: WidgetUse, widget: Widget, findings: Problems)
             )
 
 
-def _check_local(part: Node, widget: Widget, findings: Problems) -> None:
+def _check_local(part: Node, widget: Widget, problems: Problems) -> None:
     """Report an address on another server."""
     options = part.get("options")
     for name, inner in named_texts(options, widget.options, "same_origin") if options else ():
         if inner.data and not _LOCAL.match(inner.data):
-            findings.error(
+            problems.error(
                 inner,
                 "not-local",
                 f"option {name!r} must be an address on this dashboard's server,"
@@ -179,7 +179,7 @@ def _check_local(part: Node, widget: Widget, findings: Problems) -> None:
 
 
 def _check_given(
-    part: Node, use: WidgetUse, widget: Widget, driver: Driver, findings: Problems
+    part: Node, use: WidgetUse, widget: Widget, driver: Driver, problems: Problems
 ) -> None:
     """Report a text of the options that does not fit its argument."""
     options = part.get("options")
@@ -191,11 +191,11 @@ def _check_given(
         port = widget.outputs[schema["items"]["argument_of"] if is_item else schema["argument_of"]]
         text = inner.data.partition("=")[0] if is_item else inner.data
         for argument in _arguments(use, port, driver):
-            _check_text(inner, text, argument, use.outputs[port.name], findings)
+            _check_text(inner, text, argument, use.outputs[port.name], problems)
 
 
 def _check_text(
-    part: Node, text: str, argument: Argument, command: str, findings: Problems
+    part: Node, text: str, argument: Argument, command: str, problems: Problems
 ) -> None:
     value = _read(text, argument)
     if value is None:
@@ -207,7 +207,7 @@ def _check_text(
     else:
         return
     choices = [str(one) for one in argument.choices]
-    findings.error(
+    problems.error(
         part,
         code,
         f"command {command!r} cannot take {text!r}: its argument {argument.name!r} {wrong}",

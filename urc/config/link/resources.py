@@ -40,7 +40,7 @@ _NUMBER: Final = re.compile(r"[0-9]+|0[xX][0-9A-Fa-f]*", re.ASCII)
 _LAST_PORT: Final = 65535
 
 
-def link_files(options: Node, widget: Widget, findings: Problems) -> dict[str, str]:
+def link_files(options: Node, widget: Widget, problems: Problems) -> dict[str, str]:
     """Return file names in the options → paths.
 
     The options of the slot fit their schema. The widget's manifest marks the options that name
@@ -52,14 +52,14 @@ def link_files(options: Node, widget: Widget, findings: Problems) -> dict[str, s
         place = FilePath(part.document.file).absolute().parent / part.data
         if fault:
             hint = "name a file in the folder of this document or below"
-            findings.error(part, "file-not-served", f"{part.data!r} {fault}", hint=hint)
+            problems.error(part, "file-not-served", f"{part.data!r} {fault}", hint=hint)
         elif not place.is_file():
-            findings.error(part, "no-such-file", f"there is no file {part.data!r}")
+            problems.error(part, "no-such-file", f"there is no file {part.data!r}")
         elif not _is_below(place, FilePath(part.document.file).absolute().parent):
-            findings.error(part, "file-not-served", f"{part.data!r} is outside of this folder")
+            problems.error(part, "file-not-served", f"{part.data!r} is outside of this folder")
         elif place.stat().st_size > MOST_BYTES:
             text = f"{part.data!r} is larger than {MOST_BYTES >> 20} MiB"
-            findings.error(part, "file-not-served", text)
+            problems.error(part, "file-not-served", text)
         else:
             found[str(part.data)] = str(place.resolve())
     return found
@@ -93,7 +93,7 @@ def _is_below(place: FilePath, folder: FilePath) -> bool:
     return place.resolve().is_relative_to(folder.resolve())
 
 
-def link_pages(options: Node, widget: Widget, findings: Problems) -> dict[str, tuple[str, ...]]:
+def link_pages(options: Node, widget: Widget, problems: Problems) -> dict[str, tuple[str, ...]]:
     """Return options that may name pages → their URLs.
 
     The options of the slot fit their schema. The widget's manifest marks the options that name
@@ -105,7 +105,7 @@ def link_pages(options: Node, widget: Widget, findings: Problems) -> dict[str, t
         fault = _page_fault(url) if url else ""
         if fault:
             hint = "write it as http://robot.local:8080/status"
-            findings.error(part, "page-not-shown", f"{url[:80]!r} {fault}", hint=hint)
+            problems.error(part, "page-not-shown", f"{url[:80]!r} {fault}", hint=hint)
         found[name] = (*found.get(name, ()), *((url,) if url and not fault else ()))
     return found
 

@@ -17,7 +17,7 @@ __all__ = ["link_rules", "link_values", "settable"]
 
 
 def link_values(
-    parts: Mapping[str, Node], driver: Driver, findings: Problems
+    parts: Mapping[str, Node], driver: Driver, problems: Problems
 ) -> dict[str, Reading]:
     """Return the initial values of the emulated robot, in the types of the signals.
 
@@ -30,50 +30,50 @@ def link_values(
                 what = "a signal" if name in driver.signals else "something else"
                 text = f"{name!r} is already {what}"
                 hint = "give its initial value under 'signals'" if what == "a signal" else ""
-                findings.error(inner, "duplicate-name", text, key=True, hint=hint)
+                problems.error(inner, "duplicate-name", text, key=True, hint=hint)
             values[name] = tuple(inner.data) if isinstance(inner.data, list) else inner.data
     if "signals" in parts:
         for name, inner in parts["signals"].entries().items():
-            signal = settable(name, inner, driver, findings)
+            signal = settable(name, inner, driver, problems)
             if signal is not None:
-                values[name] = _value(inner, signal, findings)
+                values[name] = _value(inner, signal, problems)
     return values
 
 
-def settable(name: str, part: Node, driver: Driver, findings: Problems) -> Signal | None:
+def settable(name: str, part: Node, driver: Driver, problems: Problems) -> Signal | None:
     """Return the signal for a value at `part`; report a signal that cannot be set."""
     signal = driver.signals.get(name)
     if signal is None:
         text = f"{name!r} is not a signal"
         hint = did_you_mean(name, driver.signals, "signals")
-        findings.error(part, "unknown-signal", text, key=True, hint=hint)
+        problems.error(part, "unknown-signal", text, key=True, hint=hint)
         return None
     if signal.formula is not None:
         text = f"{name!r} is computed from other signals"
-        findings.error(part, "misplaced-key", text, key=True, hint="set those instead")
+        problems.error(part, "misplaced-key", text, key=True, hint="set those instead")
         return None
     return signal
 
 
-def _value(part: Node, signal: Signal, findings: Problems) -> Reading:
+def _value(part: Node, signal: Signal, problems: Problems) -> Reading:
     data = part.data
     if data is None:
         return None
     if signal.type in ("object", "image", "blob"):
         text = f"signal {signal.name!r}: a value of type {signal.type} cannot be given here"
-        findings.error(part, "wrong-type", text)
+        problems.error(part, "wrong-type", text)
         return None
     if (signal.type == "array") != isinstance(data, list):
         wanted = f"a list of {signal.items}s" if signal.type == "array" else "no list"
         text = f"signal {signal.name!r} is of type {signal.type}: expected {wanted}"
-        findings.error(part, "wrong-type", text)
+        problems.error(part, "wrong-type", text)
         return None
     if isinstance(data, list):
-        return tuple(_single(inner, signal, signal.items, findings) for inner in part.items())
-    return _single(part, signal, signal.type, findings)
+        return tuple(_single(inner, signal, signal.items, problems) for inner in part.items())
+    return _single(part, signal, signal.type, problems)
 
 
-def _single(part: Node, signal: Signal, kind: str, findings: Problems) -> Value:
+def _single(part: Node, signal: Signal, kind: str, problems: Problems) -> Value:
     value: Value = part.data
     if signal.states:
         words = [word for _, word in signal.states]
@@ -81,15 +81,15 @@ def _single(part: Node, signal: Signal, kind: str, findings: Problems) -> Value:
             text = f"signal {signal.name!r}: {shown(value)} is not one of its states"
             near = did_you_mean(str(value), words, "states")
             hint = fit_hint(value, "string") if shown(value) in words else near
-            findings.error(part, "unknown-word", text, hint=hint)
+            problems.error(part, "unknown-word", text, hint=hint)
         return value
     try:
         value = fit(value, kind)
     except ValueError as error:
         text = f"signal {signal.name!r}: {error}"
-        findings.error(part, "wrong-type", text, hint=fit_hint(value, kind))
+        problems.error(part, "wrong-type", text, hint=fit_hint(value, kind))
         return None
-    check_within(value, signal.min, signal.max, part, findings)
+    check_within(value, signal.min, signal.max, part, problems)
     return value
 
 
@@ -126,7 +126,7 @@ def _given(linker: Linker, part: Node, rule: SimulatorRule) -> set[str]:
             if name not in fields:
                 text = f"{name!r} is not a field of this frame"
                 hint = did_you_mean(name, fields, "fields")
-                linker.findings.error(inner, "unknown-field", text, key=True, hint=hint)
+                linker.problems.error(inner, "unknown-field", text, key=True, hint=hint)
         if match.topic is not None:
             linker.template(part.must("match").must("subscribe").must("topic"), match.topic)
         if match.when is not None:
@@ -149,11 +149,11 @@ def _of_command(linker: Linker, part: Node, rule: SimulatorRule) -> set[str]:
     if command.steps:
         text = f"{rule.request!r} is a sequence, which sends several frames"
         hint = "write a rule with 'match' for each of its steps"
-        linker.findings.error(inner, "wrong-command", text, hint=hint)
+        linker.problems.error(inner, "wrong-command", text, hint=hint)
     elif command.send.form == "frames":
         text = f"{rule.request!r} sends several frames, and a rule matches one"
         hint = "write a rule with match: for each of its frames"
-        linker.findings.error(inner, "wrong-command", text, hint=hint)
+        linker.problems.error(inner, "wrong-command", text, hint=hint)
     elif command.transport != rule.transport:
         _elsewhere(linker, inner, rule, command.transport)
     return set(command.arguments)
@@ -166,11 +166,11 @@ def _check_poll(linker: Linker, part: Node, rule: SimulatorRule) -> None:
     if poll is None:
         text = f"there is no poll {rule.request!r}"
         hint = did_you_mean(rule.request, polls, "polls")
-        linker.findings.error(inner, "unknown-request", text, hint=hint)
+        linker.problems.error(inner, "unknown-request", text, hint=hint)
     elif poll.run:
         text = f"the poll {rule.request!r} runs the command {poll.run!r}"
         hint = f"write command: {poll.run}"
-        linker.findings.error(inner, "wrong-command", text, hint=hint)
+        linker.problems.error(inner, "wrong-command", text, hint=hint)
     elif poll.transport != rule.transport:
         _elsewhere(linker, inner, rule, poll.transport)
 
@@ -179,7 +179,7 @@ def _elsewhere(linker: Linker, part: Node, rule: SimulatorRule, transport: str) 
     if transport not in linker.driver.transports:
         return  # reported at the request
     text = f"{rule.request!r} goes to {transport!r}, and this rule is for {rule.transport!r}"
-    linker.findings.error(part, "wrong-transport", text)
+    linker.problems.error(part, "wrong-transport", text)
 
 
 def _link_reaction(
@@ -190,11 +190,11 @@ def _link_reaction(
             text = f"{name!r} is neither a signal nor declared under 'state'"
             names = (*linker.driver.signals, *state)
             hint = did_you_mean(name, names, "names") or "declare it under simulator.state"
-            linker.findings.error(inner, "unknown-signal", text, key=True, hint=hint)
+            linker.problems.error(inner, "unknown-signal", text, key=True, hint=hint)
         elif name not in state:
-            signal = settable(name, inner, linker.driver, linker.findings)
+            signal = settable(name, inner, linker.driver, linker.problems)
             if signal is not None and not isinstance(inner.data, str):
-                _value(inner, signal, linker.findings)
+                _value(inner, signal, linker.problems)
         value = reaction.sets.get(name)
         if isinstance(value, Template):
             linker.template(inner, value, known)
@@ -205,7 +205,7 @@ def _link_reaction(
     if reaction.message and reaction.message not in linker.driver.messages:
         text = f"there is no message {reaction.message!r}"
         hint = did_you_mean(reaction.message, linker.driver.messages, "messages")
-        linker.findings.error(part, "unknown-message", text, at="message", hint=hint)
+        linker.problems.error(part, "unknown-message", text, at="message", hint=hint)
 
 
 def _check_told(linker: Linker, part: Node, told: frozenset[str]) -> None:
@@ -214,7 +214,7 @@ def _check_told(linker: Linker, part: Node, told: frozenset[str]) -> None:
         if name in told:
             text = f"the world sets the signal {name!r}"
             hint = "remove it here, or from world.signals"
-            linker.findings.error(inner, "two-sources", text, key=True, hint=hint)
+            linker.problems.error(inner, "two-sources", text, key=True, hint=hint)
 
 
 def _check_word(linker: Linker, part: Node, value: Template) -> None:
@@ -223,7 +223,7 @@ def _check_word(linker: Linker, part: Node, value: Template) -> None:
     if signal.formula is None and (signal.states or signal.type != "string"):
         text = value.evaluate({})
         if isinstance(text, str) or signal.states:
-            _single(Node(part.document, part.path, text), signal, signal.type, linker.findings)
+            _single(Node(part.document, part.path, text), signal, signal.type, linker.problems)
 
 
 def _check_answers(linker: Linker, places: tuple[Node, ...], rule: SimulatorRule) -> None:
@@ -234,4 +234,4 @@ def _check_answers(linker: Linker, places: tuple[Node, ...], rule: SimulatorRule
         if place.text("answer") == "auto":
             text = "a periodic rule has no request to reply to"
             hint = "write message: NAME to send a message of the driver"
-            linker.findings.error(place, "misplaced-key", text, at="answer", hint=hint)
+            linker.problems.error(place, "misplaced-key", text, at="answer", hint=hint)

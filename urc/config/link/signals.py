@@ -14,7 +14,7 @@ __all__ = ["link_signals"]
 _Check = Callable[[Node, Template, Iterable[str]], None]
 
 
-def link_signals(part: Node, driver: Driver, check: _Check, findings: Problems) -> None:
+def link_signals(part: Node, driver: Driver, check: _Check, problems: Problems) -> None:
     """Check every computed signal of the driver at `part`; `check` checks a template's names."""
     set_by_frames = _set_by_frames(driver)
     for name, inner in part.named("signals").items():
@@ -24,14 +24,14 @@ def link_signals(part: Node, driver: Driver, check: _Check, findings: Problems) 
         place = inner.must("value")
         check(place, formula, driver.signals)
         if not any(one in driver.signals for one in formula.names):
-            findings.error(
+            problems.error(
                 place,
                 "constant-value",
                 "this expression has no signal, so it would never be computed",
                 hint=did_you_mean("", driver.signals, "signals"),
             )
         if name in set_by_frames:
-            findings.error(
+            problems.error(
                 place,
                 "two-sources",
                 f"{name!r} is computed here, and set by {set_by_frames[name]}",
@@ -40,7 +40,7 @@ def link_signals(part: Node, driver: Driver, check: _Check, findings: Problems) 
             )
         cycle = cycle_from(name, lambda one: _needed(one, driver.signals))
         if cycle:
-            findings.error(
+            problems.error(
                 place,
                 "circular-value",
                 f"{name!r} depends on itself: {' → '.join(cycle)}",

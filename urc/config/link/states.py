@@ -12,7 +12,7 @@ __all__ = ["check_words"]
 
 
 def check_words(
-    findings: Problems, part: Node, template: Template, signals: Mapping[str, Signal]
+    problems: Problems, part: Node, template: Template, signals: Mapping[str, Signal]
 ) -> None:
     """Warn of each text in a comparison that is not a state of its signal."""
     worded = {
@@ -28,7 +28,7 @@ def check_words(
             continue
         hint = f"write {states[text]!r}" if text in states else ""
         found = template.source.find(text)
-        findings.warn(
+        problems.warn(
             part,
             "unknown-word",
             f"{name!r} is never {text!r}: its values are its states",

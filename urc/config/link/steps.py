@@ -30,7 +30,7 @@ def link_sequences(linker: Linker, part: Node) -> None:
     commands = part.named("commands")
     for name, inner in part.named("sequences").items():
         if name in commands:
-            linker.findings.error(
+            linker.problems.error(
                 inner,
                 "duplicate-name",
                 f"a command has the name {name!r}, too",
@@ -44,7 +44,7 @@ def link_sequences(linker: Linker, part: Node) -> None:
         _Walk(linker, is_named=True).steps(steps_of(inner), command.steps)
         cycle = cycle_from(name, lambda one: _runs(one, linker.driver))
         if cycle:
-            linker.findings.error(
+            linker.problems.error(
                 inner,
                 "circular-run",
                 f"{name!r} runs itself: {' → '.join(cycle)}",
@@ -130,7 +130,7 @@ class _Walk:
             if isinstance(one, sequence.RunStep) and one.command in commands:
                 loops = _loops(one.command, self._linker.driver)
                 if loops:
-                    self._linker.findings.error(
+                    self._linker.problems.error(
                         part,
                         "too-many-steps",
                         f"{loops!r} is a loop inside this loop, so the number of steps is not"
@@ -147,10 +147,10 @@ class _Walk:
             self._template(inner, step.arguments.get(name))
         if command is None:
             return
-        link_arguments(self._linker.findings, part, command, given, "run")
+        link_arguments(self._linker.problems, part, command, given, "run")
         if not self._is_named:
             refuse_two_person(self._linker, part.must("run"), command)
-            refuse_moving(self._linker.findings, part.must("run"), command, step.arguments)
+            refuse_moving(self._linker.problems, part.must("run"), command, step.arguments)
         if command.reply is not None:
             self._known |= command.reply.names
 
@@ -180,7 +180,7 @@ class _Walk:
         """Report steps that wait for a frame on a transport that cannot receive it."""
         spec = self._linker.driver.transports.get(transport)
         if self._is_named and spec is not None and spec.connection == "per_request":
-            self._linker.findings.error(
+            self._linker.problems.error(
                 part,
                 "no-connection",
                 f"{transport!r} opens a connection for each request, and none between two steps",

@@ -25,29 +25,29 @@ def link_world(
 
     `state` has the names of the robot's own state, and `parts` the parts of the simulator.
     """
-    driver, findings, own = linker.driver, linker.findings, {*state}
+    driver, problems, own = linker.driver, linker.problems, {*state}
     known = {"now", "world", *own, *driver.signals}
     for place, template in _templates(part, spec):
         linker.template(place, template, known)
     if "world" in driver.signals:
         text = "a signal has the name 'world', so expressions would be ambiguous"
-        findings.error(part, "duplicate-name", text, key=True, hint="rename the signal")
-    _link_signals(part, driver, findings, parts)
+        problems.error(part, "duplicate-name", text, key=True, hint="rename the signal")
+    _link_signals(part, driver, problems, parts)
     if spec.failsafe is None:
         return spec
     return spec._replace(failsafe=_link_failsafe(part.must("failsafe"), spec.failsafe, linker, own))
 
 
-def check_readings(findings: Problems, part: Node, template: Template) -> None:
+def check_readings(problems: Problems, part: Node, template: Template) -> None:
     """Report unknown readings of the world in a template."""
     for name, inner in _READING.findall(template.python):
         if name not in READINGS:
             text, hint = f"the world has no {name!r}", did_you_mean(name, READINGS, "readings")
-            findings.error(part, "unknown-name", text, hint=hint)
+            problems.error(part, "unknown-name", text, hint=hint)
         elif READINGS[name] and inner not in READINGS[name]:
             text = f"world.{name} has no {inner!r}" if inner else f"world.{name} has several parts"
             hint = did_you_mean(inner, READINGS[name], "parts")
-            findings.error(part, "unknown-name", text, hint=hint)
+            problems.error(part, "unknown-name", text, hint=hint)
 
 
 def _templates(part: Node, spec: WorldSpec) -> Iterator[tuple[Node, Template]]:
@@ -68,30 +68,30 @@ def _templates(part: Node, spec: WorldSpec) -> Iterator[tuple[Node, Template]]:
 
 
 def _link_signals(
-    part: Node, driver: Driver, findings: Problems, parts: Mapping[str, Node]
+    part: Node, driver: Driver, problems: Problems, parts: Mapping[str, Node]
 ) -> None:
     begun = parts["signals"].data if "signals" in parts else {}
     for name, inner in part.named("signals").items():
-        if settable(name, inner, driver, findings) is not None and name in begun:
+        if settable(name, inner, driver, problems) is not None and name in begun:
             text = f"the world sets the signal {name!r}"
             hint = "remove it here, or from the world"
-            findings.error(parts["signals"], "two-sources", text, at=name, key=True, hint=hint)
+            problems.error(parts["signals"], "two-sources", text, at=name, key=True, hint=hint)
 
 
 def _link_failsafe(part: Node, spec: Failsafe, linker: Linker, state: set[str]) -> Failsafe:
-    driver, findings = linker.driver, linker.findings
+    driver, problems = linker.driver, linker.problems
     for place, name in enumerate(spec.without):
         if name not in driver.commands:
             text = f"there is no command {name!r}"
             hint = did_you_mean(name, driver.commands, "commands")
             inner = part.must("without").items()[place]
-            findings.error(inner, "unknown-command", text, hint=hint)
+            problems.error(inner, "unknown-command", text, hint=hint)
     for name, inner in part.named("set").items():
         if name not in state:
-            settable(name, inner, driver, findings)
+            settable(name, inner, driver, problems)
     held = tuple(name for name, one in driver.commands.items() if one.hold is not None)
     without = spec.without or held
     if not without:
         text = "the driver has no held command that could reset this watchdog"
-        findings.error(part, "missing-key", text, key=True, hint="write without: [COMMAND]")
+        problems.error(part, "missing-key", text, key=True, hint="write without: [COMMAND]")
     return spec._replace(without=without)

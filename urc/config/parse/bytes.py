@@ -23,12 +23,12 @@ _BACKSLASH = re.compile(r"\\(?:x[0-9A-Fa-f]{2}|[abefnrtv0])")
 _SPELT = {r"\r": "CR", r"\n": "LF", r"\t": "TAB", r"\0": "NUL", r"\e": "ESC", r"\x1b": "ESC"}
 
 
-def parse_bytes(part: Node | None, encoding: str, findings: Problems) -> bytes | None:
+def parse_bytes(part: Node | None, encoding: str, problems: Problems) -> bytes | None:
     """Return the bytes of `part`: none without a part, None when reported."""
     if part is None:
         return b""
     if isinstance(part.data, list):
-        pieces = [parse_bytes(inner, encoding, findings) for inner in part.items()]
+        pieces = [parse_bytes(inner, encoding, problems) for inner in part.items()]
         return None if None in pieces else b"".join(piece for piece in pieces if piece)
     if not isinstance(part.data, str):
         return bytes((int(part.data),))
@@ -38,13 +38,13 @@ def parse_bytes(part: Node | None, encoding: str, findings: Problems) -> bytes |
     in_hex = _HEX.fullmatch(text)
     if in_hex:
         return bytes.fromhex(in_hex[1])
-    return _literal(text, part, encoding, findings)
+    return _literal(text, part, encoding, problems)
 
 
-def _literal(text: str, part: Node, encoding: str, findings: Problems) -> bytes | None:
+def _literal(text: str, part: Node, encoding: str, problems: Problems) -> bytes | None:
     template = _TEMPLATE.search(text)
     if template is not None:
-        findings.error(
+        problems.error(
             part,
             "bad-template",
             "these bytes are constant: templates are not possible here",
@@ -58,7 +58,7 @@ def _literal(text: str, part: Node, encoding: str, findings: Problems) -> bytes 
         names = [_SPELT.get(escape, escape) for escape in _BACKSLASH.findall(text)]
         spelt = names[0] if len(names) == 1 else "[" + ", ".join(names) + "]"
         spelt = {"[CR, LF]": "CRLF"}.get(spelt, spelt)
-        findings.error(
+        problems.error(
             part,
             "literal-backslash",
             f"these are the {len(text)} characters {text}, not a control character",
@@ -71,7 +71,7 @@ def _literal(text: str, part: Node, encoding: str, findings: Problems) -> bytes 
     if words and all(word.upper() in CONTROL_NAMES for word in words):
         spelt = ", ".join(word.upper() for word in words)
         spelt = f"[{spelt}]" if len(words) > 1 else spelt
-        findings.error(
+        problems.error(
             part,
             "bad-delimiter",
             f"{text!r} is not the name of a control character",
@@ -81,5 +81,5 @@ def _literal(text: str, part: Node, encoding: str, findings: Problems) -> bytes 
     try:
         return text.encode(encoding)
     except UnicodeEncodeError:
-        findings.error(part, "bad-delimiter", f"{text!r} does not exist in the encoding {encoding}")
+        problems.error(part, "bad-delimiter", f"{text!r} does not exist in the encoding {encoding}")
         return None

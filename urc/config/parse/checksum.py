@@ -64,20 +64,20 @@ class DeclaredChecksum(NamedTuple):
         return spelt_size(self.bits, self.spelling)
 
 
-def parse_checksum(part: Node, encoding: str, findings: Problems) -> DeclaredChecksum | None:
+def parse_checksum(part: Node, encoding: str, problems: Problems) -> DeclaredChecksum | None:
     """Return the checksum at `part`, or None when it was reported."""
-    algorithm = _algorithm(part.must("algorithm"), findings)
-    salt = _salt(part.get("salt"), encoding, findings)
+    algorithm = _algorithm(part.must("algorithm"), problems)
+    salt = _salt(part.get("salt"), encoding, problems)
     over, at = part.get("over"), part.get("at")
     window: ByteRange | str = "payload"
     if over is not None:
-        window = str(over.data) if isinstance(over.data, str) else _window(over, findings)
+        window = str(over.data) if isinstance(over.data, str) else _window(over, problems)
     spelling: Any = part.text("as", "raw")
     is_big = part.text("endian", "big") == "big"
     is_from_hex = part.flag("from_hex", default=False)
     closes = part.text("on_error", "drop") == "close"
-    before = parse_bytes(part.get("before"), encoding, findings)
-    trailer = _trailer(part, encoding, findings) if _TRAIL_KEYS & part.data.keys() else None
+    before = parse_bytes(part.get("before"), encoding, problems)
+    trailer = _trailer(part, encoding, problems) if _TRAIL_KEYS & part.data.keys() else None
     if algorithm is None or salt is None:
         return None
     place = None if at is None or isinstance(at.data, str) else int(at.data)
@@ -106,28 +106,28 @@ def values_of(algorithm: CrcSpec | FoldSpec | str) -> frozenset[int]:
     return frozenset((one & mask) + algorithm.added & 0xFF | algorithm.ored for one in every)
 
 
-def _trailer(part: Node, encoding: str, findings: Problems) -> DeclaredTrailer | None:
+def _trailer(part: Node, encoding: str, problems: Problems) -> DeclaredTrailer | None:
     """Return the place of the checksum at `part` after a text; None for a fixed place."""
-    mark = parse_bytes(part.get("after"), encoding, findings) or b""
-    each = parse_bytes(part.get("each"), encoding, findings) or b""
+    mark = parse_bytes(part.get("after"), encoding, problems) or b""
+    each = parse_bytes(part.get("each"), encoding, problems) or b""
     for key, bytes_found in (("after", mark), ("each", each)):
         if key in part.data and part.data[key] in ("", []):
-            findings.error(part, "empty-mark", f"'{key}' is empty and marks nothing", at=key)
+            problems.error(part, "empty-mark", f"'{key}' is empty and marks nothing", at=key)
             return None
         if bytes_found and isinstance(part.data.get("at", "end"), int):
             text = f"'at' has no effect with '{key}', which gives the place of the checksum"
-            findings.error(part, "misplaced-key", text, at="at", key=True)
+            problems.error(part, "misplaced-key", text, at="at", key=True)
     needs = {"optional": "after", "skip": "each", "leading_zeros": "after"}
     for key, needed in needs.items():
         if key in part.data and needed not in part.data:
             text = f"'{key}' needs '{needed}'"
             hint = _NEEDED[needed]
-            findings.error(part, "misplaced-key", text, at=key, key=True, hint=hint)
+            problems.error(part, "misplaced-key", text, at=key, key=True, hint=hint)
     is_padded = part.flag("leading_zeros", default=True)
     if not is_padded and part.text("as", "raw") == "raw":
         text = "a binary checksum has no leading zeros"
         hint = "add 'as: dec', or 'as: hex'"
-        findings.error(part, "misplaced-key", text, at="leading_zeros", key=True, hint=hint)
+        problems.error(part, "misplaced-key", text, at="leading_zeros", key=True, hint=hint)
     if not mark and not each:
         return None
     return DeclaredTrailer(
@@ -141,13 +141,13 @@ def _bits(algorithm: CrcSpec | FoldSpec | str) -> int:
     return algorithm.width if isinstance(algorithm, CrcSpec) else algorithm.bits
 
 
-def _algorithm(part: Node, findings: Problems) -> CrcSpec | FoldSpec | str | None:
+def _algorithm(part: Node, problems: Problems) -> CrcSpec | FoldSpec | str | None:
     if isinstance(part.data, str):
-        return _named(part, findings)
-    return _fold(part, findings) if "fold" in part.data else _crc(part, findings)
+        return _named(part, problems)
+    return _fold(part, problems) if "fold" in part.data else _crc(part, problems)
 
 
-def _named(part: Node, findings: Problems) -> CrcSpec | FoldSpec | str | None:
+def _named(part: Node, problems: Problems) -> CrcSpec | FoldSpec | str | None:
     name: str = part.data
     algorithm = algorithm_of(name)
     if algorithm is not None:
@@ -155,11 +155,11 @@ def _named(part: Node, findings: Problems) -> CrcSpec | FoldSpec | str | None:
     hint = did_you_mean(name, algorithm_names())
     if not hint.startswith("did you mean"):
         hint = "for example crc16-modbus, crc32, sum8, xor8, lrc; or give 'width' and 'poly'"
-    findings.error(part, "unknown-checksum", f"unknown checksum {name!r}", hint=hint)
+    problems.error(part, "unknown-checksum", f"unknown checksum {name!r}", hint=hint)
     return None
 
 
-def _crc(part: Node, findings: Problems) -> CrcSpec | None:
+def _crc(part: Node, problems: Problems) -> CrcSpec | None:
     width = part.integer("width") or 8
     numbers = {name: part.integer(name) or 0 for name in ("poly", "init", "xorout")}
     refin, refout = part.flag("refin", default=False), part.flag("refout", default=False)
@@ -167,7 +167,7 @@ def _crc(part: Node, findings: Problems) -> CrcSpec | None:
     for name, number in numbers.items():
         if number >> width:
             is_good = False
-            findings.error(
+            problems.error(
                 part,
                 "too-wide",
                 f"0x{number:X} has more than {width} bits",
@@ -179,7 +179,7 @@ def _crc(part: Node, findings: Problems) -> CrcSpec | None:
     return CrcSpec(width, numbers["poly"], numbers["init"], refin, refout, numbers["xorout"])
 
 
-def _fold(part: Node, findings: Problems) -> FoldSpec | None:
+def _fold(part: Node, problems: Problems) -> FoldSpec | None:
     operation, complement = part.text("fold"), part.text("complement", "none")
     bits, of = part.integer("bits") or 8, part.integer("of") or 8
     mask, ored = part.integer("mask"), part.integer("or") or 0
@@ -189,16 +189,16 @@ def _fold(part: Node, findings: Problems) -> FoldSpec | None:
         if number >> bits:
             is_good = False
             text = f"0x{number:X} has more than {bits} bits"
-            findings.error(part, "too-wide", text, at=name)
+            problems.error(part, "too-wide", text, at=name)
     if operation == "xor" and of > bits:
         is_good = False
         text = f"numbers of {of} bits do not fit into a result of {bits} bits"
-        findings.error(part, "too-wide", text, at="of")
+        problems.error(part, "too-wide", text, at="of")
     is_odd_xored = part.text("odd", "zeros") == "xor"
     if "odd" in part.data and of == 8:
         is_good = False
         text = "'odd' needs numbers of more than one byte"
-        findings.error(part, "misplaced-key", text, at="odd", key=True, hint="add 'of: 16'")
+        problems.error(part, "misplaced-key", text, at="odd", key=True, hint="add 'of: 16'")
     if not is_good:
         return None
     return FoldSpec(
@@ -213,10 +213,10 @@ def _fold(part: Node, findings: Problems) -> FoldSpec | None:
     )
 
 
-def _window(part: Node, findings: Problems) -> ByteRange | str:
+def _window(part: Node, problems: Problems) -> ByteRange | str:
     start, stop = part.integer("from") or 0, part.integer("to")
     if stop is not None and (start < 0) == (stop < 0) and start >= stop:
-        findings.error(
+        problems.error(
             part,
             "empty-window",
             f"the range from {start} to {stop} is empty",
@@ -226,16 +226,16 @@ def _window(part: Node, findings: Problems) -> ByteRange | str:
     return ByteRange(start, stop)
 
 
-def _salt(part: Node | None, encoding: str, findings: Problems) -> Salt | None:
+def _salt(part: Node | None, encoding: str, problems: Problems) -> Salt | None:
     if part is None:
         return Salt()
     if not isinstance(part.data, dict):
-        constant = parse_bytes(part, encoding, findings)
+        constant = parse_bytes(part, encoding, problems)
         return None if constant is None else Salt(constant)
     rows: dict[int, bytes] = {}
     is_good = True
     for name, inner in part.must("table").entries().items():
-        row = parse_bytes(inner, encoding, findings)
+        row = parse_bytes(inner, encoding, problems)
         if row is None:
             is_good = False
         else:

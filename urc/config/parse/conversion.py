@@ -17,7 +17,7 @@ _A_NUMBER: Final = re.compile(r"[+-]?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]{1
 _OF_NUMBERS: Final = ("base", "scale", "offset", "polynomial", "points")
 
 
-def parse_conversion(part: Node, findings: Problems, kind: str = "number") -> Conversion:
+def parse_conversion(part: Node, problems: Problems, kind: str = "number") -> Conversion:
     """Return the conversion among the keys of `part`, without its states.
 
     `kind` is the type of the converted value. Strings and booleans have no arithmetic.
@@ -25,7 +25,7 @@ def parse_conversion(part: Node, findings: Problems, kind: str = "number") -> Co
     if kind not in ("integer", "number"):
         for key in _OF_NUMBERS:
             if part.get(key) is not None:
-                findings.error(
+                problems.error(
                     part,
                     "misplaced-key",
                     f"'{key}' has no effect for {kind}",
@@ -39,8 +39,8 @@ def parse_conversion(part: Node, findings: Problems, kind: str = "number") -> Co
     return Conversion(
         base=part.integer("base") or 0,
         not_available=absent,
-        polynomial=_polynomial(part, findings),
-        points=_points(part.get("points"), findings),
+        polynomial=_polynomial(part, problems),
+        points=_points(part.get("points"), problems),
     )
 
 
@@ -55,7 +55,7 @@ def _numbers_in(absent: object) -> tuple[float, ...]:
     return (number,) if isfinite(number) else ()
 
 
-def parse_states(part: Node, kind: str, findings: Problems) -> tuple[tuple[str, str], ...]:
+def parse_states(part: Node, kind: str, problems: Problems) -> tuple[tuple[str, str], ...]:
     """Return the states of a signal or conversion, by their raw texts."""
     states = part.named("states")
     if kind in ("integer", "number"):
@@ -63,7 +63,7 @@ def parse_states(part: Node, kind: str, findings: Problems) -> tuple[tuple[str, 
             try:
                 float(raw)
             except ValueError:
-                findings.error(
+                problems.error(
                     inner,
                     "wrong-type",
                     f"the signal has the type {kind}, and {raw!r} is not a number",
@@ -73,7 +73,7 @@ def parse_states(part: Node, kind: str, findings: Problems) -> tuple[tuple[str, 
     return tuple((raw, str(inner.data)) for raw, inner in states.items())
 
 
-def _polynomial(part: Node, findings: Problems) -> tuple[float, ...]:
+def _polynomial(part: Node, problems: Problems) -> tuple[float, ...]:
     written = part.get("scale")
     is_fraction = written is not None and isinstance(written.data, str)
     scale = fraction_of(part.text("scale")) if is_fraction else part.number("scale")
@@ -82,7 +82,7 @@ def _polynomial(part: Node, findings: Problems) -> tuple[float, ...]:
     if coefficients:
         for key in ("scale", "offset"):
             if key in part.data:
-                findings.error(
+                problems.error(
                     part,
                     "two-conversions",
                     f"'{key}' and 'polynomial' both convert the value",
@@ -92,7 +92,7 @@ def _polynomial(part: Node, findings: Problems) -> tuple[float, ...]:
                 )
         return tuple(inner.data for inner in coefficients)
     if scale == 0:
-        findings.error(
+        problems.error(
             part.must("scale"),
             "zero-scale",
             "a scale of 0 makes every value the same",
@@ -103,13 +103,13 @@ def _polynomial(part: Node, findings: Problems) -> tuple[float, ...]:
     return (offset or 0, 1 if scale is None else scale)
 
 
-def _points(part: Node | None, findings: Problems) -> tuple[tuple[float, float], ...]:
+def _points(part: Node | None, problems: Problems) -> tuple[tuple[float, float], ...]:
     if part is None:
         return ()
     pairs = part.items()
     for before, after in pairwise(pairs):
         if before.data[0] >= after.data[0]:
-            findings.error(
+            problems.error(
                 after,
                 "wrong-order",
                 f"{after.data[0]:g} is not above {before.data[0]:g} of the point before it",

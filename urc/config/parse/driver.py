@@ -27,37 +27,37 @@ from urc.registry import Registries
 __all__ = ["parse_driver", "spoken_name"]
 
 
-def parse_driver(part: Node, findings: Problems, catalog: Registries) -> Driver:
+def parse_driver(part: Node, problems: Problems, catalog: Registries) -> Driver:
     """Return the driver in the mapping at `part`; report mistakes and use defaults."""
     transports = {
-        name: parse_transport(inner, findings, catalog)
+        name: parse_transport(inner, problems, catalog)
         for name, inner in part.named("transports").items()
     }
     # With only one transport, messages and commands need not name it.
-    types, enums = _types(part, findings)
+    types, enums = _types(part, problems)
     lines = _Lines(transports, FormContext("", _set_by_frames(part), types, enums, catalog))
     transports = {
         name: line_with_flow(
-            spec, part.must("transports").must(name), lines.context(name), findings
+            spec, part.must("transports").must(name), lines.context(name), problems
         )
         for name, spec in transports.items()
     }
     commands = {
-        name: _command(inner, lines, findings) for name, inner in part.named("commands").items()
+        name: _command(inner, lines, problems) for name, inner in part.named("commands").items()
     }
     messages = {
-        name: _message(inner, lines, findings) for name, inner in part.named("messages").items()
+        name: _message(inner, lines, problems) for name, inner in part.named("messages").items()
     }
-    polls = tuple(_poll(inner, lines, commands, findings) for inner in part.listed("polls"))
+    polls = tuple(_poll(inner, lines, commands, problems) for inner in part.listed("polls"))
     signals = {
-        name: parse_signal(inner, spoken_name(name), findings)
+        name: parse_signal(inner, spoken_name(name), problems)
         for name, inner in part.named("signals").items()
     }
     return Driver(
         transports=transports,
         signals=with_ages(aged_by_lines(signals, transports, messages, polls), polls),
         # A sequence with the name of a command is reported by the check of names.
-        commands=with_moving_steps({**_sequences(part, lines, findings), **commands}),
+        commands=with_moving_steps({**_sequences(part, lines, problems), **commands}),
         messages=messages,
         polls=polls,
         discovery=_discovery(part.get("discovery")),
@@ -75,23 +75,23 @@ def _set_by_frames(part: Node) -> frozenset[str]:
     return frozenset(name for name, inner in signals if "value" not in inner.data)
 
 
-def _sequences(part: Node, lines: "_Lines", findings: Problems) -> dict[str, Command]:
+def _sequences(part: Node, lines: "_Lines", problems: Problems) -> dict[str, Command]:
     context = lines.context(lines.only)
     return {
-        name: parse_sequence(inner, spoken_name(name), lines.only, context, findings)
+        name: parse_sequence(inner, spoken_name(name), lines.only, context, problems)
         for name, inner in part.named("sequences").items()
     }
 
 
-def _types(part: Node, findings: Problems) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+def _types(part: Node, problems: Problems) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
     """Return the driver's ``types:`` and ``enums:``."""
     if "types" not in part.data and "enums" not in part.data:
         return NOTHING, NOTHING
     from urc.config.parse.struct.numbers import parse_enums
     from urc.config.parse.types import parse_types
 
-    enums = parse_enums(part, findings)
-    return parse_types(part, enums, findings), enums
+    enums = parse_enums(part, problems)
+    return parse_types(part, enums, problems), enums
 
 
 class _Lines:
@@ -124,61 +124,61 @@ def spoken_name(name: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def _message(part: Node, lines: _Lines, findings: Problems) -> Message:
+def _message(part: Node, lines: _Lines, problems: Problems) -> Message:
     transport = lines.name(part, "from")
     context, answer = lines.context(transport), part.get("acknowledge")
-    read = with_collected(part, parse_read(part, findings, context), findings)
-    sent = None if answer is None else parse_write(answer, findings, context)
+    read = with_collected(part, parse_read(part, problems, context), problems)
+    sent = None if answer is None else parse_write(answer, problems, context)
     return Message(part.name, transport, read, sent)
 
 
-def _poll(part: Node, lines: _Lines, commands: dict[str, Command], findings: Problems) -> Poll:
+def _poll(part: Node, lines: _Lines, commands: dict[str, Command], problems: Problems) -> Poll:
     transport = lines.name(part, "to")
     context = lines.context(transport)
     send = part.get("send")
-    asked = parse_write(send, findings, context) if send else NOTHING_SENT
+    asked = parse_write(send, problems, context) if send else NOTHING_SENT
     poll = Poll(
         name=part.text("name", f"polls.{part.name}"),
         transport=transport,
-        every_s=findings.duration(part, "every", 1.0, least=0.005),
+        every_s=problems.duration(part, "every", 1.0, least=0.005),
         send=asked,
-        reply=parse_reply(part.get("reply"), findings, context) or implied_reply(asked),
-        phase_s=findings.duration(part, "phase", 0.0, least=0.0, most=3600),
+        reply=parse_reply(part.get("reply"), problems, context) or implied_reply(asked),
+        phase_s=problems.duration(part, "phase", 0.0, least=0.0, most=3600),
     )
-    return poll_with_flow(poll, part, commands, findings)
+    return poll_with_flow(poll, part, commands, problems)
 
 
-def _command(part: Node, lines: _Lines, findings: Problems) -> Command:
+def _command(part: Node, lines: _Lines, problems: Problems) -> Command:
     transport = lines.name(part, "to")
     context = lines.context(transport)
-    send = parse_write(part.must("send"), findings, context)
+    send = parse_write(part.must("send"), problems, context)
     command = Command(
         name=part.name,
         transport=transport,
         send=send,
-        arguments={name: _argument(inner, findings) for name, inner in part.named("args").items()},
-        reply=parse_reply(part.get("reply"), findings, context) or implied_reply(send),
+        arguments={name: _argument(inner, problems) for name, inner in part.named("args").items()},
+        reply=parse_reply(part.get("reply"), problems, context) or implied_reply(send),
         title=part.text("title", spoken_name(part.name)),
         description=part.text("description"),
     )
-    return command_with_flow(command, part, findings)
+    return command_with_flow(command, part, problems)
 
 
-def _argument(part: Node, findings: Problems) -> Argument:
+def _argument(part: Node, problems: Problems) -> Argument:
     kind = part.text("type", "number")
-    of = element_of(part, kind, findings)
-    low, high = check_range(part, of, findings)
-    choices = [_fitting(inner, of, findings) for inner in part.listed("choices")]
+    of = element_of(part, kind, problems)
+    low, high = check_range(part, of, problems)
+    choices = [_fitting(inner, of, problems) for inner in part.listed("choices")]
     default_part = part.get("default")
     default: Reading = None
     if default_part is not None:
-        default = _default(default_part, part, kind, findings)
+        default = _default(default_part, part, kind, problems)
         for one in default if isinstance(default, tuple) else (default,):
-            check_within(one, low, high, default_part, findings)
+            check_within(one, low, high, default_part, problems)
             if choices and one not in choices:
                 text = "the default is not one of the choices"
-                findings.error(default_part, "unknown-word", text)
-    _check_argument(part, kind, of, findings)
+                problems.error(default_part, "unknown-word", text)
+    _check_argument(part, kind, of, problems)
     argument = Argument(
         name=part.name,
         type=kind,  # type: ignore[arg-type]  # the schema's enum is this Literal
@@ -194,14 +194,14 @@ def _argument(part: Node, findings: Problems) -> Argument:
         items=of,  # type: ignore[arg-type]  # as above
         size=part.integer("size"),
     )
-    return parse_choice_questions(part, argument, findings)
+    return parse_choice_questions(part, argument, problems)
 
 
-def _check_argument(part: Node, kind: str, of: str, findings: Problems) -> None:
+def _check_argument(part: Node, kind: str, of: str, problems: Problems) -> None:
     """Report a reserved name, and keys without effect for the type."""
     if part.name in ("settings", "pi"):
         what = "the settings" if part.name == "settings" else "the number"
-        findings.error(
+        problems.error(
             part,
             "bad-name",
             f"an argument cannot have the name {part.name!r}",
@@ -209,7 +209,7 @@ def _check_argument(part: Node, kind: str, of: str, findings: Problems) -> None:
             hint=f"in templates this name is {what}",
         )
     if of != "string" and "allow_control" in part.data:
-        findings.error(
+        problems.error(
             part,
             "misplaced-key",
             f"'allow_control' has no effect for {kind}",
@@ -218,24 +218,24 @@ def _check_argument(part: Node, kind: str, of: str, findings: Problems) -> None:
         )
 
 
-def _default(inner: Node, argument: Node, kind: str, findings: Problems) -> Reading:
+def _default(inner: Node, argument: Node, kind: str, problems: Problems) -> Reading:
     """Return the default; for an array, a list of its size."""
     if kind != "array":
-        return _fitting(inner, kind, findings)
+        return _fitting(inner, kind, problems)
     if not isinstance(inner.data, list):
         text = f"expected a list, found {shown(inner.data)}"
-        findings.error(inner, "wrong-type", text, hint="such as [0, 0, 0]")
+        problems.error(inner, "wrong-type", text, hint="such as [0, 0, 0]")
         return None
     size = argument.integer("size")
     if size is not None and len(inner.data) != size:
         text = f"expected {size} elements, found {len(inner.data)}"
-        findings.error(inner, "wrong-size", text)
-    return tuple(_fitting(one, argument.text("items", "number"), findings) for one in inner.items())
+        problems.error(inner, "wrong-size", text)
+    return tuple(_fitting(one, argument.text("items", "number"), problems) for one in inner.items())
 
 
-def _fitting(part: Node, kind: str, findings: Problems) -> Value:
+def _fitting(part: Node, kind: str, problems: Problems) -> Value:
     try:
         return fit(part.data, kind)
     except ValueError as error:
-        findings.error(part, "wrong-type", str(error), hint=fit_hint(part.data, kind))
+        problems.error(part, "wrong-type", str(error), hint=fit_hint(part.data, kind))
         return None

@@ -44,32 +44,32 @@ NOTHING_SENT: Final = WriteSpec("text", {"template": compile_template("")})
 
 
 def line_with_flow(
-    spec: TransportSpec, part: Node, context: FormContext, findings: Problems
+    spec: TransportSpec, part: Node, context: FormContext, problems: Problems
 ) -> TransportSpec:
     """Return the transport with its queue, keepalive, timeouts and steps."""
     queue = part.get("queue")
     if spec.connection == "per_request":
-        refuse(part, ("keepalive",), "has no effect: each request opens a connection", findings)
+        refuse(part, ("keepalive",), "has no effect: each request opens a connection", problems)
         if queue is not None:
-            refuse(queue, ("in_flight",), "is always 1: each request opens a connection", findings)
+            refuse(queue, ("in_flight",), "is always 1: each request opens a connection", problems)
     if spec.is_half_duplex and queue is not None:
-        refuse(queue, ("in_flight",), "is always 1: the transport is half-duplex", findings)
+        refuse(queue, ("in_flight",), "is always 1: the transport is half-duplex", problems)
     timeouts = part.get("timeouts")
     if timeouts is not None and "on_connect" not in part.data:
-        refuse(timeouts, ("on_connect",), "has no effect without steps", findings)
+        refuse(timeouts, ("on_connect",), "has no effect without steps", problems)
     steps = StepContext(spec.name, is_named=False, forms=context)
     on_connect, on_close = part.get("on_connect"), part.get("on_close")
-    errors, faults = parse_errors(part, findings, context)
+    errors, faults = parse_errors(part, problems, context)
     if queue is not None and spec.type in MESSAGING:
-        refuse(queue, ("bytes",), "counts bytes, and this transport carries messages", findings)
+        refuse(queue, ("bytes",), "counts bytes, and this transport carries messages", problems)
     return spec._replace(
         errors=errors,
         faults=faults,
         queue=_queue(queue, spec.type),
-        keepalive=_keepalive(part.get("keepalive"), context, findings),
-        on_connect=parse_steps(on_connect, steps, findings) if on_connect else (),
-        on_close=parse_steps(on_close, steps, findings) if on_close else (),
-        stale_after_s=findings.duration(part, "stale_after", 0.0, least=0.05) or None,
+        keepalive=_keepalive(part.get("keepalive"), context, problems),
+        on_connect=parse_steps(on_connect, steps, problems) if on_connect else (),
+        on_close=parse_steps(on_close, steps, problems) if on_close else (),
+        stale_after_s=problems.duration(part, "stale_after", 0.0, least=0.05) or None,
     )
 
 
@@ -99,14 +99,14 @@ def aged_by_lines(
     }
 
 
-def command_with_flow(command: Command, part: Node, findings: Problems) -> Command:
+def command_with_flow(command: Command, part: Node, problems: Problems) -> Command:
     """Return the command with its queueing, conditions, motion and retries."""
     hold, confirm, verify = part.get("hold"), part.get("confirm"), part.get("verify")
-    retries, retry = _retries(part.get("retries"), findings)
+    retries, retry = _retries(part.get("retries"), problems)
     is_idempotent = part.flag("idempotent", default=False)
     is_asked_again = command.reply is not None and command.reply.is_asked_again
     if retries and not (is_idempotent or is_asked_again):
-        findings.error(
+        problems.error(
             part,
             "not-idempotent",
             "the robot may perform it twice when its reply is lost",
@@ -114,52 +114,52 @@ def command_with_flow(command: Command, part: Node, findings: Problems) -> Comma
             hint="write idempotent: true if a repetition does no harm, or remove 'retries'",
         )
     if retries and command.reply is None:
-        findings.error(
+        problems.error(
             part, "misplaced-key", "'retries' needs 'reply': without it no failure shows",
             at="retries", key=True,
         )  # fmt: skip
     if part.text("priority") == "realtime":
-        refuse(part, ("coalesce", "rate_limit"), "has no effect with realtime priority", findings)
+        refuse(part, ("coalesce", "rate_limit"), "has no effect with realtime priority", problems)
     if hold is not None:
-        refuse(part, ("moves", "stop"), "has no effect with 'hold', which moves it", findings)
-        _refuse_asides(part.get("reply"), findings)
+        refuse(part, ("moves", "stop"), "has no effect with 'hold', which moves it", problems)
+        _refuse_asides(part.get("reply"), problems)
     stops = part.flag("stop", default=False)
     if stops:
-        _check_stop(command, part, findings)
-    moves, moves_if = parse_moves(part, findings)
+        _check_stop(command, part, problems)
+    moves, moves_if = parse_moves(part, problems)
     return command._replace(
         priority=cast("Priority", part.text("priority", "realtime" if stops else "normal")),
         is_latest_only=part.text("coalesce") == "latest",
-        rate_per_s=_rate(part.get("rate_limit"), findings),
+        rate_per_s=_rate(part.get("rate_limit"), problems),
         retries=retries,
         retry=retry,
         is_idempotent=is_idempotent,
-        hold=_hold(hold, findings) if hold else None,
+        hold=_hold(hold, problems) if hold else None,
         moves=moves,
         moves_if=moves_if,
         stops=stops,
         confirm=_confirm(confirm) if confirm else None,
-        requires=_requires(part, findings),
-        verify=_verify(verify, findings) if verify else None,
+        requires=_requires(part, problems),
+        verify=_verify(verify, problems) if verify else None,
     )
 
 
-def _refuse_asides(reply: Node | None, findings: Problems) -> None:
+def _refuse_asides(reply: Node | None, problems: Problems) -> None:
     """Report `resend` and `extend` of a held command, whose newest values are sent all the time."""
     for inner in [reply, *reply.listed("stages")] if reply is not None else ():
         why = "has no effect with 'hold': the next value follows anyway"
-        refuse(inner, ("resend", "extend"), why, findings)
+        refuse(inner, ("resend", "extend"), why, problems)
 
 
-def _check_stop(command: Command, part: Node, findings: Problems) -> None:
+def _check_stop(command: Command, part: Node, problems: Problems) -> None:
     """Report keys that would block or delay a command of STOP."""
     moves = () if part.data.get("moves") is False else ("moves",)  # false is the default of a stop
     hindering = (*moves, "confirm", "requires", "coalesce", "rate_limit")
-    refuse(part, hindering, "has no effect with 'stop': nothing may delay a stop", findings)
+    refuse(part, hindering, "has no effect with 'stop': nothing may delay a stop", problems)
     for name, one in command.arguments.items():
         if one.confirm or (one.is_required and one.default is None):
             what = "asks people" if one.confirm else "has no default"
-            findings.error(
+            problems.error(
                 part,
                 "missing-argument",
                 f"STOP sends it without arguments, and {name!r} {what}",
@@ -170,24 +170,24 @@ def _check_stop(command: Command, part: Node, findings: Problems) -> None:
 
 
 def poll_with_flow(
-    poll: Poll, part: Node, commands: dict[str, Command], findings: Problems
+    poll: Poll, part: Node, commands: dict[str, Command], problems: Problems
 ) -> Poll:
     """Return the poll with its command and its period."""
     offline, when = part.get("offline"), part.get("when")
     poll = poll._replace(
-        when=findings.expression(when) if when else None,
+        when=problems.expression(when) if when else None,
         priority=cast("Priority", part.text("priority", "low")),
-        offline=_offline(offline, findings) if offline else None,
+        offline=_offline(offline, problems) if offline else None,
     )
     run = part.get("run")
     if run is None:
         if "send" not in part.data:
-            findings.error(
+            problems.error(
                 part, "missing-key", "'send' or 'run' is missing: the poll sends nothing", key=True
             )
-        refuse(part, ("args",), "belongs to 'run'", findings)
+        refuse(part, ("args",), "belongs to 'run'", problems)
         return poll
-    refuse(part, ("send", "reply", "to"), "has no effect with 'run'", findings)
+    refuse(part, ("send", "reply", "to"), "has no effect with 'run'", problems)
     poll = poll._replace(run=str(run.data), arguments=_arguments(part))
     command = commands.get(poll.run)
     if command is None:
@@ -202,14 +202,14 @@ def poll_with_flow(
 
 
 def parse_sequence(
-    part: Node, title: str, only: str, context: FormContext, findings: Problems
+    part: Node, title: str, only: str, context: FormContext, problems: Problems
 ) -> Command:
     """Return the command for a sequence.
 
     `part` is the list of steps, or a mapping with it. `only` is the only transport, or "".
     """
     inner = part.must("steps") if isinstance(part.data, dict) else part
-    steps = parse_steps(inner, StepContext(only, is_named=True, forms=context), findings)
+    steps = parse_steps(inner, StepContext(only, is_named=True, forms=context), problems)
     named = [
         step.transport
         for step in all_steps(steps)
@@ -230,7 +230,7 @@ def parse_sequence(
         description=part.text("description"),
         moves=part.flag("moves", default=False),
         confirm=_confirm(confirm) if confirm else None,
-        requires=_requires(part, findings),
+        requires=_requires(part, problems),
     )
 
 
@@ -253,46 +253,46 @@ def _queue(part: Node | None, kind: str) -> Queue:
     )
 
 
-def _keepalive(part: Node | None, context: FormContext, findings: Problems) -> Keepalive | None:
+def _keepalive(part: Node | None, context: FormContext, problems: Problems) -> Keepalive | None:
     if part is None:
         return None
     given = [key for key in ("send", "run") if key in part.data]
     if len(given) != 1:
         text = "both 'send' and 'run' are given" if given else "'send' or 'run' is missing"
         where = {"at": "run"} if given else {}
-        findings.error(part, "two-forms" if given else "missing-key", text, key=True, **where)
+        problems.error(part, "two-forms" if given else "missing-key", text, key=True, **where)
         return None
     send = part.get("send")
     return Keepalive(
-        every_s=findings.duration(part, "every", 1.0, least=0.05),
+        every_s=problems.duration(part, "every", 1.0, least=0.05),
         run=part.text("run"),
-        send=parse_write(send, findings, context) if send else None,
-        watchdog_s=findings.duration(part, "watchdog", 0.0) or None,
+        send=parse_write(send, problems, context) if send else None,
+        watchdog_s=problems.duration(part, "watchdog", 0.0) or None,
         after=tuple(str(inner.data) for inner in part.listed("after")),
     )
 
 
-def _rate(part: Node | None, findings: Problems) -> float | None:
+def _rate(part: Node | None, problems: Problems) -> float | None:
     if part is None:
         return None
     number, _, unit = str(part.data).partition("/")
     rate = float(number) / _PER_S[unit]
     if not 1 / 3600 <= rate <= 1000:
-        findings.error(part, "out-of-range", f"expected 1/h to 1000/s, found {part.data}")
+        problems.error(part, "out-of-range", f"expected 1/h to 1000/s, found {part.data}")
         return None
     return rate
 
 
-def _hold(part: Node, findings: Problems) -> Hold:
-    repeat_s = findings.duration(part, "repeat", 0.05, least=0.01, most=10)
-    lease_s = findings.duration(part, "lease", 0.25, least=0.1, most=1.0)
+def _hold(part: Node, problems: Problems) -> Hold:
+    repeat_s = problems.duration(part, "repeat", 0.05, least=0.01, most=10)
+    lease_s = problems.duration(part, "lease", 0.25, least=0.1, most=1.0)
     release, step = part.get("release"), part.get("step")
-    step_s = findings.duration(part, "step", 0.0, least=0.001, most=10) if step else None
+    step_s = problems.duration(part, "step", 0.0, least=0.001, most=10) if step else None
     if step is not None:
         text = "has no effect with 'step': the robot stops itself after each step"
-        refuse(part, ("release", "watchdog"), text, findings)
+        refuse(part, ("release", "watchdog"), text, problems)
     elif release is None:
-        findings.error(
+        problems.error(
             part,
             "missing-release",
             "a held command needs a stop for its release",
@@ -305,13 +305,13 @@ def _hold(part: Node, findings: Problems) -> Hold:
     values = {name: given(inner.data) for name, inner in entries.items()}
     slew = {name: float(inner.data) for name, inner in part.named("slew").items()}
     on_stall = cast("Literal['abort', 'wait'] | None", part.text("on_stall") or None)
-    return Hold(repeat_s, values, lease_s, _watchdog_s(part, findings), slew, on_stall, step_s)
+    return Hold(repeat_s, values, lease_s, _watchdog_s(part, problems), slew, on_stall, step_s)
 
 
-def _watchdog_s(part: Node, findings: Problems) -> float | None:
+def _watchdog_s(part: Node, problems: Problems) -> float | None:
     if part.text("watchdog") == "none":
         return math.inf
-    return findings.duration(part, "watchdog", 0.0) or None
+    return problems.duration(part, "watchdog", 0.0) or None
 
 
 def _confirm(part: Node) -> Confirm:
@@ -319,7 +319,7 @@ def _confirm(part: Node) -> Confirm:
     return Confirm(level, part.must("text").data, part.flag("two_person", default=False))
 
 
-def parse_choice_questions(part: Node, argument: Argument, findings: Problems) -> Argument:
+def parse_choice_questions(part: Node, argument: Argument, problems: Problems) -> Argument:
     """Return the argument with the confirmations of some of its choices."""
     asked = part.named("confirm")
     if not asked:
@@ -327,7 +327,7 @@ def parse_choice_questions(part: Node, argument: Argument, findings: Problems) -
     kind = argument.items if argument.type == "array" else argument.type
     words = ["true", "false"] if kind == "boolean" else [_written(one) for one in argument.choices]
     if not words:
-        findings.error(
+        problems.error(
             part,
             "misplaced-key",
             "'confirm' of an argument needs 'choices'",
@@ -337,7 +337,7 @@ def parse_choice_questions(part: Node, argument: Argument, findings: Problems) -
         )
     for name, inner in asked.items():
         if words and name not in words:
-            findings.error(
+            problems.error(
                 inner,
                 "unknown-word",
                 f"{name!r} is not one of the choices",
@@ -352,16 +352,16 @@ def _written(value: Value) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _retries(part: Node | None, findings: Problems) -> tuple[int, Retry]:
+def _retries(part: Node | None, problems: Problems) -> tuple[int, Retry]:
     """Return the number of retries and their waits."""
     if part is None:
         return 0, Retry()
     if not isinstance(part.data, dict):
         return int(part.data), Retry()
-    initial_s = findings.duration(part, "initial", 0.0, most=MAX_STEP_S)
-    max_s = findings.duration(part, "max", initial_s, most=MAX_STEP_S)
+    initial_s = problems.duration(part, "initial", 0.0, most=MAX_STEP_S)
+    max_s = problems.duration(part, "max", initial_s, most=MAX_STEP_S)
     if max_s < initial_s:
-        findings.error(
+        problems.error(
             part,
             "wrong-order",
             "the first wait is longer than the longest wait",
@@ -371,21 +371,21 @@ def _retries(part: Node | None, findings: Problems) -> tuple[int, Retry]:
     return part.integer("count") or 0, Retry(initial_s, max_s)
 
 
-def _requires(part: Node, findings: Problems) -> tuple[Requirement, ...]:
+def _requires(part: Node, problems: Problems) -> tuple[Requirement, ...]:
     found = []
     for inner in part.listed("requires"):
-        condition = findings.expression(inner.must("expr"))
+        condition = problems.expression(inner.must("expr"))
         if condition is not None:
             found.append(Requirement(condition, inner.must("else").data))
     return tuple(found)
 
 
-def _verify(part: Node, findings: Problems) -> Verify | None:
-    condition = findings.expression(part.must("expr"))
-    within_s = findings.duration(part, "within", 1.0, most=MAX_STEP_S)
+def _verify(part: Node, problems: Problems) -> Verify | None:
+    condition = problems.expression(part.must("expr"))
+    within_s = problems.duration(part, "within", 1.0, most=MAX_STEP_S)
     return None if condition is None else Verify(condition, within_s)
 
 
-def _offline(part: Node, findings: Problems) -> Offline:
+def _offline(part: Node, problems: Problems) -> Offline:
     after = part.integer("after") or 1
-    return Offline(after, findings.duration(part, "retry", 10.0, least=0.05))
+    return Offline(after, problems.duration(part, "retry", 10.0, least=0.05))

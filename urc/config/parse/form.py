@@ -55,7 +55,7 @@ class FormContext(NamedTuple):
 class ReadForm(Protocol):
     """A module that parses one form of received frames."""
 
-    def parse_read(self, part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
+    def parse_read(self, part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
         """Return the declaration at `part`, or None when a problem was reported."""
 
     def place_of(self, part: Node, field: str) -> tuple[Node, dict[str, Any]]:
@@ -65,7 +65,7 @@ class ReadForm(Protocol):
 class WriteForm(Protocol):
     """A module that parses one form of sent frames."""
 
-    def parse_write(self, part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
+    def parse_write(self, part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
         """Return the declaration at `part`, or None when a problem was reported."""
 
     def templates(self, part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
@@ -99,12 +99,12 @@ def body_form(part: Node) -> tuple[Node, WriteForm] | None:
     return None
 
 
-def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec:
+def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec:
     """Return the form of a received frame."""
     given = [key for key in READ_FORMS if key in part.data]
     if len(given) != 1:
         found = " and ".join(f"'{key}'" for key in given)
-        findings.error(
+        problems.error(
             part,
             "two-forms" if given else "missing-form",
             f"{found} are both forms of this frame"
@@ -119,11 +119,11 @@ def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec
     if found_form is None:
         return _NO_READ
     inner, form = found_form
-    spec = form.parse_read(inner, findings, context) or _NO_READ
-    return beside_form(part, spec, findings)
+    spec = form.parse_read(inner, problems, context) or _NO_READ
+    return beside_form(part, spec, problems)
 
 
-def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec:
+def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec:
     """Return the form of the frame under ``send:``."""
     inner, form = write_form(part)
-    return form.parse_write(inner, findings, context) or _NO_WRITE
+    return form.parse_write(inner, problems, context) or _NO_WRITE

@@ -12,68 +12,68 @@ _DURATIONS = ("throttle", "every")
 __all__ = ["beside_form", "parse_lines", "with_collected"]
 
 
-def beside_form(part: Node, spec: ReadSpec, findings: Problems) -> ReadSpec:
+def beside_form(part: Node, spec: ReadSpec, problems: Problems) -> ReadSpec:
     """Return `spec` with the keys next to its form in the reply or message at `part`."""
     conversions = {
-        name: _conversion(inner, findings) for name, inner in part.named("fields").items()
+        name: _conversion(inner, problems) for name, inner in part.named("fields").items()
     }
     sets = {
-        name: findings.expression(inner, allows_bytes=True)
+        name: problems.expression(inner, allows_bytes=True)
         for name, inner in part.named("set").items()
     }
     for name, inner in part.named("set").items():
         if name in spec.fields:
             text = f"the frame already sets {name!r}"
             hint = f"rename the field to _{name}, also in the expression"
-            findings.error(inner, "duplicate-name", text, key=True, hint=hint)
+            problems.error(inner, "duplicate-name", text, key=True, hint=hint)
     heads = part.named("head") if "head" in part.data else {}
     for name, inner in heads.items():
         if name in spec.fields:
             text = f"the frame already sets {name!r}"
-            findings.error(inner, "duplicate-name", text, key=True, hint="rename one of them")
+            problems.error(inner, "duplicate-name", text, key=True, hint="rename one of them")
     when, subscribe = part.get("when"), part.get("subscribe")
-    topic = findings.template(subscribe.must("topic")) if subscribe else None
+    topic = problems.template(subscribe.must("topic")) if subscribe else None
     if topic is not None and ("+" in topic.source or "#" in topic.source):
         spec = spec._replace(fields=(*spec.fields, "_topic"))
     head = {name: str(inner.data).lower() for name, inner in heads.items()}
     spec = spec._replace(head=head, fields=(*spec.fields, *head))
     return spec._replace(
         topic=topic,
-        listen=_listening(subscribe, findings) if subscribe else NOTHING,
+        listen=_listening(subscribe, problems) if subscribe else NOTHING,
         fields=(*spec.fields, *sets),
         conversions=conversions,
         sets=_compiled(sets),
-        when=findings.expression(when) if when else None,
+        when=problems.expression(when) if when else None,
     )
 
 
-def with_collected(part: Node, spec: ReadSpec, findings: Problems) -> ReadSpec:
+def with_collected(part: Node, spec: ReadSpec, problems: Problems) -> ReadSpec:
     """Return `spec` with the values that the message at `part` collects from several frames."""
     found: dict[str, Collect] = {}
     for name, inner in part.named("collect").items():
         if name in spec.fields:
             text = f"the frame already sets {name!r}"
             hint = f"rename the field to _{name}, and collect that field"
-            findings.error(inner, "duplicate-name", text, key=True, hint=hint)
+            problems.error(inner, "duplicate-name", text, key=True, hint=hint)
         begin, end = inner.get("begin"), inner.get("end")
         if begin is None and end is None:
             text = "'begin' or 'end' is missing"
             hint = "give a condition for its first frame (begin), or for its last frame (end)"
-            findings.error(inner, "missing-key", text, key=True, hint=hint)
-        value = findings.expression(inner.must("value"), allows_bytes=True)
+            problems.error(inner, "missing-key", text, key=True, hint=hint)
+        value = problems.expression(inner.must("value"), allows_bytes=True)
         if value is not None:
             found[name] = Collect(
                 value,
-                findings.expression(begin) if begin else None,
-                findings.expression(end) if end else None,
+                problems.expression(begin) if begin else None,
+                problems.expression(end) if end else None,
                 inner.integer("max") or Collect(value).max,
             )
     return spec._replace(fields=(*spec.fields, *found), collects=found) if found else spec
 
 
-def _listening(part: Node, findings: Problems) -> dict[str, Value]:
+def _listening(part: Node, problems: Problems) -> dict[str, Value]:
     return {
-        name: findings.duration(part, name, 0.0, least=0.0)
+        name: problems.duration(part, name, 0.0, least=0.0)
         if name in _DURATIONS
         else part.scalar(name)
         for name in part.data
@@ -85,15 +85,15 @@ def _compiled(sets: dict[str, Template | None]) -> dict[str, Template]:
     return {name: one for name, one in sets.items() if one is not None}
 
 
-def _conversion(part: Node, findings: Problems) -> Conversion:
-    conversion = parse_conversion(part, findings)
-    return conversion._replace(states=parse_states(part, "", findings))
+def _conversion(part: Node, problems: Problems) -> Conversion:
+    conversion = parse_conversion(part, problems)
+    return conversion._replace(states=parse_states(part, "", problems))
 
 
-def parse_lines(part: Node | None, findings: Problems) -> int | Pattern | None:
+def parse_lines(part: Node | None, problems: Problems) -> int | Pattern | None:
     """Return the number of frames of a reply, or the pattern of its last frame."""
     if part is None:
         return None
     if isinstance(part.data, dict):
-        return findings.pattern(part.must("until"))
+        return problems.pattern(part.must("until"))
     return int(part.data)

@@ -34,52 +34,52 @@ class _Frame(NamedTuple):
     length: LengthSpec | None
 
 
-def parse_layout(part: Node, encoding: str, findings: Problems, longest: int) -> FrameLayout:
+def parse_layout(part: Node, encoding: str, problems: Problems, longest: int) -> FrameLayout:
     """Return the layout of the framing at `part`; report a mistake and use its default."""
     kind = part.text("type")
     start = end = b""
     if kind in MARKED:
         start_key, end_key = ("open", "close") if kind == "brackets" else ("start", "end")
-        start = parse_bytes(part.get(start_key), encoding, findings) or b""
-        end = parse_bytes(part.get(end_key), encoding, findings) or b""
+        start = parse_bytes(part.get(start_key), encoding, problems) or b""
+        end = parse_bytes(part.get(end_key), encoding, problems) or b""
         if kind == "brackets":
-            _check_marks(part, findings)
+            _check_marks(part, problems)
     size = part.integer("size") if kind == "fixed" else None
-    length = _parse_length(part.must("length"), encoding, findings) if kind == "length" else None
+    length = _parse_length(part.must("length"), encoding, problems) if kind == "length" else None
     frame = _Frame(start, end, size, length)
     if length is not None:
-        _check_length(part.must("length"), start, length, findings)
+        _check_length(part.must("length"), start, length, problems)
         if length.is_loose:
-            _check_loose(part, findings)
-    found = [parse_checksum(one, encoding, findings) for one in checksums_of(part)]
+            _check_loose(part, problems)
+    found = [parse_checksum(one, encoding, problems) for one in checksums_of(part)]
     written = [one for one in found if one is not None]
     trailing = [one for one in written if one.trailer is not None]
-    digits = _digits(part, findings)
+    digits = _digits(part, problems)
     if trailing:
-        _check_trail(part, trailing[0], len(written), findings)
+        _check_trail(part, trailing[0], len(written), problems)
         layout = FrameLayout(
             start, end, len(start), len(end), trailer=_trail_of(trailing[0], start)
         )
     else:
-        layout = _placed(part, frame, written, findings)
-    _check_size(part, layout, longest, findings)
+        layout = _placed(part, frame, written, problems)
+    _check_size(part, layout, longest, problems)
     return layout._replace(digits=digits)
 
 
-def _digits(part: Node, findings: Problems) -> Digits:
+def _digits(part: Node, problems: Problems) -> Digits:
     """Return the digits that encode the bytes of the framing at `part`."""
     digits: Any = part.text("decode") if part.text("type") in _SPELT else ""
     if digits and "escape" in part.data:
         text = "'escape' has no effect with 'decode': digits need no escape"
-        findings.error(part, "misplaced-key", text, at="escape", key=True)
+        problems.error(part, "misplaced-key", text, at="escape", key=True)
     return digits  # type: ignore[no-any-return]  # the schema has the words
 
 
-def _check_trail(part: Node, written: DeclaredChecksum, count: int, findings: Problems) -> None:
+def _check_trail(part: Node, written: DeclaredChecksum, count: int, problems: Problems) -> None:
     key = "after" if "after" in written.part.data else "each"
     kind = part.text("type")
     if kind in ("fixed", "length"):
-        findings.error(
+        problems.error(
             written.part,
             "misplaced-key",
             f"'{key}' needs text frames; frames of type {kind!r} have fixed places",
@@ -89,7 +89,7 @@ def _check_trail(part: Node, written: DeclaredChecksum, count: int, findings: Pr
         )
     elif count > 1:
         text = f"a checksum with '{key}' must be the only one of its frame"
-        findings.error(written.part, "misplaced-key", text, at=key, key=True)
+        problems.error(written.part, "misplaced-key", text, at=key, key=True)
 
 
 def _trail_of(written: DeclaredChecksum, start: bytes) -> TrailerSpec:
@@ -113,11 +113,11 @@ def checksums_of(part: Node) -> list[Node]:
     return inner.items() if isinstance(inner.data, list) else [inner]
 
 
-def _check_marks(part: Node, findings: Problems) -> None:
+def _check_marks(part: Node, problems: Problems) -> None:
     for key in ("open", "close"):
         inner = part.must(key)
         if inner.data in ("", []):
-            findings.error(
+            problems.error(
                 inner,
                 "empty-mark",
                 f"'{key}' is empty and marks no frame",
@@ -126,7 +126,7 @@ def _check_marks(part: Node, findings: Problems) -> None:
 
 
 def _placed(
-    part: Node, frame: _Frame, written: list[DeclaredChecksum], findings: Problems
+    part: Node, frame: _Frame, written: list[DeclaredChecksum], problems: Problems
 ) -> FrameLayout:
     """Return the layout with the places that depend on each other."""
     start, end, size, length = frame
@@ -152,12 +152,12 @@ def _placed(
         lasts.append(at == last)
     payload = part.get("payload") if part.text("type") == "length" else None
     if payload is not None:
-        head, tail = _payload(payload, frame, head, tail, findings)
+        head, tail = _payload(payload, frame, head, tail, problems)
     layout = FrameLayout(start, end, head, tail, size, length)
     specs = []
     for one, at, is_last in zip(written, places, lasts, strict=True):
         spec = _checksum(one, at, is_last, layout)
-        _check_checksum(one.part, spec, layout, findings)
+        _check_checksum(one.part, spec, layout, problems)
         specs.append(spec)
     if not specs:
         return layout
@@ -182,20 +182,20 @@ def _spec_of(written: DeclaredChecksum, over: ByteRange, at: int) -> ChecksumSpe
 
 
 def _payload(
-    part: Node, frame: _Frame, head: int, tail: int, findings: Problems
+    part: Node, frame: _Frame, head: int, tail: int, problems: Problems
 ) -> tuple[int, int]:
     start, stop = part.integer("from"), part.integer("to")
     head = head if start is None else start
     tail = tail if stop is None else -stop
     if head < len(frame.start):
-        findings.error(
+        problems.error(
             part,
             "overlap",
             f"the payload begins at {head}, inside the start bytes",
             at="from",
         )
     if tail < len(frame.end):
-        findings.error(
+        problems.error(
             part,
             "overlap",
             f"the payload ends inside the end bytes, {tail} bytes before the end of the frame",
@@ -216,34 +216,34 @@ def _over(written: DeclaredChecksum, behind: int, layout: FrameLayout) -> ByteRa
 
 
 def _check_checksum(
-    part: Node, checksum: ChecksumSpec, layout: FrameLayout, findings: Problems
+    part: Node, checksum: ChecksumSpec, layout: FrameLayout, problems: Problems
 ) -> None:
     """Report a checksum or window outside the frame, or over another part of it."""
     at, size, frame_size = checksum.at, checksum.size, layout.size
     if at < 0 and at + size > 0:
         text = f"a checksum of {size} bytes at {at} exceeds the end of the frame"
-        findings.error(part, "outside-frame", text, at="at", hint=f"the last possible is {-size}")
+        problems.error(part, "outside-frame", text, at="at", hint=f"the last possible is {-size}")
         return
     if frame_size is not None and not -frame_size <= at <= frame_size - size:
         text = f"a checksum of {size} bytes at {at} is not inside a frame of {frame_size}"
-        findings.error(part, "outside-frame", text, at="at" if "at" in part.data else "")
+        problems.error(part, "outside-frame", text, at="at" if "at" in part.data else "")
         return
     if at < 0 and at + size > -len(layout.end):
         text = f"the checksum at {at} overlaps the end bytes"
-        findings.error(
+        problems.error(
             part, "overlap", text, at="at", hint=f"the last possible is {-size - len(layout.end)}"
         )
     if 0 <= at < len(layout.start):
         text = f"the checksum at {at} overlaps the start bytes"
-        findings.error(part, "overlap", text, at="at")
+        problems.error(part, "overlap", text, at="at")
     length = layout.length
     if length and at >= 0 and at < length.offset + length.size and length.offset < at + size:
-        findings.error(part, "overlap", f"the checksum at {at} overlaps the length field", at="at")
-    _check_window(part, checksum, layout, findings)
+        problems.error(part, "overlap", f"the checksum at {at} overlaps the length field", at="at")
+    _check_window(part, checksum, layout, problems)
 
 
 def _check_window(
-    part: Node, checksum: ChecksumSpec, layout: FrameLayout, findings: Problems
+    part: Node, checksum: ChecksumSpec, layout: FrameLayout, problems: Problems
 ) -> None:
     size, over = layout.size, checksum.over
     where = "over" if "over" in part.data else ""
@@ -253,7 +253,7 @@ def _check_window(
             return
         if -over.start > least:
             text = f"the window starts {-over.start} before the end; a frame has {least} or more"
-            findings.warn(part, "outside-frame", text, at=where)
+            problems.warn(part, "outside-frame", text, at=where)
         return
     if size < layout.head + layout.tail:
         return  # reported elsewhere
@@ -261,23 +261,23 @@ def _check_window(
     stop = size if over.stop is None else over.stop if over.stop >= 0 else size + over.stop
     if not 0 <= start <= size or not 0 <= stop <= size:
         text = f"the window of the checksum is outside a frame of {size} bytes"
-        findings.error(part, "outside-frame", text, at=where)
+        problems.error(part, "outside-frame", text, at=where)
     elif start >= stop:
-        findings.error(part, "empty-window", "the checksum covers no bytes", at=where)
+        problems.error(part, "empty-window", "the checksum covers no bytes", at=where)
 
 
-def _check_size(part: Node, layout: FrameLayout, longest: int, findings: Problems) -> None:
+def _check_size(part: Node, layout: FrameLayout, longest: int, problems: Problems) -> None:
     """Report frames that cannot hold their own parts, or exceed the largest size."""
     least = layout.head + layout.tail
     if layout.size is not None and layout.size < least:
-        findings.error(
+        problems.error(
             part,
             "frame-too-small",
             f"{layout.size} bytes cannot hold the start, end and checksum, which take {least}",
             at="size",
         )
     elif max(least, layout.size or 0) > longest:
-        findings.error(
+        problems.error(
             part,
             "frame-too-small",
             f"a frame has at least {max(least, layout.size or 0)} bytes, which is more"
@@ -289,15 +289,15 @@ def _check_size(part: Node, layout: FrameLayout, longest: int, findings: Problem
 _MOST_BYTES = 8
 
 
-def _parse_length(part: Node, encoding: str, findings: Problems) -> LengthSpec:
+def _parse_length(part: Node, encoding: str, problems: Problems) -> LengthSpec:
     """Return the length field at `part`; report a mistake and use its default."""
     size = part.integer("size") or 1
     spelling = part.text("as", "raw")
     flag, until = part.get("flag"), part.get("until")
-    mark = None if until is None else parse_bytes(until, encoding, findings)
+    mark = None if until is None else parse_bytes(until, encoding, problems)
     if until is not None and mark == b"":
         text = "'until' is empty and ends no number"
-        findings.error(until, "empty-mark", text, hint="give the bytes after it, such as ':'")
+        problems.error(until, "empty-mark", text, hint="give the bytes after it, such as ':'")
     return LengthSpec(
         offset=part.integer("offset") or 0,
         size=size,
@@ -313,10 +313,10 @@ def _parse_length(part: Node, encoding: str, findings: Problems) -> LengthSpec:
     )
 
 
-def _check_length(part: Node, start: bytes, length: LengthSpec, findings: Problems) -> None:
+def _check_length(part: Node, start: bytes, length: LengthSpec, problems: Problems) -> None:
     """Report a length field that overlaps the start bytes, or has keys without effect."""
     if length.offset < len(start):
-        findings.error(
+        problems.error(
             part,
             "overlap",
             f"the length field at {length.offset} overlaps the start bytes",
@@ -325,34 +325,34 @@ def _check_length(part: Node, start: bytes, length: LengthSpec, findings: Proble
         )
     if length.spelling == "raw" and length.size > _MOST_BYTES:
         text = f"a binary number has {_MOST_BYTES} bytes at most, found {length.size}"
-        findings.error(part, "too-wide", text, at="size", hint="write 'as: dec' for decimal digits")
+        problems.error(part, "too-wide", text, at="size", hint="write 'as: dec' for decimal digits")
         return
     most = 8 * length.size if length.spelling == "raw" else 64
     if length.bits != 64 and length.bits > most:
-        findings.error(part, "too-wide", f"the field has {most} bits, not {length.bits}", at="bits")
+        problems.error(part, "too-wide", f"the field has {most} bits, not {length.bits}", at="bits")
     if not length.is_loose:
         return
     key = "until" if length.until else "counted"
     if length.spelling == "raw":
         text = f"'{key}' needs a number in digits"
-        findings.error(part, "misplaced-key", text, at=key, key=True, hint="add 'as: dec'")
+        problems.error(part, "misplaced-key", text, at=key, key=True, hint="add 'as: dec'")
     for other in ("bits", "endian", "flag", *(("counted",) if length.until else ())):
         if other in part.data:
             text = f"'{other}' has no effect with '{key}'"
-            findings.error(part, "misplaced-key", text, at=other, key=True)
+            problems.error(part, "misplaced-key", text, at=other, key=True)
 
 
-def _check_loose(part: Node, findings: Problems) -> None:
+def _check_loose(part: Node, problems: Problems) -> None:
     """Report keys that need a fixed start of the payload, where the length field has none."""
     for key in ("payload", "escape"):
         if key in part.data:
             text = f"'{key}' has no effect when 'until' ends the length"
             hint = "the payload starts after the length and ends with the frame"
-            findings.error(part, "misplaced-key", text, at=key, key=True, hint=hint)
+            problems.error(part, "misplaced-key", text, at=key, key=True, hint=hint)
     inner = part.get("checksum")
     if inner is not None:
         for one in inner.items() if isinstance(inner.data, list) else [inner]:
             if "over" not in one.data or one.must("over").data == "payload":
                 text = "the start of the payload is not fixed"
                 hint = "write 'over: frame', or give two places"
-                findings.error(one, "misplaced-key", text, hint=hint)
+                problems.error(one, "misplaced-key", text, hint=hint)

@@ -23,15 +23,15 @@ _SWITCHABLE: Final = (
 
 
 def parse_framing(
-    part: Node, encoding: str, findings: Problems, catalog: Registries
+    part: Node, encoding: str, problems: Problems, catalog: Registries
 ) -> FramingSpec:
     """Return the framing at `part`; report a mistake and use its default."""
     kind = part.must("type")
     if kind.data == "switch" and catalog.framings.get(kind.data) is not None:
-        return _switch(part, encoding, findings, catalog)
+        return _switch(part, encoding, problems, catalog)
     longest = part.integer("max") or FramingSpec().max_bytes
     if catalog.framings.get(kind.data) is None:
-        findings.error(
+        problems.error(
             kind,
             "unknown-framing",
             f"there is no framing of type {kind.data!r}",
@@ -42,35 +42,35 @@ def parse_framing(
     if parse is None:
         options = {name: item for name, item in part.data.items() if name not in ("type", "max")}
         return FramingSpec(kind.data, options, longest)
-    options = parse(part, encoding, findings)
-    layout = parse_layout(part, encoding, findings, longest)
+    options = parse(part, encoding, problems)
+    layout = parse_layout(part, encoding, problems, longest)
     if kind.data == "delimiter" and "escape" not in part.data:
-        _check_raw(part, layout, options, findings)
-    escape = parse_escape(part, layout, options, encoding, findings)
+        _check_raw(part, layout, options, problems)
+    escape = parse_escape(part, layout, options, encoding, problems)
     if escape is not None and escape.is_of_payload:
         layout = layout._replace(escape=escape)
     elif escape is not None:
         options["escape"] = escape
     if layout != FrameLayout() or kind.data in MARKED:
         options["layout"] = layout
-    return _with_patience(part, FramingSpec(kind.data, options, longest), findings)
+    return _with_common_options(part, FramingSpec(kind.data, options, longest), problems)
 
 
-def _with_patience(part: Node, spec: FramingSpec, findings: Problems) -> FramingSpec:
+def _with_common_options(part: Node, spec: FramingSpec, problems: Problems) -> FramingSpec:
     """Return the framing with the options of every framing type."""
     if "timeout" not in part.data and "strip_ansi" not in part.data:
         return spec
-    timeout_s = findings.duration(part, "timeout", 0.0, least=0.001, most=60) or None
+    timeout_s = problems.duration(part, "timeout", 0.0, least=0.001, most=60) or None
     strips = "strip_ansi" in part.data and part.flag("strip_ansi", default=False)
     return spec._replace(timeout_s=timeout_s, strips_ansi=strips)
 
 
-def _delimiter(part: Node, encoding: str, findings: Problems) -> dict[str, Any]:
-    tx = parse_bytes(part.must("tx"), encoding, findings)
+def _delimiter(part: Node, encoding: str, problems: Problems) -> dict[str, Any]:
+    tx = parse_bytes(part.must("tx"), encoding, problems)
     rx_part = part.must("rx")
-    rx = parse_bytes(rx_part, encoding, findings)
+    rx = parse_bytes(rx_part, encoding, problems)
     if rx == b"":
-        findings.error(
+        problems.error(
             rx_part,
             "empty-delimiter",
             "the delimiter is empty and cannot end a frame",
@@ -80,7 +80,7 @@ def _delimiter(part: Node, encoding: str, findings: Problems) -> dict[str, Any]:
 
 
 def _check_raw(
-    part: Node, layout: FrameLayout, options: dict[str, Any], findings: Problems
+    part: Node, layout: FrameLayout, options: dict[str, Any], problems: Problems
 ) -> None:
     """Warn of a binary checksum that may contain a delimiter."""
     specs = () if layout.digits else (*layout.checksums, layout.checksum)
@@ -88,7 +88,7 @@ def _check_raw(
     ends = options["tx"] + options["rx"]
     for spec in (*specs, trailing):
         if spec is not None and spec.spelling == "raw" and values_of(spec.algorithm) & {*ends}:
-            findings.warn(
+            problems.warn(
                 part.must("checksum"),
                 "raw-checksum",
                 "a binary checksum may contain the delimiter and end its own frame",
@@ -97,23 +97,23 @@ def _check_raw(
             return
 
 
-def _regex(part: Node, encoding: str, findings: Problems) -> dict[str, Any]:
+def _regex(part: Node, encoding: str, problems: Problems) -> dict[str, Any]:
     inner = part.must("pattern")
-    if findings.pattern(inner, is_over_bytes=True) is not None:
-        _check_pattern(inner, findings)
-    return {"pattern": inner.data} | _tx(part, encoding, findings)
+    if problems.pattern(inner, is_over_bytes=True) is not None:
+        _check_pattern(inner, problems)
+    return {"pattern": inner.data} | _tx(part, encoding, problems)
 
 
-def _tx(part: Node, encoding: str, findings: Problems) -> dict[str, Any]:
-    tx = parse_bytes(part.get("tx"), encoding, findings)
+def _tx(part: Node, encoding: str, problems: Problems) -> dict[str, Any]:
+    tx = parse_bytes(part.get("tx"), encoding, problems)
     return {"tx": tx} if tx else {}
 
 
-def _idle(part: Node, encoding: str, findings: Problems) -> dict[str, Any]:
-    return {"gap_s": findings.duration(part, "gap", 0.02, least=0.001, most=60)}
+def _idle(part: Node, encoding: str, problems: Problems) -> dict[str, Any]:
+    return {"gap_s": problems.duration(part, "gap", 0.02, least=0.001, most=60)}
 
 
-def _plain(part: Node, encoding: str, findings: Problems) -> dict[str, Any]:
+def _plain(part: Node, encoding: str, problems: Problems) -> dict[str, Any]:
     return {}
 
 
@@ -132,40 +132,40 @@ _PARSERS: Final[dict[str, Callable[[Node, str, Problems], dict[str, Any]]]] = {
 }
 
 
-def _switch(part: Node, encoding: str, findings: Problems, catalog: Registries) -> FramingSpec:
+def _switch(part: Node, encoding: str, problems: Problems, catalog: Registries) -> FramingSpec:
     cases: list[tuple[bytes, FramingSpec]] = []
     for case in part.listed("cases"):
         first_part, inner = case.must("first"), case.must("framing")
-        first = parse_bytes(first_part, encoding, findings)
-        if not _is_switchable(inner.must("type"), findings):
+        first = parse_bytes(first_part, encoding, problems)
+        if not _is_switchable(inner.must("type"), problems):
             continue
         for key in ("timeout", "strip_ansi"):
             if key in inner.data:
                 text = f"'{key}' must be a key of the 'switch' itself"
-                findings.error(inner, "misplaced-key", text, at=key, key=True)
-        spec = parse_framing(inner, encoding, findings, catalog)._replace(
+                problems.error(inner, "misplaced-key", text, at=key, key=True)
+        spec = parse_framing(inner, encoding, problems, catalog)._replace(
             timeout_s=None, strips_ansi=False
         )
         if first is None:
             continue
         if not first:
-            findings.error(first_part, "empty-mark", "an empty case cannot select a framing")
+            problems.error(first_part, "empty-mark", "an empty case cannot select a framing")
             continue
-        _check_case(first_part, first, spec, cases, findings)
+        _check_case(first_part, first, spec, cases, problems)
         cases.append((first, spec))
     options: dict[str, Any] = {"cases": tuple(cases)}
     longest = max((spec.max_bytes for _, spec in cases), default=FramingSpec().max_bytes)
     other = part.get("else")
-    if other is not None and _is_switchable(other.must("type"), findings):
-        options["otherwise"] = parse_framing(other, encoding, findings, catalog)
+    if other is not None and _is_switchable(other.must("type"), problems):
+        options["otherwise"] = parse_framing(other, encoding, problems, catalog)
         longest = max(longest, options["otherwise"].max_bytes)
-    return _with_patience(part, FramingSpec("switch", options, longest), findings)
+    return _with_common_options(part, FramingSpec("switch", options, longest), problems)
 
 
-def _is_switchable(kind: Node, findings: Problems) -> bool:
+def _is_switchable(kind: Node, problems: Problems) -> bool:
     if kind.data in _SWITCHABLE:
         return True
-    findings.error(
+    problems.error(
         kind,
         "misplaced-framing",
         f"a case of 'switch' cannot have the type {kind.data!r}",
@@ -179,12 +179,12 @@ def _check_case(
     first: bytes,
     spec: FramingSpec,
     before: list[tuple[bytes, FramingSpec]],
-    findings: Problems,
+    problems: Problems,
 ) -> None:
     """Report a case that is never reached, or whose frames begin with other bytes."""
     for other, _ in before:
         if first.startswith(other):
-            findings.error(
+            problems.error(
                 part,
                 "unreachable-case",
                 f"frames that start with {first.hex(' ')} go to the earlier case of"
@@ -194,7 +194,7 @@ def _check_case(
             return
     start = getattr(spec.options.get("layout"), "start", b"")
     if start and not (start.startswith(first) or first.startswith(start)):
-        findings.error(
+        problems.error(
             part,
             "never-matches",
             f"its frames start with {start.hex(' ')}, not with {first.hex(' ')}",
@@ -204,12 +204,12 @@ def _check_case(
 _REPEATS = (_constants.MAX_REPEAT, _constants.MIN_REPEAT)
 
 
-def _check_pattern(part: Node, findings: Problems) -> None:
+def _check_pattern(part: Node, problems: Problems) -> None:
     """Report mistakes in a pattern for a stream, such as an unclear end of its frames."""
     text: str = part.data
     far = next((place for place, char in enumerate(text) if ord(char) > 127), None)
     if far is not None:
-        findings.error(
+        problems.error(
             part,
             "bad-pattern",
             f"{text[far]!r} is not a byte, and the pattern matches bytes",
@@ -219,21 +219,21 @@ def _check_pattern(part: Node, findings: Problems) -> None:
         return
     tree = _parser.parse(text.removeprefix("^"))
     if tree.getwidth()[0] == 0:
-        findings.error(
+        problems.error(
             part,
             "matches-nothing",
             "the pattern also matches an empty frame",
             hint="make it match at least one byte",
         )
     elif _has_anchor(tree):
-        findings.error(
+        problems.error(
             part,
             "misplaced-anchor",
             "'^', '$' and '\\b' have no effect inside a stream",
             hint="a frame starts where the pattern matches; add the bytes that end it",
         )
     elif _is_open(tree):
-        findings.error(
+        problems.error(
             part,
             "open-end",
             "the pattern has an open end, so the end of a frame is never certain",

@@ -6,12 +6,12 @@ from urc.config.node import Node, Problems
 __all__ = ["check_headers"]
 
 
-def check_headers(part: Node, findings: Problems) -> None:
+def check_headers(part: Node, problems: Problems) -> None:
     """Report each header of `part` that identifies the client or controls the request."""
     headers = part.entries().get("headers")  # most transport types have none
     for name, inner in headers.entries().items() if headers else ():
         if is_reserved(name):
-            findings.error(
+            problems.error(
                 inner,
                 "reserved-header",
                 f"a document may not set the header {name!r}",

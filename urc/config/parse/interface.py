@@ -17,16 +17,16 @@ _Cell = tuple[str, int]
 """The content of a cell, and its offset in the text."""
 
 
-def parse_interface(part: Node, name: str, findings: Problems) -> Interface:
+def parse_interface(part: Node, name: str, problems: Problems) -> Interface:
     """Return the interface at `part`, without the widgets of its slots."""
     title = part.text("title", spoken_name(name))
     pages = part.named("tabs")
-    tabs = {key: _tab(inner, findings, part) for key, inner in pages.items()}
+    tabs = {key: _tab(inner, problems, part) for key, inner in pages.items()}
     only = Tab()
     if pages:
-        _check_beside_tabs(part, findings)
+        _check_beside_tabs(part, problems)
     else:
-        only = _tab(part, findings)
+        only = _tab(part, problems)
     background = part.text("background")
     interface = Interface(
         name=name,
@@ -40,7 +40,7 @@ def parse_interface(part: Node, name: str, findings: Problems) -> Interface:
         tabs=tabs,
     )
     if background in interface.shown:
-        findings.error(
+        problems.error(
             part,
             "misplaced-key",
             f"{background!r} is also in the grid",
@@ -50,10 +50,10 @@ def parse_interface(part: Node, name: str, findings: Problems) -> Interface:
     return interface._replace(background=background)
 
 
-def check_names(root: Node, findings: Problems) -> None:
+def check_names(root: Node, problems: Problems) -> None:
     """Report an interface with the name of the built-in interface."""
     if DEBUG in root.named("interfaces"):
-        findings.error(
+        problems.error(
             root.must("interfaces"),
             "bad-name",
             f"{DEBUG!r} is the name of the built-in interface of every robot",
@@ -63,10 +63,10 @@ def check_names(root: Node, findings: Problems) -> None:
         )
 
 
-def _check_beside_tabs(part: Node, findings: Problems) -> None:
+def _check_beside_tabs(part: Node, problems: Problems) -> None:
     for key in ("grid", "layouts", "left_handed"):
         if part.get(key) is not None:
-            findings.error(
+            problems.error(
                 part,
                 "misplaced-key",
                 f"'{key}' and 'tabs' exclude each other",
@@ -76,23 +76,23 @@ def _check_beside_tabs(part: Node, findings: Problems) -> None:
             )
 
 
-def _tab(part: Node, findings: Problems, around: Node | None = None) -> Tab:
+def _tab(part: Node, problems: Problems, around: Node | None = None) -> Tab:
     """Return one page; the mirroring keys of `around` are the defaults of its tabs."""
     is_mirrored = around.flag("mirror", default=True) if around is not None else True
     left = part.get("left_handed")
     return Tab(
         name=part.name if around is not None else "",
         title=part.text("title", spoken_name(part.name)) if around is not None else "",
-        layouts=_pictures(part, findings, is_tab=around is not None),
-        left_handed=_by_screen(left, findings) if left is not None else {},
+        layouts=_pictures(part, problems, is_tab=around is not None),
+        left_handed=_by_screen(left, problems) if left is not None else {},
         is_mirrored=part.flag("mirror", default=is_mirrored),
     )
 
 
-def _pictures(part: Node, findings: Problems, *, is_tab: bool) -> dict[str, Layout]:
+def _pictures(part: Node, problems: Problems, *, is_tab: bool) -> dict[str, Layout]:
     one, several = part.get("grid"), part.get("layouts")
     if one is None and several is None:
-        findings.error(
+        problems.error(
             part,
             "missing-key",
             f"{'a tab' if is_tab else 'an interface'} lacks 'grid'",
@@ -100,40 +100,40 @@ def _pictures(part: Node, findings: Problems, *, is_tab: bool) -> dict[str, Layo
             hint="draw it: a line for each row, a name for each cell, '.' for an empty cell",
         )
     if one is not None and several is not None:
-        findings.error(
+        problems.error(
             several,
             "misplaced-key",
             "'grid' and 'layouts' exclude each other",
             key=True,
             hint="move 'grid' into 'layouts' as 'landscape'",
         )
-    found = {"landscape": _grid(one, findings)} if one is not None else {}
-    return found | (_by_screen(several, findings) if several is not None else {})
+    found = {"landscape": _grid(one, problems)} if one is not None else {}
+    return found | (_by_screen(several, problems) if several is not None else {})
 
 
-def _by_screen(several: Node, findings: Problems) -> dict[str, Layout]:
+def _by_screen(several: Node, problems: Problems) -> dict[str, Layout]:
     pictures = {screen: several.get(screen) for screen in SCREENS}
     return {
-        screen: _grid(picture, findings)
+        screen: _grid(picture, problems)
         for screen, picture in pictures.items()
         if picture is not None
     }
 
 
-def _grid(part: Node, findings: Problems) -> Layout:
+def _grid(part: Node, problems: Problems) -> Layout:
     rows = _rows(part.data)
     if not rows:
-        findings.error(part, "empty-grid", "the grid has no rows")
+        problems.error(part, "empty-grid", "the grid has no rows")
         return Layout(1, 1, ())
     if len(rows) > _MOST or len(rows[0]) > _MOST:
-        findings.error(part, "wrong-size", f"a grid has at most {_MOST} rows and columns")
+        problems.error(part, "wrong-size", f"a grid has at most {_MOST} rows and columns")
         return Layout(1, 1, ())
     width = len(rows[0])
     is_sound = True
     for number, row in enumerate(rows, 1):
         if len(row) != width:
             is_sound = False
-            findings.error(
+            problems.error(
                 part,
                 "uneven-rows",
                 f"row {number} has {_cells(len(row))}, the first row has {width}",
@@ -144,7 +144,7 @@ def _grid(part: Node, findings: Problems) -> Layout:
         for text, offset in row:
             if not _NAME.fullmatch(text) and not _EMPTY.fullmatch(text):
                 is_sound = False
-                findings.error(
+                problems.error(
                     part,
                     "bad-name",
                     f"{text!r} is not a valid slot name",
@@ -154,7 +154,7 @@ def _grid(part: Node, findings: Problems) -> Layout:
                 )
     if not is_sound:
         return Layout(1, 1, ())
-    slots = _slots(part, rows, findings)
+    slots = _slots(part, rows, problems)
     return Layout(len(rows), width, tuple(slots))
 
 
@@ -173,7 +173,7 @@ def _rows(text: str) -> list[list[_Cell]]:
     return rows
 
 
-def _slots(part: Node, rows: list[list[_Cell]], findings: Problems) -> list[Slot]:
+def _slots(part: Node, rows: list[list[_Cell]], problems: Problems) -> list[Slot]:
     places: dict[str, list[tuple[int, int]]] = {}
     for row_number, row in enumerate(rows):
         for column, (text, _) in enumerate(row):
@@ -185,12 +185,12 @@ def _slots(part: Node, rows: list[list[_Cell]], findings: Problems) -> list[Slot
         columns = [column for _, column in cells]
         left, right = min(columns), max(columns)
         slot = Slot(name, top, left, bottom - top + 1, right - left + 1)
-        _check_rectangle(slot, part, rows, findings)
+        _check_rectangle(slot, part, rows, problems)
         slots.append(slot)
     return slots
 
 
-def _check_rectangle(slot: Slot, part: Node, rows: list[list[_Cell]], findings: Problems) -> None:
+def _check_rectangle(slot: Slot, part: Node, rows: list[list[_Cell]], problems: Problems) -> None:
     bottom, right = slot.row + slot.row_span, slot.column + slot.column_span
     wrong = [
         (row, column)
@@ -207,7 +207,7 @@ def _check_rectangle(slot: Slot, part: Node, rows: list[list[_Cell]], findings: 
     ]
     more = f" and {len(wrong) - 4} more" if len(wrong) > 4 else ""
     text, offset = rows[wrong[0][0]][wrong[0][1]]
-    findings.error(
+    problems.error(
         part,
         "not-a-rectangle",
         f"slot {slot.name!r} is not a rectangle: it extends from row {slot.row + 1} column"

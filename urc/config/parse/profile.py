@@ -18,18 +18,18 @@ _VALUE_TYPES: Final = {
 """Type of a setting → type of its value; a missing type means text."""
 
 
-def parse_setting(part: Node, findings: Problems) -> Setting:
+def parse_setting(part: Node, problems: Problems) -> Setting:
     """Return one setting."""
     kind = part.text("type")
     low, high = check_range(
-        part, _VALUE_TYPES.get(kind, "string") if kind != "port" else kind, findings
+        part, _VALUE_TYPES.get(kind, "string") if kind != "port" else kind, problems
     )
     choices = tuple(str(inner.data) for inner in part.listed("choices"))
-    _check_choices(part, kind, choices, findings)
+    _check_choices(part, kind, choices, problems)
     is_secret = part.flag("secret", default=False)
     default_part = part.get("default")
     if is_secret and default_part is not None:
-        findings.error(
+        problems.error(
             default_part,
             "secret-in-document",
             "a document must not contain a secret",
@@ -38,7 +38,7 @@ def parse_setting(part: Node, findings: Problems) -> Setting:
         )
     is_required = part.flag("required", default=True)
     if not is_required and default_part is not None:
-        findings.error(
+        problems.error(
             part,
             "misplaced-key",
             "'required' has no effect with 'default': the setting is never empty",
@@ -57,20 +57,20 @@ def parse_setting(part: Node, findings: Problems) -> Setting:
         is_required=is_required,
         description=part.text("description"),
         default=(
-            None if default_part is None else setting_value(default_part, kind, choices, findings)
+            None if default_part is None else setting_value(default_part, kind, choices, problems)
         ),
     )
     if default_part is not None:
-        check_within(setting.default, low, high, default_part, findings)
+        check_within(setting.default, low, high, default_part, problems)
     return setting
 
 
-def _check_choices(part: Node, kind: str, choices: tuple[str, ...], findings: Problems) -> None:
+def _check_choices(part: Node, kind: str, choices: tuple[str, ...], problems: Problems) -> None:
     """Report a setting of type choice without choices, and choices of another type."""
     if kind == "choice" and not choices:
-        findings.error(part, "missing-key", "a setting of type choice needs 'choices'", key=True)
+        problems.error(part, "missing-key", "a setting of type choice needs 'choices'", key=True)
     if kind != "choice" and choices:
-        findings.error(
+        problems.error(
             part,
             "misplaced-key",
             f"'choices' has no effect for {kind}",
@@ -80,13 +80,13 @@ def _check_choices(part: Node, kind: str, choices: tuple[str, ...], findings: Pr
         )
 
 
-def setting_value(part: Node, kind: str, choices: tuple[str, ...], findings: Problems) -> Value:
+def setting_value(part: Node, kind: str, choices: tuple[str, ...], problems: Problems) -> Value:
     """Return the value of a setting in a document, or None when it was reported."""
     wanted = _VALUE_TYPES.get(kind, "string")
     try:
         value = fit(part.data, wanted)
     except ValueError as error:
-        findings.error(part, "wrong-type", str(error), hint=fit_hint(part.data, wanted))
+        problems.error(part, "wrong-type", str(error), hint=fit_hint(part.data, wanted))
         return None
     fault = ""
     if kind == "port" and not 1 <= int(value or 0) <= 65535:
@@ -96,7 +96,7 @@ def setting_value(part: Node, kind: str, choices: tuple[str, ...], findings: Pro
     elif kind == "choice" and value not in choices:
         fault = f"{shown(value)} is not one of the choices"
     if fault:
-        findings.error(part, "bad-value", fault)
+        problems.error(part, "bad-value", fault)
         return None
     return value
 

@@ -28,14 +28,14 @@ _MOST_BUSY_S = 600.0
 """Default of ``within``: maximum time of a busy robot, in seconds."""
 
 
-def parse_reply(part: Node | None, findings: Problems, context: FormContext) -> Reply | None:
+def parse_reply(part: Node | None, problems: Problems, context: FormContext) -> Reply | None:
     """Return the reply at `part`, or None."""
     if part is None:
         return None
-    own, context = parse_own_framing(part, findings, context)
+    own, context = parse_own_framing(part, problems, context)
     stages = part.listed("stages")
     for inner in stages:
-        refuse(inner, _OF_THE_WHOLE, "must be a key of the whole reply", findings)
+        refuse(inner, _OF_THE_WHOLE, "must be a key of the whole reply", problems)
     if stages:
         beside = (
             *READ_FORMS,
@@ -48,16 +48,16 @@ def parse_reply(part: Node | None, findings: Problems, context: FormContext) -> 
             "resend",
             "extend",
         )
-        refuse(part, beside, "must be a key of one of the stages", findings)
-    first, *others = [parse_stage(inner, findings, context) for inner in stages or [part]]
-    errors, faults = parse_errors(part, findings, context) if stages else ((), ())
+        refuse(part, beside, "must be a key of one of the stages", problems)
+    first, *others = [parse_stage(inner, problems, context) for inner in stages or [part]]
+    errors, faults = parse_errors(part, problems, context) if stages else ((), ())
     match = part.get("match")
     return Reply(
         read=first.read,
         errors=first.errors,
         faults=first.faults,
         timeout_s=first.timeout_s,
-        match=findings.expression(match) if match else None,
+        match=problems.expression(match) if match else None,
         stages=tuple(others),
         framing=own,
         asides=first.asides,
@@ -72,17 +72,17 @@ def implied_reply(send: WriteSpec) -> Reply | None:
     return Reply(ReadSpec("any")) if send.options.get("verb") in NUMBERED else None
 
 
-def parse_stage(part: Node, findings: Problems, context: FormContext) -> Stage:
+def parse_stage(part: Node, problems: Problems, context: FormContext) -> Stage:
     """Return one stage of the reply to any request."""
-    errors, faults = parse_errors(part, findings, context)
+    errors, faults = parse_errors(part, problems, context)
     if "silence" in part.data:
-        return _silence(part, errors, faults, findings)
+        return _silence(part, errors, faults, problems)
     return Stage(
-        read=_read(part, findings, context),
+        read=_read(part, problems, context),
         errors=errors,
         faults=faults,
-        timeout_s=findings.duration(part, "timeout", 0.0, most=3600) or None,
-        asides=_asides(part, findings, context),
+        timeout_s=problems.duration(part, "timeout", 0.0, most=3600) or None,
+        asides=_asides(part, problems, context),
     )
 
 
@@ -90,22 +90,22 @@ def _silence(
     part: Node,
     errors: tuple[Pattern, ...],
     faults: tuple[ErrorReply, ...],
-    findings: Problems,
+    problems: Problems,
 ) -> Stage:
     """Return the stage for a robot that is silent on success."""
     beside = (*READ_FORMS, *_BESIDE_SILENCE)
-    refuse(part, beside, "has no effect with 'silence', which is the reply", findings)
-    read, within_s = ReadSpec("silence"), findings.duration(part, "silence", 0.3, most=60)
+    refuse(part, beside, "has no effect with 'silence', which is the reply", problems)
+    read, within_s = ReadSpec("silence"), problems.duration(part, "silence", 0.3, most=60)
     return Stage(read=read, errors=errors, faults=faults, timeout_s=within_s)
 
 
-def _asides(part: Node, findings: Problems, context: FormContext) -> ProvisionalReplies:
+def _asides(part: Node, problems: Problems, context: FormContext) -> ProvisionalReplies:
     """Return the provisional replies under ``resend:`` and ``extend:``."""
     extend, extend_s = part.get("extend"), _MOST_BUSY_S
     if extend is not None and isinstance(extend.data, dict):
-        extend_s = findings.duration(extend, "within", _MOST_BUSY_S, most=3600)
-        if extend_s < findings.duration(part, "timeout", 0.0, most=3600):
-            findings.error(
+        extend_s = problems.duration(extend, "within", _MOST_BUSY_S, most=3600)
+        if extend_s < problems.duration(part, "timeout", 0.0, most=3600):
+            problems.error(
                 extend,
                 "wrong-order",
                 "'within' is shorter than the timeout of the reply",
@@ -114,24 +114,24 @@ def _asides(part: Node, findings: Problems, context: FormContext) -> Provisional
             )
     resend = part.get("resend")
     if resend is not None and isinstance(resend.data, dict):
-        refuse(resend, ("within",), "belongs to 'extend'", findings)
+        refuse(resend, ("within",), "belongs to 'extend'", problems)
     return ProvisionalReplies(
-        _aside(resend, findings, context), _aside(extend, findings, context), extend_s
+        _aside(resend, problems, context), _aside(extend, problems, context), extend_s
     )
 
 
-def _aside(part: Node | None, findings: Problems, context: FormContext) -> ReadSpec | None:
+def _aside(part: Node | None, problems: Problems, context: FormContext) -> ReadSpec | None:
     """Return a frame in any form; a text is a pattern."""
     if part is None:
         return None
     if isinstance(part.data, dict):
-        return parse_read(part, findings, context)
-    pattern = findings.pattern(part)
+        return parse_read(part, problems, context)
+    pattern = problems.pattern(part)
     return ReadSpec("regex", {"pattern": pattern}, pattern.groups) if pattern else None
 
 
 def parse_errors(
-    part: Node, findings: Problems, context: FormContext
+    part: Node, problems: Problems, context: FormContext
 ) -> tuple[tuple[Pattern, ...], tuple[ErrorReply, ...]]:
     """Return the error replies under ``errors:``: patterns, and replies of any form."""
     patterns: list[Pattern] = []
@@ -139,24 +139,24 @@ def parse_errors(
     for inner in part.listed("errors"):
         if isinstance(inner.data, dict):
             text = inner.get("text")
-            read = parse_read(inner, findings, context)
-            faults.append(ErrorReply(read, findings.template(text) if text else None))
+            read = parse_read(inner, problems, context)
+            faults.append(ErrorReply(read, problems.template(text) if text else None))
         else:
-            pattern = findings.pattern(inner)
+            pattern = problems.pattern(inner)
             if pattern is not None:
                 patterns.append(pattern)
     return tuple(patterns), tuple(faults)
 
 
-def refuse(part: Node, keys: tuple[str, ...], why: str, findings: Problems) -> None:
+def refuse(part: Node, keys: tuple[str, ...], why: str, problems: Problems) -> None:
     """Report each of `keys` in `part`."""
     for key in keys:
         if key in part.data:
-            findings.error(part, "misplaced-key", f"'{key}' {why}", at=key, key=True)
+            problems.error(part, "misplaced-key", f"'{key}' {why}", at=key, key=True)
 
 
 def parse_own_framing(
-    part: Node, findings: Problems, context: FormContext
+    part: Node, problems: Problems, context: FormContext
 ) -> tuple[FramingSpec | None, FormContext]:
     """Return the reply's own framing, if any, and the context of its forms."""
     inner = part.get("framing")
@@ -164,10 +164,10 @@ def parse_own_framing(
         return None, context
     if context.catalog is None:
         return None, context  # no transports in this document, which was reported
-    spec = parse_framing(inner, context.encoding, findings, context.catalog)
+    spec = parse_framing(inner, context.encoding, problems, context.catalog)
     return spec, context._replace(framing=None)
 
 
-def _read(part: Node, findings: Problems, context: FormContext) -> ReadSpec:
-    lines = parse_lines(part.get("lines"), findings)
-    return parse_read(part, findings, context)._replace(lines=lines)
+def _read(part: Node, problems: Problems, context: FormContext) -> ReadSpec:
+    lines = parse_lines(part.get("lines"), problems)
+    return parse_read(part, problems, context)._replace(lines=lines)

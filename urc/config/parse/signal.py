@@ -19,21 +19,21 @@ _ROTATIONS: Final = ("roll", "pitch", "yaw")
 _BYTES: Final = ("image", "blob")
 
 
-def parse_signal(part: Node, title: str, findings: Problems) -> Signal:
+def parse_signal(part: Node, title: str, problems: Problems) -> Signal:
     """Return the signal at `part`; `title` is the default of its title."""
     kind = part.text("type", "number")
     element = part.text("items", "number") if kind == "array" else kind
-    _check_vector(part, kind, findings)
-    low, high = check_range(part, element, findings)
+    _check_vector(part, kind, problems)
+    low, high = check_range(part, element, problems)
     if part.name == "pi":
         text, hint = "a signal cannot have the name 'pi'", "in expressions this name is the number"
-        findings.error(part, "bad-name", text, key=True, hint=hint)
+        problems.error(part, "bad-name", text, key=True, hint=hint)
     precision = part.integer("precision")
     if precision is not None and element != "number":
-        findings.error(
+        problems.error(
             part, "misplaced-key", f"'precision' has no effect for {kind}", at="precision", key=True
         )
-    axes = _axes(part, kind, findings)
+    axes = _axes(part, kind, problems)
     return Signal(
         name=part.name,
         type=kind,  # type: ignore[arg-type]  # the schema's enum is this Literal
@@ -42,17 +42,17 @@ def parse_signal(part: Node, title: str, findings: Problems) -> Signal:
         min=low,
         max=high,
         precision=precision,
-        states=parse_states(part, element, findings),
-        limits=_limits(part, element, (low, high), findings),
-        stale_after_s=findings.duration(part, "stale_after", 0.0, least=0.05),
+        states=parse_states(part, element, problems),
+        limits=_limits(part, element, (low, high), problems),
+        stale_after_s=problems.duration(part, "stale_after", 0.0, least=0.05),
         description=part.text("description"),
-        conversion=parse_conversion(part, findings, element),
+        conversion=parse_conversion(part, problems, element),
         items=element if kind == "array" else "number",  # type: ignore[arg-type]  # as above
         size=part.integer("size"),
         axes=axes,  # type: ignore[arg-type]  # as above
-        formula=_formula(part, findings),
-        deadband=_deadband(part, element, (low, high), findings),
-        debounce_s=_debounce_s(part, kind, findings),
+        formula=_formula(part, problems),
+        deadband=_deadband(part, element, (low, high), problems),
+        debounce_s=_debounce_s(part, kind, problems),
     )
 
 
@@ -96,10 +96,10 @@ def _with_age(signal: Signal, polls: tuple[Poll, ...]) -> Signal:
     return signal._replace(stale_after_s=max(1.0, 3 * min(periods)) if periods else 5.0)
 
 
-def _check_vector(part: Node, kind: str, findings: Problems) -> None:
+def _check_vector(part: Node, kind: str, problems: Problems) -> None:
     for key, kinds in (("items", ("array",)), ("size", ("array", *_BYTES))):
         if part.get(key) is not None and kind not in kinds:
-            findings.error(
+            problems.error(
                 part,
                 "misplaced-key",
                 f"'{key}' has no effect for {kind}",
@@ -109,12 +109,12 @@ def _check_vector(part: Node, kind: str, findings: Problems) -> None:
             )
 
 
-def _check_rotation(part: Node, kind: str, findings: Problems) -> None:
+def _check_rotation(part: Node, kind: str, problems: Problems) -> None:
     """Warn of a rotation without an axis convention, unless it is computed."""
     is_named = not {*part.name.split("_")}.isdisjoint(_ROTATIONS)
     is_angle = kind in _NUMBERS and part.text("unit") in ANGLE_UNITS
     if is_named and is_angle and "value" not in part.data:
-        findings.warn(
+        problems.warn(
             part,
             "no-axes",
             f"{part.name!r} has no axis convention",
@@ -124,10 +124,10 @@ def _check_rotation(part: Node, kind: str, findings: Problems) -> None:
         )
 
 
-def _axes(part: Node, kind: str, findings: Problems) -> str:
+def _axes(part: Node, kind: str, problems: Problems) -> str:
     inner = part.get("axes")
     if inner is None:
-        _check_rotation(part, kind, findings)
+        _check_rotation(part, kind, problems)
         return ""
     axes = str(inner.data)
     size = part.integer("size")
@@ -141,12 +141,12 @@ def _axes(part: Node, kind: str, findings: Problems) -> str:
         fits = kind == "object" or (kind == "array" and size in (2, 3, 4))
         wanted = "a vector is an array of size 2 or 3, a quaternion one of size 4, or an object"
     if not fits:
-        findings.error(inner, "wrong-axes", f"axes {axes} do not fit this signal", hint=wanted)
+        problems.error(inner, "wrong-axes", f"axes {axes} do not fit this signal", hint=wanted)
     return axes
 
 
 def _deadband(
-    part: Node, element: str, bounds: tuple[float | None, float | None], findings: Problems
+    part: Node, element: str, bounds: tuple[float | None, float | None], problems: Problems
 ) -> float:
     band = part.number("deadband") or 0.0
     if not band:
@@ -154,9 +154,9 @@ def _deadband(
     low, high = bounds
     if element not in _NUMBERS:
         text = f"'deadband' has no effect for {element}"
-        findings.error(part, "misplaced-key", text, at="deadband", key=True)
+        problems.error(part, "misplaced-key", text, at="deadband", key=True)
     elif low is not None and high is not None and band > high - low:
-        findings.error(
+        problems.error(
             part,
             "out-of-range",
             f"a change of {band:g} is impossible between {low:g} and {high:g}, so none would show",
@@ -165,20 +165,20 @@ def _deadband(
     return band
 
 
-def _debounce_s(part: Node, kind: str, findings: Problems) -> float:
+def _debounce_s(part: Node, kind: str, problems: Problems) -> float:
     if kind not in (*_NUMBERS, "boolean", "string") and "debounce" in part.data:
         text = f"'debounce' has no effect for {kind}"
-        findings.error(part, "misplaced-key", text, at="debounce", key=True)
-    return findings.duration(part, "debounce", 0.0, most=3600)
+        problems.error(part, "misplaced-key", text, at="debounce", key=True)
+    return problems.duration(part, "debounce", 0.0, most=3600)
 
 
-def _formula(part: Node, findings: Problems) -> Template | None:
+def _formula(part: Node, problems: Problems) -> Template | None:
     inner = part.get("value")
     if inner is None:
         return None
     for key in CONVERSION_KEYS:
         if key in part.data:
-            findings.error(
+            problems.error(
                 part,
                 "misplaced-key",
                 f"'{key}' has no effect for a computed signal",
@@ -186,16 +186,16 @@ def _formula(part: Node, findings: Problems) -> Template | None:
                 key=True,
                 hint="put it into the formula under 'value'",
             )
-    return findings.expression(inner)
+    return problems.expression(inner)
 
 
-def _check_hysteresis(part: Node, values: Mapping[str, float | None], findings: Problems) -> None:
+def _check_hysteresis(part: Node, values: Mapping[str, float | None], problems: Problems) -> None:
     """Warn of an alarm that ends only after the opposite alarm has begun."""
     width = part.number("hysteresis") or 0.0
     low = values["low"] if values["low"] is not None else values["lolo"]
     high = values["high"] if values["high"] is not None else values["hihi"]
     if low is not None and high is not None and width >= high - low > 0:
-        findings.warn(
+        problems.warn(
             part,
             "wide-hysteresis",
             f"the alarm at {low:g} would end only at {low + width:g}, when that at {high:g} has"
@@ -206,20 +206,20 @@ def _check_hysteresis(part: Node, values: Mapping[str, float | None], findings: 
 
 
 def _limits(
-    part: Node, kind: str, bounds: tuple[float | None, float | None], findings: Problems
+    part: Node, kind: str, bounds: tuple[float | None, float | None], problems: Problems
 ) -> AlarmLimits:
     inner = part.get("limits")
     if inner is None:
         return AlarmLimits()
     if kind not in _NUMBERS:
-        findings.error(inner, "misplaced-key", f"'limits' have no effect for {kind}", key=True)
+        problems.error(inner, "misplaced-key", f"'limits' have no effect for {kind}", key=True)
         return AlarmLimits()
     names = ("lolo", "low", "high", "hihi")
     values = {name: inner.number(name) for name in names}
     given = [(name, value) for name, value in values.items() if value is not None]
     for (name, value), (after, more) in pairwise(given):
         if value >= more:
-            findings.error(
+            problems.error(
                 inner,
                 "wrong-order",
                 f"{after} {more:g} is not above {name} {value:g}",
@@ -227,13 +227,13 @@ def _limits(
                 hint="the order is lolo < low < high < hihi",
             )
     for name, value in given:
-        check_within(value, *bounds, inner.must(name), findings)
-    _check_hysteresis(inner, values, findings)
+        check_within(value, *bounds, inner.must(name), problems)
+    _check_hysteresis(inner, values, problems)
     return AlarmLimits(
         lolo=values["lolo"],
         low=values["low"],
         high=values["high"],
         hihi=values["hihi"],
         hysteresis=inner.number("hysteresis") or 0.0,
-        for_s=findings.duration(inner, "for", 0.0, least=0.0),
+        for_s=problems.duration(inner, "for", 0.0, least=0.0),
     )

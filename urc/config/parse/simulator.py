@@ -49,37 +49,37 @@ _LONGEST_S: Final = 3600.0
 Spec = TypeVar("Spec", bound=Any)
 
 
-def parse_world(part: Node, findings: Problems) -> WorldSpec:
+def parse_world(part: Node, problems: Problems) -> WorldSpec:
     """Return the world at `part`, before its names are resolved."""
     if "body" not in part.data:
         text = "this world lacks 'body'"
         hint = "write body: { type: differential }, or another kind"
-        findings.error(part, "missing-key", text, key=True, hint=hint)
+        problems.error(part, "missing-key", text, key=True, hint=hint)
         return WorldSpec()
     body = _filled(BodySpec(), part, "body")
-    _check_body(part.must("body"), body, findings)
-    _check_inputs(part, body, findings)
+    _check_body(part.must("body"), body, problems)
+    _check_inputs(part, body, problems)
     laser = _filled(LaserSpec(), part, "laser")
     battery = _filled(BatterySpec(), part, "battery")
     if laser.first >= laser.last:
         text = "the end of the field of view is before its start"
-        findings.error(part.must("laser"), "wrong-order", text, key=True)
+        problems.error(part.must("laser"), "wrong-order", text, key=True)
     if battery.empty >= battery.full:
         text = f"empty at {battery.empty:g} V is not below full at {battery.full:g} V"
-        findings.error(part.must("battery"), "wrong-order", text, key=True)
+        problems.error(part.must("battery"), "wrong-order", text, key=True)
     plan, start, datum = part.get("map"), part.get("start"), part.get("datum")
     return WorldSpec(
         body=body,
-        drive={name: _value(one, findings) for name, one in part.named("drive").items()},  # type: ignore[misc]  # as the schema says
-        senses=_templates(part.named("signals"), findings),
-        failsafe=_failsafe(part.get("failsafe"), findings),
+        drive={name: _value(one, problems) for name, one in part.named("drive").items()},  # type: ignore[misc]  # as the schema says
+        senses=_templates(part.named("signals"), problems),
+        failsafe=_failsafe(part.get("failsafe"), problems),
         map=None if plan is None else _plan(plan),
         start=WorldSpec().start if start is None else _start(start),
         datum=WorldSpec().datum if datum is None else _datum(datum),
         seed=part.integer("seed") or 0 if "seed" in part.data else 1,
         odometry=_filled(OdometrySpec(), part, "odometry"),
         laser=laser,
-        camera=_camera(part, findings),
+        camera=_camera(part, problems),
         battery=battery,
     )
 
@@ -120,52 +120,52 @@ def _filled(spec: Spec, part: Node, key: str) -> Spec:
     return filled
 
 
-def _camera(part: Node, findings: Problems) -> CameraSpec:
+def _camera(part: Node, problems: Problems) -> CameraSpec:
     spec, inner = _filled(CameraSpec(), part, "camera"), part.get("camera")
     found: dict[str, Any] = {}
     for key in ("flip", "mirror"):
         if inner is not None and isinstance(inner.data.get(key), str):
-            found[key] = findings.template(inner.must(key)) or False
+            found[key] = problems.template(inner.must(key)) or False
     return spec._replace(**found)
 
 
-def _check_body(part: Node, body: BodySpec, findings: Problems) -> None:
+def _check_body(part: Node, body: BodySpec, problems: Problems) -> None:
     for key in part.data:
         kinds = BODY_KEYS.get(key)
         if kinds is not None and body.type not in kinds:
             text = f"'{key}' has no effect for {body.type}; it is for {' and '.join(kinds)}"
-            findings.error(part, "misplaced-key", text, at=key, key=True)
+            problems.error(part, "misplaced-key", text, at=key, key=True)
 
 
-def _check_inputs(part: Node, body: BodySpec, findings: Problems) -> None:
+def _check_inputs(part: Node, body: BodySpec, problems: Problems) -> None:
     known = INPUTS[body.type]
     for name, inner in part.named("drive").items():
         if name not in known:
             text = f"a body of type {body.type} has no input {name!r}"
             hint = did_you_mean(name, known, "inputs") or f"it has {', '.join(known)}"
-            findings.error(inner, "unknown-input", text, key=True, hint=hint)
+            problems.error(inner, "unknown-input", text, key=True, hint=hint)
 
 
-def _value(part: Node, findings: Problems) -> Template | Reading:
+def _value(part: Node, problems: Problems) -> Template | Reading:
     if isinstance(part.data, str):
-        return findings.template(part) or 0.0
+        return problems.template(part) or 0.0
     value = given(part.data)
     return float(value) if isinstance(value, bool) else value
 
 
-def _templates(parts: Mapping[str, Node], findings: Problems) -> dict[str, Template]:
-    found = {name: findings.template(inner) for name, inner in parts.items()}
+def _templates(parts: Mapping[str, Node], problems: Problems) -> dict[str, Template]:
+    found = {name: problems.template(inner) for name, inner in parts.items()}
     return {name: template for name, template in found.items() if template is not None}
 
 
-def _failsafe(part: Node | None, findings: Problems) -> Failsafe | None:
+def _failsafe(part: Node | None, problems: Problems) -> Failsafe | None:
     if part is None:
         return None
     sets = {
-        name: findings.template(inner) or None if isinstance(inner.data, str) else given(inner.data)
+        name: problems.template(inner) or None if isinstance(inner.data, str) else given(inner.data)
         for name, inner in part.named("set").items()
     }
-    after_s = findings.duration(part, "after", 1.0, least=0.05, most=_LONGEST_S)
+    after_s = problems.duration(part, "after", 1.0, least=0.05, most=_LONGEST_S)
     return Failsafe(after_s, tuple(one.data for one in part.listed("without")), sets)
 
 
@@ -200,7 +200,7 @@ class SimulatorSpec(NamedTuple):
 
 
 def parse_simulator(
-    sources: Sources, driver: Driver, catalog: Registries, findings: Problems
+    sources: Sources, driver: Driver, catalog: Registries, problems: Problems
 ) -> SimulatorSpec:
     """Return the rules of each transport, and the world, before their names are resolved."""
     found: dict[str, list[SimulatorRule]] = {}
@@ -217,22 +217,22 @@ def parse_simulator(
         spec = driver.transports.get(name)
         if spec is not None:
             context = context._replace(encoding=spec.encoding, framing=spec.framing)
-        found[name] = [_rule(inner, name, findings, context) for inner in part.items()]
-        _check_names(part, found[name], findings)
+        found[name] = [_rule(inner, name, problems, context) for inner in part.items()]
+        _check_names(part, found[name], problems)
     world = sources.simulator.get("world")
     if world is None:
         return SimulatorSpec(found)
 
-    return SimulatorSpec(found, parse_world(world, findings))
+    return SimulatorSpec(found, parse_world(world, problems))
 
 
-def _check_names(part: Node, rules: list[SimulatorRule], findings: Problems) -> None:
+def _check_names(part: Node, rules: list[SimulatorRule], problems: Problems) -> None:
     """Report two rules of one name, which a derived document could not tell apart."""
     seen: set[str] = set()
     for inner, rule in zip(part.items(), rules, strict=True):
         if rule.name and rule.name in seen:
             text = f"two rules of {rule.transport!r} have the name {rule.name!r}"
-            findings.error(inner, "duplicate-name", text, at="name", hint="rename one of them")
+            problems.error(inner, "duplicate-name", text, at="name", hint="rename one of them")
         seen.add(rule.name)
 
 
@@ -243,31 +243,31 @@ def _needs_types(data: object) -> bool:
     return isinstance(data, list) and any(map(_needs_types, data))
 
 
-def _rule(part: Node, transport: str, findings: Problems, context: FormContext) -> SimulatorRule:
+def _rule(part: Node, transport: str, problems: Problems, context: FormContext) -> SimulatorRule:
     triggers = [key for key in _TRIGGERS if key in part.data]
     if len(triggers) != 1:
-        _not_one_trigger(part, triggers, findings)
+        _not_one_trigger(part, triggers, problems)
     request = part.text("command") or part.text("poll")
     does = any(key in part.data for key in ("set", "send", "message", "close", "then"))
     if "every" in part.data and not does:
-        findings.error(part, "missing-key", "a periodic rule needs 'send'", key=True)
+        problems.error(part, "missing-key", "a periodic rule needs 'send'", key=True)
     when, match = part.get("when"), part.get("match")
-    first = _reaction(part, findings, context, answers=bool(request) and not _speaks(part))
+    first = _reaction(part, problems, context, answers=bool(request) and not _speaks(part))
     if "every" in part.data and first.after_s:
         text = "a periodic rule cannot have 'after'"
-        findings.error(part, "misplaced-key", text, at="after", key=True)
+        problems.error(part, "misplaced-key", text, at="after", key=True)
     return SimulatorRule(
         transport=transport,
         name=part.text("name"),
-        match=None if match is None else _match(match, findings, context),
+        match=None if match is None else _match(match, problems, context),
         request=request,
         every_s=(
-            findings.duration(part, "every", 1.0, least=0.005) if "every" in part.data else None
+            problems.duration(part, "every", 1.0, least=0.005) if "every" in part.data else None
         ),
-        when=None if when is None else findings.expression(when),
+        when=None if when is None else problems.expression(when),
         reactions=(
             first,
-            *(_reaction(inner, findings, context) for inner in part.listed("then")),
+            *(_reaction(inner, problems, context) for inner in part.listed("then")),
         ),
     )
 
@@ -277,9 +277,9 @@ def _speaks(part: Node) -> bool:
     return any("send" in one.data or "answer" in one.data for one in (part, *part.listed("then")))
 
 
-def _not_one_trigger(part: Node, triggers: list[str], findings: Problems) -> None:
+def _not_one_trigger(part: Node, triggers: list[str], problems: Problems) -> None:
     if not triggers:
-        findings.error(
+        problems.error(
             part,
             "missing-key",
             "this rule lacks 'match' or 'every'",
@@ -288,7 +288,7 @@ def _not_one_trigger(part: Node, triggers: list[str], findings: Problems) -> Non
         )
         return
     both = f"'{triggers[0]}' and '{triggers[1]}'"
-    findings.error(
+    problems.error(
         part,
         "misplaced-key",
         f"{both} are two triggers of one rule",
@@ -298,30 +298,30 @@ def _not_one_trigger(part: Node, triggers: list[str], findings: Problems) -> Non
     )
 
 
-def _match(part: Node, findings: Problems, context: FormContext) -> Pattern | ReadSpec | None:
+def _match(part: Node, problems: Problems, context: FormContext) -> Pattern | ReadSpec | None:
     if isinstance(part.data, str):
-        return findings.pattern(part)
-    return parse_read(part, findings, context)
+        return problems.pattern(part)
+    return parse_read(part, problems, context)
 
 
 def _reaction(
-    part: Node, findings: Problems, context: FormContext, *, answers: bool = False
+    part: Node, problems: Problems, context: FormContext, *, answers: bool = False
 ) -> Reaction:
     answer = part.text("answer")
     send, framing = part.get("send"), part.get("framing")
     if framing is not None and send is None:
         text = "'framing' has no effect without 'send'"
-        findings.error(part, "misplaced-key", text, at="framing", key=True)
+        problems.error(part, "misplaced-key", text, at="framing", key=True)
     if framing is not None:
         context = context._replace(framing=None)
     return Reaction(
-        after_s=findings.duration(part, "after", 0.0, least=0.0, most=MAX_STEP_S),
-        sets=_sets(part.named("set"), findings),
+        after_s=problems.duration(part, "after", 0.0, least=0.0, most=MAX_STEP_S),
+        sets=_sets(part.named("set"), problems),
         answers=answers if not answer else answer == "auto",
-        send=None if send is None else parse_write(send, findings, context),
+        send=None if send is None else parse_write(send, problems, context),
         message=part.text("message"),
         framing=(
-            parse_framing(framing, context.encoding, findings, context.catalog)
+            parse_framing(framing, context.encoding, problems, context.catalog)
             if framing is not None and context.catalog is not None
             else None
         ),
@@ -329,11 +329,11 @@ def _reaction(
     )
 
 
-def _sets(parts: Mapping[str, Node], findings: Problems) -> dict[str, Template | Reading]:
+def _sets(parts: Mapping[str, Node], problems: Problems) -> dict[str, Template | Reading]:
     values: dict[str, Template | Reading] = {}
     for name, inner in parts.items():
         if isinstance(inner.data, str):
-            template = findings.template(inner)
+            template = problems.template(inner)
             if template is not None:
                 values[name] = template
         else:

@@ -41,19 +41,19 @@ class StepContext(NamedTuple):
     forms: FormContext
 
 
-def parse_steps(part: Node, context: StepContext, findings: Problems) -> tuple[sequence.Step, ...]:
+def parse_steps(part: Node, context: StepContext, problems: Problems) -> tuple[sequence.Step, ...]:
     """Return the steps in the list at `part`, with their branches."""
-    steps = _steps(part, context, findings)
+    steps = _steps(part, context, problems)
     count = sum(1 for _ in sequence.all_steps(steps))
     if count > sequence.MAX_STEPS:
-        findings.error(
+        problems.error(
             part,
             "too-many-steps",
             f"found {count} steps with branches; the limit is {sequence.MAX_STEPS}",
         )
     most = sequence.most_steps(steps)
     if most > sequence.MAX_STEPS_DONE:
-        findings.error(
+        problems.error(
             part,
             "too-many-steps",
             f"with all rounds of 'repeat' it has {most} steps;"
@@ -64,18 +64,18 @@ def parse_steps(part: Node, context: StepContext, findings: Problems) -> tuple[s
 
 
 def _steps(
-    part: Node | None, context: StepContext, findings: Problems
+    part: Node | None, context: StepContext, problems: Problems
 ) -> tuple[sequence.Step, ...]:
     if part is None:
         return ()
-    found = [_step(inner, context, findings) for inner in part.items()]
+    found = [_step(inner, context, problems) for inner in part.items()]
     return tuple(step for step in found if step is not None)
 
 
-def _step(part: Node, context: StepContext, findings: Problems) -> sequence.Step | None:
+def _step(part: Node, context: StepContext, problems: Problems) -> sequence.Step | None:
     verbs = [verb for verb in VERBS if verb in part.data]
     if len(verbs) != 1:
-        findings.error(
+        problems.error(
             part,
             "two-verbs" if verbs else "missing-verb",
             f"'{verbs[0]}' and '{verbs[1]}' are two actions"
@@ -90,60 +90,60 @@ def _step(part: Node, context: StepContext, findings: Problems) -> sequence.Step
     for key in part.data:
         if key != verb and key not in _BESIDE[verb]:
             text = f"'{key}' has no effect with '{verb}'"
-            findings.error(part, "misplaced-key", text, at=key, key=True)
+            problems.error(part, "misplaced-key", text, at=key, key=True)
     if not context.is_named:
-        refuse(part, ("to", "from"), "is for sequences: these steps have one transport", findings)
-    return _one(verb, part, context, findings)
+        refuse(part, ("to", "from"), "is for sequences: these steps have one transport", problems)
+    return _one(verb, part, context, problems)
 
 
-def _one(verb: str, part: Node, context: StepContext, findings: Problems) -> sequence.Step | None:
+def _one(verb: str, part: Node, context: StepContext, problems: Problems) -> sequence.Step | None:
     inner = part.must(verb)
     match verb:
         case "send":
-            send = parse_write(inner, findings, context.forms)
+            send = parse_write(inner, problems, context.forms)
             transport = part.text("to", context.transport)
             return sequence.SendStep(transport, send, part.flag("redact", default=False))
         case "expect":
-            return _expect(part, inner, context, findings)
+            return _expect(part, inner, context, problems)
         case "prompt":
-            return _prompt(part, inner, context, findings)
+            return _prompt(part, inner, context, problems)
         case "wait":
-            return _wait(part, inner, context, findings)
+            return _wait(part, inner, context, problems)
         case "repeat":
-            return _repeat(part, inner, context, findings)
+            return _repeat(part, inner, context, problems)
         case "run":
-            return sequence.RunStep(str(inner.data), _values(part.named("args"), findings))
+            return sequence.RunStep(str(inner.data), _values(part.named("args"), problems))
         case "set":
-            return sequence.SetStep(_values(inner.entries(), findings))
+            return sequence.SetStep(_values(inner.entries(), problems))
         case "if":
-            return _if(part, inner, context, findings)
+            return _if(part, inner, context, problems)
         case _:
-            text = findings.template(inner)
+            text = problems.template(inner)
             return sequence.FailStep(text or _NEVER)
 
 
 def _expect(
-    part: Node, inner: Node, context: StepContext, findings: Problems
+    part: Node, inner: Node, context: StepContext, problems: Problems
 ) -> sequence.ExpectStep | None:
     transport = part.text("from", context.transport)
     framing = None
     if isinstance(inner.data, dict):
-        refuse(inner, _OF_REQUESTS, "has no effect for a step", findings)
-        refuse(inner, ("timeout",), "must be next to 'expect', not inside", findings)
-        framing, forms = parse_own_framing(inner, findings, context.forms)
-        stage = parse_stage(inner, findings, forms)
+        refuse(inner, _OF_REQUESTS, "has no effect for a step", problems)
+        refuse(inner, ("timeout",), "must be next to 'expect', not inside", problems)
+        framing, forms = parse_own_framing(inner, problems, context.forms)
+        stage = parse_stage(inner, problems, forms)
     else:
-        pattern = findings.pattern(inner)
+        pattern = problems.pattern(inner)
         if pattern is None:
             return None
         stage = Stage(ReadSpec("regex", {"pattern": pattern}, pattern.groups))
-    otherwise, text = _else(part, context, findings)
+    otherwise, text = _else(part, context, problems)
     return sequence.ExpectStep(
         transport,
         stage.read,
         stage.errors,
         stage.faults,
-        _timeout_s(part, findings),
+        _timeout_s(part, problems),
         otherwise,
         text,
         framing,
@@ -151,34 +151,34 @@ def _expect(
 
 
 def _prompt(
-    part: Node, inner: Node, context: StepContext, findings: Problems
+    part: Node, inner: Node, context: StepContext, problems: Problems
 ) -> sequence.PromptStep | None:
-    pattern = findings.pattern(inner)
+    pattern = problems.pattern(inner)
     if pattern is None:
         return None
-    otherwise, text = _else(part, context, findings)
+    otherwise, text = _else(part, context, problems)
     transport = part.text("from", context.transport)
-    return sequence.PromptStep(transport, pattern, _timeout_s(part, findings), otherwise, text)
+    return sequence.PromptStep(transport, pattern, _timeout_s(part, problems), otherwise, text)
 
 
 def _wait(
-    part: Node, inner: Node, context: StepContext, findings: Problems
+    part: Node, inner: Node, context: StepContext, problems: Problems
 ) -> sequence.Step | None:
     if not isinstance(inner.data, dict):
-        refuse(part, ("else",), "has no effect for a plain wait", findings)
-        return sequence.WaitStep(findings.duration(part, "wait", 0.0, most=sequence.MAX_STEP_S))
-    condition = findings.expression(inner.must("until"))
-    otherwise, text = _else(part, context, findings)
-    timeout_s = findings.duration(inner, "timeout", 0.0, most=sequence.MAX_STEP_S)
+        refuse(part, ("else",), "has no effect for a plain wait", problems)
+        return sequence.WaitStep(problems.duration(part, "wait", 0.0, most=sequence.MAX_STEP_S))
+    condition = problems.expression(inner.must("until"))
+    otherwise, text = _else(part, context, problems)
+    timeout_s = problems.duration(inner, "timeout", 0.0, most=sequence.MAX_STEP_S)
     return None if condition is None else sequence.UntilStep(condition, timeout_s, otherwise, text)
 
 
 def _repeat(
-    part: Node, inner: Node, context: StepContext, findings: Problems
+    part: Node, inner: Node, context: StepContext, problems: Problems
 ) -> sequence.Step | None:
     times = part.integer("times")
     if times is None:
-        findings.error(
+        problems.error(
             part,
             "missing-key",
             "'times' is missing: the number of rounds has no limit",
@@ -187,57 +187,57 @@ def _repeat(
         )
     until = part.get("until")
     if until is None:
-        refuse(part, ("else",), "needs 'until'", findings)
-    otherwise, text = _else(part, context, findings)
+        refuse(part, ("else",), "needs 'until'", problems)
+    otherwise, text = _else(part, context, problems)
     return sequence.RepeatStep(
-        _steps(inner, context, findings),
+        _steps(inner, context, problems),
         times or 1,
-        findings.expression(until) if until else None,
+        problems.expression(until) if until else None,
         otherwise,
         text,
     )
 
 
-def _timeout_s(part: Node, findings: Problems) -> float | None:
-    return findings.duration(part, "timeout", 0.0, most=sequence.MAX_STEP_S) or None
+def _timeout_s(part: Node, problems: Problems) -> float | None:
+    return problems.duration(part, "timeout", 0.0, most=sequence.MAX_STEP_S) or None
 
 
 def _else(
-    part: Node, context: StepContext, findings: Problems
+    part: Node, context: StepContext, problems: Problems
 ) -> tuple[tuple[sequence.Step, ...] | None, str]:
     """Return the steps after a failed wait, or the message of the failure."""
     inner = part.get("else")
     if inner is None:
         return None, ""
     if isinstance(inner.data, list):
-        return _steps(inner, context, findings), ""
+        return _steps(inner, context, problems), ""
     return None, "" if inner.data == "fail" else str(inner.data)
 
 
 def _if(
-    part: Node, inner: Node, context: StepContext, findings: Problems
+    part: Node, inner: Node, context: StepContext, problems: Problems
 ) -> sequence.IfStep | None:
-    condition = findings.expression(inner)
-    then = _steps(part.get("then"), context, findings)
-    otherwise, text = _else(part, context, findings)
+    condition = problems.expression(inner)
+    then = _steps(part.get("then"), context, problems)
+    otherwise, text = _else(part, context, problems)
     if text:
-        findings.error(
+        problems.error(
             part.must("else"),
             "wrong-type",
             "'else' of an 'if' must be a list of steps",
             hint="write else: [{ fail: … }] to end here",
         )
     if "then" not in part.data and "else" not in part.data:
-        findings.error(part, "missing-key", "'then' is missing: this step does nothing", key=True)
+        problems.error(part, "missing-key", "'then' is missing: this step does nothing", key=True)
     return None if condition is None else sequence.IfStep(condition, then, otherwise or ())
 
 
-def _values(parts: dict[str, Node], findings: Problems) -> dict[str, Template | Value]:
+def _values(parts: dict[str, Node], problems: Problems) -> dict[str, Template | Value]:
     """Return plain values, and templates for texts with expressions."""
     values: dict[str, Template | Value] = {}
     for name, inner in parts.items():
         if isinstance(inner.data, str):
-            template = findings.template(inner)
+            template = problems.template(inner)
             if template is not None:
                 values[name] = template
         else:

@@ -28,45 +28,45 @@ _HAPPENS: Final = ("feed", "run", "wait", "connects", "closes", "leaves")
 """Keys of a step that exclude each other."""
 
 
-def parse_test(part: Node, findings: Problems) -> DocumentTest:
+def parse_test(part: Node, problems: Problems) -> DocumentTest:
     """Return one test, before its names are resolved."""
     line, column, source = _place(part)
     reply_to = part.scalar("reply_to")
     if isinstance(reply_to, float):
         reply_to = int(reply_to)
-    _check_keys(part, findings)
+    _check_keys(part, problems)
     return DocumentTest(
         name=part.text("name"),
         line=line,
-        feed=_fed(part, "feed", findings),
+        feed=_fed(part, "feed", problems),
         reply_to=reply_to,
         run=part.text("run") or None,
         arguments=_values(part, "args"),
         expect=_expected(part),
-        sent=_fed(part, "sent", findings),
+        sent=_fed(part, "sent", problems),
         fails=part.text("fails") or None,
         file=part.document.source_of(part.path).file,
         column=column,
         source=source,
         settings={name: inner.data for name, inner in part.named("settings").items()},
-        steps=tuple(_step(inner, findings) for inner in part.listed("steps")),
+        steps=tuple(_step(inner, problems) for inner in part.listed("steps")),
         polls=tuple(str(inner.data) for inner in part.listed("polls")),
         is_ready=part.flag("ready", default=False),
     )
 
 
-def _check_keys(part: Node, findings: Problems) -> None:
+def _check_keys(part: Node, problems: Problems) -> None:
     has_steps = "steps" in part.data
     for key in _AT_ONCE if has_steps else _IN_STEPS:
         if key in part.data:
             why = "must be a key of one of the steps" if has_steps else "needs 'steps'"
-            findings.error(part, "misplaced-key", f"'{key}' {why}", at=key, key=True)
+            problems.error(part, "misplaced-key", f"'{key}' {why}", at=key, key=True)
 
 
-def _step(part: Node, findings: Problems) -> DialogueStep:
+def _step(part: Node, problems: Problems) -> DialogueStep:
     happens = [key for key in _HAPPENS if part.data.get(key, False) is not False]
     if len(happens) > 1:
-        findings.error(
+        problems.error(
             part,
             "two-verbs",
             f"'{happens[0]}' and '{happens[1]}' are two actions",
@@ -76,21 +76,21 @@ def _step(part: Node, findings: Problems) -> DialogueStep:
         )
     if "of" in part.data and not {"reply", "fails"} & part.data.keys():
         text = "'of' needs a 'reply' or a failure"
-        findings.error(part, "misplaced-key", text, at="of", key=True)
+        problems.error(part, "misplaced-key", text, at="of", key=True)
     line, column, source = _place(part)
     wait = part.get("wait")
     return DialogueStep(
         line=line,
         column=column,
         source=source,
-        feed=_fed(part, "feed", findings),
+        feed=_fed(part, "feed", problems),
         run=part.text("run"),
         arguments=_values(part, "args"),
-        wait_s=findings.duration(part, "wait", 0.0) if wait else None,
+        wait_s=problems.duration(part, "wait", 0.0) if wait else None,
         connects=part.text("connects"),
         closes=part.text("closes"),
         leaves=part.flag("leaves", default=False),
-        sent=_fed(part, "sent", findings),
+        sent=_fed(part, "sent", problems),
         expect=_expected(part),
         reply=_values(part, "reply") if "reply" in part.data else None,
         of=part.text("of"),
@@ -130,47 +130,47 @@ def _state(part: Node) -> Expected:
     )
 
 
-def _fed(part: Node, key: str, findings: Problems) -> dict[str, Fed | tuple[Fed, ...]]:
-    return {name: _pieces(inner, findings) for name, inner in part.named(key).items()}
+def _fed(part: Node, key: str, problems: Problems) -> dict[str, Fed | tuple[Fed, ...]]:
+    return {name: _pieces(inner, problems) for name, inner in part.named(key).items()}
 
 
-def _pieces(part: Node, findings: Problems) -> Fed | tuple[Fed, ...]:
+def _pieces(part: Node, problems: Problems) -> Fed | tuple[Fed, ...]:
     if isinstance(part.data, list):
-        return tuple(_wire(inner, findings) for inner in part.items())
-    return _wire(part, findings)
+        return tuple(_wire(inner, problems) for inner in part.items())
+    return _wire(part, problems)
 
 
-def _wire(part: Node, findings: Problems) -> Fed:
+def _wire(part: Node, problems: Problems) -> Fed:
     """Return text, the bytes under ``hex``, or a message."""
     if not isinstance(part.data, dict):
         return str(part.data)
     inner = part.get("hex")
-    return _message(part, findings) if inner is None else _hex(inner, findings)
+    return _message(part, problems) if inner is None else _hex(inner, problems)
 
 
-def _message(part: Node, findings: Problems) -> Envelope:
+def _message(part: Node, problems: Problems) -> Envelope:
     verb, inner = next((verb, one) for verb in _VERBS if (one := part.get(verb)) is not None)
     bodies = [key for key in _BODIES if key in inner.data]
     if len(bodies) > 1:
         text = f"'{bodies[0]}' and '{bodies[1]}' are two bodies of one message"
-        findings.error(inner, "two-forms", text, at=bodies[1], key=True)
+        problems.error(inner, "two-forms", text, at=bodies[1], key=True)
     body: object = None
     for key in bodies:
         value = inner.must(key)
         if key == "json":
             body = value.data
         else:
-            body = _hex(value, findings) if key == "hex" else str(value.data).encode()
+            body = _hex(value, problems) if key == "hex" else str(value.data).encode()
     given = ((name, inner.get(name)) for name in _ADDRESS)
     attributes = {name: one.data for name, one in given if one is not None}
     return Envelope(verb, attributes, body)
 
 
-def _hex(inner: Node, findings: Problems) -> bytes:
+def _hex(inner: Node, problems: Problems) -> bytes:
     try:
         return bytes.fromhex(inner.data)
     except ValueError:
         text = "expected pairs of hex digits"
         hint = "write each byte as two digits, such as 02 FF 0D"
-        findings.error(inner, "not-hex", text, hint=hint)
+        problems.error(inner, "not-hex", text, hint=hint)
         return b""

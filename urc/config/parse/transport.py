@@ -22,21 +22,21 @@ _COMMON: Final = (
 )  # fmt: skip
 
 
-def parse_transport(part: Node, findings: Problems, catalog: Registries) -> TransportSpec:
+def parse_transport(part: Node, problems: Problems, catalog: Registries) -> TransportSpec:
     """Return one transport."""
     kind = part.must("type")
     if catalog.transports.get(kind.data) is None:
-        findings.error(
+        problems.error(
             kind,
             "unknown-transport-type",
             f"there is no transport of type {kind.data!r}",
             hint=renamed_value_hint("type", kind.data)
             or did_you_mean(kind.data, catalog.transports, "types"),
         )
-    check_headers(part, findings)
+    check_headers(part, problems)
     encoding = part.text("encoding", "utf-8")
     options = {
-        name: _option(inner, findings)
+        name: _option(inner, problems)
         for name, inner in part.entries().items()
         if name not in _COMMON
     }
@@ -46,56 +46,56 @@ def parse_transport(part: Node, findings: Problems, catalog: Registries) -> Tran
         type=kind.data,
         options=options,
         connection="persistent" if persistent else "per_request",
-        framing=_framing(part, encoding, findings, catalog),
+        framing=_framing(part, encoding, problems, catalog),
         encoding=encoding,
-        timeouts=_timeouts(part.get("timeouts"), findings),
-        backoff=_backoff(part.get("reconnect"), findings),
-        min_gap_s=findings.duration(part, "min_gap", 0.0, least=0.0, most=3600),
+        timeouts=_timeouts(part.get("timeouts"), problems),
+        backoff=_backoff(part.get("reconnect"), problems),
+        min_gap_s=problems.duration(part, "min_gap", 0.0, least=0.0, most=3600),
         tunnel=part.text("tunnel"),
         is_half_duplex=part.text("duplex") == "half",
         never_replies=part.text("replies") == "never",
     )
 
 
-def _framing(part: Node, encoding: str, findings: Problems, catalog: Registries) -> FramingSpec:
+def _framing(part: Node, encoding: str, problems: Problems, catalog: Registries) -> FramingSpec:
     """Return the framing of received frames, with the framing of sent frames if it differs."""
     own = part.get("framing")
     if own is None:
         return FramingSpec("datagram")  # the schema requires 'framing' for streams
-    framing = parse_framing(own, encoding, findings, catalog)
+    framing = parse_framing(own, encoding, problems, catalog)
     sent = part.get("send_framing")
     if sent is None:
         return framing
-    return framing._replace(sent=parse_framing(sent, encoding, findings, catalog))
+    return framing._replace(sent=parse_framing(sent, encoding, problems, catalog))
 
 
-def _option(part: Node, findings: Problems) -> object:
+def _option(part: Node, problems: Problems) -> object:
     """Return an option: plain, a template, or a list or mapping of them."""
-    tree = compiled_tree(part, findings)
+    tree = compiled_tree(part, problems)
     if isinstance(tree, Template) and tree.is_constant:
         return tree.evaluate({})
     return tree
 
 
-def _timeouts(part: Node | None, findings: Problems) -> Timeouts:
+def _timeouts(part: Node | None, problems: Problems) -> Timeouts:
     if part is None:
         return Timeouts()
     return Timeouts(
-        connect_s=findings.duration(part, "connect", 3.0, least=0.01, most=300),
-        reply_s=findings.duration(part, "reply", 2.0, most=3600),
-        idle_s=findings.duration(part, "idle", 0.0, least=0.01) or None,
-        on_connect_s=findings.duration(part, "on_connect", 0.0, least=0.01, most=3600) or None,
+        connect_s=problems.duration(part, "connect", 3.0, least=0.01, most=300),
+        reply_s=problems.duration(part, "reply", 2.0, most=3600),
+        idle_s=problems.duration(part, "idle", 0.0, least=0.01) or None,
+        on_connect_s=problems.duration(part, "on_connect", 0.0, least=0.01, most=3600) or None,
     )
 
 
-def _backoff(part: Node | None, findings: Problems) -> Backoff:
+def _backoff(part: Node | None, problems: Problems) -> Backoff:
     if part is None:
         return Backoff()
     default = Backoff()
-    initial = findings.duration(part, "initial", default.initial_s, least=0.01, most=3600)
-    longest = findings.duration(part, "max", max(default.max_s, initial), least=0.01, most=3600)
+    initial = problems.duration(part, "initial", default.initial_s, least=0.01, most=3600)
+    longest = problems.duration(part, "max", max(default.max_s, initial), least=0.01, most=3600)
     if initial > longest:
-        findings.error(
+        problems.error(
             part,
             "wrong-order",
             "the first wait is longer than the longest wait",

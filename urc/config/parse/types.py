@@ -13,7 +13,7 @@ Items = tuple[Item, ...]
 
 
 def parse_types(
-    part: Node, enums: Mapping[str, tuple[tuple[int, str], ...]], findings: Problems
+    part: Node, enums: Mapping[str, tuple[tuple[int, str], ...]], problems: Problems
 ) -> Mapping[str, Items]:
     """Return every type of the driver at `part`; an invalid type is empty."""
     parts = part.named("types")
@@ -21,10 +21,10 @@ def parse_types(
     needed = {name: set(_names(inner.data)) & parts.keys() for name, inner in parts.items()}
     for name, inner in parts.items():
         if number_of(name) is not None or name in ("bytes", "text", "rest"):
-            findings.error(inner, "bad-name", f"{name!r} is a built-in type", key=True)
+            problems.error(inner, "bad-name", f"{name!r} is a built-in type", key=True)
             needed[name] = set()
     for name in parts:
-        _parse(name, parts, needed, (), types, enums, findings)
+        _parse(name, parts, needed, (), types, enums, problems)
     return types
 
 
@@ -35,7 +35,7 @@ def _parse(
     above: tuple[str, ...],
     types: dict[str, Items],
     enums: Mapping[str, tuple[tuple[int, str], ...]],
-    findings: Problems,
+    problems: Problems,
 ) -> None:
     """Parse the types that `name` needs, then `name` itself."""
     if name in types:
@@ -44,14 +44,14 @@ def _parse(
     for other in sorted(needed[name]):
         if other in types_above:
             circle = " → ".join((*types_above[types_above.index(other) :], other))
-            findings.error(
+            problems.error(
                 parts[name], "recursion", f"a type cannot contain itself: {circle}", key=True
             )
             types[other] = types.get(other, ())
             continue
-        _parse(other, parts, needed, types_above, types, enums, findings)
+        _parse(other, parts, needed, types_above, types, enums, problems)
     if name not in types:
-        types[name] = ItemParser(findings, types, enums, "type", "").items(parts[name])
+        types[name] = ItemParser(problems, types, enums, "type", "").items(parts[name])
 
 
 def _names(data: Any) -> Iterator[str]:

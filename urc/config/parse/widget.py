@@ -17,13 +17,13 @@ __all__ = ["WidgetFolder", "parse_widget"]
 _NAME = re.compile(r"[a-z][a-z0-9-]{0,63}")
 
 
-def parse_widget(document: Document, findings: Problems) -> Widget:
+def parse_widget(document: Document, problems: Problems) -> Widget:
     """Return the widget of a manifest."""
     part = Node(document, (), document.data)
     folder = FilePath(document.file).parent
     name = part.text("name")
     if folder.absolute().name != name:
-        findings.error(
+        problems.error(
             part,
             "wrong-name",
             f"the folder has the name {folder.absolute().name!r}, the widget {name!r}",
@@ -34,7 +34,7 @@ def parse_widget(document: Document, findings: Problems) -> Widget:
     smallest = [int(inner.data) for inner in size.listed("min")] if size else []
     options = part.get("options")
     if options is not None:
-        _check_defaults(options, findings)
+        _check_defaults(options, problems)
     widget = Widget(
         name=name,
         title=part.text("title"),
@@ -52,11 +52,11 @@ def parse_widget(document: Document, findings: Problems) -> Widget:
             tuple(map(str, inner.data)) for inner in part.listed("required_together")
         ),
     )
-    _check_names(part, widget, findings)
+    _check_names(part, widget, problems)
     return widget
 
 
-def _check_names(part: Node, widget: Widget, findings: Problems) -> None:
+def _check_names(part: Node, widget: Widget, problems: Problems) -> None:
     """Report each name of an input, output or option that the manifest does not have."""
     ports, options = {**widget.inputs, **widget.outputs}, widget.options
     told: list[tuple[Node, Iterable[str]]] = []
@@ -77,7 +77,7 @@ def _check_names(part: Node, widget: Widget, findings: Problems) -> None:
                 told.append((one.must("argument_of"), widget.outputs))
     for inner, known in told:
         if inner.data not in known:
-            findings.error(
+            problems.error(
                 inner,
                 "unknown-input",
                 f"this widget has no {inner.data!r}",
@@ -120,7 +120,7 @@ def _output(part: Node) -> WidgetPort:
     )
 
 
-def _check_defaults(options: Node, findings: Problems) -> None:
+def _check_defaults(options: Node, problems: Problems) -> None:
     """Report each default that does not fit its own schema."""
     for name, inner in options.entries().items():
         default = inner.get("default")
@@ -129,7 +129,7 @@ def _check_defaults(options: Node, findings: Problems) -> None:
         for problem in check_options(
             options.document, options.path, {name: default.data}, options.data
         ):
-            findings.error(default, problem.code, problem.message, hint=problem.hint)
+            problems.error(default, problem.code, problem.message, hint=problem.hint)
 
 
 def _nearby(file: FilePath) -> str:
@@ -185,9 +185,9 @@ class WidgetFolder:
         except ProblemsError as error:
             self.problems += error.problems
             return None
-        problems = check_shape(document)
-        if not problems and kind_of(document) != "widget":
-            problems = [
+        wrong = check_shape(document)
+        if not wrong and kind_of(document) != "widget":
+            wrong = [
                 document.problem(
                     ("kind",),
                     "wrong-kind",
@@ -195,7 +195,7 @@ class WidgetFolder:
                     hint="write 'kind: widget'",
                 )
             ]
-        findings = Problems()
-        widget = None if has_errors(problems) else parse_widget(document, findings)
-        self.problems += [*document.findings, *problems, *findings]
-        return None if has_errors(findings) else widget
+        problems = Problems()
+        widget = None if has_errors(wrong) else parse_widget(document, problems)
+        self.problems += [*document.problems, *wrong, *problems]
+        return None if has_errors(problems) else widget

@@ -12,29 +12,29 @@ __all__ = ["check_answers"]
 _HINT: Final = "remove 'replies: never', or remove the waits for this transport"
 
 
-def check_answers(part: Node, driver: Driver, findings: Problems) -> None:
+def check_answers(part: Node, driver: Driver, problems: Problems) -> None:
     """Report waits on a transport without replies, and silence that no error reply can end."""
     for name, inner in part.named("commands").items():
         one = driver.commands[name]
-        _check_silence(inner, one.reply, driver.transports.get(one.transport), findings)
+        _check_silence(inner, one.reply, driver.transports.get(one.transport), problems)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
-        _check_silence(inner, poll.reply, driver.transports.get(poll.transport), findings)
+        _check_silence(inner, poll.reply, driver.transports.get(poll.transport), problems)
     mute = {name for name, spec in driver.transports.items() if spec.never_replies}
     if not mute:
         return
     for name, inner in part.named("transports").items():
         if name in mute:
-            _check_line(inner, driver.transports[name], findings)
+            _check_line(inner, driver.transports[name], problems)
     for name, inner in part.named("commands").items():
         command = driver.commands[name]
         if command.transport in mute and command.reply is not None:
-            _refuse(inner, "reply" if "reply" in inner.data else "send", name, findings)
+            _refuse(inner, "reply" if "reply" in inner.data else "send", name, problems)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
         if poll.transport in mute and poll.reply is not None and "send" in inner.data:
-            _refuse(inner, "reply" if "reply" in inner.data else "send", poll.name, findings)
+            _refuse(inner, "reply" if "reply" in inner.data else "send", poll.name, problems)
     for name, inner in part.named("messages").items():
         if driver.messages[name].transport in mute:
-            findings.error(
+            problems.error(
                 inner,
                 "never-replies",
                 f"{driver.messages[name].transport!r} receives nothing: it has 'replies: never'",
@@ -42,11 +42,11 @@ def check_answers(part: Node, driver: Driver, findings: Problems) -> None:
                 hint=_HINT,
             )
     for name, inner in part.named("sequences").items():
-        _check_steps(steps_of(inner), driver.commands[name].steps, mute, findings)
+        _check_steps(steps_of(inner), driver.commands[name].steps, mute, problems)
 
 
 def _check_silence(
-    part: Node, reply: Reply | None, spec: TransportSpec | None, findings: Problems
+    part: Node, reply: Reply | None, spec: TransportSpec | None, problems: Problems
 ) -> None:
     """Report a stage of silence that no error reply can end."""
     place = part.get("reply")
@@ -57,7 +57,7 @@ def _check_silence(
     inners = place.listed("stages") or [place]
     for inner, (read, errors, faults) in zip(inners, answers, strict=True):
         if read.form == "silence" and not (errors or faults):
-            findings.error(
+            problems.error(
                 inner,
                 "nothing-refuses",
                 "silence means success, and no error reply is declared",
@@ -67,25 +67,25 @@ def _check_silence(
             )
 
 
-def _refuse(part: Node, key: str, name: str, findings: Problems) -> None:
+def _refuse(part: Node, key: str, name: str, problems: Problems) -> None:
     text = f"{name!r} waits for a reply on a transport with 'replies: never'"
-    findings.error(part, "never-replies", text, at=key, key=True, hint=_HINT)
+    problems.error(part, "never-replies", text, at=key, key=True, hint=_HINT)
 
 
-def _check_line(part: Node, spec: TransportSpec, findings: Problems) -> None:
+def _check_line(part: Node, spec: TransportSpec, problems: Problems) -> None:
     timeouts = part.get("timeouts")
     for place, key in ((part, "stale_after"), (timeouts, "idle")):
         if place is not None and key in place.data:
             text = f"{key!r} waits for the robot on a transport with 'replies: never'"
-            findings.error(place, "never-replies", text, at=key, key=True, hint=_HINT)
+            problems.error(place, "never-replies", text, at=key, key=True, hint=_HINT)
     for key, steps in (("on_connect", spec.on_connect), ("on_close", spec.on_close)):
         if steps:
-            _check_steps(part.must(key), steps, {spec.name}, findings)
+            _check_steps(part.must(key), steps, {spec.name}, problems)
 
 
-def _check_steps(part: Node, steps: tuple[Step, ...], mute: set[str], findings: Problems) -> None:
+def _check_steps(part: Node, steps: tuple[Step, ...], mute: set[str], problems: Problems) -> None:
     for step in all_steps(steps):
         if isinstance(step, (ExpectStep, PromptStep)) and step.transport in mute:
             text = f"a step waits for {step.transport!r}, which has 'replies: never'"
-            findings.error(part, "never-replies", text, key=True, hint=_HINT)
+            problems.error(part, "never-replies", text, key=True, hint=_HINT)
             return

@@ -26,36 +26,36 @@ _BITS_OF_A_BYTE = 10
 """Bits of a byte on a serial line, with start and stop bit."""
 
 
-def check_flow(part: Node, driver: Driver, secrets: frozenset[str], findings: Problems) -> None:
+def check_flow(part: Node, driver: Driver, secrets: frozenset[str], problems: Problems) -> None:
     """Add the warnings about the driver at `part`.
 
     `secrets` has the names of secret settings.
     """
     for name, inner in part.named("transports").items():
-        _check_line(inner, driver.transports[name], findings)
-        _check_baud(inner, driver, driver.transports[name], findings)
+        _check_line(inner, driver.transports[name], problems)
+        _check_baud(inner, driver, driver.transports[name], problems)
     for name, inner in part.named("commands").items():
         command = driver.commands[name]
         if command.reply is not None and "reply" in inner.data:
-            _check_stages(inner.must("reply"), command.reply, command.transport, driver, findings)
+            _check_stages(inner.must("reply"), command.reply, command.transport, driver, problems)
         if command.verify is not None:
-            _check_haste(inner.must("verify"), driver, name, findings)
+            _check_haste(inner.must("verify"), driver, name, problems)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
-        _check_poll(inner, poll, findings)
-    _check_secrets(part, driver, secrets, findings)
-    check_answers(part, driver, findings)
-    check_traffic(part, driver, findings)
-    check_motion(part, driver, findings)
-    check_unguarded(part, driver, findings)
-    check_unmarked(part, driver, findings)
-    check_frames_apart(part, driver, findings)
+        _check_poll(inner, poll, problems)
+    _check_secrets(part, driver, secrets, problems)
+    check_answers(part, driver, problems)
+    check_traffic(part, driver, problems)
+    check_motion(part, driver, problems)
+    check_unguarded(part, driver, problems)
+    check_unmarked(part, driver, problems)
+    check_frames_apart(part, driver, problems)
 
 
-def _check_line(part: Node, spec: TransportSpec, findings: Problems) -> None:
+def _check_line(part: Node, spec: TransportSpec, problems: Problems) -> None:
     keepalive = spec.keepalive
     watchdog_s = keepalive.watchdog_s if keepalive is not None else None
     if keepalive is not None and watchdog_s is not None and keepalive.every_s >= watchdog_s:
-        findings.warn(
+        problems.warn(
             part.must("keepalive").must("every"),
             "slow-keepalive",
             f"the watchdog of the robot runs out first, after {shown_duration(watchdog_s)}",
@@ -63,7 +63,7 @@ def _check_line(part: Node, spec: TransportSpec, findings: Problems) -> None:
         )
     waits_s = sum(_wait_s(step) for step in all_steps(spec.on_close))
     if waits_s > _GOOD_BYE_S:
-        findings.warn(
+        problems.warn(
             part.must("on_close"),
             "long-on-close",
             f"its waits take {shown_duration(waits_s)}, and the limit is"
@@ -78,7 +78,7 @@ def _wait_s(step: Step) -> float:
     return step.seconds if isinstance(step, WaitStep) else 0.0
 
 
-def _check_baud(part: Node, driver: Driver, spec: TransportSpec, findings: Problems) -> None:
+def _check_baud(part: Node, driver: Driver, spec: TransportSpec, problems: Problems) -> None:
     """Warn of polls whose smallest frames already exceed the baud rate of a serial line."""
     baud = spec.options.get("baud")
     if isinstance(baud, bool) or not isinstance(baud, (int, float)) or baud <= 0:
@@ -86,7 +86,7 @@ def _check_baud(part: Node, driver: Driver, spec: TransportSpec, findings: Probl
     polls = [poll for poll in driver.polls if poll.transport == spec.name]
     bytes_per_s = sum(_least_bytes(poll) / poll.every_s for poll in polls)
     if bytes_per_s * _BITS_OF_A_BYTE > baud:
-        findings.warn(
+        problems.warn(
             part,
             "too-many-polls",
             f"the polls need {bytes_per_s * _BITS_OF_A_BYTE:.0f} bit/s or more, and the line"
@@ -104,7 +104,7 @@ def _least_bytes(poll: Poll) -> int:
 
 
 def _check_stages(
-    part: Node, reply: Reply, transport: str, driver: Driver, findings: Problems
+    part: Node, reply: Reply, transport: str, driver: Driver, problems: Problems
 ) -> None:
     """Warn of a long second stage that delays the polls of a line with one request in flight."""
     if not reply.stages or driver.transports[transport].queue.in_flight > 1:
@@ -112,7 +112,7 @@ def _check_stages(
     periods = [poll.every_s for poll in driver.polls if poll.transport == transport]
     longest_s = max((one.timeout_s or 0.0 for one in reply.stages), default=0.0)
     if periods and longest_s > min(periods):
-        findings.warn(
+        problems.warn(
             part.must("stages"),
             "stages-block-line",
             f"while it waits up to {shown_duration(longest_s)} for its last stage, the poll every"
@@ -122,7 +122,7 @@ def _check_stages(
         )
 
 
-def _check_haste(part: Node, driver: Driver, name: str, findings: Problems) -> None:
+def _check_haste(part: Node, driver: Driver, name: str, problems: Problems) -> None:
     """Warn when the signals of a condition are polled less often than its time limit."""
     verify = driver.commands[name].verify
     if verify is None:
@@ -131,7 +131,7 @@ def _check_haste(part: Node, driver: Driver, name: str, findings: Problems) -> N
         periods = [poll.every_s for poll in driver.polls if signal in _fields(poll.reply)]
         told = any(signal in one.read.fields for one in driver.messages.values())
         if periods and not told and min(periods) > verify.within_s:
-            findings.warn(
+            problems.warn(
                 part.must("within"),
                 "verify-too-early",
                 f"{signal!r} is read only every {shown_duration(min(periods))}",
@@ -143,9 +143,9 @@ def _fields(reply: Reply | None) -> tuple[str, ...]:
     return () if reply is None else reply.read.fields
 
 
-def _check_poll(part: Node, poll: Poll, findings: Problems) -> None:
+def _check_poll(part: Node, poll: Poll, problems: Problems) -> None:
     if poll.offline is not None and poll.offline.retry_s < poll.every_s:
-        findings.warn(
+        problems.warn(
             part.must("offline").must("retry"),
             "retry-too-early",
             f"an offline part is asked more often than an online part"
@@ -162,7 +162,7 @@ def _digested(part: Node, send: WriteSpec) -> set[str]:
     return digested - {name for one in found for name in one.settings - digested_settings(one)}
 
 
-def _check_secrets(part: Node, driver: Driver, secrets: frozenset[str], findings: Problems) -> None:
+def _check_secrets(part: Node, driver: Driver, secrets: frozenset[str], problems: Problems) -> None:
     """Warn of commands that send a secret without `redact`."""
     asked = [
         (inner.must("send"), driver.commands[name].send)
@@ -176,7 +176,7 @@ def _check_secrets(part: Node, driver: Driver, secrets: frozenset[str], findings
     for place, send in asked:
         used = sorted((send.settings & secrets) - _digested(place, send))
         if used:
-            findings.warn(
+            problems.warn(
                 place,
                 "secret-not-redacted",
                 f"the secret {used[0]!r} is visible in the traffic of every request",
@@ -185,7 +185,7 @@ def _check_secrets(part: Node, driver: Driver, secrets: frozenset[str], findings
     for inner, step in _sends(part, driver):
         used = sorted((step.send.settings & secrets) - _digested(inner.must("send"), step.send))
         if used and not step.is_secret:
-            findings.warn(
+            problems.warn(
                 inner.must("send"),
                 "secret-not-redacted",
                 f"the secret {used[0]!r} may appear in messages and logs",

@@ -31,26 +31,26 @@ _MAY_BE_LESS: Final = re.compile(r"[*?|{]|\(\)")
 """Characters of a group that may be empty."""
 
 
-def check_frames_apart(part: Node, driver: Driver, findings: Problems) -> None:
+def check_frames_apart(part: Node, driver: Driver, problems: Problems) -> None:
     """Add the warnings about the frames of the driver at `part`."""
-    _check_messages(part, driver, findings)
+    _check_messages(part, driver, problems)
     for inner, reply in _replies(part, driver):
-        _check_refusals(inner, reply, findings)
+        _check_refusals(inner, reply, problems)
         for stage, read in _stages(inner, reply):
-            _check_empty(stage, read, driver.signals, findings)
-    _check_shared_refusals(part, driver, findings)
+            _check_empty(stage, read, driver.signals, problems)
+    _check_shared_refusals(part, driver, problems)
     for name, inner in part.named("messages").items():
-        _check_empty(inner, driver.messages[name].read, driver.signals, findings)
+        _check_empty(inner, driver.messages[name].read, driver.signals, problems)
     for inner in _prompts(part):
-        pattern = findings.pattern(inner)
+        pattern = problems.pattern(inner)
         if pattern is not None and _finds(pattern, ""):
-            findings.warn(
+            problems.warn(
                 inner,
                 "matches-empty",
                 "the pattern matches empty text, so any first byte counts as the prompt",
                 hint="match the end of the prompt, such as 'login: $'",
             )
-    _check_words(part, findings)
+    _check_words(part, problems)
 
 
 def _prompts(part: Node) -> Iterator[Node]:
@@ -135,7 +135,7 @@ def _head(source: str) -> str:
     return found[1][:-1] if source[found.end() : found.end() + 1] in ("*", "?", "{") else found[1]
 
 
-def _check_messages(part: Node, driver: Driver, findings: Problems) -> None:
+def _check_messages(part: Node, driver: Driver, problems: Problems) -> None:
     """Warn of a message whose frames match an earlier message, which takes them."""
     seen: list[tuple[str, str, ReadSpec, _Text | None]] = []
     for name, inner in part.named("messages").items():
@@ -146,7 +146,7 @@ def _check_messages(part: Node, driver: Driver, findings: Problems) -> None:
                 continue
             shown = _shared(read, earlier, message.read, text)
             if shown is not None:
-                findings.warn(
+                problems.warn(
                     inner,
                     "ambiguous-frame",
                     f"{other!r}, above, takes the same frames{shown}, so this one gets none"
@@ -213,7 +213,7 @@ def _asked(items: tuple[Item, ...]) -> dict[tuple[int, int], object] | None:
     return found
 
 
-def _check_refusals(part: Node, reply: Reply, findings: Problems) -> None:
+def _check_refusals(part: Node, reply: Reply, problems: Problems) -> None:
     """Warn of an error pattern that matches a reply: errors are tried first."""
     good = _text_of(reply.read) if reply.read.when is None and reply.read.lines is None else None
     errors = [(inner, "an error", "errors") for inner in part.listed("errors")]
@@ -225,7 +225,7 @@ def _check_refusals(part: Node, reply: Reply, findings: Problems) -> None:
         if pattern is None:
             continue
         if _finds(pattern, ""):
-            findings.warn(
+            problems.warn(
                 inner,
                 "matches-empty",
                 f"the pattern matches empty text, so every reply counts as {what}"
@@ -236,17 +236,17 @@ def _check_refusals(part: Node, reply: Reply, findings: Problems) -> None:
                 else "match the start of such a frame",
             )
         elif good is not None and _Text(pattern).takes_all_of(good):
-            findings.warn(
+            problems.warn(
                 inner,
                 "ambiguous-frame",
                 f"the reply on success matches it, such as {good.samples[0][:_SHOWN]!r}: it would"
                 f" count as {what}",
                 hint=f"make it match {whose} only; they are tried first",
             )
-    _check_struct_refusals(part, reply, findings)
+    _check_struct_refusals(part, reply, problems)
 
 
-def _check_shared_refusals(part: Node, driver: Driver, findings: Problems) -> None:
+def _check_shared_refusals(part: Node, driver: Driver, problems: Problems) -> None:
     """Warn of an error pattern of a transport that matches the reply to some request."""
     for name, inner in part.named("transports").items():
         spec = driver.transports[name]
@@ -256,9 +256,9 @@ def _check_shared_refusals(part: Node, driver: Driver, findings: Problems) -> No
             if transport != name or reply is None or reply.read.lines is not None:
                 continue
             alone = Reply(reply.read, spec.errors, faults=spec.faults)
-            told = len(findings.problems)
-            _check_refusals(inner, alone, findings)
-            if len(findings.problems) > told:
+            told = len(problems.problems)
+            _check_refusals(inner, alone, problems)
+            if len(problems.problems) > told:
                 break  # one warning is enough
 
 
@@ -269,7 +269,7 @@ def _patterns_of(asides: ProvisionalReplies) -> Iterator[Pattern]:
             yield pattern
 
 
-def _check_struct_refusals(part: Node, reply: Reply, findings: Problems) -> None:
+def _check_struct_refusals(part: Node, reply: Reply, problems: Problems) -> None:
     """Warn of a binary error reply that differs from the reply in only a field."""
     given = [inner for inner in part.listed("errors") if isinstance(inner.data, dict)]
     if len(given) != len(reply.faults) or reply.read.form != "struct":
@@ -277,7 +277,7 @@ def _check_struct_refusals(part: Node, reply: Reply, findings: Problems) -> None
     for inner, fault in zip(given, reply.faults, strict=True):
         is_plain = fault.read.form == "struct" and fault.read.when is None
         if is_plain and _covers(_items(fault.read), _items(reply.read)):
-            findings.warn(
+            problems.warn(
                 inner,
                 "ambiguous-frame",
                 "the reply on success matches it, and would count as an error",
@@ -289,7 +289,7 @@ def _check_struct_refusals(part: Node, reply: Reply, findings: Problems) -> None
 
 
 def _check_empty(
-    part: Node, read: ReadSpec, signals: Mapping[str, Signal], findings: Problems
+    part: Node, read: ReadSpec, signals: Mapping[str, Signal], problems: Problems
 ) -> None:
     """Warn of a number from a group that may be empty."""
     pattern = read.options.get("pattern")
@@ -304,7 +304,7 @@ def _check_empty(
         if can_be_empty(pattern, name):
             found = read_form(part)
             place, where = found[1].place_of(found[0], name) if found else (part, {})
-            findings.warn(
+            problems.warn(
                 place,
                 "matches-empty",
                 f"{name!r} may be empty here, and empty text is not a number",
@@ -326,7 +326,7 @@ def _is_plain_number(signal: Signal) -> bool:
 # -- types and enums
 
 
-def _check_words(part: Node, findings: Problems) -> None:
+def _check_words(part: Node, problems: Problems) -> None:
     """Warn of types and enums that are never used."""
     if "types" not in part.data and "enums" not in part.data:
         return
@@ -334,7 +334,7 @@ def _check_words(part: Node, findings: Problems) -> None:
     for key, noun, code in (("types", "type", "unused-type"), ("enums", "enum", "unused-enum")):
         for name, inner in part.named(key).items():
             if everywhere[name] == _words(inner.data)[name]:
-                findings.warn(
+                problems.warn(
                     inner,
                     code,
                     f"nothing uses the {noun} {name!r}",

@@ -27,7 +27,7 @@ _BITS_OF_A_BYTE: Final = 10
 _ROUNDING: Final = 1.000001
 
 
-def check_motion(part: Node, driver: Driver, findings: Problems) -> None:
+def check_motion(part: Node, driver: Driver, problems: Problems) -> None:
     """Report problems of the held commands of the driver at `part`."""
     held = [
         (inner.must("hold"), driver.commands[name], hold)
@@ -35,21 +35,21 @@ def check_motion(part: Node, driver: Driver, findings: Problems) -> None:
         if (hold := driver.commands[name].hold) is not None
     ]
     for inner, command, hold in held:
-        _check_line(inner, driver.transports.get(command.transport), findings)
+        _check_line(inner, driver.transports.get(command.transport), problems)
         if hold.step_s is None:
-            _check_watchdog(inner, command, hold, findings)
+            _check_watchdog(inner, command, hold, problems)
         else:
-            _check_step(inner, hold, hold.step_s, findings)
-        _check_lease(inner, hold, findings)
+            _check_step(inner, hold, hold.step_s, problems)
+        _check_lease(inner, hold, problems)
     for name, spec in driver.transports.items():
         on_line = [one for one in held if one[1].transport == name]
         if on_line:
-            _check_baud(on_line, spec, findings)
-            _check_will(on_line, spec, findings)
+            _check_baud(on_line, spec, problems)
+            _check_will(on_line, spec, problems)
     is_mute = all(driver.transports[one[1].transport].never_replies for one in held)
     noticed = any(_notices(spec, driver) for spec in driver.transports.values())
     if held and not is_mute and not noticed:
-        findings.warn(
+        problems.warn(
             held[0][0],
             "no-loss-detection",
             "the loss of the robot would go unnoticed: no transport has 'stale_after',"
@@ -62,16 +62,16 @@ def check_motion(part: Node, driver: Driver, findings: Problems) -> None:
         for name, spec in driver.transports.items():
             streamed = [one for one in held if one[1].transport == name and not one[2].step_s]
             if streamed:
-                _check_freeze(streamed[0], spec, findings)
+                _check_freeze(streamed[0], spec, problems)
 
 
-def _check_freeze(one: tuple[Node, Command, Hold], spec: TransportSpec, findings: Problems) -> None:
+def _check_freeze(one: tuple[Node, Command, Hold], spec: TransportSpec, problems: Problems) -> None:
     """Warn of motion over a transport that cannot detect a frozen robot program."""
     part, command, _ = one
     is_asked = spec.type in _ASKED or spec.never_replies
     if is_asked or spec.stale_after_s is not None or spec.connection == "per_request":
         return
-    findings.warn(
+    problems.warn(
         part,
         "no-liveness-check",
         f"while {command.name!r} is held, a frozen robot program would go unnoticed:"
@@ -82,9 +82,9 @@ def _check_freeze(one: tuple[Node, Command, Hold], spec: TransportSpec, findings
     )
 
 
-def _check_line(part: Node, spec: TransportSpec | None, findings: Problems) -> None:
+def _check_line(part: Node, spec: TransportSpec | None, problems: Problems) -> None:
     if spec is not None and spec.connection == "per_request":
-        findings.error(
+        problems.error(
             part,
             "motion-unconnected",
             f"a held command needs an open connection, and {spec.name!r} opens one for each"
@@ -94,10 +94,10 @@ def _check_line(part: Node, spec: TransportSpec | None, findings: Problems) -> N
         )
 
 
-def _check_watchdog(part: Node, command: Command, hold: Hold, findings: Problems) -> None:
+def _check_watchdog(part: Node, command: Command, hold: Hold, problems: Problems) -> None:
     watchdog_s = hold.watchdog_s
     if watchdog_s is None:
-        findings.warn(
+        problems.warn(
             part,
             "unknown-watchdog",
             f"the robot's own watchdog after the last {command.name!r} is unknown",
@@ -107,7 +107,7 @@ def _check_watchdog(part: Node, command: Command, hold: Hold, findings: Problems
         )
         return
     if hold.lease_s >= watchdog_s:
-        findings.error(
+        problems.error(
             part.get("lease") or part.must("watchdog"),
             "lease-too-long",
             f"the lease is {shown_duration(hold.lease_s)}, and the robot stops itself after"
@@ -115,7 +115,7 @@ def _check_watchdog(part: Node, command: Command, hold: Hold, findings: Problems
             hint="make 'lease' shorter than 'watchdog', so that the lease ends first",
         )
     if hold.repeat_s >= watchdog_s:
-        findings.error(
+        problems.error(
             part.must("repeat"),
             "repeat-too-slow",
             f"it is repeated every {shown_duration(hold.repeat_s)}, and the robot stops itself"
@@ -124,9 +124,9 @@ def _check_watchdog(part: Node, command: Command, hold: Hold, findings: Problems
         )
 
 
-def _check_step(part: Node, hold: Hold, step_s: float, findings: Problems) -> None:
+def _check_step(part: Node, hold: Hold, step_s: float, problems: Problems) -> None:
     if hold.repeat_s < step_s / _ROUNDING:
-        findings.error(
+        problems.error(
             part.must("repeat"),
             "step-backlog",
             f"it is repeated every {shown_duration(hold.repeat_s)}, and a step takes"
@@ -135,7 +135,7 @@ def _check_step(part: Node, hold: Hold, step_s: float, findings: Problems) -> No
             hint="repeat it at the rate of the steps, or make the steps smaller",
         )
     if step_s > LONG_LEASE_S:
-        findings.warn(
+        problems.warn(
             part.must("step"),
             "long-step",
             f"the robot moves on for {shown_duration(step_s)} after the release",
@@ -143,9 +143,9 @@ def _check_step(part: Node, hold: Hold, step_s: float, findings: Problems) -> No
         )
 
 
-def _check_lease(part: Node, hold: Hold, findings: Problems) -> None:
+def _check_lease(part: Node, hold: Hold, problems: Problems) -> None:
     if hold.lease_s > LONG_LEASE_S:
-        findings.warn(
+        problems.warn(
             part.must("lease"),
             "long-lease",
             f"the robot moves on for {shown_duration(hold.lease_s)} after its operator is lost",
@@ -154,7 +154,7 @@ def _check_lease(part: Node, hold: Hold, findings: Problems) -> None:
 
 
 def _check_baud(
-    held: list[tuple[Node, Command, Hold]], spec: TransportSpec, findings: Problems
+    held: list[tuple[Node, Command, Hold]], spec: TransportSpec, problems: Problems
 ) -> None:
     """Report motion whose smallest frames already exceed the baud rate of a serial line."""
     baud = spec.options.get("baud")
@@ -168,7 +168,7 @@ def _check_baud(
         return
     part, command, _ = min(held, key=lambda one: one[2].repeat_s)
     what = f"{command.name!r} needs" if len(held) == 1 else f"the {len(held)} held commands need"
-    findings.error(
+    problems.error(
         part.must("repeat"),
         "line-too-slow",
         f"{what} {bits_per_s:.0f} bit/s or more, and the line carries {baud:g}",
@@ -177,13 +177,13 @@ def _check_baud(
 
 
 def _check_will(
-    held: list[tuple[Node, Command, Hold]], spec: TransportSpec, findings: Problems
+    held: list[tuple[Node, Command, Hold]], spec: TransportSpec, problems: Problems
 ) -> None:
     """Warn of motion through a broker without a last will that stops the robot."""
     if spec.type != "mqtt" or spec.options.get("will") is not None:
         return
     part, command, _ = held[0]
-    findings.warn(
+    problems.warn(
         part,
         "motion-without-will",
         f"if the connection to the broker is lost, nothing ends {command.name!r}",

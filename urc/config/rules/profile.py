@@ -23,21 +23,21 @@ def check_profile(
     driver: Driver,
     interfaces: dict[str, Interface],
     uses: NameUses,
-    findings: Problems,
+    problems: Problems,
 ) -> None:
     """Add a warning for each unused declaration, and for polls that are too fast."""
-    _check_name(sources, findings)
-    _check_unused(sources, driver, uses, findings)
-    _check_slots(sources, interfaces, findings)
-    _check_unfilled(sources, interfaces, findings)
+    _check_name(sources, problems)
+    _check_unused(sources, driver, uses, problems)
+    _check_slots(sources, interfaces, problems)
+    _check_unfilled(sources, interfaces, problems)
     for part, poll in zip(sources.driver.listed("polls"), driver.polls, strict=True):
-        _check_pace(part, poll, sources.driver, findings)
-    _check_rate(sources.driver, driver, findings)
+        _check_pace(part, poll, sources.driver, problems)
+    _check_rate(sources.driver, driver, problems)
     secrets = {name for name, one in sources.settings.items() if one.flag("secret", default=False)}
-    check_flow(sources.driver, driver, frozenset(secrets), findings)
+    check_flow(sources.driver, driver, frozenset(secrets), problems)
 
 
-def _check_name(sources: Sources, findings: Problems) -> None:
+def _check_name(sources: Sources, problems: Problems) -> None:
     """Warn of a robot whose file has another name than the robot."""
     file = PurePath(sources.root.document.file)
     name = sources.root.text("name")
@@ -45,7 +45,7 @@ def _check_name(sources: Sources, findings: Problems) -> None:
     is_of_package = file.name == "robot.yaml" and file.parent.name == name
     is_other = file.suffix in _ENDINGS and name != file.stem and not is_of_package
     if sources.kind == "robot" and is_other:
-        findings.warn(
+        problems.warn(
             sources.root,
             "name-mismatch",
             f"the robot has the name {name!r}, and its file {file.name!r}",
@@ -54,10 +54,10 @@ def _check_name(sources: Sources, findings: Problems) -> None:
         )
 
 
-def _check_unused(sources: Sources, driver: Driver, uses: NameUses, findings: Problems) -> None:
+def _check_unused(sources: Sources, driver: Driver, uses: NameUses, problems: Problems) -> None:
     for name, part in sources.driver.named("signals").items():
         if name not in uses.signals and driver.signals[name].formula is None:
-            findings.warn(
+            problems.warn(
                 part,
                 "never-set",
                 f"nothing sets the signal {name!r}",
@@ -68,12 +68,12 @@ def _check_unused(sources: Sources, driver: Driver, uses: NameUses, findings: Pr
             )
     for name, part in sources.driver.named("transports").items():
         if name not in uses.transports:
-            findings.warn(
+            problems.warn(
                 part, "unused-transport", f"nothing uses the transport {name!r}", key=True
             )
     for name, part in sources.settings.items():
         if name not in uses.settings:
-            findings.warn(
+            problems.warn(
                 part,
                 "unused-setting",
                 f"nothing uses the setting {name!r}",
@@ -82,7 +82,7 @@ def _check_unused(sources: Sources, driver: Driver, uses: NameUses, findings: Pr
             )
 
 
-def _check_slots(sources: Sources, interfaces: dict[str, Interface], findings: Problems) -> None:
+def _check_slots(sources: Sources, interfaces: dict[str, Interface], problems: Problems) -> None:
     """Warn of a slot that this document fills and no interface shows.
 
     A driver's document fills slots for every interface, so only the slots of the robot are checked.
@@ -93,7 +93,7 @@ def _check_slots(sources: Sources, interfaces: dict[str, Interface], findings: P
     for name, parts in sources.slots.items():
         part = parts[-1]
         if name not in shown and part.document is sources.root.document:
-            findings.warn(
+            problems.warn(
                 part,
                 "slot-not-shown",
                 f"no interface has a slot {name!r}",
@@ -102,7 +102,7 @@ def _check_slots(sources: Sources, interfaces: dict[str, Interface], findings: P
             )
 
 
-def _check_unfilled(sources: Sources, interfaces: dict[str, Interface], findings: Problems) -> None:
+def _check_unfilled(sources: Sources, interfaces: dict[str, Interface], problems: Problems) -> None:
     """Warn of an empty slot in a robot's own grid.
 
     An interface in its own document serves several drivers, and may have slots that a driver lacks.
@@ -116,7 +116,7 @@ def _check_unfilled(sources: Sources, interfaces: dict[str, Interface], findings
             found = _drawn(part, slot)
             if found is not None:
                 picture, offset = found
-                findings.warn(
+                problems.warn(
                     picture,
                     "slot-not-filled",
                     f"no widget fills the slot {slot!r}",
@@ -140,7 +140,7 @@ def _drawn(part: Node, slot: str) -> tuple[Node, int] | None:
     return None
 
 
-def _check_pace(part: Node, poll: Poll, driver: Node, findings: Problems) -> None:
+def _check_pace(part: Node, poll: Poll, driver: Node, problems: Problems) -> None:
     """Warn of a poll whose reply timeout is longer than its period.
 
     An explicit timeout up to the default gives no warning, because the default gives none either.
@@ -158,7 +158,7 @@ def _check_pace(part: Node, poll: Poll, driver: Node, findings: Problems) -> Non
             return  # a default is not a decision of the author
         seconds = Problems().duration(timeouts, "reply", 2.0) if timeouts else None
     if seconds is not None and seconds > max(poll.every_s, Timeouts().reply_s):
-        findings.warn(
+        problems.warn(
             part.must("every"),
             "short-poll-timeout",
             f"the next request is due after {shown_duration(poll.every_s)}, but a reply may take"
@@ -175,14 +175,14 @@ def _place(part: Node, near: Node) -> str:
     return line if file == near.document.source_of(near.path).file else f"{line} of {file}"
 
 
-def _check_rate(part: Node, driver: Driver, findings: Problems) -> None:
+def _check_rate(part: Node, driver: Driver, problems: Problems) -> None:
     """Warn of polls that together exceed the request rate of their transport."""
     for name, transport in driver.transports.items():
         if not transport.min_gap_s:
             continue
         rate = sum(1 / poll.every_s for poll in driver.polls if poll.transport == name)
         if rate * transport.min_gap_s > 1:
-            findings.warn(
+            problems.warn(
                 part.must("transports").must(name),
                 "too-many-polls",
                 f"the polls need {rate:g} requests a second, but a min_gap of"

@@ -12,31 +12,31 @@ from urc.model.driver import Command, Driver, TransportSpec
 __all__ = ["check_traffic"]
 
 
-def check_traffic(part: Node, driver: Driver, findings: Problems) -> None:
+def check_traffic(part: Node, driver: Driver, problems: Problems) -> None:
     """Add the warnings about the traffic and the motion of the driver at `part`."""
     for name, inner in part.named("commands").items():
         command = driver.commands[name]
         spec = driver.transports.get(command.transport)
         if command.hold is not None and spec is not None:
-            _check_pace(inner.must("hold"), command, spec, findings)
-            _check_kept(inner.must("send"), command, findings)
+            _check_pace(inner.must("hold"), command, spec, problems)
+            _check_kept(inner.must("send"), command, problems)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
         rate = driver.commands[poll.run].rate_per_s if poll.run in driver.commands else None
         if rate is not None and 1 / poll.every_s > rate:
-            findings.warn(
+            problems.warn(
                 inner.must("every"),
                 "too-many-polls",
                 f"it is polled {1 / poll.every_s:g} times a second, and {poll.run!r} may be sent"
                 f" {rate:g} times",
                 hint="poll more slowly, or raise its 'rate_limit'",
             )
-    _check_counted(part, driver, findings)
-    _check_ports(part, driver, findings)
+    _check_counted(part, driver, problems)
+    _check_ports(part, driver, problems)
     for name, inner in part.named("transports").items():
-        _check_silence(inner, driver.transports[name], driver, findings)
+        _check_silence(inner, driver.transports[name], driver, problems)
 
 
-def _check_counted(part: Node, driver: Driver, findings: Problems) -> None:
+def _check_counted(part: Node, driver: Driver, problems: Problems) -> None:
     """Warn of commands that fill the robot's buffer without a reply that shows their end."""
     requests = [
         (inner, one.transport, one.reply, one.priority)
@@ -52,7 +52,7 @@ def _check_counted(part: Node, driver: Driver, findings: Problems) -> None:
         spec = driver.transports.get(transport)
         is_counted = spec is not None and spec.queue.most_bytes is not None
         if is_counted and reply is None and priority != "realtime":
-            findings.warn(
+            problems.warn(
                 inner.must("send"),
                 "uncounted",
                 f"{transport!r} counts the unread bytes of the robot, and no reply shows"
@@ -62,7 +62,7 @@ def _check_counted(part: Node, driver: Driver, findings: Problems) -> None:
             )
 
 
-def _check_ports(part: Node, driver: Driver, findings: Problems) -> None:
+def _check_ports(part: Node, driver: Driver, problems: Problems) -> None:
     """Warn of two transports that listen on one port of this machine."""
     seen: dict[tuple[str, str, str], str] = {}
     for name, inner in part.named("transports").items():
@@ -74,7 +74,7 @@ def _check_ports(part: Node, driver: Driver, findings: Problems) -> None:
         port, address = options[key], options.get("bind", "")
         place = (kind, _written(port), _written(address))
         if place in seen:
-            findings.warn(
+            problems.warn(
                 inner.must(key),
                 "same-port",
                 f"{seen[place]!r} listens on {place[1]}, too, and only one transport can",
@@ -87,7 +87,7 @@ def _written(value: object) -> str:
     return value.source if isinstance(value, Template) else str(value)
 
 
-def _check_kept(part: Node, command: Command, findings: Problems) -> None:
+def _check_kept(part: Node, command: Command, problems: Problems) -> None:
     """Report motion that a broker would keep or repeat."""
     attributes = command.send.options.get("attributes")
     if not isinstance(attributes, Mapping):
@@ -95,7 +95,7 @@ def _check_kept(part: Node, command: Command, findings: Problems) -> None:
     kept = [("retain", "is kept for later subscribers")] if attributes.get("retain") else []
     kept += [("qos", "is repeated until its acknowledgement")] if attributes.get("qos") else []
     for key, what in kept:
-        findings.error(
+        problems.error(
             part.must("publish"),
             "motion-kept",
             f"{command.name!r} moves the robot, and with this {key} it {what}",
@@ -105,7 +105,7 @@ def _check_kept(part: Node, command: Command, findings: Problems) -> None:
         )
 
 
-def _check_pace(part: Node, command: Command, spec: TransportSpec, findings: Problems) -> None:
+def _check_pace(part: Node, command: Command, spec: TransportSpec, problems: Problems) -> None:
     """Warn of a held command whose period is shorter than its rate limit allows."""
     if command.hold is None:
         return
@@ -115,7 +115,7 @@ def _check_pace(part: Node, command: Command, spec: TransportSpec, findings: Pro
         (1 / command.rate_per_s if command.rate_per_s else 0.0, "its 'rate_limit'"),
     ):
         if limit_s > repeat_s * 1.001:  # Tolerance, because 1/20 s and 50 ms are the same.
-            findings.warn(
+            problems.warn(
                 part.must("repeat"),
                 "hold-rate-limited",
                 f"it is repeated every {shown_duration(repeat_s)}, and {what} allows it every"
@@ -124,7 +124,7 @@ def _check_pace(part: Node, command: Command, spec: TransportSpec, findings: Pro
             )
 
 
-def _check_silence(part: Node, spec: TransportSpec, driver: Driver, findings: Problems) -> None:
+def _check_silence(part: Node, spec: TransportSpec, driver: Driver, problems: Problems) -> None:
     """Warn of a transport that counts as silent, or closes, between two polls."""
     if any(one.transport == spec.name for one in driver.messages.values()):
         return  # unsolicited messages come at an unknown rate
@@ -142,7 +142,7 @@ def _check_silence(part: Node, spec: TransportSpec, driver: Driver, findings: Pr
         (part, "stale_after", spec.stale_after_s, "counts as silent"),
     ):
         if place is not None and limit_s is not None and limit_s <= min(periods):
-            findings.warn(
+            problems.warn(
                 place.must(key),
                 "slow-keepalive",
                 f"the line {what} after {shown_duration(limit_s)}, but the robot is polled every"

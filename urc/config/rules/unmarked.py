@@ -52,7 +52,7 @@ _HINT_OF_STEPS: Final = (
 )
 
 
-def check_unmarked(part: Node, driver: Driver, findings: Problems) -> None:
+def check_unmarked(part: Node, driver: Driver, problems: Problems) -> None:
     """Warn of each command and sequence that seems to move the robot and is not marked."""
     for key in ("commands", "sequences"):
         for name, inner in part.named(key).items():
@@ -61,7 +61,7 @@ def check_unmarked(part: Node, driver: Driver, findings: Problems) -> None:
                 continue
             why = why_it_moves(name, command)
             if why:
-                findings.warn(
+                problems.warn(
                     inner,
                     "unmarked-motion",
                     f"{name!r} seems to move the robot ({why}) and is not marked: STOP does not"
@@ -71,7 +71,7 @@ def check_unmarked(part: Node, driver: Driver, findings: Problems) -> None:
                 )
 
 
-def check_unguarded(part: Node, driver: Driver, findings: Problems) -> None:
+def check_unguarded(part: Node, driver: Driver, problems: Problems) -> None:
     """Warn of autonomous motion that STOP cannot end and that needs no confirmation.
 
     A held command needs neither: its release ends it.
@@ -83,7 +83,7 @@ def check_unguarded(part: Node, driver: Driver, findings: Problems) -> None:
             command = driver.commands[name]
             is_said = isinstance(inner.data, dict) and "moves" in inner.data
             if is_said and command.moves and not _is_asked(command):
-                findings.warn(
+                problems.warn(
                     inner.must("moves"),
                     "unguarded-motion",
                     f"{name!r} starts autonomous motion: STOP has no command to end it,"

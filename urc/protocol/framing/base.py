@@ -27,8 +27,8 @@ __all__ = [
     "FramingError",
     "Open",
     "StreamDecoder",
-    "seal_of",
-    "sealed",
+    "frame_codec_of",
+    "encode_frame",
 ]
 
 SKIPPED: Final = ""
@@ -166,13 +166,13 @@ class StreamDecoder:
         return FrameFault(code, message, closes)
 
 
-def seal_of(spec: FramingSpec) -> FrameCodec | None:
+def frame_codec_of(spec: FramingSpec) -> FrameCodec | None:
     """Return the frame codec of `spec`, or None when payloads are the frames themselves."""
     layout = cast("FrameLayout | None", spec.options.get("layout"))
     return None if layout is None or layout == FrameLayout() else FrameCodec(layout)
 
 
-def sealed(codec: FrameCodec | None, payload: bytes, max_bytes: int) -> bytes:
+def encode_frame(codec: FrameCodec | None, payload: bytes, max_bytes: int) -> bytes:
     """Return the frame around `payload`; raise `FramingError` if it cannot be framed."""
     try:
         frame = payload if codec is None else codec.close(payload)

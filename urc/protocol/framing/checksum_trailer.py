@@ -35,10 +35,10 @@ class ChecksumTrailer:
         """Return `text` with its checksums; raise `BadFrame` if they cannot be computed."""
         spec = self._spec
         if not spec.each:
-            return self._sealed(text)
+            return self._encode_frame(text)
         lines = text.split(spec.each)
         return spec.each.join(
-            line if place < spec.skip or not line else self._sealed(line)
+            line if place < spec.skip or not line else self._encode_frame(line)
             for place, line in enumerate(lines)
         )
 
@@ -76,7 +76,7 @@ class ChecksumTrailer:
         mark_text = ascii(spec.mark.decode("latin-1"))
         raise self._checksum.wrong(f"the frame has no {mark_text} followed by a checksum; dropped")
 
-    def _sealed(self, text: bytes) -> bytes:
+    def _encode_frame(self, text: bytes) -> bytes:
         right = self._right(text)
         if right is None:
             raise self._checksum.saltless(self._before + text)

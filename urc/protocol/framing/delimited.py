@@ -9,8 +9,8 @@ from urc.protocol.framing.base import (
     FramingError,
     Open,
     StreamDecoder,
-    seal_of,
-    sealed,
+    encode_frame,
+    frame_codec_of,
 )
 from urc.protocol.framing.frame import BadFrame, FrameCodec
 from urc.protocol.framing.receive_buffer import ReceiveBuffer, RescanBudget
@@ -30,11 +30,11 @@ class DelimiterFraming(NamedTuple):
     def from_spec(cls, spec: FramingSpec) -> "DelimiterFraming":
         """Return the framing for options ``tx`` and ``rx``, both bytes."""
         tx, rx = cast("bytes", spec.options["tx"]), cast("bytes", spec.options["rx"])
-        return cls(tx, rx, spec.max_bytes, seal_of(spec))
+        return cls(tx, rx, spec.max_bytes, frame_codec_of(spec))
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        frame = payload if self.codec is None else sealed(self.codec, payload, self.max_bytes)
+        frame = payload if self.codec is None else encode_frame(self.codec, payload, self.max_bytes)
         if self.tx and self.tx in frame:
             raise FramingError(
                 f"{payload!r} contains the delimiter {self.tx!r}: it would be two frames"

@@ -19,7 +19,7 @@ from urc.protocol.framing.base import (
     FramingError,
     Open,
     StreamDecoder,
-    sealed,
+    encode_frame,
 )
 from urc.protocol.framing.delimited import DelimiterDecoder
 from urc.protocol.framing.frame import BadFrame, FrameCodec, LengthField
@@ -50,7 +50,7 @@ class EscapedFraming(NamedTuple):
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        frame = sealed(self.codec, payload, self.max_bytes)
+        frame = encode_frame(self.codec, payload, self.max_bytes)
         start, end = self.codec.layout.start, self.codec.layout.end
         inner = frame[len(start) : len(frame) - len(end)]
         if not inner:

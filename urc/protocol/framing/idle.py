@@ -3,7 +3,13 @@
 from typing import NamedTuple, cast
 
 from urc.model.driver import FramingSpec
-from urc.protocol.framing.base import Decoder, FrameFault, StreamDecoder, seal_of, sealed
+from urc.protocol.framing.base import (
+    Decoder,
+    FrameFault,
+    StreamDecoder,
+    encode_frame,
+    frame_codec_of,
+)
 from urc.protocol.framing.frame import BadFrame, FrameCodec
 from urc.protocol.framing.receive_buffer import ReceiveBuffer
 
@@ -20,11 +26,11 @@ class IdleFraming(NamedTuple):
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> "IdleFraming":
         """Return the framing for the option ``gap_s``."""
-        return cls(cast("float", spec.options["gap_s"]), seal_of(spec), spec.max_bytes)
+        return cls(cast("float", spec.options["gap_s"]), frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        return sealed(self.codec, payload, self.max_bytes)
+        return encode_frame(self.codec, payload, self.max_bytes)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder."""
@@ -44,11 +50,11 @@ class DatagramFraming(NamedTuple):
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> "DatagramFraming":
         """Return the framing."""
-        return cls(seal_of(spec), spec.max_bytes)
+        return cls(frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        return sealed(self.codec, payload, self.max_bytes)
+        return encode_frame(self.codec, payload, self.max_bytes)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder."""

@@ -15,8 +15,8 @@ from urc.protocol.framing.base import (
     FrameFault,
     FramingError,
     StreamDecoder,
-    seal_of,
-    sealed,
+    encode_frame,
+    frame_codec_of,
 )
 from urc.protocol.framing.frame import BadFrame, FrameCodec
 from urc.protocol.framing.receive_buffer import ReceiveBuffer
@@ -43,11 +43,11 @@ class JsonFraming(NamedTuple):
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> "JsonFraming":
         """Return the framing for the option ``tx``."""
-        return cls(cast("bytes", spec.options.get("tx", b"")), seal_of(spec), spec.max_bytes)
+        return cls(cast("bytes", spec.options.get("tx", b"")), frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        frame = sealed(self.codec, payload, self.max_bytes)
+        frame = encode_frame(self.codec, payload, self.max_bytes)
         if _JsonDecoder(None, b"", None, self.max_bytes).feed(frame) != [frame.strip(_BETWEEN)]:
             raise FramingError(f"{payload[:80]!r} is not one JSON object or array")
         return frame if self.is_reversed else frame + self.tx

@@ -17,8 +17,8 @@ from urc.protocol.framing.base import (
     FrameFault,
     Framing,
     StreamDecoder,
-    seal_of,
-    sealed,
+    encode_frame,
+    frame_codec_of,
 )
 from urc.protocol.framing.frame import BadFrame, FrameCodec
 from urc.protocol.framing.receive_buffer import ReceiveBuffer, RescanBudget
@@ -35,11 +35,11 @@ class LengthFraming(NamedTuple):
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> Framing:
         """Return the framing for the option ``layout``."""
-        return cls(seal_of(spec) or FrameCodec(FrameLayout()), spec.max_bytes)
+        return cls(frame_codec_of(spec) or FrameCodec(FrameLayout()), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        return sealed(self.codec, payload, self.max_bytes)
+        return encode_frame(self.codec, payload, self.max_bytes)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder."""

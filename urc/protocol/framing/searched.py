@@ -13,8 +13,8 @@ from urc.protocol.framing.base import (
     FramingError,
     Open,
     StreamDecoder,
-    seal_of,
-    sealed,
+    encode_frame,
+    frame_codec_of,
 )
 from urc.protocol.framing.delimited import DelimiterDecoder
 from urc.protocol.framing.frame import BadFrame, FrameCodec
@@ -49,11 +49,11 @@ class RegexFraming(NamedTuple):
         """Return the framing for the options ``pattern`` (its text) and ``tx`` (bytes)."""
         search = _searcher(cast("str", spec.options["pattern"]))
         tx = cast("bytes", spec.options.get("tx", b""))
-        return cls(search, tx, seal_of(spec), spec.max_bytes)
+        return cls(search, tx, frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        frame = sealed(self.codec, payload, self.max_bytes)
+        frame = encode_frame(self.codec, payload, self.max_bytes)
         if self.tx and not self.is_reversed:
             if self.tx in frame:
                 raise FramingError(f"{payload!r} contains {self.tx!r}: it would be two frames")
@@ -178,11 +178,11 @@ class BracketsFraming(NamedTuple):
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> Framing:
         """Return the framing for the option ``layout``, with its start and end."""
-        return cls(seal_of(spec) or FrameCodec(FrameLayout()), spec.max_bytes)
+        return cls(frame_codec_of(spec) or FrameCodec(FrameLayout()), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        frame = sealed(self.codec, payload, self.max_bytes)
+        frame = encode_frame(self.codec, payload, self.max_bytes)
         layout = self.codec.layout
         inner = frame[len(layout.start) : len(frame) - len(layout.end)]
         for mark in (layout.start, layout.end):

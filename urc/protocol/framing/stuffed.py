@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from urc.model.driver import FramingSpec
-from urc.protocol.framing.base import Decoder, FramingError, seal_of, sealed
+from urc.protocol.framing.base import Decoder, FramingError, encode_frame, frame_codec_of
 from urc.protocol.framing.delimited import DelimiterDecoder
 from urc.protocol.framing.frame import BadFrame, FrameCodec
 from urc.protocol.framing.receive_buffer import ReceiveBuffer
@@ -31,11 +31,11 @@ class SlipFraming(NamedTuple):
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> "SlipFraming":
         """Return the framing."""
-        return cls(seal_of(spec), spec.max_bytes)
+        return cls(frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        frame = sealed(self.codec, payload, self.max_bytes)
+        frame = encode_frame(self.codec, payload, self.max_bytes)
         if not frame:
             raise FramingError("SLIP cannot send an empty frame")
         return frame.replace(_ESCAPE, _ESCAPED_ESCAPE).replace(_END, _ESCAPED_END) + _END
@@ -60,11 +60,11 @@ class CobsFraming(NamedTuple):
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> "CobsFraming":
         """Return the framing."""
-        return cls(seal_of(spec), spec.max_bytes)
+        return cls(frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
         """Return the bytes of one frame, or raise `FramingError`."""
-        return _to_cobs(sealed(self.codec, payload, self.max_bytes)) + b"\0"
+        return _to_cobs(encode_frame(self.codec, payload, self.max_bytes)) + b"\0"
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder."""

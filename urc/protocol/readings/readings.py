@@ -45,7 +45,7 @@ class Readings:
         self.signals = signals
         self.settings: Mapping[str, object] = names.get("settings", NOTHING)  # type: ignore[assignment]
         self._converters: dict[str, Convert] = {}
-        self._judges = {
+        self._alarm_monitors = {
             name: AlarmMonitor(one.limits)
             for name, one in signals.items()
             if one.limits != AlarmLimits()
@@ -55,7 +55,7 @@ class Readings:
             for name, one in signals.items()
             if one.deadband or one.debounce_s
         }
-        self._timed = tuple(name for name in self._judges if signals[name].limits.for_s > 0)
+        self._timed = tuple(name for name in self._alarm_monitors if signals[name].limits.for_s > 0)
         self._last: dict[str, Sample] = {}
         """Newest sample of each input of a formula, and of each signal in `_timed`."""
         self._namespace: dict[str, object] = dict(names)
@@ -100,12 +100,12 @@ class Readings:
 
     def alarm(self, name: str, value: Reading, now: float) -> Alarm:
         """Update the alarm state of a signal, and return it."""
-        alarm_monitor = self._judges.get(name)
+        alarm_monitor = self._alarm_monitors.get(name)
         return "" if alarm_monitor is None else alarm_monitor.alarm_monitor(value, now)
 
-    def judges(self, name: str) -> bool:
+    def alarm_monitors(self, name: str) -> bool:
         """Return whether the signal has limits."""
-        return name in self._judges
+        return name in self._alarm_monitors
 
     def keeps(self, name: str) -> bool:
         """Return whether a formula or a timed alarm uses the signal, for `follow`."""
@@ -121,7 +121,7 @@ class Readings:
         """Time at which `tick` may have samples; None when only a frame can change them."""
         if not self._timed and not self._change_filter:
             return None
-        times = [self._judges[name].deadline for name in self._timed]
+        times = [self._alarm_monitors[name].deadline for name in self._timed]
         times += [one.deadline for one in self._change_filter.values()]
         return min((time for time in times if time is not None), default=None)
 
@@ -136,9 +136,9 @@ class Readings:
             samples += [sample for sample in settled if sample is not None]
             self.follow(samples, [], now)
         for name in self._timed:
-            due = self._judges[name].deadline
+            due = self._alarm_monitors[name].deadline
             if due is not None and due <= now:
-                sample = self._last[name]._replace(alarm=self._judges[name].tick(now))
+                sample = self._last[name]._replace(alarm=self._alarm_monitors[name].tick(now))
                 self._last[name] = sample
                 samples.append(sample)
         return samples

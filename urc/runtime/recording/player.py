@@ -75,7 +75,7 @@ class Player:
         """Position at the time `_since_s`, in seconds."""
         self._since_s: float | None = None
         """Monotonic time of the last start; None while paused."""
-        self._wishes_to_run = True
+        self._wants_to_run = True
         self._is_open = False
         self._number = 0
         """Number of changes of position or state so far."""
@@ -101,7 +101,7 @@ class Player:
     @property
     def is_playing(self) -> bool:
         """Whether the playback runs, or will run with the first viewer."""
-        return self._wishes_to_run
+        return self._wants_to_run
 
     @property
     def speed(self) -> float:
@@ -111,12 +111,12 @@ class Player:
     def play(self) -> None:
         """Start; at the end, start from the beginning."""
         at_end = self.position_s >= self.length_s
-        self._wishes_to_run = True
+        self._wants_to_run = True
         self._stand(0.0 if at_end else self.position_s, is_moved=at_end)
 
     def pause(self) -> None:
         """Pause at the current position."""
-        self._wishes_to_run = False
+        self._wants_to_run = False
         self._stand(self.position_s)
 
     def seek(self, position_s: float) -> None:
@@ -128,7 +128,7 @@ class Player:
 
     def _stand(self, position_s: float, *, is_moved: bool = False) -> None:
         self._base_s = position_s
-        is_running = self._wishes_to_run and self._is_open
+        is_running = self._wants_to_run and self._is_open
         self._since_s = self._clock.now() if is_running else None
         self._number += is_moved
         self._changed.set()
@@ -223,12 +223,12 @@ class Player:
                     await self._changed.wait()
 
     async def _at_end(self, number: int) -> None:
-        if self._is_looped and self._wishes_to_run and self.length_s > 0:
+        if self._is_looped and self._wants_to_run and self.length_s > 0:
             await self._clock.sleep(_REST_S)
             if number == self._number:
                 self.seek(0.0)
             return
-        self._wishes_to_run = False
+        self._wants_to_run = False
         self._stand(self.length_s)
         while number == self._number:
             self._changed.clear()

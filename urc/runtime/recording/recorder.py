@@ -27,7 +27,7 @@ from urc.model.values import Sample
 from urc.problems import UrcError
 from urc.runtime.hub import EventTap, Hub, LogEntry, Tapped, Traffic
 from urc.runtime.recording.shapes import PROFILE, RecordingEncoder, channels
-from urc.runtime.widget_registry import shelf_of
+from urc.runtime.widget_registry import widget_folder_of
 
 __all__ = ["Recorder", "check_installed", "named", "recorded"]
 
@@ -172,7 +172,7 @@ class Recorder:
 
         profile, document = self._profile, self._document
         if document is None:
-            document = resolve(profile.file, shelf_of(profile.file), profile).text
+            document = resolve(profile.file, widget_folder_of(profile.file), profile).text
             # Comments of the document show where each key comes from; the home folder is private.
             document = document.replace(f"# {Path(profile.file).parent}{os.sep}", "# ")
         writer: Any = Writer(stream, chunk_size=_CHUNK_BYTES)

@@ -38,7 +38,7 @@ class UdpServer(asyncio.DatagramProtocol):
         self._context = context
         self._clients = Clients(context)
         self._line: asyncio.DatagramTransport | None = None
-        self._inboxes: dict[_Address, asyncio.Queue[bytes]] = {}
+        self._receivers: dict[_Address, asyncio.Queue[bytes]] = {}
         self._told: _Address | None = None
         """Address on which the driver listens."""
 
@@ -81,18 +81,18 @@ class UdpServer(asyncio.DatagramProtocol):
             return
         if self._context.last_peer is not None:
             self._context.last_peer.host = address[0]
-        if address not in self._inboxes:
+        if address not in self._receivers:
             self._meet(address)
         with suppress(asyncio.QueueFull):
-            self._inboxes[address].put_nowait(data)
+            self._receivers[address].put_nowait(data)
 
     def _meet(self, address: _Address) -> None:
         receiver: asyncio.Queue[bytes] = asyncio.Queue(_WAITING)
-        self._inboxes[address] = receiver
+        self._receivers[address] = receiver
 
         def forget() -> None:
-            if self._inboxes.get(address) is receiver:
-                del self._inboxes[address]
+            if self._receivers.get(address) is receiver:
+                del self._receivers[address]
 
         self._clients.admit(lambda client: self._talk(client, address, receiver), forget)
 

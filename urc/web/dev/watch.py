@@ -16,7 +16,7 @@ from urc.problems import Problem, ProblemsError, UrcError, has_errors
 from urc.runtime.document_tests import exercise
 from urc.runtime.file_watch import PERIOD_S, FileWatcher
 from urc.runtime.registries import built_in_catalog
-from urc.runtime.widget_registry import shelf_of
+from urc.runtime.widget_registry import widget_folder_of
 from urc.web.fleet.robots import Robot, RobotService
 
 __all__ = ["CheckedProfile", "ProfileWatch", "Remake", "examine"]
@@ -40,7 +40,7 @@ class CheckedProfile(NamedTuple):
 
 def examine(file: str) -> CheckedProfile:
     """Check a document and run its tests."""
-    checked = check(file, built_in_catalog(), shelf_of(file))
+    checked = check(file, built_in_catalog(), widget_folder_of(file))
     problems = checked.problems
     if checked.profile is not None:
         problems = (*problems, *exercise(checked.profile).problems)

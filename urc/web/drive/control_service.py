@@ -141,7 +141,7 @@ class ControlService:
 
     # -- pages
 
-    def sit(self, place: str, role: Role, wake: Callable[[], None]) -> OperatorSession:
+    def add_page(self, place: str, role: Role, wake: Callable[[], None]) -> OperatorSession:
         """Add a page; raise `UrcError` when there are too many.
 
         Args:
@@ -156,7 +156,7 @@ class ControlService:
         self._operators[operator.client.id] = operator
         return operator
 
-    def rise(self, operator: OperatorSession) -> None:
+    def remove_page(self, operator: OperatorSession) -> None:
         """Remove a page; its held controls stop."""
         for command in list(operator.alarms):
             operator.forget(command)
@@ -165,7 +165,7 @@ class ControlService:
             operator.spare.end()
         self.controller.part(operator.client.id)
 
-    def seat_of(self, key: str) -> OperatorSession | None:
+    def operator_of(self, key: str) -> OperatorSession | None:
         """Return the page with this key, or None."""
         said = key.encode()
         return next(

@@ -81,7 +81,7 @@ class RedundantSocket:
             said = _hello.decode(message.get("text") or b"")
         except (TimeoutError, *_BAD):
             return None
-        return self._controls.seat_of(said.key)
+        return self._controls.operator_of(said.key)
 
     async def _listen(self, operator: OperatorSession) -> None:
         while (message := await self._line.receive())["type"] != "websocket.disconnect":

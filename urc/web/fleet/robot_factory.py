@@ -26,7 +26,7 @@ from urc.runtime.open_profile import open_document
 from urc.runtime.session import Session
 from urc.runtime.settings import parse_setting
 from urc.runtime.settings_store import DRIVEN, SettingsStore, StoredSettings, in_use
-from urc.runtime.widget_registry import shelf_of
+from urc.runtime.widget_registry import widget_folder_of
 from urc.web.fleet.robots import Robot
 
 __all__ = ["InstalledInterface", "ResolvedSettings", "RobotFactory", "RobotOptions"]
@@ -195,7 +195,7 @@ class RobotFactory:
         """Return an installed interface with its bindings on a robot."""
         if added.lock.key.name in profile.interfaces:
             return InterfaceFit(None, fault="this robot has an interface of that name already")
-        return fit_interface(added.document, profile, shelf_of(added.document))
+        return fit_interface(added.document, profile, widget_folder_of(added.document))
 
     def interfaces(self) -> list[InstalledInterface]:
         """Return the newest version of each interface that a user installed directly."""

@@ -215,7 +215,7 @@ class RobotService:
         """Whether the limit of clients is reached."""
         return self._visitors >= CLIENTS
 
-    def has_seat_for(self, peer: SocketPeer) -> bool:
+    def has_place_for(self, peer: SocketPeer) -> bool:
         """Return whether another client of `peer` still leaves places for other visitors."""
         most = KNOWN_SEATS if peer.is_known else SEATS
         return not peer.who or self._operators[peer.who] < most

@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 from urc._daemon import in_daemon
 from urc._translatable import phrase
 from urc.packages.index import IndexEntry
-from urc.packages.install import origin_lines, plan_file, plan_wish
+from urc.packages.install import origin_lines, plan_file, plan_requirement
 from urc.packages.install_plan import InstallPlan
 from urc.packages.lock import Lock
 from urc.packages.names import PackageError, PackageId, PackageRequirement
@@ -309,7 +309,7 @@ class Jobs:
         if isinstance(what, (PackageRequirement, Lock)) and not known:
             raise PackageError("there is no repository: add one first")
         if isinstance(what, PackageRequirement):
-            return plan_wish(what, known, self._store, job.notes.append)
+            return plan_requirement(what, known, self._store, job.notes.append)
         if isinstance(what, Lock):
             plan = plan_update(what, known, self._store, job.notes.append)
             if plan is None:

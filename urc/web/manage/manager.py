@@ -13,7 +13,7 @@ from urc._daemon import in_daemon
 from urc.model.profile import Profile
 from urc.packages.index import IndexEntry
 from urc.packages.lock import Lock
-from urc.packages.names import PackageError, PackageId, PackageRequirement, parse_wish
+from urc.packages.names import PackageError, PackageId, PackageRequirement, parse_requirement
 from urc.packages.repositories import Repository
 from urc.packages.sources import Source
 from urc.problems import UrcError, printable
@@ -226,7 +226,7 @@ class Manager:
         Raises:
             PackageError: it is not installed, or its robot is being driven.
         """
-        required = parse_wish(text)
+        required = parse_requirement(text)
         for lock in await asyncio.to_thread(self._meant, required):
             self._check_idle_of(lock.key)
 
@@ -257,7 +257,7 @@ class Manager:
 
     def installed(self, text: str) -> Lock:
         """Return the newest installed version of a package; raise `PackageError`."""
-        lock = self.factory.store.find(parse_wish(text))
+        lock = self.factory.store.find(parse_requirement(text))
         if lock is None:
             raise PackageError(f"{text} is not installed")
         return lock

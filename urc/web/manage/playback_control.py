@@ -13,10 +13,10 @@ from urc.web.fleet.robots import Playback
 from urc.web.manage.routes import ApiError, answer, body_of, told
 from urc.web.manage.wire import PlaybackRequest, PlaybackState
 
-__all__ = ["move_tape", "tape_state"]
+__all__ = ["move_playback", "playback_state"]
 
 
-def tape_state(playback: Playback | None) -> Response:
+def playback_state(playback: Playback | None) -> Response:
     """Return the state of the playback as a response; 404 for None."""
     if playback is None:
         return told(404, "this robot is no recording")
@@ -31,7 +31,7 @@ def tape_state(playback: Playback | None) -> Response:
     )
 
 
-async def move_tape(request: Request, playback: Playback | None) -> Response:
+async def move_playback(request: Request, playback: Playback | None) -> Response:
     """Run, pause or move the playback, and return its state as a response."""
     if playback is None:
         return told(404, "this robot is no recording")
@@ -43,4 +43,4 @@ async def move_tape(request: Request, playback: Playback | None) -> Response:
         playback.seek(asked.position_s)
     if asked.is_playing is not None and asked.is_playing != playback.is_playing:
         (playback.play if asked.is_playing else playback.pause)()
-    return tape_state(playback)
+    return playback_state(playback)

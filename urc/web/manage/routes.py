@@ -16,7 +16,7 @@ from starlette.requests import HTTPConnection, Request
 from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route
 
-from urc.packages.names import FOLDERS, PackageError, PackageRequirement, parse_wish
+from urc.packages.names import FOLDERS, PackageError, PackageRequirement, parse_requirement
 from urc.problems import UrcError
 from urc.web.manage.jobs import Busy, Wanted
 from urc.web.manage.manager import Manager
@@ -270,7 +270,7 @@ class ManageRoutes:
         """Start the install of a package: download it, and list its permissions."""
         self.check(request)
         said = await body_of(request, InstallRequest)
-        return self._begun(parse_wish(said.package))
+        return self._begun(parse_requirement(said.package))
 
     @_api
     async def add(self, request: Request) -> Response:
@@ -313,7 +313,7 @@ class ManageRoutes:
         self.check(request)
         said = await body_of(request, InstallRequest)
         if not said.yes:
-            required = parse_wish(said.package)
+            required = parse_requirement(said.package)
             gone = await asyncio.to_thread(self._manager.gone, required)
             filled = await asyncio.to_thread(self._manager.forgettable, required)
             return answer(RemovedPackages(tuple(gone), "", has_settings=bool(filled)))
@@ -347,7 +347,7 @@ class ManageRoutes:
         inside = path.strip("/")
         if inside.partition("/")[0] in FOLDERS:
             try:
-                return parse_wish(inside)
+                return parse_requirement(inside)
             except PackageError:
                 pass  # a folder of this machine may have that name
         if not self._is_here(request):

@@ -11,7 +11,7 @@ from hmac import compare_digest
 from typing import Literal, NamedTuple
 from urllib.parse import quote
 
-__all__ = ["PARAMETER", "STRANGER", "Access", "Standing", "Visitor"]
+__all__ = ["PARAMETER", "UNKNOWN_VISITOR", "Access", "Standing", "Visitor"]
 
 PARAMETER = "key"
 """Name of the start key in the query of a URL."""
@@ -37,7 +37,7 @@ class Visitor(NamedTuple):
     """Whether the request itself carries the key, which a third-party page cannot send."""
 
 
-STRANGER = Visitor()
+UNKNOWN_VISITOR = Visitor()
 
 
 class Access:
@@ -121,11 +121,13 @@ class Access:
             scheme, _, word = value.decode("latin-1").partition(" ")
             if name == b"authorization" and scheme.lower() == "bearer":
                 standing = self._standing(word.strip())
-                return Visitor(standing, f"program {standing}", True) if standing else STRANGER
+                return (
+                    Visitor(standing, f"program {standing}", True) if standing else UNKNOWN_VISITOR
+                )
         for cookie, session in _cookies(pairs):
             if cookie == self.cookie and session in self._sessions:
                 return self._sessions[session]
-        return STRANGER
+        return UNKNOWN_VISITOR
 
     def _standing(self, word: str) -> Standing | None:
         if _is_same(word, self.key):

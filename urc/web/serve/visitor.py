@@ -8,14 +8,14 @@ from ipaddress import ip_address
 from starlette.requests import HTTPConnection
 
 from urc.web.page_socket import SocketPeer
-from urc.web.serve.access import STRANGER, Visitor
+from urc.web.serve.access import UNKNOWN_VISITOR, Visitor
 
 __all__ = ["guest_of", "is_here", "may_manage", "visitor_of"]
 
 
 def visitor_of(connection: HTTPConnection) -> Visitor:
     """Return the visitor of a request, as the page policy identified it."""
-    found: Visitor = getattr(connection.state, "visitor", STRANGER)
+    found: Visitor = getattr(connection.state, "visitor", UNKNOWN_VISITOR)
     return found
 
 

@@ -22,7 +22,7 @@ from urc.model.profile import Profile
 from urc.model.widget import Widget
 from urc.problems import Problem, ProblemsError
 from urc.runtime.file_watch import FileWatcher
-from urc.runtime.widget_registry import shelf_of
+from urc.runtime.widget_registry import widget_folder_of
 from urc.shipped import shipped
 from urc.web.load.assets import Assets, widget_assets
 from urc.web.load.widget_trust import WidgetTrust
@@ -79,13 +79,13 @@ class WidgetLookup:
         profiles = list(self._profiles())
         mine = [one.widgets[name].folder for one in profiles if name in one.widgets]
         registries = self._registries(profiles)
-        on_shelf = (registry.place(name) for registry in registries if registry.has(name))
-        return next(iter(mine), None) or next(on_shelf, None)
+        in_folder = (registry.place(name) for registry in registries if registry.has(name))
+        return next(iter(mine), None) or next(in_folder, None)
 
     def _registries(self, profiles: Iterable[Profile]) -> list[WidgetFolder]:
         """Return the folders of widgets; none of them can replace a widget of URC."""
         files = dict.fromkeys(one.file for one in profiles)
-        return [WidgetFolder(shipped("widgets")), *(shelf_of(file) for file in files)]
+        return [WidgetFolder(shipped("widgets")), *(widget_folder_of(file) for file in files)]
 
 
 def _on(registry: WidgetFolder, name: str) -> Found:

@@ -12,14 +12,14 @@ from urc.model.payload import WriteSpec
 __all__ = ["parse_write", "templates"]
 
 
-def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
+def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
     """Return the bytes of the list at `part`."""
     pieces: list[Placed] = []
     for place, inner in enumerate(part.items()):
         if isinstance(inner.data, str) and "{{" in inner.data:
-            piece: Piece | None = _expression(inner, findings)
+            piece: Piece | None = _expression(inner, problems)
         else:
-            piece = parse_bytes(inner, context.encoding, findings)
+            piece = parse_bytes(inner, context.encoding, problems)
         if piece is None:
             return None
         offset = inner.data.find("{{") + 2 if isinstance(piece, Template) else 0
@@ -32,11 +32,11 @@ def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
     return templates_at(part, spec)
 
 
-def _expression(part: Node, findings: Problems) -> Template | None:
+def _expression(part: Node, problems: Problems) -> Template | None:
     try:
         split = list(split_template(part.data))
         if len(split) != 1 or split[0][2] is None:
-            findings.error(
+            problems.error(
                 part,
                 "bad-template",
                 "an expression must be alone in its list item",
@@ -47,7 +47,7 @@ def _expression(part: Node, findings: Problems) -> Template | None:
         try:
             return compile_expression(text or "", allows_bytes=True)
         except ExpressionError as error:
-            findings.error(part, "bad-template", str(error), offset=offset + error.offset)
+            problems.error(part, "bad-template", str(error), offset=offset + error.offset)
     except ExpressionError as error:
-        findings.error(part, "bad-template", str(error), offset=error.offset)
+        problems.error(part, "bad-template", str(error), offset=error.offset)
     return None

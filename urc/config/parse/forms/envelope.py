@@ -34,34 +34,34 @@ _STAMPED: Final = {
 """Type of geometry_msgs → its field in the stamped type (common_interfaces)."""
 
 
-def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
+def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
     """Return the envelope at `part`, whose key is its verb."""
     body = body_form(part)
-    spec = body[1].parse_write(body[0], findings, context) if body else None
-    before = len(findings.problems)
-    check_headers(part, findings)
+    spec = body[1].parse_write(body[0], problems, context) if body else None
+    before = len(problems.problems)
+    check_headers(part, problems)
     attributes = {
-        name: compiled_tree(inner, findings)
+        name: compiled_tree(inner, problems)
         for name, inner in part.entries().items()
         if body is None or inner.path != body[0].path
     }
-    if (body and spec is None) or len(findings.problems) > before:
+    if (body and spec is None) or len(problems.problems) > before:
         return None
     if part.name == "request" and ("url" in part.data) == ("path" in part.data):
         both = "url" in part.data
         text = "'path' and 'url' are both given" if both else "'path' is missing"
         hint = "write 'path', or 'url' for an address from the robot itself"
-        findings.error(part, "two-forms" if both else "missing-key", text, key=True, hint=hint)
+        problems.error(part, "two-forms" if both else "missing-key", text, key=True, hint=hint)
         return None
     url = attributes.get("url")
     if isinstance(url, Template) and any(not name.startswith("_") for name in url.names):
         text = "'url' must be one field from the robot, such as _next, and nothing else"
         hint = "put arguments and settings into 'path' or 'query', which stay on this server"
-        findings.error(part.must("url"), "wrong-form", text, hint=hint)
+        problems.error(part.must("url"), "wrong-form", text, hint=hint)
         return None
     stamped = part.get("stamped") if part.name == "publish" else None
     if stamped is not None and attributes.pop("stamped"):
-        kind = _stamped_type(part, attributes.get("type"), findings)
+        kind = _stamped_type(part, attributes.get("type"), problems)
         if kind is None or spec is None:
             return None
         attributes["type"], spec = f"{kind}Stamped", _stamped(kind, spec)
@@ -78,12 +78,12 @@ def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSp
     )
 
 
-def _stamped_type(part: Node, kind: object, findings: Problems) -> str | None:
+def _stamped_type(part: Node, kind: object, problems: Problems) -> str | None:
     """Return the type at `part` if it has a stamped type; else report it."""
     package, _, name = str(kind).replace("/msg/", "/").partition("/")
     if package == "geometry_msgs" and name in _STAMPED and "json" in part.data:
         return str(kind)
-    findings.error(
+    problems.error(
         part,
         "bad-value",
         f"{kind!r} has no known stamped type, or no json",

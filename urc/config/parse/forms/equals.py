@@ -9,14 +9,14 @@ from urc.model.payload import ReadSpec
 __all__ = ["parse_read", "place_of"]
 
 
-def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
+def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
     """Return the text."""
     try:
         part.data.encode(context.encoding)
     except UnicodeEncodeError as error:
         wrong = error.object[error.start]
         text = f"{wrong!r} does not exist in the encoding {context.encoding}"
-        findings.error(part, "not-in-encoding", text, offset=error.start)
+        problems.error(part, "not-in-encoding", text, offset=error.start)
         return None
     return ReadSpec("equals", {"text": part.data})
 

@@ -10,10 +10,10 @@ from urc.model.payload import WriteSpec, each_of
 __all__ = ["parse_write", "templates"]
 
 
-def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
+def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
     """Return the frames at `part`, in their order."""
     if context.framing is not None and context.framing.type == "datagram":
-        findings.error(
+        problems.error(
             part,
             "many-frames",
             "several frames of one command are sent together, and here each is a message of"
@@ -24,15 +24,15 @@ def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSp
     frames: list[WriteSpec] = []
     for item in part.items():
         inner, form = write_form(item)
-        found = form.parse_write(inner, findings, context)
+        found = form.parse_write(inner, problems, context)
         if found is None:
             return None
         if found.form == "envelope":
             text = "this frame is a message of its own, and cannot be sent together with others"
-            findings.error(item, "many-frames", text, hint="write a command for each")
+            problems.error(item, "many-frames", text, hint="write a command for each")
         elif COUNTERS in found.names:
             text = "a frame with a counter cannot be sent together with others"
-            findings.error(item, "many-frames", text, hint="write a command for each")
+            problems.error(item, "many-frames", text, hint="write a command for each")
         frames.append(found)
     return WriteSpec(
         "frames",

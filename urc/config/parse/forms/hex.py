@@ -23,20 +23,20 @@ _NOT_HEX = re.compile(r"[^0-9A-Fa-f\s]")
 _ODD = re.compile(r"(?<![0-9A-Fa-f])(?:[0-9A-Fa-f]{2})*[0-9A-Fa-f](?![0-9A-Fa-f])")
 
 
-def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
+def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
     """Return the bytes at `part`."""
     pieces: list[Placed] = []
     try:
         for offset, literal, expression in split_template(part.data):
             if expression is None:
-                piece: Piece | None = _digits(part, literal, offset, findings)
+                piece: Piece | None = _digits(part, literal, offset, problems)
             else:
-                piece = _expression(part, expression, offset, findings)
+                piece = _expression(part, expression, offset, problems)
             if piece is None:
                 return None
             pieces.append(Placed(piece, offset=offset))
     except ExpressionError as error:
-        findings.error(part, "bad-template", str(error), offset=error.offset)
+        problems.error(part, "bad-template", str(error), offset=error.offset)
         return None
     return spec_of("hex", pieces)
 
@@ -46,34 +46,34 @@ def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
     return templates_at(part, spec)
 
 
-def _digits(part: Node, literal: str, offset: int, findings: Problems) -> bytes | None:
+def _digits(part: Node, literal: str, offset: int, problems: Problems) -> bytes | None:
     wrong = _NOT_HEX.search(literal)
     if wrong is not None:
         text = f"{wrong[0]!r} is not a hex digit"
         hint = "write bytes as 02 FF 0D, and values as {{ x | u8 }}"
-        findings.error(part, "not-hex", text, offset=offset + wrong.start(), hint=hint)
+        problems.error(part, "not-hex", text, offset=offset + wrong.start(), hint=hint)
         return None
     odd = _ODD.search(literal)
     if odd is not None:
         text = f"{odd[0]!r} has an odd number of hex digits"
         at = offset + odd.start()
         hint = "two digits make a byte"
-        findings.error(part, "not-hex", text, offset=at, length=len(odd[0]), hint=hint)
+        problems.error(part, "not-hex", text, offset=at, length=len(odd[0]), hint=hint)
         return None
     return bytes.fromhex(literal)
 
 
-def _expression(part: Node, text: str, offset: int, findings: Problems) -> Template | None:
+def _expression(part: Node, text: str, offset: int, problems: Problems) -> Template | None:
     try:
         template = compile_expression(text, allows_bytes=True)
     except ExpressionError as error:
-        findings.error(part, "bad-template", str(error), offset=offset + error.offset)
+        problems.error(part, "bad-template", str(error), offset=offset + error.offset)
         return None
     if not (is_byte_filter(last_filter(template)) or is_nonce(template)):
         shown = text.strip()
         value = shown.rpartition("|")[0].strip() or shown
         plain = f"({value})" if re.search(r"\W", value) else value
-        findings.error(
+        problems.error(
             part,
             "no-width",
             f"{shown!r} does not give its size in bytes",

@@ -18,12 +18,12 @@ _PLAIN = re.compile(rf"{_NAME}(?:\.{_NAME}|\[[0-9]{{1,5}}\])*")
 _STEP = re.compile(r'([A-Za-z_][A-Za-z0-9_]*)|"([^"\\]+)"|\[([0-9]+)\]')
 
 
-def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
+def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
     """Return the path of each field: plain, or a compiled expression."""
     paths: dict[str, object] = {}
     is_good = True
     for name, inner in part.entries().items():
-        path = _path(inner, findings)
+        path = _path(inner, problems)
         is_good = is_good and path is not None
         paths[name] = path
     return ReadSpec("json", {"paths": paths}, tuple(paths)) if is_good else None
@@ -34,7 +34,7 @@ def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
     return part.must(field), {"key": True}
 
 
-def _path(part: Node, findings: Problems) -> object:
+def _path(part: Node, problems: Problems) -> object:
     text = part.data.strip()
     if _PLAIN.fullmatch(text):
         return _plain(text)
@@ -46,11 +46,11 @@ def _path(part: Node, findings: Problems) -> object:
     except JMESPathError as error:
         offset = getattr(error, "lex_position", None) or 0
         hint = "it starts at the top, without '$': battery.level" if text.startswith("$") else ""
-        findings.error(
+        problems.error(
             part, "bad-path", f"{text!r} is not a JMESPath expression", offset=offset, hint=hint
         )
     except RecursionError:
-        findings.error(part, "bad-path", "the expression is nested too deeply")
+        problems.error(part, "bad-path", "the expression is nested too deeply")
     return None
 
 

@@ -11,11 +11,11 @@ from urc.model.payload import WriteSpec
 __all__ = ["compiled_tree", "parse_write", "placed_templates", "templates", "templates_in"]
 
 
-def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
+def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
     """Return the value at `part`, with compiled templates."""
-    before = len(findings.problems)
-    tree = compiled_tree(part, findings)
-    if len(findings.problems) > before:
+    before = len(problems.problems)
+    tree = compiled_tree(part, problems)
+    if len(problems.problems) > before:
         return None
     found = list(templates_in(tree))
     names = frozenset[str]().union(*(one.names for one in found))
@@ -28,18 +28,18 @@ def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
     return placed_templates(part, spec.options.get("tree"))
 
 
-def compiled_tree(part: Node, findings: Problems) -> Any:
+def compiled_tree(part: Node, problems: Problems) -> Any:
     """Return the value at `part`, with each text in braces as a template."""
     if isinstance(part.data, dict):
         for name, inner in part.entries().items():
             if "{{" in name:
                 text = "a template is only possible in a value, not in a name"
-                findings.error(inner, "bad-template", text, key=True)
-        return {name: compiled_tree(inner, findings) for name, inner in part.entries().items()}
+                problems.error(inner, "bad-template", text, key=True)
+        return {name: compiled_tree(inner, problems) for name, inner in part.entries().items()}
     if isinstance(part.data, list):
-        return [compiled_tree(inner, findings) for inner in part.items()]
+        return [compiled_tree(inner, problems) for inner in part.items()]
     if isinstance(part.data, str) and "{{" in part.data:
-        return findings.template(part)
+        return problems.template(part)
     return part.data
 
 

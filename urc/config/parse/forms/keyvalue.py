@@ -9,11 +9,11 @@ from urc.model.payload import ReadSpec
 __all__ = ["parse_read", "place_of"]
 
 
-def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
+def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
     """Return the separators, and the field of each key."""
     pairs, separator = part.must("pairs"), part.must("separator")
     if pairs.data == separator.data:
-        findings.error(
+        problems.error(
             separator, "same-separator", "the separator of pairs also separates key and value"
         )
         return None
@@ -22,7 +22,7 @@ def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec
     for inner in named.values():
         if inner.data in seen:
             text = f"two keys set the field {inner.data!r}"
-            findings.error(inner, "duplicate-name", text)
+            problems.error(inner, "duplicate-name", text)
             return None
         seen.add(inner.data)
     if part.get("fields") is None:
@@ -33,7 +33,7 @@ def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec
     for place, inner in enumerate(part.listed("first")):
         if inner.data and (inner.data in bare[:place] or inner.data in keys.values()):
             text = f"the field {inner.data!r} is named twice"
-            findings.error(inner, "duplicate-name", text)
+            problems.error(inner, "duplicate-name", text)
             return None
     strip = part.get("strip")
     options = {

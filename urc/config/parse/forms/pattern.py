@@ -26,12 +26,12 @@ class _Fault(Exception):
         self.place: dict[str, Any] = {"offset": offset, "length": length, "hint": hint}
 
 
-def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
+def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
     """Return the pattern at `part` with its fields."""
     try:
         holes, tail = _parse(str(part.data))
     except _Fault as fault:
-        findings.error(part, "bad-pattern", str(fault), **fault.place)
+        problems.error(part, "bad-pattern", str(fault), **fault.place)
         return None
     names = tuple(hole.name for hole in holes if hole.name)
     return ReadSpec("pattern", {"holes": holes, "tail": tail}, names)

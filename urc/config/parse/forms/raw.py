@@ -9,7 +9,7 @@ from urc.model.payload import ReadSpec
 __all__ = ["parse_read", "place_of"]
 
 
-def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec:
+def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec:
     """Return the field at `part`."""
     return ReadSpec("raw", {"field": part.data}, (part.data,))
 

@@ -9,9 +9,9 @@ from urc.model.payload import ReadSpec
 __all__ = ["parse_read", "place_of"]
 
 
-def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
+def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
     """Return the pattern at `part` with its groups."""
-    pattern = findings.pattern(part)
+    pattern = problems.pattern(part)
     if pattern is None:
         return None
     return ReadSpec("regex", {"pattern": pattern}, pattern.groups)

@@ -11,7 +11,7 @@ __all__ = ["parse_read", "place_of"]
 _MORE = "..."
 
 
-def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
+def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
     """Return the separator and the names of the parts."""
     names: list[str] = []
     has_more = is_good = True
@@ -24,10 +24,10 @@ def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec
             name, tail = name.removesuffix(_MORE), name.removesuffix(_MORE)
         if name.endswith(_MORE):
             text = "'...' is only possible at the end"
-            findings.error(inner, "bad-name", text)
+            problems.error(inner, "bad-name", text)
             is_good = False
         elif name in names and name:
-            findings.error(inner, "duplicate-name", f"the field {name!r} occurs twice")
+            problems.error(inner, "duplicate-name", f"the field {name!r} occurs twice")
             is_good = False
         names.append(name)
     strip = part.get("strip")

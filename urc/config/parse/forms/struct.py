@@ -25,25 +25,25 @@ __all__ = ["parse_read", "parse_write", "place_of", "templates"]
 Uses = tuple[tuple[tuple[str | int, ...], Template], ...]
 
 
-def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
+def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
     """Return the items at `part`, with their ids as fields."""
-    before = len(findings.problems)
-    parser = ItemParser(findings, context.types, context.enums, "read", context.encoding)
+    before = len(problems.problems)
+    parser = ItemParser(problems, context.types, context.enums, "read", context.encoding)
     items = parser.items(part)
-    _check_size(part, items, context.framing, findings)
-    if len(findings.problems) > before:
+    _check_size(part, items, context.framing, problems)
+    if len(problems.problems) > before:
         return None
     return ReadSpec("struct", {"items": items}, tuple(dict.fromkeys(names_of(items))))
 
 
-def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
+def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
     """Return the items at `part`, with the ids as arguments unless they are computed."""
-    before = len(findings.problems)
-    parser = ItemParser(findings, context.types, context.enums, "send", context.encoding)
+    before = len(problems.problems)
+    parser = ItemParser(problems, context.types, context.enums, "send", context.encoding)
     items = parser.items(part)
     framing = context.framing
-    _check_size(part, items, framing and (framing.sent or framing), findings)
-    if len(findings.problems) > before:
+    _check_size(part, items, framing and (framing.sent or framing), problems)
+    if len(problems.problems) > before:
         return None
     derived = derived_sizes(items).keys()
     given = set(names_of(items, sent=True)) - derived
@@ -61,7 +61,7 @@ def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSp
 
 
 def _check_size(
-    part: Node, items: tuple[Item, ...], framing: FramingSpec | None, findings: Problems
+    part: Node, items: tuple[Item, ...], framing: FramingSpec | None, problems: Problems
 ) -> None:
     """Report items that do not fit the frames of the transport."""
     if framing is None:
@@ -75,10 +75,10 @@ def _check_size(
             over = f"write {{ size: {room - least} }} for unused bytes"
             hint = over if least < room else ""
             text = f"the items take {least} bytes, and a frame of this transport holds {room}"
-            findings.error(part, "does-not-fit", text, hint=hint)
+            problems.error(part, "does-not-fit", text, hint=hint)
     elif least + around > framing.max_bytes:
         text = f"the items take {least} bytes, and a frame on this line has {framing.max_bytes}"
-        findings.error(part, "does-not-fit", text + " at most", hint="raise 'max' of the framing")
+        problems.error(part, "does-not-fit", text + " at most", hint="raise 'max' of the framing")
 
 
 def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:

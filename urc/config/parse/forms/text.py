@@ -11,9 +11,9 @@ from urc.model.payload import WriteSpec
 __all__ = ["parse_write", "templates"]
 
 
-def parse_write(part: Node, findings: Problems, context: FormContext) -> WriteSpec | None:
+def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
     """Return the template at `part`."""
-    template = findings.template(part)
+    template = problems.template(part)
     if template is None:
         return None
     return WriteSpec("text", {"template": template}, template.names, template.settings)

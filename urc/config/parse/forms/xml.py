@@ -20,19 +20,19 @@ _PIECE = re.compile(r"(?:\[[^\]]*\]|[^/\[])*")
 """Text up to the next slash outside of brackets."""
 
 
-def parse_read(part: Node, findings: Problems, context: FormContext) -> ReadSpec | None:
+def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
     """Return the path of each field."""
     paths: dict[str, XmlPath | None] = {}
     root: XmlStep | None = None
     for name, inner in part.entries().items():
-        path = paths[name] = _path(inner, findings)
+        path = paths[name] = _path(inner, problems)
         if path is not None:
             root = root or path.steps[0]
             if path.steps[0] != root:
                 start, other = _spelt(path.steps[0]), _spelt(root)
                 text = f"this path starts at {start!r}, and another at {other!r}"
                 hint = "a document has one root element: write one message for each root"
-                findings.error(inner, "bad-path", text, hint=hint)
+                problems.error(inner, "bad-path", text, hint=hint)
                 paths[name] = None
     if None in paths.values():
         return None
@@ -44,7 +44,7 @@ def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
     return part.must(field), {"key": True}
 
 
-def _path(part: Node, findings: Problems) -> XmlPath | None:
+def _path(part: Node, problems: Problems) -> XmlPath | None:
     steps: list[XmlStep] = []
     offset = 0
     while True:
@@ -55,7 +55,7 @@ def _path(part: Node, findings: Problems) -> XmlPath | None:
             return XmlPath(tuple(steps), attribute[1])
         step = _STEP.fullmatch(piece)
         if step is None:
-            findings.error(
+            problems.error(
                 part,
                 "bad-path",
                 f"{piece!r} is not a step of a path",

@@ -51,19 +51,19 @@ class ItemParser:
 
     def __init__(
         self,
-        findings: Problems,
+        problems: Problems,
         types: Mapping[str, Items],
         enums: Mapping[str, tuple[tuple[int, str], ...]],
         purpose: Purpose,
         encoding: str,
     ) -> None:
-        self.findings = findings
+        self.problems = problems
         self.types = types
         self.enums = enums
         self.purpose = purpose
         self.encoding = encoding
-        self.scope = Scope(findings, purpose)
-        self.leaves = LeafParser(findings, enums, self.scope)
+        self.scope = Scope(problems, purpose)
+        self.leaves = LeafParser(problems, enums, self.scope)
 
     def items(self, part: Node) -> Items:
         """Return the items of the list at `part`, without the invalid items."""
@@ -75,7 +75,7 @@ class ItemParser:
             total += weight_of(item)
             if total > MOST_ITEMS:
                 text = f"it has more than {MOST_ITEMS} items, including those of its types"
-                self.findings.error(inner, "wrong-size", text)
+                self.problems.error(inner, "wrong-size", text)
                 return ()
         self._check_rest(part, found)
         return tuple(item for item in found if item is not None)
@@ -85,7 +85,7 @@ class ItemParser:
         for place, item in enumerate(found[:-1]):
             extents = (item.size, item.times) if item is not None else ()
             if any(extent is not None and extent.kind == "rest" for extent in extents):
-                self.findings.error(
+                self.problems.error(
                     part.items()[place + 1],
                     "after-rest",
                     "the item before it takes the rest of the frame",
@@ -98,7 +98,7 @@ class ItemParser:
             return None
         if depth_of(item) > DEEPEST:
             text = f"types and switches are nested more than {DEEPEST} levels deep"
-            self.findings.error(part, "too-deep", text)
+            self.problems.error(part, "too-deep", text)
             return None
         self._check_sent(part, item)
         self.scope.add(part, item)
@@ -114,10 +114,10 @@ class ItemParser:
             return Item("struct", rest, items=items)
         number = number_of(word)
         if number is None:
-            unknown_type(part, word, self.types, self.findings)
+            unknown_type(part, word, self.types, self.problems)
             return None
         if not rest:
-            self.findings.error(
+            self.problems.error(
                 part,
                 "bad-item",
                 f"expected a name or a constant after {word!r}",
@@ -128,7 +128,7 @@ class ItemParser:
         if constant is None:
             self.scope.check_name(part, rest)
             return Item(kind_of(number), rest, number)
-        check_fits(part, number, constant, self.findings)
+        check_fits(part, number, constant, self.problems)
         return Item(kind_of(number), "", number, const=constant)
 
     def _long(self, part: Node) -> Item | None:
@@ -138,7 +138,7 @@ class ItemParser:
             return None
         for key in part.data:
             if key not in _KEYS[kind]:
-                self.findings.error(
+                self.problems.error(
                     part, "misplaced-key", f"'{key}' has no effect for {_NOUNS[kind]}",
                     at=key, key=True,
                 )  # fmt: skip
@@ -159,7 +159,7 @@ class ItemParser:
             if "size" in part.data and "id" not in part.data and "bits" not in part.data:
                 return "padding"
             text = "an item lacks 'type'"
-            self.findings.error(part, "missing-key", text, key=True, hint="for example 'type: u8'")
+            self.problems.error(part, "missing-key", text, key=True, hint="for example 'type: u8'")
             return None
         if "bits" in part.data:
             return "bits"
@@ -171,7 +171,7 @@ class ItemParser:
         if number is None:
             if "count" in part.data and width_of(named.data) is not None:
                 return "packed"
-            unknown_type(named, named.data, self.types, self.findings)
+            unknown_type(named, named.data, self.types, self.problems)
             return None
         return kind_of(number)
 
@@ -191,14 +191,14 @@ class ItemParser:
         if kind == "padding":
             if size is not None and size.kind == "prefix":
                 text = "the size of skipped bytes cannot be a type"
-                self.findings.error(part.must("size"), "bad-item", text)
+                self.problems.error(part.must("size"), "bad-item", text)
                 return None
             return Item("padding", size=size, pad=part.integer("pad") or 0)
         value = self.scope.value(part.get("value"))
         if kind == "struct":
             return self._struct(part, Item("struct", name, size=size, times=times, value=value))
         start = Item("text" if kind == "text" else "bytes", name, size=size, times=times)
-        return parse_content(part, start._replace(value=value), self.encoding, self.findings)
+        return parse_content(part, start._replace(value=value), self.encoding, self.problems)
 
     def _struct(self, part: Node, item: Item) -> Item | None:
         items = self.types[part.text("type")]
@@ -206,30 +206,30 @@ class ItemParser:
         if trim is not None:
             size_is_free = item.size is not None and item.size.kind != "fixed"
             if not size_is_free or fixed_size(_without_rest(items)) is None:
-                self.findings.error(
+                self.problems.error(
                     part, "misplaced-key", "'trim' needs a fixed type in a window of another size",
                     at="trim", key=True, hint="write 'size: rest', or name the item with the size",
                 )  # fmt: skip
                 return None
         if item.value is not None and item.times is None:
             text = "'value' of a struct needs an array"
-            self.findings.error(part, "misplaced-key", text, at="value", key=True)
+            self.problems.error(part, "misplaced-key", text, at="value", key=True)
         return item._replace(items=items, trim=trim)
 
     def _array(self, part: Node, item: Item) -> Item | None:
         if not item.id and item.kind not in ("struct", "packed"):
             text = "an array needs an 'id'"
-            self.findings.error(part, "missing-key", text, key=True, hint="{ size: … } skips bytes")
+            self.problems.error(part, "missing-key", text, key=True, hint="{ size: … } skips bytes")
             return None
         if item.const is not None:
             text = "'const' has no effect for an array"
-            self.findings.error(part, "misplaced-key", text, at="const", key=True)
+            self.problems.error(part, "misplaced-key", text, at="const", key=True)
             return None
         if item.kind == "packed":
             return item
         if least_size((item._replace(times=None, condition=None),)) == 0:
             text = "each of its items must take at least one byte"
-            self.findings.error(part, "bad-item", text, at="count")
+            self.problems.error(part, "bad-item", text, at="count")
             return None
         return item
 
@@ -246,7 +246,7 @@ class ItemParser:
             if prefix.kind in ("integer", "varint") and not prefix.is_signed:
                 return Extent("prefix", prefix=prefix)
             text = f"a size must be a whole number without a sign, found {part.data!r}"
-            self.findings.error(part, "bad-item", text)
+            self.problems.error(part, "bad-item", text)
             return None
         expression = self.scope.expression(part)
         return None if expression is None else Extent("expression", expression=expression)
@@ -276,7 +276,7 @@ class ItemParser:
             return self.items(part)
         items = self.types.get(part.data)
         if items is None:
-            unknown_type(part, part.data, self.types, self.findings, only_types=True)
+            unknown_type(part, part.data, self.types, self.problems, only_types=True)
             return ()
         for name in Scope.names(Item("struct", items=items)):
             self.scope.know(part, name, None)
@@ -291,18 +291,18 @@ class ItemParser:
         if isinstance(key, str) and subject.number.kind == "integer" and key not in words:
             text = f"{key!r} is no value of {subject.id!r}"
             hint = f"its words: {', '.join(words)}" if words else "it has only numbers"
-            self.findings.error(part, "unknown-word", text, key=True, hint=hint)
+            self.problems.error(part, "unknown-word", text, key=True, hint=hint)
         elif isinstance(key, int) and key in dict(subject.enum):
             word = dict(subject.enum)[key]
             text = f"{subject.id!r} has the word {word!r} for this value, never {key}"
-            self.findings.error(part, "unknown-word", text, key=True, hint=f"write {word}:")
+            self.problems.error(part, "unknown-word", text, key=True, hint=f"write {word}:")
         elif isinstance(key, int) and subject.number.kind == "integer":
-            check_fits(part, subject.number, key, self.findings, key=True)
+            check_fits(part, subject.number, key, self.problems, key=True)
 
     def _check_sent(self, part: Node, item: Item) -> None:
         """Report an item of a sent struct that has no value."""
         if self.purpose == "send" and asks_for_the_end(item):
-            self.findings.error(
+            self.problems.error(
                 part,
                 "nothing-to-send",
                 "'_left' and '_size' are unknown while a frame is built",
@@ -317,7 +317,7 @@ class ItemParser:
         ):
             return
         if not item.id and item.const is None and item.value is None:
-            self.findings.error(
+            self.problems.error(
                 part, "nothing-to-send", "'id', 'const' or 'value' is missing",
                 hint="name the argument, or write { size: … } for unused bytes",
             )  # fmt: skip

@@ -21,15 +21,15 @@ class LeafParser:
     """A parser for items without inner items."""
 
     def __init__(
-        self, findings: Problems, enums: Mapping[str, tuple[tuple[int, str], ...]], scope: Scope
+        self, problems: Problems, enums: Mapping[str, tuple[tuple[int, str], ...]], scope: Scope
     ) -> None:
-        self.findings = findings
+        self.problems = problems
         self.enums = enums
         self.scope = scope
 
     def number(self, part: Node, name: str, times: Extent | None) -> Item:
         """Return a number, or an array of numbers."""
-        parser = NumberParser(part, self.findings)
+        parser = NumberParser(part, self.problems)
         number = number_of(part.text("type"))
         assert number is not None  # noqa: S101  # checked by `_kind`
         return Item(
@@ -40,22 +40,22 @@ class LeafParser:
             const=parser.constant(number),
             scale=parser.scale(),
             offset=part.number("offset") or 0,
-            enum=parse_enum(part, number, self.enums, self.findings),
-            valid=parse_valid(part, self.findings),
+            enum=parse_enum(part, number, self.enums, self.problems),
+            valid=parse_valid(part, self.problems),
             value=self.scope.value(part.get("value")),
         )
 
     def packed(self, part: Node, name: str, times: Extent | None) -> Item | None:
         """Return an array of numbers that take no whole bytes, such as ``u11``."""
         parser, number, count = (
-            NumberParser(part, self.findings),
+            NumberParser(part, self.problems),
             width_of(part.text("type")),
             part.must("count"),
         )
         assert number is not None  # noqa: S101  # checked by `_kind`
         if times is None or times.kind != "fixed" or number.bits * times.number % 8:
             text = f"numbers of {number.bits} bits need a count that fills whole bytes"
-            self.findings.error(count, "wrong-size", text, hint="such as 8, 16 or 24")
+            self.problems.error(count, "wrong-size", text, hint="such as 8, 16 or 24")
             return None
         return Item(
             "packed",
@@ -64,8 +64,8 @@ class LeafParser:
             times=times,
             scale=parser.scale(),
             offset=part.number("offset") or 0,
-            enum=parse_enum(part, number, self.enums, self.findings),
-            valid=parse_valid(part, self.findings),
+            enum=parse_enum(part, number, self.enums, self.problems),
+            valid=parse_valid(part, self.problems),
             is_lsb_first=part.text("order", "msb") == "lsb",
         )
 
@@ -75,12 +75,12 @@ class LeafParser:
         number = number_of(named.data)
         if number is None or number.kind != "integer" or number.is_signed or number.is_coded:
             text = f"bits need an unsigned whole number, found {named.data!r}"
-            self.findings.error(named, "bad-item", text, hint="such as u8 or u16be")
+            self.problems.error(named, "bad-item", text, hint="such as u8 or u16be")
             return None
         parts = [self._bit(inner) for inner in part.listed("bits")]
         widths = sum(one.number.bits for one in parts)
         if widths != number.bits:
-            self.findings.error(
+            self.problems.error(
                 part.must("bits"),
                 "wrong-size",
                 f"the bits take {widths} in all, and {named.data} has {number.bits}",
@@ -94,7 +94,7 @@ class LeafParser:
         if isinstance(part.data, str):
             self.scope.check_name(part, part.data)
             return Item("number", part.data, Number("integer", 1))
-        parser = NumberParser(part, self.findings)
+        parser = NumberParser(part, self.problems)
         name = part.text("id")
         self.scope.check_name(part.get("id") or part, name)
         number = parser.width()
@@ -105,29 +105,29 @@ class LeafParser:
             const=parser.constant(number),
             scale=parser.scale(),
             offset=part.number("offset") or 0,
-            enum=parse_enum(part, number, self.enums, self.findings),
-            valid=parse_valid(part, self.findings),
+            enum=parse_enum(part, number, self.enums, self.problems),
+            valid=parse_valid(part, self.problems),
             value=self.scope.value(part.get("value")),
         )
 
 
-def parse_content(part: Node, item: Item, encoding: str, findings: Problems) -> Item | None:
+def parse_content(part: Node, item: Item, encoding: str, problems: Problems) -> Item | None:
     """Return `item`, of text or bytes, with its constant, its padding and its end."""
     own = part.text("encoding")
-    until = _bytes(part.get("until"), own or encoding, findings)
-    const = _bytes(part.get("const"), own or encoding, findings)
+    until = _bytes(part.get("until"), own or encoding, problems)
+    const = _bytes(part.get("const"), own or encoding, problems)
     if const is not None:
         for key in ("size", "until", "pad", "value", "count"):
             if key in part.data:
                 text = f"'{key}' has no effect for a constant"
-                findings.error(part, "misplaced-key", text, at=key, key=True)
+                problems.error(part, "misplaced-key", text, at=key, key=True)
                 return None
         return item._replace(const=const, size=Extent("fixed", len(const)), encoding=own)
     if (item.size is None) == (until is None):
         if item.size is None and ("size" in part.data or "until" in part.data):
             return None  # already reported
         key = "until" if until is not None else ""
-        findings.error(
+        problems.error(
             part,
             "misplaced-key" if key else "missing-key",
             "'size' and 'until' both define its end" if key else "'size' or 'until' is missing",
@@ -139,14 +139,14 @@ def parse_content(part: Node, item: Item, encoding: str, findings: Problems) -> 
     is_fixed = item.size is not None and item.size.kind == "fixed"
     if "pad" in part.data and not is_fixed:
         text = "'pad' needs a fixed size"
-        findings.error(part, "misplaced-key", text, at="pad", key=True)
+        problems.error(part, "misplaced-key", text, at="pad", key=True)
         return None
     return item._replace(until=until or b"", pad=part.integer("pad") or 0, encoding=own)
 
 
-def _bytes(part: Node | None, encoding: str, findings: Problems) -> bytes | None:
-    found = parse_bytes(part, encoding, findings) if part is not None else None
+def _bytes(part: Node | None, encoding: str, problems: Problems) -> bytes | None:
+    found = parse_bytes(part, encoding, problems) if part is not None else None
     if part is not None and found == b"":
-        findings.error(part, "wrong-size", "expected at least one byte")
+        problems.error(part, "wrong-size", "expected at least one byte")
         return None
     return found

@@ -41,7 +41,7 @@ def written_constant(text: str) -> int | float | bool | None:
 
 
 def unknown_type(
-    part: Node, word: str, types: Iterable[str], findings: Problems, *, only_types: bool = False
+    part: Node, word: str, types: Iterable[str], problems: Problems, *, only_types: bool = False
 ) -> None:
     """Report a word that is not a type."""
     if width_of(word) is not None and number_of(f"{word}be") is None:
@@ -53,12 +53,12 @@ def unknown_type(
     else:
         known = [*types, *(() if only_types else (*_COMMON_TYPES, *WORDS_OF_TYPES))]
         hint = did_you_mean(word, known, "types")
-    findings.error(part, "unknown-type", f"there is no type {word!r}", length=len(word), offset=0,
+    problems.error(part, "unknown-type", f"there is no type {word!r}", length=len(word), offset=0,
                    hint=hint)  # fmt: skip
 
 
 def check_fits(
-    part: Node, number: Number, value: object, findings: Problems, *, key: bool = False
+    part: Node, number: Number, value: object, problems: Problems, *, key: bool = False
 ) -> None:
     """Report a constant that its type cannot hold."""
     if number.kind == "float":
@@ -73,15 +73,15 @@ def check_fits(
         sign = "signed " if number.is_signed else ""
         text = f"a whole number of {number.bits} {sign}bits, {number.least} to {number.most}"
     if not is_fine:
-        findings.error(part, "does-not-fit", f"expected {text}, found {value!r}", key=key)
+        problems.error(part, "does-not-fit", f"expected {text}, found {value!r}", key=key)
 
 
 class NumberParser:
     """A parser for the keys of one number."""
 
-    def __init__(self, part: Node, findings: Problems) -> None:
+    def __init__(self, part: Node, problems: Problems) -> None:
         self._part = part
-        self._findings = findings
+        self._problems = problems
 
     def width(self) -> Number:
         """Return the number of one field of ``bits``."""
@@ -99,8 +99,8 @@ class NumberParser:
         for key in ("value", "enum", "scale", "offset", "valid"):
             if key in self._part.data:
                 text = f"'{key}' has no effect for a constant"
-                self._findings.error(self._part, "misplaced-key", text, at=key, key=True)
-        check_fits(inner, number, inner.data, self._findings)
+                self._problems.error(self._part, "misplaced-key", text, at=key, key=True)
+        check_fits(inner, number, inner.data, self._problems)
         is_number = isinstance(inner.data, (bool, int, float))
         return inner.data if is_number else 0
 
@@ -110,12 +110,12 @@ class NumberParser:
         if inner is not None and isinstance(inner.data, str):
             return fraction_of(inner.data)
         if inner is not None and inner.data == 0:
-            self._findings.error(inner, "zero-scale", "expected a scale other than 0")
+            self._problems.error(inner, "zero-scale", "expected a scale other than 0")
             return 1
         return 1 if inner is None else inner.data
 
 
-def parse_valid(part: Node, findings: Problems) -> tuple[float, float] | None:
+def parse_valid(part: Node, problems: Problems) -> tuple[float, float] | None:
     """Return ``valid``."""
     inner = part.get("valid")
     if inner is None:
@@ -123,39 +123,39 @@ def parse_valid(part: Node, findings: Problems) -> tuple[float, float] | None:
     low, high = inner.number("min"), inner.number("max")
     low, high = -1e308 if low is None else low, 1e308 if high is None else high
     if low > high:
-        findings.error(inner, "wrong-order", f"min {low:g} is above max {high:g}", at="min")
+        problems.error(inner, "wrong-order", f"min {low:g} is above max {high:g}", at="min")
         return None
     return low, high
 
 
-def parse_enums(part: Node, findings: Problems) -> dict[str, Enum]:
+def parse_enums(part: Node, problems: Problems) -> dict[str, Enum]:
     """Return the driver's ``enums:``."""
-    return {name: _enum(inner, findings) for name, inner in part.named("enums").items()}
+    return {name: _enum(inner, problems) for name, inner in part.named("enums").items()}
 
 
-def parse_enum(part: Node, number: Number, enums: Mapping[str, Enum], findings: Problems) -> Enum:
+def parse_enum(part: Node, number: Number, enums: Mapping[str, Enum], problems: Problems) -> Enum:
     """Return ``enum`` of an item: an enum of the driver, or its own."""
     inner = part.get("enum")
     if inner is None:
         return ()
     if number.kind == "boolean":
         text = "'enum' has no effect for booleans"
-        findings.error(part, "misplaced-key", text, at="enum", key=True)
+        problems.error(part, "misplaced-key", text, at="enum", key=True)
         return ()
     for key in ("scale", "offset"):
         if key in part.data:
             text = f"'{key}' has no effect with 'enum'"
-            findings.error(part, "misplaced-key", text, at=key, key=True)
+            problems.error(part, "misplaced-key", text, at=key, key=True)
     is_named = isinstance(inner.data, str)
-    enum = enums.get(inner.data) if is_named else _enum(inner, findings)
+    enum = enums.get(inner.data) if is_named else _enum(inner, problems)
     if enum is None:
         hint = did_you_mean(inner.data, enums, "enums")
-        findings.error(inner, "unknown-enum", f"there is no enum {inner.data!r}", hint=hint)
+        problems.error(inner, "unknown-enum", f"there is no enum {inner.data!r}", hint=hint)
         return ()
     places = {} if is_named else {int(key, 0): one for key, one in inner.entries().items()}
     for raw, word in enum:
         if number.kind != "float" and not number.least <= raw <= number.most:
-            findings.error(
+            problems.error(
                 places.get(raw, inner),
                 "does-not-fit",
                 f"{raw} ({word}) does not fit into {number.bits} bits,"
@@ -166,18 +166,18 @@ def parse_enum(part: Node, number: Number, enums: Mapping[str, Enum], findings: 
     return enum
 
 
-def _enum(part: Node, findings: Problems) -> Enum:
+def _enum(part: Node, problems: Problems) -> Enum:
     found: dict[int, str] = {}
     words: set[str] = set()
     for key, inner in part.entries().items():
         raw, word = int(key, 0), str(inner.data)
         if raw in found:
             text = f"{key} is {raw}, which already has a word"
-            findings.error(inner, "duplicate-name", text, key=True)
+            problems.error(inner, "duplicate-name", text, key=True)
         elif word in words:
             text = f"another number has the word {word!r}"
             hint = "give each number its own word, so that a word stands for one number"
-            findings.error(inner, "duplicate-name", text, hint=hint)
+            problems.error(inner, "duplicate-name", text, hint=hint)
         found[raw] = word
         words.add(word)
     return tuple(found.items())

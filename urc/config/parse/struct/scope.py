@@ -14,12 +14,12 @@ __all__ = ["Scope"]
 class Scope:
     """The names known at one point of a struct, from the items before it."""
 
-    def __init__(self, findings: Problems, purpose: Literal["read", "send", "type"]) -> None:
+    def __init__(self, problems: Problems, purpose: Literal["read", "send", "type"]) -> None:
         self.known: dict[str, Item | None] = {}
         """Name → item; None for a name that is not an item of this struct."""
         self.uses: list[tuple[Node, Template]] = []
         """Expressions over arguments and settings, with their places."""
-        self._findings = findings
+        self._problems = problems
         self._purpose = purpose
 
     def get(self, name: str) -> Item | None:
@@ -48,24 +48,24 @@ class Scope:
         if name in self.known:
             at = "id" if isinstance(part.data, dict) and "id" in part.data else ""
             text = f"another item has the name {name!r}"
-            self._findings.error(part, "duplicate-name", text, at=at, hint="give each its own name")
+            self._problems.error(part, "duplicate-name", text, at=at, hint="give each its own name")
         self.known[name] = item
 
     def check_name(self, part: Node, name: str) -> None:
         """Report an id that already has another meaning."""
         if name in FRAME_NAMES or number_of(name) is not None or name == "settings":
-            self._findings.error(part, "bad-name", f"{name!r} has another meaning here")
+            self._problems.error(part, "bad-name", f"{name!r} has another meaning here")
         elif name and not (name.isidentifier() and name.isascii() and name == name.lower()):
             text = f"{name!r} is not a valid item name"
             hint = "use lower-case letters, digits and underscores"
-            self._findings.error(part, "bad-name", text, hint=hint)
+            self._problems.error(part, "bad-name", text, hint=hint)
 
     def expression(self, part: Node) -> Template | None:
         """Return the expression at `part`, over the items before it."""
         return self._expression(part, frozenset())
 
     def _expression(self, part: Node, outer: frozenset[str]) -> Template | None:
-        expression = self._findings.expression(part)
+        expression = self._problems.expression(part)
         return None if expression is None else self._checked(part, expression, outer)
 
     def value(self, part: Node | None) -> Template | None:
@@ -85,7 +85,7 @@ class Scope:
             return expression
         for name in sorted(expression.names - self.known.keys() - FRAME_NAMES - outer):
             found = expression.source.find("seq" if name == COUNTERS else name)
-            self._findings.error(
+            self._problems.error(
                 part,
                 "unknown-name",
                 f"no earlier item has the name {name!r}",
