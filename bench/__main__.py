@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from bench.figures import PAGE, told, write_docs
+from bench.figures import PAGES, told, write_docs
 from bench.harness import report
 from scripts.needs import NEEDS, bring
 
@@ -17,9 +17,12 @@ NAMES = (
     "driver_flood",
     "fanout",
     "fanout_stall",
+    "server_robots",
     "browser_peers",
     "browser_widgets",
+    "browser_roslibjs",
     "motion_path",
+    "motion_cost",
     "motion_stop",
     "motion_engine",
     "motion_guard",
@@ -35,6 +38,7 @@ NAMES = (
 PROGRAMS = {
     "browser_peers": "chromium",
     "browser_widgets": "chromium",
+    "browser_roslibjs": "chromium",
     "motion_input": "chromium",
 }
 """Benchmark → required program in addition to Python, by its name in `scripts.needs`."""
@@ -45,7 +49,9 @@ def main() -> int:
     parser.add_argument("names", metavar="NAME", nargs="*", help=f"of {', '.join(NAMES)}")
     parser.add_argument("--full", action="store_true", help="more rounds")
     parser.add_argument(
-        "--write-docs", action="store_true", help=f"write the figures of motion into {PAGE.name}"
+        "--write-docs",
+        action="store_true",
+        help=f"write the figures into {' and '.join(page.name for page in PAGES)}",
     )
     arguments = parser.parse_args()
     for name in arguments.names:

@@ -1,19 +1,23 @@
 """Figures of a run: printed as JSON, one line each, and optionally written into the documentation.
 
-`./dev bench --full --write-docs` writes the figures of motion into docs/motion.md, between marks.
+`./dev bench --full --write-docs` writes them into docs/motion.md and docs/performance.md, between
+marks.
 """
 
 import json
-import re
 from collections.abc import Mapping, Sequence
 from math import inf
 from pathlib import Path
 
-__all__ = ["PAGE", "distribution", "tell", "told", "write_docs"]
+__all__ = ["PAGES", "distribution", "tell", "told", "write_docs"]
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "motion.md"
+_DOCS = Path(__file__).resolve().parents[1] / "docs"
+PAGES = (_DOCS / "motion.md", _DOCS / "performance.md")
 BARS = 40
 """Longest bar of a histogram, in characters."""
+
+_UNITS = {"ms": "ms", "us": "us", "mb": "MB", "hz": "Hz"}
+"""End of a name → its unit in a title."""
 
 told: list[dict[str, object]] = []
 """Figures of this run."""
@@ -44,17 +48,19 @@ def distribution(times_ms: Sequence[float], bin_ms: float) -> dict[str, object]:
     }
 
 
-def write_docs(page: Path = PAGE) -> None:
-    """Write the figures of this run into the page; older figures of other benchmarks stay."""
-    text = page.read_text("utf-8")
+def write_docs(pages: Sequence[Path] = PAGES) -> None:
+    """Write the figures of this run into the pages; older figures of other benchmarks stay."""
+    texts = {page: page.read_text("utf-8") for page in pages}
     for kind in sorted({str(one["figure"]) for one in told if "figure" in one}):
         rows = [one for one in told if one.get("figure") == kind]
         begin, end = f"<!-- figures: {kind} -->", "<!-- end -->"
-        found = re.search(rf"(?s){re.escape(begin)}.*?{end}", text)
-        if found is None:
-            raise SystemExit(f"bench: {page} has no place {begin!r}")
-        text = text[: found.start()] + f"{begin}\n{_section(rows)}{end}" + text[found.end() :]
-    page.write_text(text, "utf-8")
+        page = next((page for page, text in texts.items() if begin in text), None)
+        if page is None:
+            raise SystemExit(f"bench: no page has a place {begin!r}")
+        before, _, rest = texts[page].partition(begin)
+        texts[page] = f"{before}{begin}\n{_section(rows)}{end}{rest.partition(end)[2]}"
+    for page, text in texts.items():
+        page.write_text(text, "utf-8")
 
 
 def _section(rows: Sequence[Mapping[str, object]]) -> str:
@@ -68,10 +74,13 @@ def _section(rows: Sequence[Mapping[str, object]]) -> str:
 
 def _title(name: str) -> str:
     words, _, unit = name.rpartition("_")
-    return f"{words.replace('_', ' ')}, {unit}" if unit in ("ms", "us") else name.replace("_", " ")
+    title = words if unit in _UNITS else name
+    return title.replace("_", " ") + (f", {_UNITS[unit]}" if unit in _UNITS else "")
 
 
 def _cell(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     if isinstance(value, list):
         return ", ".join(map(str, value)) or "–"
     return str(value)

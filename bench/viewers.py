@@ -1,8 +1,9 @@
 """Pages that only watch: they open WebSockets, select channels, and count received data.
 
-``python -m bench.viewers PORT PATH CLIENTS [SHOWN…]`` prints ``ready``. At the end of its input it
-prints a JSON list with messages and bytes of each client. Frames are counted and never decoded,
-because only the server is measured.
+``python -m bench.viewers PORT PATH CLIENTS [SHOWN…]`` prints ``ready``. ``{}`` in PATH is the
+number of the client. After each line of its input, and at its end, it prints a JSON list with
+messages and bytes of each client. Frames are counted and never decoded, because only the server is
+measured.
 """
 
 import json
@@ -16,10 +17,12 @@ from urc.testing.entry import BEARER
 HANDSHAKE = (
     "GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\n"
     "Origin: http://127.0.0.1:{port}\r\n"
-    f"Authorization: {BEARER['authorization']}\r\n"
+    "Authorization: {key}\r\n"
     "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
     "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
 )
+KEY = os.environ.get("URC_BENCH_KEY")
+"""Start key of a real server; else that of the tests."""
 CHUNK = 1 << 18
 OPEN_TIMEOUT_S = 10
 
@@ -29,7 +32,8 @@ class Viewer:
 
     def __init__(self, port: int, path: str, shown: list[str]) -> None:
         self.line = socket.create_connection(("127.0.0.1", port), OPEN_TIMEOUT_S)
-        self.line.sendall(HANDSHAKE.format(path=path, port=port).encode())
+        key = f"Bearer {KEY}" if KEY else BEARER["authorization"]
+        self.line.sendall(HANDSHAKE.format(path=path, port=port, key=key).encode())
         head = b""
         while b"\r\n\r\n" not in head:
             head += self.line.recv(4096)
@@ -82,7 +86,7 @@ def head_and_body(data: bytes) -> int | None:
 def main() -> None:
     """Count frames until standard input ends."""
     port, path, count, *shown = sys.argv[1:]
-    viewers = [Viewer(int(port), path, shown) for _ in range(int(count))]
+    viewers = [Viewer(int(port), path.format(each), shown) for each in range(int(count))]
     ready = selectors.DefaultSelector()
     for viewer in viewers:
         ready.register(viewer.line, selectors.EVENT_READ, viewer)
@@ -91,10 +95,12 @@ def main() -> None:
     while True:
         for key, _ in ready.select():
             if key.data is None:
-                os.read(key.fd, 1)
-                print(json.dumps([[viewer.messages, viewer.bytes] for viewer in viewers]))
-                return
-            if not key.data.take():
+                order = os.read(key.fd, 64)
+                counts = [[viewer.messages, viewer.bytes] for viewer in viewers]
+                print(json.dumps(counts), flush=True)
+                if not order:
+                    return
+            elif not key.data.take():
                 ready.unregister(key.fileobj)
 
 
