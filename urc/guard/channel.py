@@ -1,7 +1,7 @@
 """The channel between the guard's client and the guard: its two sides, as protocols.
 
 `urc.guard.pipe_channel.PipeChannel` leads to a process, `urc.guard.local_channel.LocalChannel` to a
-guard in this process. Neither knows which controls are armed: the client has that table.
+guard in this process. Neither channel knows the armed controls: the client has that table.
 """
 
 from collections.abc import Iterable
@@ -29,34 +29,36 @@ class ChannelListener(Protocol):
         """Whether a control may be moving."""
 
     def briefing(self) -> Iterable[messages.ToGuard]:
-        """Return everything a new guard must know, in the order of telling.
+        """Return the messages that initialise a new guard, in their order.
 
-        Asked for once for each new guard: an owed stop counts as told from then on.
+        Called once for each new guard: a pending stop counts as sent from then on.
         """
 
     def handle(self, message: messages.FromGuard, size: int) -> None:
         """Handle a message of the guard; `size` is its size in bytes for flow control."""
 
     def lost(self, reason: str) -> None:
-        """Handle the end of the guard, and of every line with it."""
+        """Handle the end of the guard, which closes every line."""
 
 
 class Channel(Protocol):
-    """The way to a guard, and the guard's life. Posting never waits."""
+    """The connection to a guard, and the guard's life cycle. Posting never waits."""
 
     def start(self) -> None:
         """Start the guard; needs a running loop."""
 
     async def finish(self) -> None:
-        """Let the guard stop everything and close every line, then end it."""
+        """Let the guard stop all controls and close every line, then end the guard."""
 
     def post(self, message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
-        """Send a message to the guard. Without a guard it is dropped: the next one is briefed.
+        """Send a message to the guard.
+
+        Without a guard, the message is dropped, because the next guard is initialised anyway.
 
         Args:
             message: the message.
-            slot: an unsent message of the same slot is replaced by this one; "": none is.
-            is_urgent: sent before all unsent messages.
+            slot: this message replaces an unsent message of the same slot; "" for no slot.
+            is_urgent: whether the message is sent before all unsent messages.
 
         Raises:
             UNFIT: the message cannot be encoded (`urc.guard.pipe.UNFIT`).
@@ -66,7 +68,7 @@ class Channel(Protocol):
         """Discard the unsent message of a slot."""
 
     async def ready(self) -> None:
-        """Return when there is a guard."""
+        """Return once a guard is ready."""
 
     def now(self) -> float:
         """Return the guard's time, in seconds."""

@@ -1,13 +1,13 @@
 """The client of the guard: the robot's lines behind it, and one table of its held commands.
 
-Theory of operation. A guard that dies takes its knowledge with it. So the client keeps a table of
-the held commands that were armed or stopped: their terms, and whether they may be moving. A new
-guard is briefed from this table. It gets the lines, the owed stop of each command that may be
-moving, and the terms of the other armed commands. It opens the lines of owed stops and writes these
-stops first. No motion goes on by itself.
+Theory of operation. The state of a guard is lost when its process dies. So the client keeps a table
+of the held commands that were armed or stopped: their terms, and whether they may be moving. A new
+guard is initialised from this table. The new guard gets the lines, the pending stop of each command
+that may be moving, and the terms of the other armed commands. The guard opens the lines with
+pending stops and writes these stops first. No motion continues by itself.
 
 A control *may be moving* from its first tick, or from a stop, until the guard reports the stop of
-its newest tick as written. So a stop outlives the guard that was to write it.
+its newest tick as written. So a stop survives the death of the guard that should have written it.
 """
 
 import asyncio
@@ -54,13 +54,13 @@ class _Control:
     """Frame of the newest tick while it is held, when it carries counters."""
     may_move: bool = False
     stopped_s: float = float("-inf")
-    """Time at which its last stop was reported."""
+    """Time of the last reported stop."""
 
 
 class GuardClient:
     """The lines of one robot behind a guard, and its held commands.
 
-    It is `urc.runtime.motion_controller.MotionBackend`, and the `ChannelListener` of its channel.
+    The client implements `urc.runtime.motion_controller.MotionBackend` and `ChannelListener`.
     """
 
     def __init__(
@@ -72,9 +72,9 @@ class GuardClient:
         """Prepare; nothing runs before `start`.
 
         Args:
-            lines: in the order in which they carry each other.
+            lines: the lines; a tunnel precedes the lines inside it.
             held: the held commands by name.
-            channel_to: makes the channel for this client.
+            channel_to: creates the channel for this client.
         """
         self.lines = tuple(lines)
         self.channel = channel_to(self)
@@ -90,10 +90,11 @@ class GuardClient:
         }
         """The lines, for the links of the session."""
         self.on_stand: Stands = _unheard
-        """Told the counters of a line, and whether every counted frame of the engine has left."""
+        """Receives the counters of a line, and whether all counted frames of the engine were sent.
+        """
         self._held = dict(held)
         self._controls: dict[str, _Control] = {}
-        """The one table of armed and possibly moving commands."""
+        """The table of armed and possibly moving commands."""
         self._stops: deque[tuple[str, Reason]] = deque(maxlen=_MOST_STOPS)
         self._stopped = asyncio.Event()
 
@@ -102,7 +103,7 @@ class GuardClient:
         self.channel.start()
 
     async def finish(self) -> None:
-        """Stop everything that may be moving, close every line, and end the guard."""
+        """Stop all commands that may be moving, close every line, and end the guard."""
         await self.channel.finish()
 
     # -- held commands: `urc.runtime.motion_controller.MotionBackend`
@@ -111,7 +112,7 @@ class GuardClient:
         """Accept ticks of `command` from now on.
 
         Raises:
-            UrcError: nothing would ever stop it under these terms.
+            UrcError: under these terms, nothing would ever stop the motion.
         """
         try:
             HoldToRun(terms)
@@ -140,7 +141,7 @@ class GuardClient:
         self.channel.post(tick, slot=command)
 
     def renew(self, command: str, stop: Payload | FrameVariants) -> None:
-        """Replace the stop frame of `command` from now on; it arms nothing."""
+        """Replace the stop frame of `command`, without arming it."""
         control = self._controls.get(command)
         if control is not None:
             control.terms = terms = control.terms.stopped_by(stop)
@@ -148,7 +149,7 @@ class GuardClient:
             self.channel.post(renewal, slot=f"{command} stop")
 
     def release(self, command: str) -> None:
-        """Stop `command`, which was let go."""
+        """Stop `command` after its release."""
         self._discard_tick(command)
         self.channel.post(messages.ReleaseControl(command))
 
@@ -166,10 +167,10 @@ class GuardClient:
             self.channel.post(messages.StopMotion(told), is_urgent=True)
 
     def stop_all(self, stop_frame: Callable[[str], Payload | FrameVariants]) -> None:
-        """Stop everything that may be moving.
+        """Stop all commands that may be moving.
 
         Args:
-            stop_frame: renders the stop frame of a command as it is now. When it raises `UrcError`,
+            stop_frame: renders the stop frame of a command as it is now. If it raises `UrcError`,
                 the last stop frame of the command is used.
         """
         stops: dict[str, Payload | FrameVariants] = {}
@@ -210,7 +211,7 @@ class GuardClient:
         return control
 
     def _discard_tick(self, command: str) -> None:
-        """Discard an unsent tick, and never render it again: it would begin a motion."""
+        """Discard an unsent tick for good, because it would start a motion."""
         self.channel.drop(command)
         control = self._controls.get(command)
         if control is not None:
@@ -224,7 +225,7 @@ class GuardClient:
         return any(control.may_move for control in self._controls.values())
 
     def briefing(self) -> Iterator[messages.ToGuard]:
-        """Yield everything a new guard must know; owed stops go before everything armed."""
+        """Yield the messages that initialise a new guard: pending stops, then armed controls."""
         for spec in self.lines:
             yield spec.make
         for command, control in self._controls.items():
@@ -253,7 +254,7 @@ class GuardClient:
         self.on_stand(line, stand, is_settled)
 
     def _tick_again(self, counted: messages.CountersAdvanced) -> None:
-        """Render ticks again whose numbers were used up. They keep their age."""
+        """Render ticks again after other frames used their numbers. The ticks keep their age."""
         for command, number in counted.stale:
             control = self._controls.get(command)
             if control is None or control.counted is None or control.number != number:

@@ -1,10 +1,10 @@
-"""One line of the robot, as the guard keeps it.
+"""A line of the robot inside the guard.
 
-Theory of operation. One task lives at a time: it opens the transport, reads it to its end, and
-closes it. The engine says when to open and to close, and gets what arrives for as long as it takes
-it (credit). When the line is cut while the robot may be moving, nobody waits for the engine, which
-may be frozen or dead: the line is opened again by the guard itself (a *rescue*), the stop is the
-first thing written, and the open line is kept for the engine, which finds it at its next attempt.
+Theory of operation. One task at a time opens the transport, reads to its end, and closes it. The
+engine requests opening and closing, and receives data within its credit. If the line is cut while
+the robot may be moving, the guard does not wait for the engine, which may be frozen or dead. The
+guard itself opens the line again (a *rescue*) and writes the stop first. The open line is then kept
+for the engine's next attempt.
 """
 
 import asyncio
@@ -34,33 +34,34 @@ from urc.transports.connect_race import HURRY, ConnectRace
 __all__ = ["WINDOW_BYTES", "GuardedConnection"]
 
 WINDOW_BYTES: Final = 65536
-"""What may be on its way to the engine before it has taken any."""
+"""Limit of bytes sent to the engine before an acknowledgement."""
 _GRACE_S: Final = 1.0
-"""What a transport may take beyond the time it promised."""
+"""Time allowed to a transport beyond its own timeout."""
 _CLOSE_S: Final = 1.0
 _RESCUE_S: Final = 90.0
-"""A robot that cannot be reached for this long is left to the engine's own attempts."""
+"""Time limit of a rescue; after that, only the engine tries to connect."""
 _KEPT_S: Final = 6.0
-"""How long a rescued line is kept for the engine."""
+"""Time for which a rescued line is kept for the engine."""
 _EVERY_S: Final = 0.05
-"""Shortest time between two attempts; where opening is dear, five times that."""
+"""Shortest time between two attempts; five times as long if opening is expensive."""
 _SHORTEST_S: Final = 0.07
 _LONGEST_S: Final = 2.0
-"""Bounds of an attempt's time: some times what good ones take. One that was begun while the robot
-was away is lost, and holds the next one up."""
+"""Bounds of the timeout of an attempt, a multiple of the time of successful attempts. An attempt
+from the time without a robot is lost, and delays the next attempt.
+"""
 _REMEMBERED: Final = 5
 _TIMES: Final = 4.0
 _LOG_IN_S: Final = 6.0
 _GROWTH: Final = 1.25
 _LONG_S: Final = 0.5
-"""Where tries cannot overlap, each has more time than the one before, up to this."""
+"""Limit of the timeout of attempts that cannot overlap; the timeout grows with each attempt."""
 _USUAL_S: Final = 0.25
 _WITHIN_S: Final = 0.7
-"""Repeats of a stop, and what a slow line needs for the last one."""
+"""Time for the repeats of a stop, and for the last repeat on a slow line."""
 _PAUSE_S: Final = 0.01
 
 Emit = Callable[[messages.FromGuard], int]
-"""Passes a message on; returns about how many bytes it takes."""
+"""Passes a message on; returns its approximate size in bytes."""
 
 log = logging.getLogger(__name__)
 
@@ -112,26 +113,27 @@ class GuardedConnection:
         self._handed = asyncio.Event()
         self._is_rescuing = False
         self._waiting: TimerHandle | None = None
-        """Set while the engine waits for a rescue to succeed; rings when its time is up."""
+        """Timer of the engine's timeout while the engine waits for a rescue, or None."""
         self._fault = ""
         self._patience_s = _USUAL_S
         self._took_s: deque[float] = deque(maxlen=_REMEMBERED)
-        """By the last that were good: the shortest says what the way takes, without this machine's
-        own delays."""
+        """Durations of the last successful attempts; the shortest has the least delay of this
+        machine.
+        """
         self._hurry = ConnectRace(_SHORTEST_S)
         self._credit = 0
         self._credited = asyncio.Event()
         self._is_reading = False
         self._acked = 0
         self._counted = 0
-        """Number of the newest frame with counters that the engine sent, and that has left."""
+        """Number of the newest frame with counters from the engine that was sent."""
         self._round = 0
-        """How often what the engine sent was refused because its numbers were used up."""
+        """Number of times that frames of the engine were refused because of used numbers."""
 
     # -- what the engine says
 
     def open(self, turn: int, timeout_s: float) -> None:
-        """Open the line; told by `LineOpened` or `OpenFailed`."""
+        """Open the line; the result is reported by `LineOpened` or `OpenFailed`."""
         self._turn = turn
         if not self._is_rescuing:
             self._switch(self._live(timeout_s))
@@ -142,7 +144,7 @@ class GuardedConnection:
             self._waiting = self._clock.call_at(self._clock.now() + timeout_s, self._in_vain)
 
     def close(self, turn: int) -> None:
-        """Close the line, after the stop of what moves; told by `LineClosed`."""
+        """Stop moving controls and close the line; the result is reported by `LineClosed`."""
         if turn != self._turn or self._is_rescuing:
             self._forget_waiting()
             self._emit(messages.LineClosed(self.name, turn))
@@ -153,7 +155,7 @@ class GuardedConnection:
             self._switch(self._shut(turn))
 
     def send(self, said: messages.SendBytes) -> None:
-        """Send what is no motion; told by `SendDone`, `SendRefused` or `SendStale`."""
+        """Send a frame without motion; reported by `SendDone`, `SendRefused` or `SendStale`."""
         if said.turn != self._turn or not self._is_handed or said.round != self._round:
             return  # of an earlier connection, or made again meanwhile
         data, number = said.data, said.number
@@ -170,7 +172,7 @@ class GuardedConnection:
                 self._acked = number
 
     def _leave(self, said: messages.SendBytes) -> Payload | None:
-        """Return what is sent, now that its turn has come; None: it must not be sent any more."""
+        """Return the data to send at the frame's turn; None if it must not be sent any more."""
         if said.round != self._round:
             return None
         if not self._sent_counters.fits(said.count):
@@ -187,18 +189,18 @@ class GuardedConnection:
             self._counted = said.number
 
     def _refuse(self, number: int) -> None:
-        """Send nothing of this round any more: other frames have used its numbers up."""
+        """Discard the rest of this round, because other frames have used its numbers."""
         self._round += 1
         self._emit(messages.SendStale(self.name, self._turn, number, self._sent_counters.stand))
 
     def credit(self, turn: int, amount: int) -> None:
-        """Take note that the engine has taken so much."""
+        """Add the engine's acknowledgement to its credit."""
         if turn == self._turn:
             self._credit += amount
             self._credited.set()
 
     def settle(self) -> None:
-        """Do what follows from all that was said."""
+        """Act on the messages received together."""
         if self._acked:
             number, self._acked = self._acked, 0
             self._emit(messages.SendDone(self.name, self._turn, number))
@@ -206,12 +208,12 @@ class GuardedConnection:
         self._liveness.start()
 
     def rescue(self) -> None:
-        """Open the line by ourselves, because a stop is owed."""
+        """Open the line without the engine, because a stop is pending."""
         if not self._is_open and not self._is_rescuing and self._task is None:
             self._switch(self._rescue())
 
     async def finish(self, within_s: float) -> None:
-        """Stop what moves, wait until that has gone out, and close; takes `within_s` and little."""
+        """Stop moving controls, wait for their stops within `within_s`, and close the line."""
         self.scheduler.stop_all()
         self.scheduler.write_due()
         until_s = self._clock.now() + within_s
@@ -238,7 +240,7 @@ class GuardedConnection:
     # -- one connection
 
     def _switch(self, work: Coroutine[Any, Any, None]) -> None:
-        """Let `work` take the place of the task that lives."""
+        """Replace the running task by `work`."""
         self._task = asyncio.get_running_loop().create_task(self._after(self._task, work))
 
     async def _after(self, old: asyncio.Task[None] | None, work: Coroutine[Any, Any, None]) -> None:
@@ -264,7 +266,7 @@ class GuardedConnection:
         await self._serve()
 
     async def _attempt(self, timeout_s: float) -> str:
-        """Open the transport; return why that failed, or "" when it did not."""
+        """Open the transport; return the reason of a failure, or ""."""
         began_s = self._clock.now()
         try:
             async with asyncio.timeout(timeout_s + _GRACE_S):
@@ -323,7 +325,7 @@ class GuardedConnection:
             await asyncio.sleep(0)  # a line that has always something must not hold up the stops
 
     def _arrived(self, data: bytes) -> bool:
-        """Pass on what has just arrived, where nothing comes before it."""
+        """Pass received data on at once, if no earlier data is waiting."""
         if not self._is_reading or self._credit <= 0 or not self._is_handed:
             return False
         self._pass_on(data)
@@ -337,7 +339,7 @@ class GuardedConnection:
             raise PeerClosed(f"what the robot sent cannot be passed on ({fault})") from fault
 
     async def _recover(self, reason: str, *, is_abort: bool = False) -> None:
-        """Close what is broken, tell the engine, and stop the robot if that is owed."""
+        """Close a broken line, inform the engine, and stop the robot if a stop is pending."""
         is_abort = is_abort or self.scheduler.is_in_doubt  # else the kernel would send it later
         self._cut(reason)
         await self._close_transport(is_abort=is_abort)
@@ -378,7 +380,7 @@ class GuardedConnection:
     # -- rescue
 
     def _stall(self, reason: str) -> None:
-        """Reset the line: what waits in the kernel must not arrive later."""
+        """Reset the line, so that data buffered in the kernel never arrives."""
         if self._is_open:
             self._is_open = False
             self._liveness.end()
@@ -411,7 +413,7 @@ class GuardedConnection:
             self._is_rescuing = False
 
     async def _serve_rescued(self) -> None:
-        """Wait for the engine to take the line, and serve it then."""
+        """Wait for the engine to take over the line, then serve the engine."""
         alarm = self._clock.call_at(self._clock.now() + _KEPT_S, self._handed.set)
         try:
             await self._handed.wait()
@@ -423,7 +425,7 @@ class GuardedConnection:
             self._switch(self._recover("nobody has asked for the line"))
 
     def _in_vain(self) -> None:
-        """Tell the engine, if it waits, that its time is up."""
+        """Report the timeout to a waiting engine."""
         if self._waiting is not None:
             self._forget_waiting()
             fault = self._fault or f"no answer from {self.transport.address}"

@@ -1,4 +1,4 @@
-"""Watches over the program at the other end of a line for as long as something moves there."""
+"""Watch for a frozen program at the other end of a line while the robot moves."""
 
 import asyncio
 from collections.abc import Callable
@@ -14,7 +14,7 @@ _LOOK_S: Final = ASKED_EVERY_S
 
 
 class LivenessWatch:
-    """Of one line, over all its connections."""
+    """The watch of one line, over all its connections."""
 
     def __init__(
         self,
@@ -28,11 +28,11 @@ class LivenessWatch:
         """Prepare.
 
         Args:
-            transport: asked for a sign of life where it is a `SupportsProbe`.
+            transport: probed if it is a `SupportsProbe`.
             clock: the time.
-            silent_s: how long the robot may say nothing unasked; None: for ever.
-            is_moving: whether anything moves.
-            failed: told why when the program stands still.
+            silent_s: longest silence of the robot without a probe; None for no limit.
+            is_moving: returns whether a control moves.
+            failed: receives the reason when the program is frozen.
         """
         self._transport = transport if isinstance(transport, SupportsProbe) else None
         self._clock = clock
@@ -46,17 +46,17 @@ class LivenessWatch:
 
     @property
     def is_able(self) -> bool:
-        """Whether there is a way to know."""
+        """Whether liveness can be judged at all."""
         return self._transport is not None or self._silent_s is not None
 
     def begin(self) -> None:
-        """Take note that the line is open."""
+        """Record that the line is open."""
         self._is_open = True
         self._liveness = Liveness(self._silent_s)
         self.note_arrival()
 
     def end(self) -> None:
-        """Take note that the line is closed."""
+        """Record that the line is closed."""
         self._is_open = False
         if self._alarm is not None:
             self._alarm.cancel()
@@ -66,11 +66,11 @@ class LivenessWatch:
             self._asking = None
 
     def note_arrival(self) -> None:
-        """Take note that something came, or that nothing is read because of us."""
+        """Record received bytes, or a pause in reading on our side."""
         self._liveness.note_arrival(self._clock.now())
 
     def start(self) -> None:
-        """Watch, where something moves, until nothing does."""
+        """Watch the line while a control moves."""
         if self._alarm is None and self._is_open and self.is_able and self._is_moving():
             self._check()
 

@@ -42,7 +42,7 @@ class LocalChannel:
         await self._host.finish()
 
     def post(self, message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
-        """Send a message, which the guard handles at once: none is ever unsent."""
+        """Send a message, which the guard handles at once."""
         self._host.handle(message)
         self._host.settle()
 

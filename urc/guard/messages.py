@@ -55,7 +55,9 @@ class MakeTransport(msgspec.Struct, array_like=True, frozen=True, tag=1):
     tunnel: str
     """Line that carries this one, created before; "" without one."""
     stalled_s: float
-    """Age of unsent motion at which the line counts as stalled, in seconds. It is then reset."""
+    """Age of unsent motion at which the line counts as stalled, in seconds. A stalled line is
+    reset.
+    """
     is_strict: bool
     """Whether the line is slow to open: then nothing is written while any byte is unsent."""
     silent_s: float | None = None
@@ -121,7 +123,7 @@ class RenewLease(msgspec.Struct, array_like=True, frozen=True, tag=7):
 
 
 class ReleaseControl(msgspec.Struct, array_like=True, frozen=True, tag=8):
-    """A control was let go."""
+    """A control was released."""
 
     control: str
 
@@ -285,8 +287,8 @@ def _plain(value: object) -> object:
 def encoder() -> msgspec.msgpack.Encoder:
     """Return an encoder of either side's messages.
 
-    It raises `TypeError`, `OverflowError` or `NotImplementedError` for a body that cannot be
-    encoded, never `msgspec.EncodeError`.
+    The encoder raises `TypeError`, `OverflowError` or `NotImplementedError` for a body that cannot
+    be encoded, never `msgspec.EncodeError`.
     """
     return msgspec.msgpack.Encoder(enc_hook=_plain)
 

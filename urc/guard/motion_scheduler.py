@@ -1,12 +1,12 @@
-"""The held commands of one line: writes what they have to say, and sees that the line takes it.
+"""Scheduler of the held commands of one line: writes their frames, and checks for a stall.
 
-Theory of operation. `step` asks every mover what is due: stops first, whatever waits, then motion
-where the line is clear. It is called after everything that was told, and by an alarm at the next
-time that matters; between a write and the moment when the other side has acknowledged it, that is
-every few milliseconds, because nobody tells when the kernel has got rid of its bytes.
+Theory of operation. `step` writes the due frames of every control: stops first, regardless of
+unsent data, then motion if the line is clear. `step` runs after every message, and by a timer at
+the next due time. From a write until its acknowledgement by the other side, that is every few
+milliseconds, because the kernel does not report sent bytes.
 
-*In doubt* is a control of which something was written that may not have arrived. When the line is
-cut, it is owed a stop.
+A control is *in doubt* while a written frame may not have arrived. If the line is then cut, a stop
+becomes pending.
 """
 
 import asyncio
@@ -30,9 +30,9 @@ from urc.transports.base import (
 __all__ = ["MotionScheduler"]
 
 _LOOK_S: Final = 0.005
-"""How soon one looks at a line that is not clear; nothing else is due sooner than that."""
+"""First interval of checks of a line that is not clear, and the shortest interval of all."""
 _LONGEST_LOOK_S: Final = 0.02
-"""One looks half as often each time, down to this, where nothing waits for it to be clear."""
+"""Longest interval of these checks, which doubles each time while no frame waits."""
 
 
 class MotionScheduler:
@@ -53,16 +53,16 @@ class MotionScheduler:
         """Prepare; nothing is written before `begin`.
 
         Args:
-            transport: where everything goes; used better where it is a `SupportsUnsent`,
-                `SupportsOffer` or `SupportsForget`.
+            transport: the transport of the line; `SupportsUnsent`, `SupportsOffer` and
+                `SupportsForget` are used if supported.
             clock: the time.
             stalled_s: age of unsent bytes at which the line counts as stalled.
-            is_strict: motion waits until nothing at all is unsent.
-            told: has each stop that was written: control, reason, number of its newest tick.
-            failed: told why when the line is stalled, or takes nothing any more.
+            is_strict: whether motion waits until no byte is unsent.
+            told: receives each written stop: control, reason, number of the newest tick.
+            failed: receives the reason when the line stalls or refuses data.
             sent_counters: the counters of the line.
-            counted: told when these have changed, with control and number of each tick that cannot
-                be written any more.
+            counted: called after a change of the counters, with control and number of each tick
+                that cannot be written any more.
         """
         self._clock = clock
         self._unsent = transport.unsent if isinstance(transport, SupportsUnsent) else None
@@ -74,7 +74,7 @@ class MotionScheduler:
         self._sent_counters = sent_counters or SentCounters()
         self._counted = counted
         self._counts: dict[str, Count | None] = {}
-        """Control → what its newest tick does to the counters."""
+        """Control → effect of its newest tick on the counters."""
         self._stale: list[tuple[str, int]] = []
         self._watch = StallWatch(stalled_s)
         self.queue: SendQueue[tuple[str, bool]] = SendQueue(transport, clock, self._sent)
@@ -83,7 +83,7 @@ class MotionScheduler:
         self._numbers: dict[str, int] = {}
         self._doubtful: set[str] = set()
         self._is_stop_under_way = False
-        """Whether a stop is among what may not have arrived."""
+        """Whether a written stop may not have arrived."""
         self._is_open = False
         self._alarm: TimerHandle | None = None
         self._alarm_s = 0.0
@@ -106,7 +106,7 @@ class MotionScheduler:
 
     @property
     def is_in_doubt(self) -> bool:
-        """Whether something may not have arrived."""
+        """Whether a written frame may not have arrived."""
         return bool(self._doubtful)
 
     # -- what controls are told
@@ -144,18 +144,18 @@ class MotionScheduler:
             hold_to_run.stop("released", self._clock.now())
 
     def stop(self, control: str, terms: HoldTerms) -> None:
-        """Stop `control`, whether it moves or not."""
+        """Stop `control`, even if it does not move."""
         hold_to_run = self._hold_to_run(control, terms)
         hold_to_run.stop("stopped", self._clock.now())
         if not self._is_open:
             hold_to_run.cut()
 
     def owe(self, control: str, terms: HoldTerms) -> None:
-        """Take note that `control` may be moving: it is stopped as soon as the line is open."""
+        """Record that `control` may be moving: stop it as soon as the line is open."""
         self._hold_to_run(control, terms).cut(is_doubtful=True)
 
     def stop_all(self) -> None:
-        """Stop what moves, because the line is to be closed."""
+        """Stop moving controls before the line is closed."""
         now = self._clock.now()
         for hold_to_run in self._holds.values():
             if hold_to_run.state == "moving":
@@ -171,7 +171,7 @@ class MotionScheduler:
         return hold_to_run
 
     def check_arrivals(self) -> None:
-        """Take note of what has arrived by now; only of a line that works."""
+        """Record the frames that have arrived by now; only for a working line."""
         if self._unsent is not None and self.queue.is_idle and not self._unsent():
             self._all_arrived()
 
@@ -182,7 +182,7 @@ class MotionScheduler:
     # -- the line
 
     def begin(self) -> None:
-        """Take note that the line is open: what is owed is written first."""
+        """Record that the line is open, and write pending stops first."""
         self._is_open = True
         self._sent_counters.reset()
         self._stale.clear()
@@ -193,7 +193,7 @@ class MotionScheduler:
         self.write_due()
 
     def cut(self) -> None:
-        """Take note that the line is closed: nothing that waits is kept."""
+        """Record that the line is closed, and drop all unsent frames."""
         self._is_open = False
         for control, is_stop in self.queue.end():
             if is_stop:
@@ -206,7 +206,7 @@ class MotionScheduler:
             self._alarm = None
 
     def write_due(self) -> None:
-        """Write what is due."""
+        """Write the due frames."""
         if not self._is_open:
             return
         now = self._clock.now()
@@ -227,7 +227,7 @@ class MotionScheduler:
         self.tell_counted()
 
     def tell_counted(self) -> None:
-        """Tell how the counters stand, where they have changed, and what cannot be written now."""
+        """Report changed counters, and ticks that cannot be written any more."""
         if self._sent_counters.is_changed:
             for control, hold_to_run in self._holds.items():
                 if hold_to_run.is_waiting and not self._sent_counters.fits(
@@ -285,21 +285,21 @@ class MotionScheduler:
             self._look_s = _LOOK_S
 
     def _turn(self, control: str, data: Payload, *, is_stop: bool) -> tuple[Payload, Count | None]:
-        """Return what is written now, and what it does to the counters."""
+        """Return the frame to write now, and its effect on the counters."""
         if not is_stop:
             return data, self._counts.get(control)
         stops = self._holds[control].terms.stops
         return self._sent_counters.choose(stops) if stops else (data, None)
 
     def _leave_stop(self, control: str, data: Payload) -> Payload:
-        """Return a stop, now that its turn in the lane has come."""
+        """Return a stop at its turn in the queue."""
         data, count = self._turn(control, data, is_stop=True)
         self._sent_counters.left(count)
         self._tell_soon()
         return data
 
     def _leave(self, control: str, data: Payload, count: Count | None) -> Payload | None:
-        """Return a frame of motion in its turn; None: its numbers were used up before."""
+        """Return a frame of motion at its turn, or None if its numbers are already used."""
         fits = self._sent_counters.fits(count)
         if fits:
             self._sent_counters.left(count)
@@ -309,7 +309,7 @@ class MotionScheduler:
         return data if fits else None
 
     def _tell_soon(self) -> None:
-        """Tell of the counters once the transport has the frame: the engine may answer at once."""
+        """Report the counters after handing over the frame: the engine may answer at once."""
         asyncio.get_running_loop().call_soon(self.tell_counted)
 
     def _sent(self, tag: tuple[str, bool], fault: TransportError | None) -> None:
@@ -383,9 +383,9 @@ class MotionScheduler:
 
     @property
     def _is_watched(self) -> bool:
-        """Whether bytes that do not leave matter: motion is among them, or waits for all of them.
+        """Whether unsent bytes matter: they contain motion, or motion waits for them.
 
-        The second is so where opening is dear: a ping that fell into a cut would hold a robot up
-        for as long as that lasts, and let it go on afterwards, as if nothing had been.
+        Motion waits for them if opening is expensive: a ping sent during a cut would block motion
+        until the cut ends, and old motion would then continue.
         """
         return bool(self._doubtful) or (self._is_strict and self._is_wanted)

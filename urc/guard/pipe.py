@@ -1,9 +1,9 @@
 """One end of the pipe between the engine's process and the guard.
 
-A message is its length in four bytes and then itself. Writing never waits: what the pipe does not
-take is kept, urgent things before others, and of what may be replaced only the newest. What is
-kept is bounded by whoever posts: replies by the credit of their lines, requests by what may be
-under way.
+A message on the wire is its length in four bytes, then its body. Writing never waits: unsent
+messages are queued, urgent messages first, and a newer message replaces an older one of its slot.
+The senders bound the queue: replies by the credit of their lines, requests by the limit of pending
+requests.
 """
 
 import asyncio
@@ -21,9 +21,9 @@ _HEAD = 4
 _put_head, _head_of = struct.Struct("<I").pack_into, struct.Struct("<I").unpack_from
 _READ_BYTES = 65536
 _AT_ONCE = 64
-"""Messages that are handled before others have their turn on the loop."""
+"""Number of messages handled before other tasks of the loop run."""
 UNFIT = (TypeError, OverflowError, NotImplementedError, msgspec.MsgspecError)
-"""What `post` raises for a message that cannot be passed on."""
+"""Exceptions of `post` for a message that cannot be encoded."""
 
 
 class Pipe:
@@ -43,11 +43,11 @@ class Pipe:
 
         Args:
             line: connected.
-            encoder: of what is posted.
-            decoder: of what arrives.
-            take: has each message.
-            settle: called after those that came together.
-            gone: called once, when the other side is gone.
+            encoder: encoder of posted messages.
+            decoder: decoder of received messages.
+            take: receives each message.
+            settle: called after messages that arrived together.
+            gone: called once, when the other side has closed the pipe.
         """
         line.setblocking(False)
         self._line = line
@@ -62,33 +62,33 @@ class Pipe:
         self._space = memoryview(bytearray(_READ_BYTES))
         self._held = bytearray()
         self._is_behind = False
-        """More messages have come than are handled at once."""
+        """Whether received messages wait for the next turn of the loop."""
         self._rest = b""
-        """Of a message of which the pipe has taken a part."""
+        """Unsent bytes of a partly written message."""
         self._urgent: deque[bytes] = deque()
         self._queue: deque[bytes] = deque()
         self._newest: dict[str, bytes] = {}
         self._is_writing = False
         self.is_open = True
         self.taken_bytes = 0
-        """Size of the message that is being taken, as `post` returned it on the other side."""
+        """Size of the message in `take`, as returned by `post` on the other side."""
         self._loop.add_reader(line, self._readable)
 
     @property
     def is_backed_up(self) -> bool:
-        """Whether the other side does not take what is posted as fast as it comes."""
+        """Whether the other side reads slower than messages are posted."""
         return self._is_writing
 
     def post(self, message: object, *, slot: str = "", is_urgent: bool = False) -> int:
-        """Write a message, now or as soon as the pipe takes it; return its size in bytes.
+        """Write a message as soon as the pipe accepts it; return its size in bytes.
 
         Args:
-            message: of the encoder's kind.
-            slot: of what only the newest counts, this takes the place of what waits there.
-            is_urgent: it goes before everything that waits.
+            message: a message for the encoder.
+            slot: this message replaces an unsent message of the same slot.
+            is_urgent: whether the message is sent before all unsent messages.
 
         Raises:
-            UNFIT: there is something in it that no message can carry.
+            UNFIT: the message cannot be encoded.
         """
         frame = self._frame
         self._encode(message, frame, _HEAD)
@@ -116,11 +116,11 @@ class Pipe:
         return size
 
     def drop(self, slot: str) -> None:
-        """Forget what waits in a slot."""
+        """Discard the unsent message of a slot."""
         self._newest.pop(slot, None)
 
     def close(self) -> None:
-        """Close at once; `gone` is not called any more. May be called twice."""
+        """Close at once, without calling `gone`; a second call does nothing."""
         if self.is_open:
             self.is_open = False
             self._loop.remove_reader(self._line)
@@ -128,7 +128,7 @@ class Pipe:
             self._line.close()
 
     def end(self) -> None:
-        """Let the other side know that nothing more will come."""
+        """Signal the end of the messages to the other side."""
         if self.is_open:
             try:
                 self._line.shutdown(socket.SHUT_WR)
@@ -199,7 +199,7 @@ class Pipe:
         self._look_behind()
 
     def _look_behind(self) -> None:
-        """Let others have their turn where whole messages are left over."""
+        """Let other tasks run before the remaining complete messages."""
         is_behind = _is_whole(self._held) and self.is_open
         if is_behind:
             self._loop.call_soon(self._resume)
@@ -215,7 +215,7 @@ class Pipe:
             self._read_held()
 
     def _handle(self, data: memoryview) -> int:
-        """Take the whole messages in `data`; return how many bytes they are."""
+        """Handle the complete messages in `data`; return their number of bytes."""
         at, size = 0, len(data)
         for _ in range(_AT_ONCE):
             if size - at < _HEAD or not self.is_open:

@@ -1,9 +1,9 @@
-"""The channel to a guard in a process of its own: started, watched, and restarted.
+"""The channel to a guard in a separate process, which is started, watched and restarted.
 
-Theory of operation. The guard sends a beat ten times a second. A guard that is silent for half a
-second, or gone, is killed for good, and another one is started at once. A guard that is ready to
-run but gets no processor time is not replaced: another one would get none either. A new guard knows
-nothing: its client briefs it before anything else.
+Theory of operation. The guard sends a beat ten times a second. A guard that has ended, or is silent
+for half a second, is killed and replaced at once. A guard that is ready to run but gets no
+processor time is not replaced, because a new guard would get none either. A new guard has no state:
+its client initialises it first.
 """
 
 import asyncio
@@ -23,17 +23,17 @@ from urc.guard.process import CAN_INHERIT, GuardAcceptor, ProcessState, launch, 
 __all__ = ["CAN_GUARD", "PipeChannel"]
 
 CAN_GUARD: Final = CAN_INHERIT or os.name == "nt"
-"""Whether this system can run the guard as a process of its own."""
+"""Whether this system can run the guard in a separate process."""
 _LOOK_S: Final = 0.1
 _SILENT_LOOKS: Final = 5
 _MOST_KEPT_LOOKS: Final = 15
-"""Largest number of silent looks that a busy machine excuses."""
+"""Limit of checks without a beat on a busy machine."""
 _START_LOOKS: Final = 100
-"""Silent looks allowed before the first beat: Python starts slowly on a busy machine."""
+"""Limit of checks before the first beat, because Python starts slowly on a busy machine."""
 _STEADY_S: Final = 0.5
-"""Shortest life of a guard that was started well. One that opened a line was, too."""
+"""Shortest life of a successfully started guard; opening a line also counts as success."""
 _AT_ONCE: Final = 3
-"""Guards with short lives that are replaced at once; further ones wait `_AGAIN_S`."""
+"""Number of short-lived guards that are replaced at once; later replacements wait `_AGAIN_S`."""
 _AGAIN_S: Final = 1.0
 _FINISH_S: Final = 3.0
 _DIED: Final = "the guard of this line ended; another one is starting"
@@ -42,14 +42,14 @@ log = logging.getLogger(__name__)
 
 
 class PipeChannel:
-    """The channel to a guard in a process of its own."""
+    """The channel to a guard in a separate process."""
 
     def __init__(self, listener: ChannelListener, *, is_inherited: bool = CAN_INHERIT) -> None:
         """Prepare; nothing runs before `start`.
 
         Args:
             listener: the client.
-            is_inherited: whether the process inherits its pipe. If not, it connects to a door.
+            is_inherited: whether the process inherits its pipe; otherwise it connects to a port.
         """
         self._listener = listener
         self._is_inherited = is_inherited
@@ -73,13 +73,13 @@ class PipeChannel:
 
     @property
     def pid(self) -> int:
-        """Number of the process; 0 without one."""
+        """Id of the guard's process; 0 without a process."""
         return 0 if self._process is None else self._process.pid
 
     # -- messages
 
     def post(self, message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
-        """Send a message; dropped without a guard. See `urc.guard.channel.Channel`."""
+        """Send a message, or drop it without a guard. See `urc.guard.channel.Channel`."""
         if self._pipe is not None:
             self._pipe.post(message, slot=slot, is_urgent=is_urgent)
 
@@ -89,11 +89,11 @@ class PipeChannel:
             self._pipe.drop(slot)
 
     async def ready(self) -> None:
-        """Return when there is a guard that was briefed."""
+        """Return once a guard is initialised."""
         await self._is_up.wait()
 
     def now(self) -> float:
-        """Return this machine's monotonic time, which the guard's process reads, too."""
+        """Return this machine's monotonic time, which the guard's process shares."""
         return time.monotonic()
 
     def _handle(self, message: messages.FromGuard) -> None:
@@ -105,7 +105,7 @@ class PipeChannel:
     # -- from start to end
 
     def start(self) -> None:
-        """Start the process; needs a running loop. It is briefed as soon as it is connected."""
+        """Start the process, which needs a running loop, and initialise it once connected."""
         loop = asyncio.get_running_loop()
         self._started_s = loop.time()
         try:
@@ -150,7 +150,7 @@ class PipeChannel:
         self._look = loop.call_at(self._look_s, self._watch)
 
     async def finish(self) -> None:
-        """Let the guard stop everything and end; within 3 s it has."""
+        """Let the guard stop all controls and end, within 3 s."""
         self._is_finishing = True
         if self._look is not None:
             self._look.cancel()
@@ -182,7 +182,7 @@ class PipeChannel:
     # -- the watch
 
     def _watch(self) -> None:
-        """Look whether the guard is alive, and again after `_LOOK_S`."""
+        """Check that the guard is alive, every `_LOOK_S`."""
         loop = asyncio.get_running_loop()
         # A late look counts for nothing: this process slept, and beats may be unread.
         if loop.time() - self._look_s < _LOOK_S and not self._is_kept():
@@ -197,7 +197,7 @@ class PipeChannel:
         self._look = loop.call_at(self._look_s, self._watch)
 
     def _is_kept(self) -> bool:
-        """Return whether a silent guard is ready to run, but the system gives it no time."""
+        """Return whether a silent guard is ready to run, but gets no processor time."""
         if not self._silent_looks or self._kept_looks >= _MOST_KEPT_LOOKS:
             return False
         before, self._standing = self._standing, standing(self.pid)
@@ -208,7 +208,7 @@ class PipeChannel:
         return is_kept
 
     def _died(self) -> None:
-        """Start another guard, unless this one was to end."""
+        """Start a new guard, unless the end was requested."""
         self._gone.set()
         self._pipe = None
         if self._look is not None:
@@ -229,7 +229,7 @@ class PipeChannel:
         self._listener.lost(_DIED)
 
     def _bury(self) -> None:
-        """Kill the process for good: never two guards on one line."""
+        """Kill the process, so that a line never has two guards."""
         process, self._process = self._process, None
         if process is not None:
             with suppress(ProcessLookupError):

@@ -125,7 +125,9 @@ class ProcessState(NamedTuple):
     """The state of a process, as the system reports it."""
 
     wants_to_run: bool = False
-    """Whether it runs, or waits for a processor or a disk: it neither sleeps nor is stopped."""
+    """Whether the process runs, or waits for a processor or a disk: it neither sleeps nor is
+    stopped.
+    """
     ran_s: float = 0.0
     """Processor time of its first thread, in seconds."""
 

@@ -1,6 +1,6 @@
-"""A transport whose real one lives elsewhere: the five members, by messages.
+"""The engine's proxy of a transport in the guard: the five members, by messages.
 
-What it is told of an earlier connection it does not take: each has its turn.
+Messages about an earlier connection are ignored: each connection has its turn.
 """
 
 import asyncio
@@ -23,7 +23,7 @@ _OPEN_GRACE_S: Final = 0.7
 _CLOSE_S: Final = 1.0
 _CREDIT_BYTES: Final = WINDOW_BYTES // 4
 _OFFERED_BYTES: Final = 65536
-"""What may be under way that nobody waits for."""
+"""Limit of pending bytes that no caller awaits."""
 _CLOGGED_BYTES: Final = 4096
 
 log = logging.getLogger(__name__)
@@ -34,20 +34,20 @@ Stands = Callable[[str, Mapping[str, int], bool], None]
 
 @dataclass(slots=True)
 class _Sent:
-    """Something that the guard has not handed over yet, as far as is known."""
+    """Data that the guard has not reported as handed over."""
 
     number: int
     size: int
     data: Payload
     taken: asyncio.Future[None] | None
-    """Who waits for it."""
+    """Future of the waiting caller."""
     counted: CountedFrame | None
     left: Callable[[Payload], None] | None
-    """Told what was handed over."""
+    """Receives the data that was handed over."""
 
 
 class GuardedTransport:
-    """One line, opened as often as it is needed. Also a `Prompt`."""
+    """The proxy of one line, over all its connections. Also a `Prompt`."""
 
     def __init__(
         self,
@@ -60,12 +60,12 @@ class GuardedTransport:
         """Prepare.
 
         Args:
-            name: of the line.
-            address: where it leads, for people.
-            post: passes a message on; never waits.
-            ready: returns when there is somebody who takes it.
-            stands: told how the counters of the line stand, and whether nothing with a counter is
-                under way.
+            name: name of the line.
+            address: address of the robot, for people.
+            post: passes a message to the guard without waiting.
+            ready: returns once a guard is ready.
+            stands: receives the counters of the line, and whether no frame with a counter is
+                pending.
         """
         self._stands = stands
         self._name = name
@@ -75,7 +75,7 @@ class GuardedTransport:
         self._turn = 0
         self._is_open = False
         self._is_known = False
-        """Whether the guard may have something of this turn."""
+        """Whether the guard may have data of this turn."""
         self._opening: asyncio.Future[str] | None = None
         self._closing: asyncio.Future[None] | None = None
         self._ended = _CLOSED
@@ -83,21 +83,21 @@ class GuardedTransport:
         self._arrived = asyncio.Event()
         self._sink: Callable[[bytes], bool] | None = None
         self._taken_bytes = 0
-        """Not told to the guard yet."""
+        """Received bytes that are not acknowledged to the guard yet."""
         self._number = 0
         self._under_way: deque[_Sent] = deque()
         self._round = 0
-        """How often the guard has refused what was under way."""
+        """Number of times that the guard has refused pending frames."""
         self._under_way_bytes = 0
 
     @property
     def address(self) -> str:
-        """Where it leads, for people."""
+        """Address of the robot, for people."""
         return self._address
 
     @property
     def is_open(self) -> bool:
-        """Whether it is connected, by the newest word of the guard."""
+        """Whether the line is connected, by the last report of the guard."""
         return self._is_open
 
     async def open(self, timeout_s: float) -> None:
@@ -123,7 +123,7 @@ class GuardedTransport:
             raise ConnectFailed(fault)
 
     async def receive(self) -> Payload:
-        """Return what arrived next; raise `PeerClosed` when no more will come."""
+        """Return the next received data; raise `PeerClosed` at the end."""
         while not self._receiver:
             if not self._is_open:
                 raise PeerClosed(self._ended)
@@ -142,7 +142,7 @@ class GuardedTransport:
         await taken
 
     async def close(self) -> None:
-        """Close at once. Never raises, may be called twice."""
+        """Close at once. The call never raises; a second call does nothing."""
         self._end(_CLOSED)
         self._ended = _CLOSED
         self._receiver.clear()
@@ -156,17 +156,17 @@ class GuardedTransport:
     # -- a `Prompt`
 
     def offer(self, data: bytes) -> bool:
-        """Pass `data` on; return whether it was taken."""
+        """Pass `data` on; return whether the proxy accepted it."""
         if not self._is_open or self._under_way_bytes + len(data) > _OFFERED_BYTES:
             return False
         self._enqueue(data, None)
         return True
 
     def offer_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> bool:
-        """Pass a frame with counters on, which is made again until its numbers are the next ones.
+        """Pass on a frame with counters, and render it again until its numbers are the next ones.
 
         Returns:
-            Whether it was taken; then `left` is told what was handed over.
+            Whether the frame was accepted; `left` then receives the data that was handed over.
         """
         if not self._is_open or self._under_way_bytes > _OFFERED_BYTES:
             return False
@@ -174,7 +174,11 @@ class GuardedTransport:
         return True
 
     async def send_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> None:
-        """Do the same, waiting while the line is full; raise `TransportError` if it broke."""
+        """Pass on a frame with counters, or wait while the line is full.
+
+        Raises:
+            TransportError: the line broke.
+        """
         if not self._is_open:
             raise PeerClosed(self._ended)
         taken: asyncio.Future[None] = asyncio.get_running_loop().create_future()
@@ -183,17 +187,17 @@ class GuardedTransport:
 
     @property
     def is_clogged(self) -> bool:
-        """Whether so much is under way that one should wait for it."""
+        """Whether the pending data has reached its limit."""
         return self._under_way_bytes > _CLOGGED_BYTES
 
     def divert(self, sink: Callable[[bytes], bool]) -> None:
-        """Let `sink` have what arrives, until the line is closed."""
+        """Pass received data to `sink` until the line is closed."""
         self._sink = sink
 
     # -- what is told
 
     def lost(self, reason: str) -> None:
-        """Take note that the guard is gone, and every line with it."""
+        """Record the end of the guard, which closes every line."""
         self._end(reason)
         self._is_known = False
         if self._opening is not None and not self._opening.done():
@@ -201,7 +205,7 @@ class GuardedTransport:
         self._closed()
 
     def handle(self, said: messages.FromGuard, size: int) -> None:
-        """Take what is said of this line; it counts for `size` bytes, here and in the guard."""
+        """Handle a message about this line; it counts for `size` bytes on both sides."""
         match said:
             case messages.BytesReceived(turn=turn, data=data) if (
                 turn == self._turn and self._is_open
@@ -254,7 +258,7 @@ class GuardedTransport:
         self._arrived.set()
 
     def _count(self, size: int) -> None:
-        """Tell the guard, now and then, how much was taken."""
+        """Acknowledge received bytes to the guard in larger steps."""
         self._taken_bytes += size
         if self._taken_bytes >= _CREDIT_BYTES and self._is_open:
             amount, self._taken_bytes = self._taken_bytes, 0
@@ -329,7 +333,7 @@ class GuardedTransport:
                 taken.set_result(None)
 
     def _end(self, reason: str) -> None:
-        """Let everybody who waits know that it is over; the first reason stays."""
+        """Fail all waiting calls; the first reason stays."""
         if not self._is_open:
             return
         self._is_open = False

@@ -1,11 +1,11 @@
-"""Lets the guard run before everything ordinary, where the system allows it.
+"""Real-time priority of the guard, where the system allows it.
 
-It is the process for that: no template, pattern or parser of a document runs in it, and what it
-does in a turn is bounded. It has the lowest real-time priority (``SCHED_RR``, 1), so it goes before
-other programs, and after everything that somebody has put in order with more care. Two things keep
-it from starving the machine when it has a fault all the same: whoever runs for `LONGEST_S` without
-waiting is ordinary for `PAUSE_S`, and whoever goes on for `FATAL_S` is ended by the kernel, which
-the server notices. Threads and programs that it starts are ordinary.
+The guard suits this priority: it runs no template, pattern or parser of a document, and the work of
+each turn is bounded. The guard has the lowest real-time priority (``SCHED_RR``, 1), so it precedes
+ordinary programs, but no other real-time program. Two limits prevent a faulty guard from starving
+the machine. After `LONGEST_S` without waiting, the guard has ordinary priority for `PAUSE_S`. After
+`FATAL_S`, the kernel ends the guard, which the server detects. Child threads and programs have
+ordinary priority.
 """
 
 import os
@@ -18,7 +18,7 @@ from typing import Final
 __all__ = ["FATAL_S", "LONGEST_S", "PAUSE_S", "SWITCH", "RealTimePriority", "why_not"]
 
 SWITCH: Final = "URC_REAL_TIME"
-"""Environment variable; ``no``: it is not asked for."""
+"""Environment variable; ``no`` disables the priority."""
 LONGEST_S: Final = 0.1
 FATAL_S: Final = 2.0
 PAUSE_S: Final = 1.0
@@ -29,7 +29,7 @@ if sys.platform == "linux":
     import resource
 
     def _ask() -> str:
-        """Ask for it; return why it was not given, or ""."""
+        """Request the priority; return the reason of a refusal, or ""."""
         policy = os.SCHED_RR | os.SCHED_RESET_ON_FORK
         try:
             os.sched_setscheduler(0, policy, os.sched_param(_PRIORITY))
@@ -60,12 +60,12 @@ class RealTimePriority:
     """Of this process."""
 
     def __init__(self) -> None:
-        """Nothing is asked for yet."""
+        """Create the object without requesting the priority."""
         self._again_s: float | None = None
-        """When it may be asked for again, after too long a run."""
+        """Time of the next request, after a run that was too long."""
 
     def request(self) -> str:
-        """Ask for it; return why it was not given, or ""."""
+        """Request the priority; return the reason of a refusal, or ""."""
         if os.environ.get(SWITCH, "").lower() == "no":
             return f"{SWITCH} is no"
         refusal = _ask()
@@ -75,7 +75,7 @@ class RealTimePriority:
         return refusal
 
     def retry(self) -> None:
-        """Ask for it again when the pause after too long a run is over; called now and then."""
+        """Request the priority again after the pause; called regularly."""
         if self._again_s is not None and time.monotonic() >= self._again_s:
             self._again_s = None
             _ask()
@@ -86,7 +86,7 @@ class RealTimePriority:
 
 
 def why_not() -> str:
-    """Return why a guard that is started here would not have it, or ""."""
+    """Return the reason why a guard on this machine would lack the priority, or ""."""
     if os.environ.get(SWITCH, "").lower() == "no":
         return f"{SWITCH} is no"
     refusal = _ask()

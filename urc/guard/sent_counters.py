@@ -1,8 +1,8 @@
 """The counter values that were sent on one connection.
 
-The guard has no templates. It gets rendered frames, each with its effect on the counters. A frame
-is sent only while its values are the next ones. So the values on the wire rise without gaps, in any
-order of arrival here, and regardless of frames that were rendered in advance.
+The guard has no templates. The guard gets rendered frames, each with its effect on the counters. A
+frame is sent only while its values are the next ones. So the values on the wire rise without gaps,
+in any order of arrival here, and regardless of frames that were rendered in advance.
 """
 
 from collections.abc import Sequence

@@ -18,7 +18,7 @@ FINISH_S: Final = 2.0
 
 
 class GuardServer:
-    """All lines of one robot. All runs on one event loop, and no handler waits."""
+    """All lines of one robot. All handlers run on one event loop, and no handler waits."""
 
     def __init__(self, emit: Emit, clock: LaneClock) -> None:
         """Begin without lines; `emit` sends messages to the engine's side."""
