@@ -1,8 +1,8 @@
 """Processor time of the server and its guards for each driven robot.
 
 Rounds with idle and with driven robots alternate; the difference is the cost. Pages are open in
-both. A finger at rest repeats its values 20 times a second, and a moving one changes them in every
-frame of the page, so both rates are measured.
+both. A page repeats the values of a finger at rest 20 times a second. A moving finger changes them
+in every frame.
 """
 
 import statistics

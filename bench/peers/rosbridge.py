@@ -135,7 +135,7 @@ async def publish(line: ServerConnection, topic: str) -> None:
 
 
 async def meet(line: ServerConnection) -> None:
-    """Serve a client; it also publishes, which nobody receives."""
+    """Serve a client; its own publications are dropped."""
     tasks: dict[str, asyncio.Task[None]] = {}
     try:
         async for text in line:
