@@ -19,12 +19,13 @@ _SHOWN: Final = 40
 _WAITED_FOR: Final = {
     "length": "for the rest of its length",
     "fixed": "for the rest of a frame",
-    "sync": "for the rest of a frame",
     "idle": "for the silence that ends it",
     "slip": "for the byte that ends it",
     "cobs": "for the byte that ends it",
     "brackets": "for the bracket that ends it",
     "json": "for the end of the JSON",
+    "xml": "for the end of the XML element",
+    "regex": "for bytes that complete the pattern",
 }
 """Framing → the missing part of an incomplete frame."""
 
