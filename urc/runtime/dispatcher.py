@@ -376,7 +376,7 @@ class Dispatcher:
 
     def _arm_after(self, now: float) -> None:
         """Call `_arm` unless the timer is already early enough."""
-        # Without this check, a text poll costs 1.32 times a driver by hand, not 1.2 (decision 29).
+        # Without this check, a text poll costs 1.32 times a driver by hand, not 1.2 (decision 30).
         if self._alarm_s is None or self._alarm_s > now + self._calm_s:
             self._arm()
 
