@@ -23,7 +23,7 @@ from urc.protocol.requests.exchange import CompiledRequest
 from urc.protocol.requests.rate import Made
 from urc.protocol.sequences.commands import is_guarded, why_refused
 
-__all__ = ["MotionEncoder", "MotionRefused"]
+__all__ = ["MotionEncoder", "MotionUnavailable"]
 
 _SPARE_STOPS: Final = 24
 """Numbers that other frames may use before the stops are rendered again."""
@@ -31,7 +31,7 @@ _SPARE_STOPS: Final = 24
 Check = Callable[[Mapping[str, object]], dict[str, Reading]]
 
 
-class MotionRefused(UrcError):
+class MotionUnavailable(UrcError):
     """Motion that is refused now; the message gives the reason."""
 
 
@@ -179,8 +179,8 @@ class MotionEncoder:
 
         Raises:
             BadArgument: the command is not held, or an argument is invalid.
-            MotionRefused: the connection is not ready, the robot is silent, a requirement is not
-                met, or a confirmation is missing.
+            MotionUnavailable: the connection is not ready, the robot is silent, a requirement is
+                not met, or a confirmation is missing.
         """
         way = self._ways.get(command)
         if way is None:
@@ -190,13 +190,13 @@ class MotionEncoder:
             return b""
         values = way.check(arguments)
         if not (line.is_open and line.is_ready):
-            raise MotionRefused("the robot is not connected")
+            raise MotionUnavailable("the robot is not connected")
         if line.is_silent:
-            raise MotionRefused(f"the robot has said nothing for {line.spec.stale_after_s:g} s")
+            raise MotionUnavailable(f"the robot has said nothing for {line.spec.stale_after_s:g} s")
         if way.is_guarded:
             refused = why_refused(way.command, self._known, values, confirmed_by, now)
             if refused is not None:
-                raise MotionRefused(refused.message)
+                raise MotionUnavailable(refused.message)
         line.gave_motion(command, values, now)
         names = values if ask.is_local else {**self._known.names, **line.learnt, **values}
         if not ask.has_counters:

@@ -133,7 +133,7 @@ class MotionController:
     def attach(self, session: MotionSession) -> None:
         """Connect a session: its engine, movers and events. Send an outstanding stop."""
         self._frames, self._backend = session.frames, session.backend
-        session.on_motion = self.hear
+        session.on_motion = self.handle
         backend = self._backend
         if backend is not None and not self._unconfirmed.isdisjoint(self._holds):
             backend.stop(self._stop_frames(self._holds))
@@ -289,7 +289,7 @@ class MotionController:
             self._backend.release(command)
             self._renew_stops(control.line)  # the counter of this stop frame is used up
 
-    def hear(self, event: MotionEvent) -> None:
+    def handle(self, event: MotionEvent) -> None:
         """Handle an event of the engine."""
         match event:
             case NumbersUsed(line):

@@ -34,7 +34,6 @@ from urc.runtime.transport_chain import make_transports
 
 if TYPE_CHECKING:
     from urc.guard.guard_client import GuardClient
-    from urc.transports.base import Transport
 
 __all__ = ["CommandFailed", "Motion", "Session", "FifoEvent", "resolve_settings"]
 
@@ -127,9 +126,8 @@ class Session:
         self.settings = dict(settings)
         driver = profile.driver
         self._redactor = Redactor.of(profile, self.settings)
-        streams = (
-            name for name, spec in driver.transports.items() if spec.framing.type != "datagram"
-        )
+        specs = driver.transports.items()
+        streams = (name for name, spec in specs if spec.framing.type != "datagram")
         self.hub = Hub(driver.signals, self._redactor, streams)
         self._clock: Clock = clock or LoopClock()
         fresh = TimeAndNonce(time.time, secrets.token_bytes)
@@ -147,12 +145,7 @@ class Session:
             {name: program.sequence_control for name, program in engine.programs.items()},
             self._tell_motion,
         )
-        self._links = self._made_links(
-            make_transports(driver, self.settings, transports)
-            if self.backend is None
-            else self.backend.transports,
-            random,
-        )
+        self._links = self._made_links(transports, random)
         self.on_motion: Callable[[MotionEvent], None] | None = None
         """Takes the engine's events of held commands: set by `MotionController.attach`."""
         self._stops = 0
@@ -177,10 +170,13 @@ class Session:
         backend.on_stand = partial(self._counters_told, engine)
         return backend
 
-    def _made_links(
-        self, transports: "Mapping[str, Transport]", random: Callable[[], float]
-    ) -> dict[str, Link]:
+    def _made_links(self, table: Table, random: Callable[[], float]) -> dict[str, Link]:
         driver = self.profile.driver
+        transports = (
+            make_transports(driver, self.settings, table)
+            if self.backend is None
+            else self.backend.transports
+        )
         links = {
             name: Link(
                 spec,

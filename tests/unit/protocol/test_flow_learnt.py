@@ -4,7 +4,7 @@ import pytest
 
 from tests.dialogue import Dialogue, driver_of
 from urc.protocol.events import Ready
-from urc.protocol.motion_encoder import MotionRefused
+from urc.protocol.motion_encoder import MotionUnavailable
 
 SESSION = """
 wire: keepalive: { every: 3s, send: "{{ _session }} ALIVE" }
@@ -99,7 +99,7 @@ def test_motion_knows_it() -> None:
     talk = Dialogue(SESSION).connect()
     motions = talk.engine.motions
     assert not motions.is_lasting("drive")
-    with pytest.raises(MotionRefused):
+    with pytest.raises(MotionUnavailable):
         motions.motion_frame("drive", {"v": 1}, 0.0)
     talk.says("HELLO abc")
     assert motions.motion_frame("drive", {"v": 1}, 0.0) == b"abc V 1\n"

@@ -8,7 +8,7 @@ from urc.model.payload import Count, CountedFrame, FrameVariants, Numbered, Payl
 from urc.problems import UrcError
 from urc.protocol.engine import Engine
 from urc.protocol.events import MotionReady, NumbersUsed, Ready, Replied, Request, Samples, Send
-from urc.protocol.motion_encoder import MotionEncoder, MotionRefused
+from urc.protocol.motion_encoder import MotionEncoder, MotionUnavailable
 from urc.protocol.requests.encode import BadArgument
 
 DRIVER = """
@@ -44,12 +44,12 @@ def test_what_stops_it_needs_neither_the_robot_nor_a_connection() -> None:
 def test_motion_needs_a_line_that_is_ready() -> None:
     """Nothing of it waits until there is one."""
     talk = Dialogue(DRIVER)
-    with pytest.raises(MotionRefused, match="the robot is not connected"):
+    with pytest.raises(MotionUnavailable, match="the robot is not connected"):
         talk.engine.motions.motion_frame("turn", {"v": 1}, 0)
     talk.connect()
     assert talk.engine.motions.motion_frame("turn", {"v": 1}, 0) == b"0 TURN 1\n"
     talk.engine.closed("wire", "gone", 1)
-    with pytest.raises(MotionRefused, match="the robot is not connected"):
+    with pytest.raises(MotionUnavailable, match="the robot is not connected"):
         talk.engine.motions.motion_frame("turn", {"v": 1}, 1)
 
 
@@ -57,11 +57,11 @@ def test_motion_needs_what_the_command_requires_at_each_tick() -> None:
     """The reason is the driver's own; old news is no news."""
     talk = Dialogue(DRIVER).connect()
     move = talk.engine.motions.motion_frame
-    with pytest.raises(MotionRefused, match="not in automatic mode"):
+    with pytest.raises(MotionUnavailable, match="not in automatic mode"):
         move("drive", {"v": 3}, 0.1)
     talk.says("MODE auto")
     assert move("drive", {"v": 3}, 0.2) == b"DRIVE 3 2\n"
-    with pytest.raises(MotionRefused, match="not in automatic mode"):
+    with pytest.raises(MotionUnavailable, match="not in automatic mode"):
         move("drive", {"v": 3}, 6.0)
 
 
@@ -84,7 +84,7 @@ def test_two_people_must_confirm_where_one_is_not_enough() -> None:
     engine.start("wire", 0)
     move = engine.motions.motion_frame
     for people in ((), ("ann",), ("ann", "ann"), ("ann", "")):
-        with pytest.raises(MotionRefused, match="two people must confirm"):
+        with pytest.raises(MotionUnavailable, match="two people must confirm"):
             move("turn", {"v": 1}, 0.1, people)
     assert move("turn", {"v": 1}, 0.1, ("ann", "bob")) == b"0 TURN 1\n"
 
@@ -181,7 +181,7 @@ def test_line_with_start_up_steps_is_ready_for_motion_after_them() -> None:
 
 def test_its_errors_are_of_one_kind() -> None:
     """Whoever asks catches one."""
-    assert issubclass(MotionRefused, UrcError)
+    assert issubclass(MotionUnavailable, UrcError)
     assert issubclass(BadArgument, UrcError)
 
 
@@ -213,7 +213,7 @@ def test_a_robot_that_says_nothing_any_more_is_not_moved() -> None:
     talk.at(1.9)
     assert move("turn", {"v": 1}, 1.9)
     talk.at(2.1)
-    with pytest.raises(MotionRefused, match="the robot has said nothing for 2 s"):
+    with pytest.raises(MotionUnavailable, match="the robot has said nothing for 2 s"):
         move("turn", {"v": 1}, 2.1)
     assert talk.engine.motions.stop_frame("turn"), "it is stopped all the same"
     talk.says("MODE manual")

@@ -311,13 +311,13 @@ def test_a_stop_before_the_login_is_repeated_after_it() -> None:
     assert it.heard() == []
     assert not it.controller.is_confirmed
     it.frames.is_greeted = True
-    it.controller.hear(MotionReady("air"))
+    it.controller.handle(MotionReady("air"))
     assert it.heard() == []
-    it.controller.hear(MotionReady("wire"))
+    it.controller.handle(MotionReady("wire"))
     assert it.heard() == ["stop drive"]
     it.controller.stopped("drive", "stopped")
     assert it.controller.is_confirmed
-    it.controller.hear(MotionReady("wire"))
+    it.controller.handle(MotionReady("wire"))
     assert it.heard() == [], "once is enough"
 
 
@@ -331,7 +331,7 @@ def test_a_stop_on_a_half_duplex_line_is_repeated_when_the_line_is_ready() -> No
     it.controller.stopped("drive", "revoked")
     assert not it.controller.is_confirmed
     it.frames.is_greeted = True
-    it.controller.hear(MotionReady("wire"))
+    it.controller.handle(MotionReady("wire"))
     assert it.heard() == ["stop drive"]
 
 
@@ -344,7 +344,7 @@ def test_a_line_that_the_guard_lost_is_not_ready_whatever_the_engine_knows() -> 
     it.backend.is_up = False
     it.controller.stopped("drive", "revoked")
     it.backend.is_up = True
-    it.controller.hear(MotionReady("wire"))
+    it.controller.handle(MotionReady("wire"))
     assert it.heard() == ["stop drive"]
 
 
@@ -354,7 +354,7 @@ def test_a_stop_on_a_line_that_is_ready_is_not_repeated() -> None:
     it.tick(speed=0.5)
     it.controller.stopped("drive", "expired")
     it.heard()
-    it.controller.hear(MotionReady("wire"))
+    it.controller.handle(MotionReady("wire"))
     assert it.heard() == []
 
 
@@ -425,7 +425,7 @@ def test_a_robot_that_refuses_ends_the_motion_in_its_own_words() -> None:
     told: list[tuple[str, str]] = []
     it.controller.on_refused = lambda command, why: told.append((command, why))
     it.heard()
-    it.controller.hear(MotionRefused("wire", "drive", "the guard is open"))
+    it.controller.handle(MotionRefused("wire", "drive", "the guard is open"))
     assert it.heard() == ["release drive"]
     assert told == [("drive", "the guard is open")]
     assert it.tick(speed=0.5) == "the guard is open"
@@ -442,9 +442,9 @@ def test_a_refusal_of_what_does_not_move_changes_nothing() -> None:
     it.tick(speed=0.5)
     it.controller.release("ann", "drive")
     it.heard()
-    it.controller.hear(MotionRefused("wire", "drive", "too late"))
-    it.controller.hear(MotionRefused("wire", "lift", "it never moved"))
-    it.controller.hear(MotionRefused("wire", "beep", "it is not held"))
+    it.controller.handle(MotionRefused("wire", "drive", "too late"))
+    it.controller.handle(MotionRefused("wire", "lift", "it never moved"))
+    it.controller.handle(MotionRefused("wire", "beep", "it is not held"))
     assert it.heard() == []
     assert it.tick(speed=0.5) == ""
 

@@ -25,7 +25,7 @@ def test_a_new_session_owes_no_stop_to_what_rests() -> None:
     it = Scene()
     it.controller.detach()
     it.controller.attach(FakeSession(it.frames, it.backend))
-    it.controller.hear(MotionReady("wire"))
+    it.controller.handle(MotionReady("wire"))
     assert it.heard() == []
 
 

@@ -92,5 +92,5 @@ def test_refusal_ends_the_motion_also_without_a_listener() -> None:
     it.drive("ann", "take")
     it.tick(speed=0.5)
     it.heard()
-    it.controller.hear(MotionRefused("wire", "drive", "too steep"))
+    it.controller.handle(MotionRefused("wire", "drive", "too steep"))
     assert it.heard() == ["release drive"]

@@ -398,7 +398,7 @@ async def test_the_words_of_a_robot_that_refuses_to_move_are_told_at_its_control
         it.say(ann, "take")
         it.tick(ann)
         it.read(bob)
-        it.controls.controller.hear(MotionRefused("wire", "drive", "the guard is open"))
+        it.controls.controller.handle(MotionRefused("wire", "drive", "the guard is open"))
         for operator in (ann, bob):
             (told,) = [one for one in it.read(operator) if one["t"] == "refused"]
             assert (told["command"], told["message"]) == ("drive", "the guard is open")
