@@ -1,6 +1,6 @@
 """Time until a robot stops after its guard is killed while the robot is driven.
 
-Another guard replaces it within half a second, and sends the stop before anything else.
+A new guard replaces the killed guard within half a second, and sends the stop first.
 """
 
 import tempfile

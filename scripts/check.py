@@ -1,8 +1,8 @@
 """The command `./dev test`: lint, types and every test, in a fixed order, with one summary.
 
 `./dev test quick` leaves out the tests with real servers and browsers; it needs only Node. A failed
-step does not stop the ones after it. Exit code 0 when all passed, 1 otherwise. A test without its
-program is left out by name; with ``CI=true`` that is a failure.
+step does not stop later steps. Exit code 0 when all passed, 1 otherwise. A test without its program
+is left out by name; with ``CI=true`` that is a failure.
 """
 
 import hashlib

@@ -37,7 +37,7 @@ class Need:
 
     name: str
     executables: tuple[str, ...]
-    """Any one of them is enough."""
+    """Alternative executables; one is enough."""
     package: str
     """Debian packages, separated by spaces; "" for a program from npm."""
     purpose: str

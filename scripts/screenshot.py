@@ -41,7 +41,7 @@ class Shot:
 
 
 def main() -> int:
-    """Take the README's picture, or all of them; return the exit code."""
+    """Take the README's picture, or all pictures; return the exit code."""
     parser = argparse.ArgumentParser(prog="screenshot", description="Picture the dashboard.")
     parser.add_argument("--all", type=Path, metavar="FOLDER", help="every screen and theme")
     folder = parser.parse_args().all

@@ -2,7 +2,8 @@
 
 Each robot is a socket that stores received frames in order and answers polls. A session with its
 guard drives the robots. Each gesture uses its own connection. A control is held for seconds,
-sometimes together with a second control. Then both are released, or their lease expires.
+sometimes together with a second control. Then all held controls are released, or their leases
+expire.
 """
 
 import asyncio

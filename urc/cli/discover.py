@@ -135,7 +135,7 @@ async def _nearby(
 ) -> tuple[list[Row], str]:
     """Return the open ports of shipped robots, at their defaults on this machine or at given hosts.
 
-    A rosbridge among them also gives its topics.
+    An answering rosbridge also reports its topics.
     """
     from urc.transports.discover_local import listening
 

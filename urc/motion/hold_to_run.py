@@ -32,7 +32,7 @@ Reason = Literal["released", "expired", "stopped", "revoked"]
 
 
 class HoldTerms(NamedTuple):
-    """The terms of an armed control. Only its stop changes while it moves."""
+    """The terms of an armed control. Only the stop frame changes during the motion."""
 
     stop: Payload
     """Frame that stops the motion, framing included. It is empty for a robot that moves in steps:

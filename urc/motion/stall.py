@@ -1,6 +1,6 @@
 """Detection of stalled lines, by the age of the oldest unsent byte.
 
-Only the number of unsent bytes is known. It grows with each write, and shrinks with each
+Only the number of unsent bytes is known. The number grows with each write, and shrinks with each
 acknowledgement, in the same order. So its course gives the time at which the oldest unsent byte was
 written. The number alone says nothing: a busy line may always have unsent bytes.
 """

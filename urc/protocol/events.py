@@ -108,7 +108,7 @@ class Violation(NamedTuple):
 class NumbersUsed(NamedTuple):
     """Counters of this line advanced: the stop frames rendered so far have used numbers.
 
-    Only of a line whose counters are shared with motion (`MotionEncoder.share`).
+    The event occurs only on lines whose counters are shared with motion (`MotionEncoder.share`).
     """
 
     transport: str

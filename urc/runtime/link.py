@@ -2,9 +2,9 @@
 
 Theory of operation. `run` is a loop of three waits. The loop waits for a reason to connect: a
 persistent link always has one; else the engine sends `Open`, or each request opens the link. Then
-it waits for the backoff, and for the end of the connection. A reader and a writer run while the
-connection is open. Every end (by the robot, the engine or a rule below) goes through `_end`, and
-one place stops both tasks.
+the loop waits for the backoff, and for the end of the connection. A reader and a writer run while
+the connection is open. Every end (by the robot, the engine or a rule below) goes through `_end`,
+and one place stops both tasks.
 
 A connection is good from its first good frame, and only that resets the backoff. So URC does not
 hammer a robot that accepts connections and closes them. With steps of a connection
@@ -115,7 +115,7 @@ class Link:
         self._heard_s = self._clock.now()
         self._is_reader_waiting = False
         self._is_ready = not self._spec.on_connect
-        """Whether the steps of the connection are done, or missing."""
+        """Whether the steps of the connection are done; true without steps."""
         self._has_heard = False
         """Whether a good frame arrived before the steps were done."""
         self._has_stood = False

@@ -1,4 +1,4 @@
-"""The widgets that a document can use: those of URC, and those that came with the document."""
+"""Widgets available to a document: those of URC, and those of the document's package."""
 
 from os import PathLike
 from pathlib import Path

@@ -232,7 +232,7 @@ class SupportsEnd(Protocol):
 
 
 def unsent_of(stream: ByteStream | None) -> int:
-    """Return the unsent bytes of a stream; 0 if it cannot count them."""
+    """Return the number of unsent bytes of a stream; 0 if the stream cannot count them."""
     if stream is not None and isinstance(stream, SupportsUnsent):
         return stream.unsent()
     return 0

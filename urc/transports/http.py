@@ -2,7 +2,7 @@
 
 A request counts as sent once its bytes are in the kernel; `receive` returns its response. The
 number of concurrent requests is limited. When a further request waits too long, the oldest one is
-dropped. No request waits for a lost connection: it fails at once.
+dropped. A request on a lost connection fails at once.
 """
 
 import asyncio

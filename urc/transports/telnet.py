@@ -142,8 +142,8 @@ class _TelnetStream:
 def _acknowledge(line: socket.socket) -> None:
     """Acknowledge the received bytes at once.
 
-    Telnet servers send small segments and wait for each acknowledgement. A delayed one costs 40 ms
-    per command. The system resets this option with every read.
+    Telnet servers send small segments and wait for each acknowledgement. A delayed acknowledgement
+    costs 40 ms per command. The system resets this option with every read.
     """
     if _QUICKACK is not None:
         with suppress(OSError):  # the connection is closing

@@ -3,11 +3,11 @@
 Pure. Each framing works in both directions, so that the emulated robot uses the same declaration
 (`reversed`).
 
-Theory of operation. A decoder removes frames from the front of a `ReceiveBuffer`, one per call. The
-rest stays there, so that another decoder can continue when a reply has its own framing. Memory is
-bounded: the buffer never exceeds the longest frame. Time is linear: bytes are scanned once, or
-again only within a `RescanBudget`. After invalid bytes the decoder reports one violation, and
-continues where the next frame may begin.
+Theory of operation. A decoder removes frames from the front of a `ReceiveBuffer`, one per call.
+Remaining bytes stay in the buffer, so that another decoder can continue when a reply has its own
+framing. Memory is bounded: the buffer never exceeds the longest frame. Time is linear: bytes are
+scanned once, or again only within a `RescanBudget`. After invalid bytes the decoder reports one
+violation, and continues where the next frame may begin.
 """
 
 from collections.abc import Callable

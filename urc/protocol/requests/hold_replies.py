@@ -5,7 +5,7 @@ that replies to each frame is handled here: an acknowledgement is no stray frame
 the motion. An unsolicited refusal counts as well, such as that of a controller with an open guard.
 
 In half duplex, frames of motion wait for an outstanding reply, and queued requests wait for the
-replies to motion. Both waits are short, because a lost reply must not prevent motion. A stop
+replies to motion. These waits are short, because a lost reply must not prevent motion. A stop
 bypasses this module and never waits.
 
 A command expects replies from its first frame on, until the reply timeout of the newest frame.

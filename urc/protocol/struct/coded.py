@@ -1,4 +1,4 @@
-"""Numbers of a struct with encodings of their own: variable lengths, decimal digits, odd widths.
+"""Numbers of a struct with special encodings: variable lengths, decimal digits, odd widths.
 
 Pure. ``varint`` is LEB128 as in Protocol Buffers, ``zigzag`` their signed form. ``bcd`` has a
 decimal digit in each half of a byte. ``f32cdab`` has swapped words of 16 bits, and ``u14by7le``

@@ -6,7 +6,7 @@ never probe the other side. The figures are in docs/decisions. Here, roslibpy's 
 a list, which the transport sends over its own socket. The transport passes received data to the
 protocol. One object serves one connection, so nothing remains for the next one.
 
-No I/O, no task, no thread.
+The client has no I/O, task or thread.
 """
 
 from collections.abc import Callable, Mapping

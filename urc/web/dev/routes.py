@@ -1,7 +1,7 @@
 """Routes of the developer pages: traffic log, parser try-out and command preview of each robot.
 
-Layer 5. Only with ``--dev``, and only for holders of the start key, because the pages show all
-traffic of a robot. `urc.web.app` has at most one `Dev`.
+Layer 5. These routes exist only with ``--dev``, and only for holders of the start key, because the
+pages show all traffic of a robot. `urc.web.app` has at most one `Dev`.
 """
 
 import asyncio

@@ -1,7 +1,8 @@
 """The developer start page: one robot with fixed values, whose documents are read at each start.
 
-Layer 5. Only with ``--dev``, and only for holders of the start key. The developer page loads a
-saved document at once. This page reads all documents again, even without a noticed change.
+Layer 5. These routes exist only with ``--dev``, and only for holders of the start key. The
+developer page loads a saved document at once. This page reads all documents again, even without a
+noticed change.
 """
 
 import asyncio

@@ -1,9 +1,9 @@
 """Commands without a held control: the check of permission, and the effect of STOP.
 
-Layer 5. Only held commands need the lease. A command without it needs the role of an operator; a
-watcher gives none. A command that starts autonomous motion (``moves``) also fails while a STOP is
-latched or another operator drives. The engine checks the latch a second time, because a command may
-have waited in a queue or for a confirmation.
+Layer 5. Only held commands need the lease. A command without a lease needs the role of an operator;
+a watcher cannot give commands. A command that starts autonomous motion (``moves``) also fails while
+a STOP is latched or another operator drives. The engine checks the latch a second time, because a
+command may have waited in a queue or for a confirmation.
 """
 
 import asyncio

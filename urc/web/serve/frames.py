@@ -1,8 +1,8 @@
 """Finds WebSocket frames that hold one whole text message: nearly every tick is one.
 
 Layer 5, pure. It only reads. The WebSocket library handles everything else from the same bytes:
-fragments, control frames and protocol errors. Here those are only counted, to find the start of the
-next frame.
+fragments, control frames and protocol errors. This module only counts their bytes, to find the
+start of the next frame.
 """
 
 from typing import Final

@@ -102,7 +102,7 @@ class Authority(NamedTuple):
     """A host with its port, as in ``Host:`` or in an origin."""
 
     host: str
-    """Lower case; IPv6 in its brackets."""
+    """Host in lower case; an IPv6 address has its brackets."""
     port: int | None
     """None if the text has no port."""
 
