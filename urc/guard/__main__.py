@@ -46,7 +46,7 @@ async def _guard(line: socket.socket, priority: RealTimePriority) -> None:
     loop = asyncio.get_running_loop()
     over = asyncio.Event()
     for name in ("SIGTERM", "SIGHUP"):
-        with suppress(AttributeError, NotImplementedError):  # Windows: the pipe's end says it there
+        with suppress(AttributeError, NotImplementedError):  # Windows: the pipe ends instead
             loop.add_signal_handler(getattr(signal, name), over.set)
 
     def emit(said: messages.FromGuard) -> int:
@@ -79,11 +79,11 @@ async def _guard(line: socket.socket, priority: RealTimePriority) -> None:
             await host.finish()
     pipe.close()
     logging.shutdown()
-    os._exit(0)  # a library's thread or task that does not end must not keep the process
+    os._exit(0)  # threads and tasks of libraries must not keep the process alive
 
 
 def _line(place: str) -> socket.socket:
-    """Return our end of the pipe: inherited, or behind the server's door."""
+    """Return this end of the pipe: inherited, or a connection to the server's door."""
     if not place.startswith(DOOR):
         return socket.socket(fileno=int(place))
     line = socket.create_connection(("127.0.0.1", int(place.removeprefix(DOOR))), timeout=_ENTER_S)
@@ -94,15 +94,15 @@ def _line(place: str) -> socket.socket:
 
 def main() -> None:
     """Guard the lines of one robot until the pipe ends, or SIGTERM."""
-    # Ctrl-C reaches every process of the terminal: the server says what is to be done about it.
+    # Ctrl-C reaches every process of the terminal; the server decides how to react.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     logging.basicConfig(format="%(levelname)s: guard: %(message)s", level=logging.WARNING)
     line = _line(sys.argv[1])
     OWN_DOORS.learn(sys.argv[2:])
     gc.collect()
-    gc.freeze()  # what is loaded by now stays: no need to look through it again
+    gc.freeze()  # excludes all loaded modules from later collections
     priority = RealTimePriority()
-    priority.request()  # where it is refused, the guard is a process like others: see `urc doctor`
+    priority.request()  # after a refusal the priority is ordinary: see `urc doctor`
     run(_guard(line, priority))
 
 

@@ -43,7 +43,7 @@ _RESCUE_S: Final = 90.0
 _KEPT_S: Final = 6.0
 """Time for which a rescued line is kept for the engine."""
 _EVERY_S: Final = 0.05
-"""Shortest time between two attempts; five times as long if opening is expensive."""
+"""Shortest time between two attempts; five times as long for a line that is slow to open."""
 _SHORTEST_S: Final = 0.07
 _LONGEST_S: Final = 2.0
 """Bounds of the timeout of an attempt, a multiple of the time of successful attempts. An attempt
@@ -67,12 +67,12 @@ log = logging.getLogger(__name__)
 
 
 class GuardedConnection:
-    """A transport, its movers, and its connection."""
+    """A transport, its hold-to-run controls, and its connection."""
 
     def __init__(
         self, make: messages.MakeTransport, transport: Transport, emit: Emit, clock: LaneClock
     ) -> None:
-        """Prepare; nothing is opened yet."""
+        """Prepare; `open` opens the line."""
         self.name = make.line
         self.transport = transport
         self._emit = emit
@@ -130,7 +130,7 @@ class GuardedConnection:
         self._round = 0
         """Number of times that frames of the engine were refused because of used numbers."""
 
-    # -- what the engine says
+    # -- requests of the engine
 
     def open(self, turn: int, timeout_s: float) -> None:
         """Open the line; the result is reported by `LineOpened` or `OpenFailed`."""
@@ -157,17 +157,17 @@ class GuardedConnection:
     def send(self, said: messages.SendBytes) -> None:
         """Send a frame without motion; reported by `SendDone`, `SendRefused` or `SendStale`."""
         if said.turn != self._turn or not self._is_handed or said.round != self._round:
-            return  # of an earlier connection, or made again meanwhile
+            return  # from an earlier connection, or rendered again meanwhile
         data, number = said.data, said.number
         offer = self._offer if self._is_free() and isinstance(data, bytes) else None
         if offer is not None and not self._sent_counters.fits(said.count):
             self._refuse(number)
-        elif offer is None or not offer(data):  # type: ignore[arg-type] # no envelope, see above
+        elif offer is None or not offer(data):  # type: ignore[arg-type] # bytes, see above
             self._queue.push(partial(self._leave, said), number)
         else:
             self._count(said)
             if self._prompt is not None and self._prompt.is_clogged:
-                self._queue.push(lambda: b"", number)  # is handed over with the rest
+                self._queue.push(lambda: b"", number)  # replies after the data before it
             else:
                 self._acked = number
 
@@ -179,7 +179,7 @@ class GuardedConnection:
             self._refuse(said.number)
             return None
         self._count(said)
-        # Told once the transport has the frame: the engine may answer at once.
+        # Reported after the transport has the frame: the engine may reply at once.
         asyncio.get_running_loop().call_soon(self.scheduler.tell_counted)
         return said.data
 
@@ -307,7 +307,7 @@ class GuardedConnection:
             reason = str(fault)
         except Exception as bug:  # supervisor, as in `_attempt`
             reason = why_broken(bug)
-        # In a task of its own: one that went on here would grow with every cut.
+        # In a new task: recovering here would nest deeper with every cut.
         self._switch(self._recover(reason))
 
     async def _read(self) -> str:
@@ -315,14 +315,14 @@ class GuardedConnection:
             while self._credit <= 0:
                 self._credited.clear()
                 await self._credited.wait()
-                self._liveness.note_arrival()  # it is the engine that was slow
+                self._liveness.note_arrival()  # the engine was slow, not the robot
             self._is_reading = True
             try:
                 data = await self.transport.receive()
             finally:
                 self._is_reading = False
             self._pass_on(data)
-            await asyncio.sleep(0)  # a line that has always something must not hold up the stops
+            await asyncio.sleep(0)  # a busy line must not delay the stops
 
     def _arrived(self, data: bytes) -> bool:
         """Pass received data on at once, if no earlier data is waiting."""
@@ -340,7 +340,8 @@ class GuardedConnection:
 
     async def _recover(self, reason: str, *, is_abort: bool = False) -> None:
         """Close a broken line, inform the engine, and stop the robot if a stop is pending."""
-        is_abort = is_abort or self.scheduler.is_in_doubt  # else the kernel would send it later
+        # Without an abort, the kernel would send its buffered bytes later.
+        is_abort = is_abort or self.scheduler.is_in_doubt
         self._cut(reason)
         await self._close_transport(is_abort=is_abort)
         if self.scheduler.owes:
@@ -394,7 +395,7 @@ class GuardedConnection:
         try:
             while self.scheduler.owes and self._clock.now() < until_s:
                 began_s = self._clock.now()
-                # Where tries overlap, a way that has become long is no reason to give up.
+                # Overlapping attempts get more time: a slower network is no reason to give up.
                 enough_s = _LOG_IN_S if self._is_slow_to_open else _LONGEST_S
                 is_hurried = self._hurry.is_used
                 self._fault = await self._attempt(enough_s if is_hurried else self._patience_s)
@@ -422,7 +423,7 @@ class GuardedConnection:
         if self._is_handed:
             await self._serve()
         else:
-            self._switch(self._recover("nobody has asked for the line"))
+            self._switch(self._recover("the engine has not asked for the line"))
 
     def _in_vain(self) -> None:
         """Report the timeout to a waiting engine."""
@@ -436,7 +437,7 @@ class GuardedConnection:
             self._waiting.cancel()
             self._waiting = None
 
-    # -- what the lanes say
+    # -- reports of the send queues
 
     def _report_stop(self, control: str, reason: str, number: int) -> None:
         self._emit(messages.StopWritten(control, reason, number))  # type: ignore[arg-type]

@@ -97,7 +97,7 @@ class LivenessWatch:
             await transport.probe()
             self.note_arrival()
         except TransportError:
-            pass  # whoever reads the line is told
+            pass  # the reader of the line reports it
         except Exception as bug:  # supervisor: a foreign transport may raise what it likes
             why_broken(bug)
         finally:

@@ -36,7 +36,7 @@ _LONGEST_LOOK_S: Final = 0.02
 
 
 class MotionScheduler:
-    """The movers of one line."""
+    """The hold-to-run controls of one line."""
 
     def __init__(
         self,
@@ -78,7 +78,7 @@ class MotionScheduler:
         self._stale: list[tuple[str, int]] = []
         self._watch = StallWatch(stalled_s)
         self.queue: SendQueue[tuple[str, bool]] = SendQueue(transport, clock, self._sent)
-        """For what cannot be handed over at once."""
+        """Frames that the transport does not accept at once."""
         self._holds: dict[str, HoldToRun] = {}
         self._numbers: dict[str, int] = {}
         self._doubtful: set[str] = set()
@@ -91,7 +91,7 @@ class MotionScheduler:
 
     @property
     def owes(self) -> bool:
-        """Whether a control is to be stopped as soon as the line is open again."""
+        """Whether a control must be stopped as soon as the line is open again."""
         return any(hold_to_run.owes_stop for hold_to_run in self._holds.values())
 
     @property
@@ -101,7 +101,7 @@ class MotionScheduler:
 
     @property
     def is_settled(self) -> bool:
-        """Whether nothing moves, and every stop was handed over, as often as it is to be."""
+        """Whether nothing moves, and every stop and its repeats were handed over."""
         return self.queue.is_idle and all(one.state == "idle" for one in self._holds.values())
 
     @property
@@ -109,16 +109,16 @@ class MotionScheduler:
         """Whether a written frame may not have arrived."""
         return bool(self._doubtful)
 
-    # -- what controls are told
+    # -- requests for a control
 
     def arm(self, control: str, terms: HoldTerms) -> None:
-        """Take ticks of `control`."""
+        """Accept ticks of `control`."""
         self._hold_to_run(control, terms).arm()
 
     def tick(
         self, control: str, number: int, data: Payload, at_s: float, count: Count | None = None
     ) -> None:
-        """Take sampled input of the time `at_s`; no bytes renew the lease and write nothing."""
+        """Handle sampled input of the time `at_s`; empty `data` only renews the lease."""
         hold_to_run = self._holds.get(control)
         if hold_to_run is None:
             return
@@ -126,19 +126,19 @@ class MotionScheduler:
         self._counts[control] = count
         now = self._clock.now()
         if now - at_s >= hold_to_run.terms.lease_s:
-            return  # it waited so long that it renews nothing
+            return  # too old to renew the lease
         is_stale = not self._sent_counters.fits(count)
         if hold_to_run.tick(None if is_stale else data or None, min(at_s, now)) and is_stale:
             self._stale.append((control, number))
 
     def renew(self, control: str, stop: Payload, stops: tuple[Numbered, ...] = ()) -> None:
-        """Stop `control` with `stop` from now on."""
+        """Replace the stop frame of `control`."""
         hold_to_run = self._holds.get(control)
         if hold_to_run is not None:
             hold_to_run.renew(hold_to_run.terms._replace(stop=stop, stops=stops))
 
     def release(self, control: str) -> None:
-        """Stop what was let go."""
+        """Stop a control that was released."""
         hold_to_run = self._holds.get(control)
         if hold_to_run is not None:
             hold_to_run.stop("released", self._clock.now())
@@ -246,7 +246,7 @@ class MotionScheduler:
         if not self.queue.is_idle:
             return False
         if self._unsent is None or not (self._doubtful or self._is_strict):
-            return True  # all that was written has gone: asking the system would take its time
+            return True  # all written bytes have left: no system call needed
         unsent = self._unsent()
         self._watch.saw(unsent, now)
         if not unsent:
@@ -257,11 +257,11 @@ class MotionScheduler:
         if is_stop and self._unsent is not None:
             self._watch.saw(self._unsent(), now)
         if is_stop and self._forget is not None and not self._is_stop_under_way:
-            # Motion that is still on its way would come after its stop. Where another stop is, no
-            # motion has gone since, and that one is not to be given up.
+            # Unsent motion must not follow its stop. After an earlier stop no motion was written,
+            # and that stop must not be dropped.
             self._forget()
             self._watch.gave_up()
-        if data == b"":  # the step that moves the robot ends by itself
+        if data == b"":  # each step of this robot ends by itself
             self._report_stop(control)
             return
         self._is_stop_under_way |= is_stop
@@ -278,8 +278,8 @@ class MotionScheduler:
             if is_stop:
                 self._report_stop(control)
         if self._unsent is not None:
-            # What a message takes on the line is seen at the next look; a guess that is too high
-            # would make it seem that something had left.
+            # The next check measures the size of an envelope. A guess that is too high would look
+            # like progress.
             self._watch.wrote(len(data) if isinstance(data, bytes) else 0, now)
             self._doubtful.add(control)
             self._look_s = _LOOK_S
@@ -333,18 +333,18 @@ class MotionScheduler:
     # -- time
 
     def _set_alarm(self, now: float) -> None:
-        # What is due already waits for the line to be clear.
+        # Overdue motion waits for the line to be clear.
         dues = [one.deadline for one in self._holds.values() if one.state != "idle"]
         at_s = min((due for due in dues if due is not None), default=float("inf"))
         at_s = max(at_s, now + _LOOK_S)
         if self._is_watched or not self.queue.is_idle:
-            # The end of a line's time is looked for when it comes, not a look later.
+            # A stall is detected at its deadline, not at the next check.
             stalled_s = self._watch.deadline or at_s
             at_s = min(at_s, now + self._look_s, max(stalled_s, now))
         elif at_s == float("inf"):
             return
         if self._alarm is not None and self._alarm_s <= at_s:
-            return  # one that rings early finds nothing to do, and is set anew
+            return  # an early alarm finds nothing due, and is set again
         if self._alarm is not None:
             self._alarm.cancel()
         self._alarm_s = at_s
@@ -378,14 +378,14 @@ class MotionScheduler:
 
     @property
     def _is_wanted(self) -> bool:
-        """Whether motion waits to be written."""
+        """Whether motion is unwritten."""
         return any(hold_to_run.is_waiting for hold_to_run in self._holds.values())
 
     @property
     def _is_watched(self) -> bool:
         """Whether unsent bytes matter: they contain motion, or motion waits for them.
 
-        Motion waits for them if opening is expensive: a ping sent during a cut would block motion
-        until the cut ends, and old motion would then continue.
+        Motion waits for them on a line that is slow to open. A ping sent during a cut would block
+        motion until the cut ends, and old motion would then continue.
         """
         return bool(self._doubtful) or (self._is_strict and self._is_wanted)

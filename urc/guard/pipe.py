@@ -100,7 +100,7 @@ class Pipe:
             try:
                 taken = self._send(frame)
             except OSError:
-                taken = self._write(frame)  # what it may mean is seen there
+                taken = self._write(frame)  # handles the error
             if taken == size + _HEAD:
                 return size
             if taken:

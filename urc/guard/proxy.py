@@ -134,7 +134,7 @@ class GuardedTransport:
         return data
 
     async def send(self, data: Payload) -> None:
-        """Hand `data` over, waiting while the line is full; raise `TransportError` if it broke."""
+        """Hand `data` over, after a wait for space; raise `TransportError` on a broken line."""
         if not self._is_open:
             raise PeerClosed(self._ended)
         taken: asyncio.Future[None] = asyncio.get_running_loop().create_future()
@@ -194,7 +194,7 @@ class GuardedTransport:
         """Pass received data to `sink` until the line is closed."""
         self._sink = sink
 
-    # -- what is told
+    # -- messages of the guard
 
     def lost(self, reason: str) -> None:
         """Record the end of the guard, which closes every line."""
@@ -275,7 +275,7 @@ class GuardedTransport:
         sent = _Sent(self._number, size_of(data), data, taken, counted, left)
         self._under_way.append(sent)
         self._under_way_bytes += sent.size
-        try:  # noted before: the answer may come at once
+        try:  # recorded first: the reply may arrive at once
             self._pass(sent, None if counted is None else counted.numbered)
         except UNFIT as fault:
             self._under_way.pop()

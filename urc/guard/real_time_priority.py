@@ -44,20 +44,20 @@ if sys.platform == "linux":
         bounds = int(longest_s * 1e6), int(fatal_s * 1e6)
         resource.setrlimit(resource.RLIMIT_RTTIME, bounds)
 
-else:  # pragma: no cover - not on the systems that are tested
+else:  # pragma: no cover - not on the tested systems
 
     def _ask() -> str:
         return _NOT_HERE
 
     def _give_back() -> None:
-        """There is nothing."""
+        """Do nothing."""
 
     def _bound(longest_s: float, fatal_s: float) -> None:
-        """There is nothing."""
+        """Do nothing."""
 
 
 class RealTimePriority:
-    """Of this process."""
+    """The real-time priority of this process."""
 
     def __init__(self) -> None:
         """Create the object without requesting the priority."""

@@ -54,7 +54,7 @@ class SendQueue(Generic[_Tag]):
         *,
         after: "SendQueue[object] | None" = None,
     ) -> None:
-        """Prepare a lane.
+        """Prepare an empty queue.
 
         Args:
             sender: the transport.

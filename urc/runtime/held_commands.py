@@ -79,10 +79,10 @@ class MotionBackend(Protocol):
 
 
 class MotionSession(Protocol):
-    """The part of a session that a desk needs."""
+    """The part of a session that a motion controller needs."""
 
     on_motion: Callable[[MotionEvent], None] | None
-    """Takes the engine's events of held commands: the desk sets it."""
+    """Callback for the engine's events of held commands; set by the motion controller."""
 
     @property
     def frames(self) -> MotionFrames:
@@ -112,7 +112,7 @@ class HeldControl:
     motion_state: Literal["rest", "moving", "ending"] = "rest"
     """``ending``: released, and its stop is not reported as written yet."""
     stop: Payload | FrameVariants | None = None
-    """Stop frame of the command, as stored by the movers."""
+    """Stop frame of the command, as stored by the motion backend."""
     is_owed_again: bool = False
     """Whether its stop was sent before the transport was ready, and must be repeated."""
     needs_release: bool = False

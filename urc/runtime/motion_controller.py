@@ -2,17 +2,17 @@
 
 Theory of operation. Pages send ticks of sampled input, and releases. For each tick, the controller
 checks three things: the lease of the page, the age of the tick, and the arguments, by the engine.
-The controller then hands the frame to the movers, which own the connection and its time limits. The
-first tick of a gesture arms the control. The same tick also renders the stop frame, so that a stop
-needs neither the engine nor the document.
+The controller then hands the frame to the motion backend, which owns the connection and its time
+limits. The first tick of a gesture arms the control. The same tick also renders the stop frame, so
+that a stop needs neither the engine nor the document.
 
 A control that stopped without a release stays closed until its page releases it. So a stick that is
 still held after the link reconnects moves nothing.
 
 A controller outlives the sessions of its robot, because the latch also holds while the robot is
-disconnected. `attach` adds the engine and the movers of a session, `detach` removes them.
+disconnected. `attach` adds the engine and the backend of a session, `detach` removes them.
 
-The module is synchronous, and callers pass the time. The movers report their stops by `stopped`.
+The module is synchronous, and callers pass the time. The backend reports its stops by `stopped`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -84,7 +84,7 @@ class MotionController:
         self.on_change: Callable[[LeaseState], None] = _ignore
         """Called after each change of the lease, and after the confirmation of a stop."""
         self.on_moved: Moved = _unseen
-        """Called for each tick whose frame went to the movers; must neither block nor raise."""
+        """Called for each tick whose frame went to the backend; must neither block nor raise."""
         self.on_refused: Callable[[str, str], None] = _unrefused
         """Called with the control and the message when the robot refuses to move."""
 
@@ -131,7 +131,7 @@ class MotionController:
     # -- the robot
 
     def attach(self, session: MotionSession) -> None:
-        """Connect a session: its engine, movers and events. Send an outstanding stop."""
+        """Connect a session: its engine, backend and events. Send an outstanding stop."""
         self._frames, self._backend = session.frames, session.backend
         session.on_motion = self.handle
         backend = self._backend
@@ -139,7 +139,7 @@ class MotionController:
             backend.stop(self._stop_frames(self._holds))
 
     def detach(self) -> None:
-        """End the session: its movers stop all motion, and no control stays armed."""
+        """End the session: its backend stops all motion, and no control stays armed."""
         self._frames = self._backend = None
         for control in self._controls.values():
             control.is_owed_again = False
@@ -197,7 +197,7 @@ class MotionController:
     def halt(self) -> list[str]:
         """Stop all motion; a new motion needs a new gesture and a new lease.
 
-        Controls that the movers have already stopped get no second stop.
+        Controls that the backend has already stopped get no second stop.
 
         Returns:
             The commands that may have moved.
@@ -308,7 +308,7 @@ class MotionController:
         self.on_refused(command, why)
 
     def stopped(self, command: str, reason: Reason) -> None:
-        """Handle a report of the movers: the stop of a control was written."""
+        """Handle a report of the backend: the stop of a control was written."""
         control = self._controls.get(command)
         if control is None:
             return

@@ -79,7 +79,7 @@ class FakeFrames:
 
 
 class FakeSession:
-    """The part of a session that a desk needs."""
+    """The part of a session that a motion controller needs."""
 
     def __init__(self, frames: FakeFrames, backend: MotionBackend | None) -> None:
         self.frames = frames

@@ -1,6 +1,6 @@
-"""The controls of one robot: one motion desk, and one operator session for each page.
+"""The controls of one robot: one motion controller, and one operator session for each page.
 
-Layer 5. Nothing blocks: a page gets the newest lease, the newest heartbeat and one notice for each
+Layer 5. No call blocks: a page gets the newest lease, the newest heartbeat and one notice for each
 control when its socket is free. Ticks faster than any robot's rate are thinned: the newest wins,
 and the last one always arrives.
 """
@@ -41,7 +41,7 @@ Offered = Literal["in time", "one more", "no tick"]
 
 
 class ControlService:
-    """The motion desk of one robot and its pages."""
+    """The motion controller of one robot and its pages."""
 
     def __init__(
         self,
@@ -131,7 +131,7 @@ class ControlService:
             self._hub = None
             self.controller.detach()
             now = self._clock.now()
-            for command in self.commands:  # movers stop silently
+            for command in self.commands:  # these stops are not reported
                 self.recorder.stopped(command, "the robot was disconnected", now)
 
     async def _follow(self, backend: MotionBackend) -> None:

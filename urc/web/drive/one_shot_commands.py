@@ -64,7 +64,7 @@ class OneShotCommands:
         clock: Clock,
         recorder: AuditRecorder,
     ) -> None:
-        """Prepare; `controller` returns the current motion desk."""
+        """Prepare; `controller` returns the current motion controller."""
         self.driver = driver
         self._controller = controller
         self._clock = clock
