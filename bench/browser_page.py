@@ -5,7 +5,6 @@ Ages use one clock, the machine's monotonic clock. Robots send the time of this 
 """
 
 import asyncio
-import sys
 from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from pathlib import Path
 from playwright.async_api import Browser, CDPSession, Page
 
 from bench.harness import Result
-from bench.rig.programs import Program, Server
+from bench.rig.programs import Server
 from tests.e2e.browser import running_browser
 
 __all__ = [
@@ -25,7 +24,6 @@ __all__ = [
     "cost_of",
     "kept",
     "opened",
-    "peer",
     "running_browser",
     "served",
 ]
@@ -71,14 +69,6 @@ class Cost:
     fps: float
     frame_ms: float
     """Time of the main thread for each frame, in milliseconds."""
-
-
-@contextmanager
-def peer(script: str, *arguments: object) -> Iterator[int]:
-    """Run a program of ``peers/``; yield its port."""
-    command = [sys.executable, "-P", str(HERE / "peers" / script), *map(str, arguments)]
-    with Program(command) as program:
-        yield int(program.wait_for("ready", 30.0)[1])
 
 
 @contextmanager

@@ -21,9 +21,9 @@ from pathlib import Path
 from playwright.async_api import Browser, Error
 
 from bench.browser_ages import TooFew, ages
-from bench.browser_page import HERE, at_share, opened, peer, running_browser, served
+from bench.browser_page import HERE, at_share, opened, running_browser, served
 from bench.harness import Result
-from bench.rig.programs import Program
+from bench.rig.programs import Program, peer
 from hatch_build import npm_command
 from scripts.node import node_executable
 

@@ -18,12 +18,12 @@ from urllib.parse import quote
 
 from playwright.async_api import Browser, CDPSession, Page
 
-from bench.browser_page import opened, peer, running_browser
+from bench.browser_page import opened, running_browser
 from bench.figures import tell
 from bench.harness import Result
 from bench.kept import Kept
 from bench.processes import spent_s
-from bench.rig.programs import Server
+from bench.rig.programs import Server, peer
 
 __all__ = ["run"]
 

@@ -13,9 +13,10 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from bench.browser_page import Cost, cost_of, kept, opened, peer, running_browser, served
+from bench.browser_page import Cost, cost_of, kept, opened, running_browser, served
 from bench.harness import Result
 from bench.peers.feed import CHANNELS, is_whole
+from bench.rig.programs import peer
 
 __all__ = ["run"]
 

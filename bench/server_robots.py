@@ -16,12 +16,11 @@ from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
-from bench.browser_page import peer
 from bench.figures import tell
 from bench.harness import Result
 from bench.kept import Kept
 from bench.processes import cpu_s, own_mb, resident_mb, spent_s
-from bench.rig.programs import Program, Server
+from bench.rig.programs import Program, Server, peer
 
 __all__ = ["run"]
 

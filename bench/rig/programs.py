@@ -15,7 +15,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import IO, NamedTuple, Self, cast
@@ -29,6 +29,7 @@ __all__ = [
     "Robots",
     "Server",
     "can_relay",
+    "peer",
 ]
 
 HERE = Path(__file__).resolve().parent
@@ -153,6 +154,14 @@ class Program:
 
     def take(self, line: str) -> None:
         """Handle a line, in the reader's thread; for subclasses."""
+
+
+@contextlib.contextmanager
+def peer(script: str, *arguments: object) -> Iterator[int]:
+    """Run a program of ``peers/``; yield its port."""
+    command = [sys.executable, "-P", str(HERE.parent / "peers" / script), *map(str, arguments)]
+    with Program(command) as program:
+        yield int(program.wait_for("ready", 30.0)[1])
 
 
 def _script(name: str, *arguments: str) -> list[str]:

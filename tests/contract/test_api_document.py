@@ -65,12 +65,12 @@ def test_answers_are_what_the_document_says(app: Starlette, document: dict[str, 
 
     with TestClient(app, base_url=ADDRESS, headers={"origin": ADDRESS}, cookies=HERE) as client:
         assert client.get(DOCUMENT).json() == document
-        fits("Shelf", client.get("/api/v1/packages").json())
-        fits("Healthy", client.get("/healthz").json())
+        fits("PackageList", client.get("/api/v1/packages").json())
+        fits("HealthStatus", client.get("/healthz").json())
         gone = client.post("/api/v1/packages/remove", json={"package": "drivers/rover"})
-        fits("Gone", gone.json())
+        fits("RemovedPackages", gone.json())
         fits("Failure", client.post("/api/v1/job/agree", json={"number": 7}).json())
         saved = client.post("/api/v1/robots/rover/settings", json={"test": False})
         fits("SettingsAnswer", saved.json())
         with pytest.raises(jsonschema.ValidationError):
-            fits("Gone", {"gone": "all"})
+            fits("RemovedPackages", {"gone": "all"})
