@@ -17,13 +17,13 @@ from bench.rig.counters import gestures
 __all__ = ["run"]
 
 GESTURES, GESTURES_IF_FULL = 6, 100
-LANES, LANES_IF_FULL = 3, 12
+ROBOTS, ROBOTS_IF_FULL = 3, 12
 SHORTEST_S, LONGEST_S, LONGEST_IF_FULL_S = 5.0, 10.0, 60.0
 
 
 def run(*, full: bool) -> Sequence[Result]:
     """Run gestures until enough have counted."""
-    wanted, queues = (GESTURES_IF_FULL, LANES_IF_FULL) if full else (GESTURES, LANES)
+    wanted, robot_count = (GESTURES_IF_FULL, ROBOTS_IF_FULL) if full else (GESTURES, ROBOTS)
     longest_s = LONGEST_IF_FULL_S if full else LONGEST_S
     dice = random.Random(5)  # noqa: S311 - the same gestures in every run
     times = [round(dice.uniform(SHORTEST_S, longest_s), 1) for _ in range(wanted)]
@@ -32,7 +32,10 @@ def run(*, full: bool) -> Sequence[Result]:
         times.remove(float(str(row["lasted_s"])))
     asyncio.run(
         gestures(
-            times, queues=queues, seed=len(kept.rows), told=lambda one: kept.add(one._asdict())
+            times,
+            robot_count=robot_count,
+            seed=len(kept.rows),
+            told=lambda one: kept.add(one._asdict()),
         )
     )
     return _told(kept.end())

@@ -23,7 +23,7 @@ from bench.rig.programs import can_relay
 __all__ = ["run"]
 
 EACH, EACH_IF_FULL = 8, 200
-LANES, LANES_IF_FULL = 2, 6
+ROBOTS, ROBOTS_IF_FULL = 2, 6
 """Number of robots of each kind, all in parallel."""
 SHORTEST_S = 0.2
 LONGEST_S, LONGEST_IF_FULL_S = 3.0, 60.0
@@ -35,9 +35,9 @@ def run(*, full: bool) -> Sequence[Result]:
     if not can_relay():
         print(json.dumps({"left_out": "motion_cuts: needs root and /dev/net/tun"}))
         return []
-    each, queues = (EACH_IF_FULL, LANES_IF_FULL) if full else (EACH, LANES)
+    each, robot_count = (EACH_IF_FULL, ROBOTS_IF_FULL) if full else (EACH, ROBOTS)
     longest_s = LONGEST_IF_FULL_S if full else LONGEST_S
-    kinds = KINDS * queues
+    kinds = KINDS * robot_count
     dice = random.Random(3)  # noqa: S311 - the same cuts in every run
     plans = {kind: _spread(each, longest_s, dice) for kind in KINDS}
     with (
@@ -46,7 +46,7 @@ def run(*, full: bool) -> Sequence[Result]:
         ThreadPoolExecutor(len(kinds)) as threads,
     ):
         rig.cut(SHORTEST_S)  # starts the guards
-        done = [threads.submit(_queue, rig, queue, plans[kinds[queue]]) for queue in rig.queues]
+        done = [threads.submit(_cut_one, rig, index, plans[kinds[index]]) for index in rig.indexes]
         cuts = [cut for one in done for cut in one.result()]
     return [_told(kind, [one for one in cuts if one.kind == kind], each) for kind in KINDS]
 
@@ -59,7 +59,7 @@ def _spread(count: int, longest_s: float, dice: random.Random) -> list[tuple[flo
     return [(seconds, 0.1 + dice.random() * 0.8) for seconds in times]
 
 
-def _queue(rig: CutRig, queue: int, plan: list[tuple[float, float]]) -> list[Cut]:
+def _cut_one(rig: CutRig, index: int, plan: list[tuple[float, float]]) -> list[Cut]:
     """Run the rest of the plan in one of several parallel threads; repeat an invalid cut."""
     cuts: list[Cut] = []
     while True:
@@ -67,7 +67,7 @@ def _queue(rig: CutRig, queue: int, plan: list[tuple[float, float]]) -> list[Cut
             seconds, share = plan.pop()
         except IndexError:
             return cuts
-        cuts.append(rig.cut_one(queue, seconds, share))
+        cuts.append(rig.cut_one(index, seconds, share))
         if cuts[-1].is_excused and sum(one.is_excused for one in cuts) < len(cuts) / 2:
             plan.append((seconds, share))
 

@@ -17,7 +17,7 @@ from bench.rig.engine import ENGINE_DEATHS, EngineRig
 
 __all__ = ["repeated", "run", "said"]
 
-LANES = 20
+ROBOTS = 20
 EACH, EACH_IF_FULL = 40, 1000
 BIN_MS = 10
 MOST_BOUTS = 3
@@ -28,18 +28,21 @@ def run(*, full: bool) -> Sequence[Result]:
     """Disturb the server; compare the slowest stop with the bound."""
     wanted = EACH_IF_FULL if full else EACH
     results: list[Result] = []
-    with tempfile.TemporaryDirectory() as folder, EngineRig(Path(folder), queues=LANES) as rig:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        EngineRig(Path(folder), robot_count=ROBOTS) as rig,
+    ):
         rig.bout("close")  # starts the guards
         for death in ENGINE_DEATHS:
-            trials = repeated(partial(rig.engine_bout, death), wanted, LANES)
+            trials = repeated(partial(rig.engine_bout, death), wanted, ROBOTS)
             results.append(said("motion_engine", death, trials, wanted, BIN_MS))
     return results
 
 
-def repeated(bout: Callable[[], list[Trial]], wanted: int, queues: int) -> list[Trial]:
+def repeated(bout: Callable[[], list[Trial]], wanted: int, robot_count: int) -> list[Trial]:
     """Repeat until enough trials are valid, or the machine is too busy."""
     trials: list[Trial] = []
-    for _ in range(MOST_BOUTS * wanted // queues):
+    for _ in range(MOST_BOUTS * wanted // robot_count):
         trials += bout()
         if sum(not one.is_excused for one in trials) >= wanted:
             break

@@ -15,7 +15,7 @@ from pathlib import Path
 from bench.figures import distribution, tell
 from bench.harness import Result
 from bench.motion_path import PROFILE, TimedPage, ticks_of
-from bench.rig.deaths import lane_profile
+from bench.rig.deaths import robot_profile
 from bench.rig.operator_process import Plan
 from bench.rig.programs import Operators, Robots, Server
 
@@ -48,7 +48,7 @@ def run(*, full: bool) -> Sequence[Result]:
                 way = tuple(WAYS)[number % len(WAYS)]
                 is_else = way == "flood elsewhere"
                 near = elsewhere if is_else else server
-                robot = "lane-2" if is_else else "lane-1"
+                robot = "robot-2" if is_else else "robot-1"
                 other = Plan(
                     number, "127.0.0.1", near.port, robot, WAYS[way], 0, life_s=LIFE_S, key=near.key
                 )
@@ -69,11 +69,11 @@ def run(*, full: bool) -> Sequence[Result]:
 
 def _profiles(folder: Path, ports: Sequence[int]) -> tuple[list[Path], list[Path]]:
     """Write the documents of the measured server and the other server."""
-    path, *queues = folder / "path.yaml", folder / "lane-1.yaml", folder / "lane-2.yaml"
+    path, *others = folder / "path.yaml", folder / "robot-1.yaml", folder / "robot-2.yaml"
     path.write_text(PROFILE.format(port=ports[0]), "utf-8")
-    for number, queue in enumerate(queues, 1):
-        queue.write_text(lane_profile(number, "127.0.0.1", ports[number]), "utf-8")
-    return [path, queues[0]], [queues[1]]
+    for number, file in enumerate(others, 1):
+        file.write_text(robot_profile(number, "127.0.0.1", ports[number]), "utf-8")
+    return [path, others[0]], [others[1]]
 
 
 def _result(taken: dict[str, list[list[float]]], rounds: int) -> Result:

@@ -18,23 +18,23 @@ from bench.rig.freeze import HEARD_MS, STOP_MS, Freeze, freeze
 __all__ = ["run"]
 
 TRIALS, TRIALS_IF_FULL = 4, 100
-LANES, LANES_IF_FULL = 2, 10
+ROBOTS, ROBOTS_IF_FULL = 2, 10
 BIN_MS = 10
 
 
 def run(*, full: bool) -> Sequence[Result]:
     """Freeze until enough trials have counted."""
-    wanted, queues = (TRIALS_IF_FULL, LANES_IF_FULL) if full else (TRIALS, LANES)
+    wanted, robot_count = (TRIALS_IF_FULL, ROBOTS_IF_FULL) if full else (TRIALS, ROBOTS)
     kept = Kept(f"motion_freeze-{wanted}")
     while (left := wanted - len(_counted(kept.rows))) > 0:
         if len(kept.rows) >= 2 * wanted:
             break  # the machine is too busy
-        at_once = min(queues, left)
+        at_once = min(robot_count, left)
         rounds = -(-left // at_once)
         asyncio.run(
             freeze(
                 rounds,
-                queues=at_once,
+                robot_count=at_once,
                 seed=len(kept.rows),
                 told=lambda one: kept.add({**one._asdict(), "excused": one.is_excused}),
             )

@@ -13,7 +13,7 @@ from bench.rig.engine import EngineRig
 
 __all__ = ["run"]
 
-LANES = 4
+ROBOTS = 4
 KILLED, KILLED_IF_FULL = 20, 200
 BIN_MS = 50
 
@@ -21,7 +21,10 @@ BIN_MS = 50
 def run(*, full: bool) -> Sequence[Result]:
     """Kill guards; compare the slowest stop with the bound."""
     wanted = KILLED_IF_FULL if full else KILLED
-    with tempfile.TemporaryDirectory() as folder, EngineRig(Path(folder), queues=LANES) as rig:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        EngineRig(Path(folder), robot_count=ROBOTS) as rig,
+    ):
         rig.bout("close")
-        trials = repeated(rig.guard_bout, wanted, LANES)
+        trials = repeated(rig.guard_bout, wanted, ROBOTS)
     return [said("motion_guard", "guard-killed", trials, wanted, BIN_MS)]

@@ -34,16 +34,16 @@ def run(*, full: bool) -> Sequence[Result]:
         return []
     lasts_s = LASTS_IF_FULL_S if full else LASTS_S
     with tempfile.TemporaryDirectory() as folder, CutRig(Path(folder), KINDS) as rig:
-        for queue in rig.queues:
-            rig.drive_once(queue, lasts_s + SPARE_S)
+        for index in rig.indexes:
+            rig.drive_once(index, lasts_s + SPARE_S)
         time.sleep(SETTLED_S)
         from_ns = time.monotonic_ns()
         time.sleep(lasts_s)
-        return [_told(rig, queue, from_ns) for queue in rig.queues]
+        return [_told(rig, index, from_ns) for index in rig.indexes]
 
 
-def _told(rig: CutRig, queue: int, from_ns: int) -> Result:
-    kind, texts = rig.kinds[queue], [one.text for one in rig.robots.since(queue, from_ns)]
+def _told(rig: CutRig, index: int, from_ns: int) -> Result:
+    kind, texts = rig.kinds[index], [one.text for one in rig.robots.since(index, from_ns)]
     seconds = (time.monotonic_ns() - from_ns) / 1e9
     figures = {"line": kind, "seconds": round(seconds), "motions": _motions(texts)}
     tell({"figure": "motion_idle", **figures, "stops": len(texts) - _motions(texts)})

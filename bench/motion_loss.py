@@ -20,7 +20,7 @@ from bench.rig.programs import can_relay
 
 __all__ = ["run"]
 
-LANES = 20
+ROBOTS = 20
 DELAY_MS = 50
 LOOK_S = 0.25
 CALM_S = 20.0
@@ -29,7 +29,7 @@ LATE_MS, LATE_WITHIN_NS = 50.0, 600_000_000
 MOST = {0: None, 1: 0.1, 3: 4.0}
 """Loss in percent → limit of stops a minute; None if only the machine causes stops."""
 LASTS_S, LASTS_IF_FULL_S = {0: 10, 1: 15, 3: 10}, {0: 60, 1: 180, 3: 60}
-"""Loss in percent → duration of the run, in seconds, with all lanes in parallel."""
+"""Loss in percent → duration of the run, in seconds, with all robots in parallel."""
 
 
 def run(*, full: bool) -> Sequence[Result]:
@@ -41,7 +41,7 @@ def run(*, full: bool) -> Sequence[Result]:
     results: list[Result] = []
     with (
         tempfile.TemporaryDirectory() as folder,
-        Rig(Path(folder), queues=LANES, has_relay=True) as rig,
+        Rig(Path(folder), robot_count=ROBOTS, has_relay=True) as rig,
     ):
         rig.bout("close")
         for loss, most in MOST.items():
@@ -61,38 +61,38 @@ def run(*, full: bool) -> Sequence[Result]:
 
 def _calm(rig: Rig) -> None:
     """Wait until the last pages are forgotten, so that their stops do not count later."""
-    for queue in rig.queues:
-        rig.robots.wait_until(partial(_is_still, rig, queue), CALM_S, "a robot at rest")
+    for index in rig.indexes:
+        rig.robots.wait_until(partial(_is_still, rig, index), CALM_S, "a robot at rest")
     time.sleep(LOOK_S)
 
 
-def _is_still(rig: Rig, queue: int) -> bool:
-    return rig.robots.heard[queue][-1].text == "M 0"
+def _is_still(rig: Rig, index: int) -> bool:
+    return rig.robots.heard[index][-1].text == "M 0"
 
 
 def _drive(rig: Rig, seconds: float, *, has_spare: bool) -> tuple[float, int, int]:
-    """Drive every lane; return the minutes of motion, and the numbers of stops.
+    """Drive every robot; return the minutes of motion, and the numbers of stops.
 
     The third number counts the stops after a delay of the machine.
     """
     until_s = time.monotonic() + seconds
-    pages = {queue: rig.drive(queue, has_spare=has_spare) for queue in rig.queues}
-    began_ns = {queue: time.monotonic_ns() for queue in pages}
+    pages = {index: rig.drive(index, has_spare=has_spare) for index in rig.indexes}
+    began_ns = {index: time.monotonic_ns() for index in pages}
     moved_ns = stops = excused = 0
     while time.monotonic() < until_s:
         time.sleep(LOOK_S)
-        for queue, number in pages.items():
-            heard = rig.robots.since(queue, began_ns[queue])
+        for index, number in pages.items():
+            heard = rig.robots.since(index, began_ns[index])
             if len(heard) > 1 and heard[-1].text == "M 0":
                 at_ns = heard[-1].time_ns
                 is_late = rig.late_ms(at_ns - LATE_WITHIN_NS, at_ns) > LATE_MS
                 stops, excused = stops + (not is_late), excused + is_late
                 moved_ns += heard[-1].time_ns - heard[0].time_ns
                 rig.operators.kill(number)
-                began_ns[queue] = time.monotonic_ns()
-                pages[queue] = rig.drive(queue, has_spare=has_spare)
-    for queue, number in pages.items():
-        heard = rig.robots.since(queue, began_ns[queue])
+                began_ns[index] = time.monotonic_ns()
+                pages[index] = rig.drive(index, has_spare=has_spare)
+    for index, number in pages.items():
+        heard = rig.robots.since(index, began_ns[index])
         moved_ns += heard[-1].time_ns - heard[0].time_ns if heard else 0
         rig.operators.kill(number)
     return moved_ns / 60e9, stops, excused

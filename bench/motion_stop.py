@@ -19,7 +19,7 @@ from bench.rig.programs import can_relay
 __all__ = ["run"]
 
 EACH, EACH_IF_FULL = 100, 1000
-LANES = 20
+ROBOTS = 20
 BIN_MS = 10
 MOST_BOUTS = 3
 """Limit of the bouts, relative to the needed ones, on a machine that is too busy."""
@@ -32,7 +32,7 @@ def run(*, full: bool) -> Sequence[Result]:
     has_relay = can_relay()
     with (
         tempfile.TemporaryDirectory() as folder,
-        Rig(Path(folder), queues=LANES, has_relay=has_relay) as rig,
+        Rig(Path(folder), robot_count=ROBOTS, has_relay=has_relay) as rig,
     ):
         rig.bout("close")  # starts the guards
         for death in DEATHS:
@@ -48,7 +48,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 def _trials(rig: Rig, death: str, wanted: int) -> list[Trial]:
     trials: list[Trial] = []
-    for _ in range(-(-MOST_BOUTS * wanted // LANES)):
+    for _ in range(-(-MOST_BOUTS * wanted // ROBOTS)):
         trials += rig.bout(death)
         if sum(not one.is_excused for one in trials) >= wanted:
             break

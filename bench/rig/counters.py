@@ -86,11 +86,11 @@ class _Robot(asyncio.DatagramProtocol):
 async def gestures(
     lasts_s: Sequence[float],
     *,
-    queues: int,
+    robot_count: int,
     seed: int = 1,
     told: Callable[[Gesture], None] | None = None,
 ) -> Sequence[Gesture]:
-    """Hold a control for each of these times, with `queues` robots in parallel."""
+    """Hold a control for each of these times, with `robot_count` robots in parallel."""
     dice = random.Random(seed)  # noqa: S311 - the same gestures in every run
     left, done = list(lasts_s), list[Gesture]()
 
@@ -102,7 +102,7 @@ async def gestures(
                 told(gesture)
 
     async with asyncio.TaskGroup() as group:
-        for _ in range(queues):
+        for _ in range(robot_count):
             group.create_task(work())
     return done
 

@@ -115,16 +115,16 @@ class CutRig:
         self.relay = enter(Relay())
         here, there = self.relay.inside("a"), self.relay.inside("b")
         others = [
-            start_counterpart(kind, queue, folder, there) for queue, kind in enumerate(self.kinds)
+            start_counterpart(kind, index, folder, there) for index, kind in enumerate(self.kinds)
         ]
         for other in others:
             if other is not None:
                 enter(other)
-        places = [place_of(kind, queue) for queue, kind in enumerate(self.kinds)]
+        places = [place_of(kind, index) for index, kind in enumerate(self.kinds)]
         self.robots = enter(Robots(places, inside=there))
-        files = [folder / f"lane-{queue}.yaml" for queue in self.queues]
-        for queue, (kind, file) in enumerate(zip(self.kinds, files, strict=True)):
-            text = document(kind, queue, self.robots.ports[queue], others[queue])
+        files = [folder / f"robot-{index}.yaml" for index in self.indexes]
+        for index, (kind, file) in enumerate(zip(self.kinds, files, strict=True)):
+            text = document(kind, index, self.robots.ports[index], others[index])
             file.write_text(text, "utf-8")
         self.server = enter(Server(files, folder / "data", inside=here))
         self.operators = enter(Operators(inside=here))
@@ -144,14 +144,14 @@ class CutRig:
         self._programs.close()
 
     @property
-    def queues(self) -> range:
+    def indexes(self) -> range:
         """Indexes of the robots."""
         return range(len(self.kinds))
 
-    def port(self, queue: int) -> int:
+    def port(self, index: int) -> int:
         """Return the port for cuts of one robot's link."""
-        first = FIRST_PORT.get(self.kinds[queue])
-        return self.robots.ports[queue] if first is None else first + queue
+        first = FIRST_PORT.get(self.kinds[index])
+        return self.robots.ports[index] if first is None else first + index
 
     def cut(self, seconds: float, order: str = "cut") -> list[Cut]:
         """Cut the link while each robot is driven; return the results.
@@ -160,43 +160,43 @@ class CutRig:
             seconds: length of the cut.
             order: ``cut``, or ``cut a`` or ``cut b`` for one direction, or ``down a``.
         """
-        return self._trial(self.queues, seconds, order, self._share())
+        return self._trial(self.indexes, seconds, order, self._share())
 
-    def cut_one(self, queue: int, seconds: float, share: float) -> Cut:
+    def cut_one(self, index: int, seconds: float, share: float) -> Cut:
         """Cut the link of one robot; safe to call from its own thread.
 
         Args:
-            queue: index of the robot.
+            index: index of the robot.
             seconds: length of the cut.
             share: share of the cut after which the control is released, in every second cut.
         """
         for _ in range(ATTEMPTS - 1):
             try:
-                return self._trial((queue,), seconds, f"cut {self.port(queue)}", share)[0]
+                return self._trial((index,), seconds, f"cut {self.port(index)}", share)[0]
             except NotDrivenError:
                 continue
-        return self._trial((queue,), seconds, f"cut {self.port(queue)}", share)[0]
+        return self._trial((index,), seconds, f"cut {self.port(index)}", share)[0]
 
-    def drive_once(self, queue: int, life_s: float) -> None:
+    def drive_once(self, index: int, life_s: float) -> None:
         """Let a page drive and release a robot; the page keeps running, and keeps the controls."""
         began_ns = time.monotonic_ns()
-        number = self._drive(queue, life_s)
-        self._await_motion(queue, began_ns)
+        number = self._drive(index, life_s)
+        self._await_motion(index, began_ns)
         self.operators.order(json.dumps({"let_go": number}))
         robots = self.robots
         robots.wait_until(
-            lambda: robots.heard[queue][-1].text == "M 0", READY_S, f"the stop of lane {queue}"
+            lambda: robots.heard[index][-1].text == "M 0", READY_S, f"the stop of robot {index}"
         )
 
     def _share(self) -> float:
         return 0.1 + self._dice.random() * 0.8
 
-    def _trial(self, queues: Sequence[int], seconds: float, order: str, share: float) -> list[Cut]:
+    def _trial(self, indexes: Sequence[int], seconds: float, order: str, share: float) -> list[Cut]:
         began_ns = time.monotonic_ns()
-        pages = {queue: self._drive(queue) for queue in queues}
+        pages = {index: self._drive(index) for index in indexes}
         try:
-            for queue in queues:
-                self._await_motion(queue, began_ns)
+            for index in indexes:
+                self._await_motion(index, began_ns)
         except NotDrivenError:
             for number in pages.values():
                 self.operators.kill(number)
@@ -204,21 +204,21 @@ class CutRig:
         time.sleep(LEAD_S + share * 0.05)
         cut_ns = self.relay.do(order)
         time.sleep(seconds * share)
-        released = {queue: number for queue, number in pages.items() if number % 2}
+        released = {index: number for index, number in pages.items() if number % 2}
         for number in released.values():
             self.operators.order(json.dumps({"let_go": number}))
         time.sleep(seconds - seconds * share)
         healed_ns = self.relay.do(order.replace("cut", "heal").replace("down", "up"))
         self._watch(pages, released, cut_ns, healed_ns)
         cuts = [
-            self._judge(queue, cut_ns, healed_ns, was_held=queue not in released)
-            for queue in queues
+            self._judge(index, cut_ns, healed_ns, was_held=index not in released)
+            for index in indexes
         ]
         for number in pages.values():
             self.operators.kill(number)
         return cuts
 
-    def _drive(self, queue: int, life_s: float = 120.0) -> int:
+    def _drive(self, index: int, life_s: float = 120.0) -> int:
         """Let a page drive a robot; return the page's number."""
         with self._lock:
             self._numbers += 1
@@ -228,7 +228,7 @@ class CutRig:
             "host": "127.0.0.1",
             "port": self.server.port,
             "key": self.server.key,
-            "robot": f"lane-{queue}",
+            "robot": f"robot-{index}",
             "death": "outside",
             "drive_s": 0.0,
             "life_s": life_s,
@@ -236,11 +236,11 @@ class CutRig:
         self.operators.start(plan)
         return number
 
-    def _await_motion(self, queue: int, began_ns: int) -> None:
+    def _await_motion(self, index: int, began_ns: int) -> None:
         def moves() -> bool:
-            return any(one.text != "M 0" for one in self.robots.since(queue, began_ns))
+            return any(one.text != "M 0" for one in self.robots.since(index, began_ns))
 
-        what = f"motion of lane {queue} ({self.kinds[queue]})"
+        what = f"motion of robot {index} ({self.kinds[index]})"
         try:
             self.robots.wait_until(moves, READY_S, what)
         except AssertionError as error:
@@ -251,15 +251,15 @@ class CutRig:
         cut_ns: int, healed_ns: int,
     ) -> None:  # fmt: skip
         """Wait for the required stops, and then for forbidden events."""
-        for queue in pages:
-            bounds = bounds_of(self.kinds[queue])
+        for index in pages:
+            bounds = bounds_of(self.kinds[index])
             is_short = (healed_ns - cut_ns) / 1e9 < bounds.unnoticed_s
-            if not bounds.is_told or (is_short and queue not in released):
+            if not bounds.is_told or (is_short and index not in released):
                 continue
             left_s = bounds.stop_ms / 1000 - (time.monotonic_ns() - healed_ns) / 1e9
             try:
                 self.robots.wait_until(
-                    lambda queue=queue: self._stops(queue, cut_ns),  # type: ignore[misc]
+                    lambda index=index: self._stops(index, cut_ns),  # type: ignore[misc]
                     max(left_s, 0.01),
                     "a stop",
                 )
@@ -267,11 +267,11 @@ class CutRig:
                 continue  # checked later
         time.sleep(WATCH_S)
 
-    def _stops(self, queue: int, cut_ns: int) -> bool:
-        return any(one.text == "M 0" for one in self.robots.since(queue, cut_ns))
+    def _stops(self, index: int, cut_ns: int) -> bool:
+        return any(one.text == "M 0" for one in self.robots.since(index, cut_ns))
 
-    def _judge(self, queue: int, cut_ns: int, healed_ns: int, *, was_held: bool) -> Cut:
-        kind, all_heard = self.kinds[queue], self.robots.since(queue, cut_ns)
+    def _judge(self, index: int, cut_ns: int, healed_ns: int, *, was_held: bool) -> Cut:
+        kind, all_heard = self.kinds[index], self.robots.since(index, cut_ns)
         heard = [one for one in all_heard if one.time_ns > healed_ns]
         stops = [place for place, one in enumerate(heard) if one.text == "M 0"]
         ages_ms = [
@@ -293,7 +293,7 @@ class CutRig:
             is_noticed=is_noticed, was_held=was_held, burst_ms=BURST_MS + late_ms,
         )  # fmt: skip
         oldest_ms = max(ages_ms, default=0.0)
-        earlier = [one.text for one in self.robots.heard[queue] if one.time_ns < cut_ns]
+        earlier = [one.text for one in self.robots.heard[index] if one.time_ns < cut_ns]
         was_moving = earlier[-1:] != ["M 0"]
         return Cut(kind, lasted_s, was_held, oldest_ms, stop_ms, fault, late_ms, was_moving)
 

@@ -16,7 +16,7 @@ from typing import NamedTuple, Self
 from bench.rig.operator_process import Plan
 from bench.rig.programs import SERVER_ADDRESS, Heard, Operators, Relay, Robots, Server
 
-__all__ = ["BOUND_MS", "DEATHS", "LEASE_MS", "LINK_DEATHS", "Rig", "Trial", "lane_profile"]
+__all__ = ["BOUND_MS", "DEATHS", "LEASE_MS", "LINK_DEATHS", "Rig", "Trial", "robot_profile"]
 
 LEASE_MS = 250.0
 BOUND_MS = LEASE_MS + 50.0
@@ -36,8 +36,8 @@ WITNESSES = 2
 _PROFILE = """\
 urc: 1
 kind: robot
-name: lane-{queue}
-title: Lane {queue}
+name: robot-{index}
+title: Robot {index}
 summary: A robot of the rig. It stamps what it hears.
 transports:
   wire: {{ type: {kind}, host: {host}, port: {port}, framing: {{ type: {framing} }} }}
@@ -49,10 +49,10 @@ commands:
 """
 
 
-def lane_profile(queue: int, host: str, port: int, kind: str = "tcp") -> str:
+def robot_profile(index: int, host: str, port: int, kind: str = "tcp") -> str:
     """Return the document of one robot of the rig: ``M TIME`` moves it, ``M 0`` stops it."""
     framing = "delimiter, tx: LF, rx: LF" if kind == "tcp" else "datagram"
-    return _PROFILE.format(queue=queue, kind=kind, host=host, port=port, framing=framing)
+    return _PROFILE.format(index=index, kind=kind, host=host, port=port, framing=framing)
 
 
 class Trial(NamedTuple):
@@ -93,7 +93,7 @@ class Rig:
         self,
         folder: Path,
         *,
-        queues: int = 20,
+        robot_count: int = 20,
         has_relay: bool = False,
         options: Sequence[str] = (),
         inside: Sequence[str] = (),
@@ -102,7 +102,7 @@ class Rig:
 
         Args:
             folder: folder for the documents and the server's data.
-            queues: number of robots, and of pages in parallel.
+            robot_count: number of robots, and of pages in parallel.
             has_relay: whether a relay, which needs root, is between pages and server.
             options: further options of ``urc serve``.
             inside: command prefix that starts the server in another namespace.
@@ -116,10 +116,10 @@ class Rig:
             here = self.relay.inside("a") if self.relay else ()
             there = self.relay.inside("b") if self.relay else ()
             self.host = SERVER_ADDRESS if self.relay else "127.0.0.1"
-            self.robots = enter(Robots(["tcp:127.0.0.1:0"] * queues, inside=there))
-            files = [folder / f"lane-{queue}.yaml" for queue in range(queues)]
-            for queue, file in enumerate(files):
-                text = lane_profile(queue, "127.0.0.1", self.robots.ports[queue])
+            self.robots = enter(Robots(["tcp:127.0.0.1:0"] * robot_count, inside=there))
+            files = [folder / f"robot-{index}.yaml" for index in range(robot_count)]
+            for index, file in enumerate(files):
+                text = robot_profile(index, "127.0.0.1", self.robots.ports[index])
                 file.write_text(text, "utf-8")
             self._serve = partial(
                 Server, files, folder / "data", *options, host=self.host, inside=(*there, *inside),
@@ -155,17 +155,17 @@ class Rig:
         began_ns = time.monotonic_ns()
         pages = self._begin(death)
         self._let_die(death, pages)
-        heard = {queue: self._await_stop(queue, began_ns) for queue in pages}
+        heard = {index: self._await_stop(index, began_ns) for index in pages}
         self._heal(death, pages)
         for number in pages.values():
             self.operators.kill(number)
         return [
-            self._judge(death, queue, began_ns, heard[queue], number)
-            for queue, number in pages.items()
+            self._judge(death, index, began_ns, heard[index], number)
+            for index, number in pages.items()
         ]
 
     @property
-    def queues(self) -> range:
+    def indexes(self) -> range:
         """Indexes of the robots."""
         return range(len(self.robots.heard))
 
@@ -174,12 +174,12 @@ class Rig:
         self._link().do(*orders)
 
     def drive(
-        self, queue: int, death: str = "outside", drive_s: float = 0.0, *, has_spare: bool = False
+        self, index: int, death: str = "outside", drive_s: float = 0.0, *, has_spare: bool = False
     ) -> int:
         """Let a page drive a robot until it vanishes; return the page's number."""
         self._numbers += 1
         plan = Plan(
-            self._numbers, self.host, self.server.port, f"lane-{queue}", death, drive_s,
+            self._numbers, self.host, self.server.port, f"robot-{index}", death, drive_s,
             life_s=LIFE_S, key=self.server.key, has_spare=has_spare,
         )  # fmt: skip
         self.operators.start(plan._asdict())
@@ -188,7 +188,7 @@ class Rig:
     def _begin(self, death: str) -> Mapping[int, int]:
         how = "outside" if death in LINK_DEATHS else death
         return {
-            queue: self.drive(queue, how, 0.3 + self._dice.random() * 0.2) for queue in self.queues
+            index: self.drive(index, how, 0.3 + self._dice.random() * 0.2) for index in self.indexes
         }
 
     def _let_die(self, death: str, pages: Mapping[int, int]) -> None:
@@ -213,21 +213,21 @@ class Rig:
             raise ValueError("this rig has no relay")
         return self.relay
 
-    def _await_stop(self, queue: int, began_ns: int) -> int:
+    def _await_stop(self, index: int, began_ns: int) -> int:
         """Wait until a robot has received motion, and then a stop; return the number of lines."""
 
         def is_still() -> bool:
-            texts = [one.text for one in self.robots.since(queue, began_ns)]
+            texts = [one.text for one in self.robots.since(index, began_ns)]
             return len(texts) > 1 and texts[-1] == "M 0"
 
         try:
-            self.robots.wait_until(is_still, STOP_WITHIN_S, f"the stop of lane {queue}")
+            self.robots.wait_until(is_still, STOP_WITHIN_S, f"the stop of robot {index}")
         except AssertionError:
             return 0
-        return len(self.robots.since(queue, began_ns))
+        return len(self.robots.since(index, began_ns))
 
-    def _judge(self, death: str, queue: int, began_ns: int, until_stop: int, number: int) -> Trial:
-        heard = self.robots.since(queue, began_ns)
+    def _judge(self, death: str, index: int, began_ns: int, until_stop: int, number: int) -> Trial:
+        heard = self.robots.since(index, began_ns)
         moved = [place for place, one in enumerate(heard) if one.text != "M 0"]
         stop = next((one for one in heard[moved[-1] + 1 :] if one.text == "M 0"), None) if (
             moved

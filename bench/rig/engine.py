@@ -30,11 +30,11 @@ class EngineRig(Rig):
             self.operators.await_told("dying", number)  # it has driven, and continues
         told = len(self.server.lines)
         self._strike(death)
-        heard = {queue: self._await_stop(queue, began_ns) for queue in pages}
+        heard = {index: self._await_stop(index, began_ns) for index in pages}
         self._mend(death, told)
         trials = [
-            self._judge(death, queue, began_ns, heard[queue], number)
-            for queue, number in pages.items()
+            self._judge(death, index, began_ns, heard[index], number)
+            for index, number in pages.items()
         ]
         for number in pages.values():
             self.operators.kill(number)
@@ -67,8 +67,8 @@ class EngineRig(Rig):
         trials = [trial for guard in self.server.guards for trial in self._kill(guard)]
         for number in pages.values():
             self.operators.kill(number)
-        for queue in pages:
-            self._await_stop(queue, began_ns)
+        for index in pages:
+            self._await_stop(index, began_ns)
         return trials
 
     def _kill(self, guard: int) -> list[Trial]:
@@ -76,26 +76,26 @@ class EngineRig(Rig):
         killed_ns = time.monotonic_ns()
         os.kill(guard, signal.SIGKILL)
         robots = self.robots
-        queues = range(len(robots.visits))
+        indexes = range(len(robots.visits))
 
         def again() -> list[tuple[int, int]]:
-            """Return the reconnected lanes, with times."""
+            """Return the reconnected robots, with times."""
             return [
-                (queue, at)
-                for queue in queues
-                for at, is_open in robots.visits[queue]
-                if is_open and at > killed_ns and (robots.since(queue, at) or not moved(queue))
+                (index, at)
+                for index in indexes
+                for at, is_open in robots.visits[index]
+                if is_open and at > killed_ns and (robots.since(index, at) or not moved(index))
             ]
 
-        def moved(queue: int) -> bool:
-            before = [one.text for one in robots.heard[queue] if one.time_ns <= killed_ns]
+        def moved(index: int) -> bool:
+            before = [one.text for one in robots.heard[index] if one.time_ns <= killed_ns]
             return before[-1:] != ["M 0"]
 
         robots.wait_until(lambda: bool(again()), AGAIN_S, "the replacement of the guard")
-        queue, opened_ns = again()[0]
-        if not moved(queue):
+        index, opened_ns = again()[0]
+        if not moved(index):
             return []
-        first = robots.since(queue, opened_ns)[0]
+        first = robots.since(index, opened_ns)[0]
         fault = "" if first.text == "M 0" else f"{first.text} arrived before the stop"
         late_ms = self.late_ms(killed_ns, first.time_ns)
         took_ms = (first.time_ns - killed_ns) / 1e6

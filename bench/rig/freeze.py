@@ -81,14 +81,14 @@ class Freeze(NamedTuple):
 async def freeze(
     rounds: int,
     *,
-    queues: int = 1,
+    robot_count: int = 1,
     lasts_s: float = 5.0,
     seed: int = 1,
     told: Callable[[Freeze], None] | None = None,
 ) -> Sequence[Freeze]:
-    """Freeze each of `queues` robots for `lasts_s`, `rounds` times."""
+    """Freeze each of `robot_count` robots for `lasts_s`, `rounds` times."""
     dice = random.Random(seed)  # noqa: S311 - the same moments in every run
-    moments = [[0.4 + dice.random() for _ in range(rounds)] for _ in range(queues)]
+    moments = [[0.4 + dice.random() for _ in range(rounds)] for _ in range(robot_count)]
     done: list[Freeze] = []
 
     def take(one: Freeze) -> None:

@@ -68,8 +68,8 @@ def bounds_of(kind: str) -> Bounds:
 _DOCUMENT = """\
 urc: 1
 kind: robot
-name: lane-{queue}
-title: Lane {queue}
+name: robot-{index}
+title: Robot {index}
 summary: A robot of the rig. It stamps what it hears.
 transports:
   wire: {{ {options} }}
@@ -120,10 +120,10 @@ class Counterpart(Program):
         super().__init__(["sh", "-c", script, "sh", *command], inside=inside)
 
 
-def place_of(kind: str, queue: int) -> str:
+def place_of(kind: str, index: int) -> str:
     """Return the place of a robot of this kind, as an argument of `robot_process`."""
     if kind == "mqtt":
-        return f"mqtt:127.0.0.1:{FIRST_PORT[kind] + queue}"
+        return f"mqtt:127.0.0.1:{FIRST_PORT[kind] + index}"
     if kind == "ssh":
         return "tcp:127.0.0.1:0"
     doors = {"udp": "udp", "websocket": "ws", "ros": "bridge", "http": "http"}
@@ -131,7 +131,7 @@ def place_of(kind: str, queue: int) -> str:
     return f"{door}:{SERVER_ADDRESS}:0"
 
 
-def document(kind: str, queue: int, port: int, other: Counterpart | None) -> str:
+def document(kind: str, index: int, port: int, other: Counterpart | None) -> str:
     """Return the document of a robot with its `port`, and its third-party program, if any."""
     options = _OPTIONS[kind].replace("HOST", SERVER_ADDRESS).replace("PORT", str(port))
     if other is not None:
@@ -141,17 +141,17 @@ def document(kind: str, queue: int, port: int, other: Counterpart | None) -> str
     aside = _ASIDE.get(kind)
     polls = f"polls:\n  - {{ every: 60ms, send: {aside} }}\n" if aside else ""
     send = _SENDS.get(kind, _TEXT)
-    return _DOCUMENT.format(queue=queue, options=options, send=send, polls=polls)
+    return _DOCUMENT.format(index=index, options=options, send=send, polls=polls)
 
 
 def start_counterpart(
-    kind: str, queue: int, folder: Path, inside: tuple[str, ...]
+    kind: str, index: int, folder: Path, inside: tuple[str, ...]
 ) -> Counterpart | None:
     """Start the third-party program for a robot of this kind; None if it needs none."""
     if kind == "mqtt":
-        return _broker(FIRST_PORT[kind] + queue, folder / f"broker-{queue}.conf", inside)
+        return _broker(FIRST_PORT[kind] + index, folder / f"broker-{index}.conf", inside)
     if kind == "ssh":
-        return _login(FIRST_PORT[kind] + queue, folder / f"login-{queue}", inside)
+        return _login(FIRST_PORT[kind] + index, folder / f"login-{index}", inside)
     return None
 
 

@@ -9,7 +9,7 @@ from bench.rig.programs import can_relay
 from tests.e2e.verdict import judged
 
 EACH = 100
-LANES = 20
+ROBOTS = 20
 AT_ONCE = ("close", "kill", "reset", "kick")
 """Deaths of which the server hears; the others it learns by silence."""
 
@@ -22,7 +22,7 @@ pytestmark = [
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
     """Robots, a server with its guards, and pages; over a relay where one can be had."""
-    with Rig(tmp_path_factory.mktemp("rig"), queues=LANES, has_relay=can_relay()) as made:
+    with Rig(tmp_path_factory.mktemp("rig"), robot_count=ROBOTS, has_relay=can_relay()) as made:
         made.bout("close")  # the first one also starts the guards, twenty programs at once
         yield made
 

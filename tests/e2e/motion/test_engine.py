@@ -10,14 +10,14 @@ from typing import NamedTuple
 
 import pytest
 
-from bench.rig.deaths import Rig, Trial, lane_profile
+from bench.rig.deaths import Rig, Trial, robot_profile
 from bench.rig.engine import ENGINE_DEATHS, EngineRig
 from bench.rig.operator_process import Page, Plan
 from bench.rig.programs import Operators, Robots, Server
 from tests.e2e.verdict import judged
 from tests.effort import IS_THOROUGH
 
-LANES = 8
+ROBOTS = 8
 EACH = 16
 IDLE_S = 20.0
 """Ten minutes, on every kind of line, are listened to by ``./dev bench --full motion_idle``."""
@@ -36,7 +36,7 @@ pytestmark = [
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[EngineRig]:
     """Robots that are driven by way of a server that can be held up."""
-    with EngineRig(tmp_path_factory.mktemp("engine"), queues=LANES) as made:
+    with EngineRig(tmp_path_factory.mktemp("engine"), robot_count=ROBOTS) as made:
         made.bout("close")
         yield made
 
@@ -66,7 +66,7 @@ def idle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Idle]:
         Operators() as operators,
     ):
         life_s = 2 * IDLE_S + 60
-        place = ("127.0.0.1", server.port, "lane-0")
+        place = ("127.0.0.1", server.port, "robot-0")
         plan = Plan(1, *place, "outside", 0.3, life_s=life_s, key=server.key)
         operators.start(plan._asdict())
         robots.wait_until(lambda: len(robots.heard[0]) > 3, WAIT_S, "motion")
@@ -83,15 +83,15 @@ def is_still(robots: Robots) -> bool:
 
 def served(folder: Path, robots: Robots, *, inside: tuple[str, ...] = ()) -> Server:
     """Start a server for the first robot."""
-    file = folder / "lane-0.yaml"
-    file.write_text(lane_profile(0, "127.0.0.1", robots.ports[0]), "utf-8")
+    file = folder / "robot-0.yaml"
+    file.write_text(robot_profile(0, "127.0.0.1", robots.ports[0]), "utf-8")
     return Server([file], folder / "data", inside=inside)
 
 
 @contextmanager
 def opened(server: Server) -> Iterator[Page]:
     """Open the page of the first robot."""
-    page = Page(Plan(1, "127.0.0.1", server.port, "lane-0", "", 0, key=server.key))
+    page = Page(Plan(1, "127.0.0.1", server.port, "robot-0", "", 0, key=server.key))
     try:
         yield page
     finally:
@@ -119,10 +119,10 @@ def test_killed_guards_of_a_real_server_are_replaced_and_stop_first(rig: EngineR
     trials: list[Trial] = []
     for _ in range(MOST_BOUTS):
         trials += rig.guard_bout()
-        if len(trials) >= LANES / 2:
+        if len(trials) >= ROBOTS / 2:
             break
     assert [one.fault for one in trials if one.fault] == []
-    assert len(trials) >= LANES / 2, "hardly any of them moved"
+    assert len(trials) >= ROBOTS / 2, "hardly any of them moved"
 
 
 @pytest.mark.needs("tun")  # root: it mounts a small disk for the server alone
@@ -132,13 +132,13 @@ def test_full_disk_delays_no_stop_and_loses_no_latch(tmp_path: Path) -> None:
     data.mkdir()
     script = 'mount -t tmpfs -o size=1m tmpfs "$0" && exec "$@"'
     inside = ("unshare", "--mount", "sh", "-c", script, str(data))
-    with Rig(tmp_path, queues=4, inside=inside) as rig:
+    with Rig(tmp_path, robot_count=4, inside=inside) as rig:
         rig.bout("close")
         there = Path(f"/proc/{rig.server.pid}/root") / data.relative_to("/")
         fill(there / "filler")
         repeated(lambda: rig.bout("freeze"), 4)
         repeated(lambda: rig.bout("close"), 4)
-        latch, before_ns = there / "latches" / "lane-0.latch.json", time.monotonic_ns()
+        latch, before_ns = there / "latches" / "robot-0.latch.json", time.monotonic_ns()
         with opened(rig.server) as page:
             page.say({"t": "stop"})
             until(page, lambda: page.is_latched, "a latched stop")
@@ -172,7 +172,7 @@ def latched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Ro
         with served(folder, robots) as server, opened(server) as page:
             page.say({"t": "stop"})
             until(page, lambda: page.is_latched, "a latched stop")
-            until(page, lambda: is_latched(folder / "data/latches/lane-0.latch.json"), "a file")
+            until(page, lambda: is_latched(folder / "data/latches/robot-0.latch.json"), "a file")
         yield folder, robots
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import pytest
 
-from bench.rig.deaths import lane_profile
+from bench.rig.deaths import robot_profile
 from bench.rig.operator_process import Page, Plan
 from bench.rig.programs import Heard, Robots, Server
 from tests.e2e.verdict import judged
@@ -39,10 +39,10 @@ def robots() -> Iterator[Robots]:
 @pytest.fixture
 def page(robots: Robots, tmp_path: Path) -> Iterator[Page]:
     """The page of the robot."""
-    file = tmp_path / "lane-0.yaml"
-    file.write_text(lane_profile(0, "127.0.0.1", robots.ports[0]), "utf-8")
+    file = tmp_path / "robot-0.yaml"
+    file.write_text(robot_profile(0, "127.0.0.1", robots.ports[0]), "utf-8")
     with Server([file], tmp_path / "data") as server:
-        made = Page(Plan(1, "127.0.0.1", server.port, "lane-0", "", 0, key=server.key))
+        made = Page(Plan(1, "127.0.0.1", server.port, "robot-0", "", 0, key=server.key))
         try:
             yield made
         finally:

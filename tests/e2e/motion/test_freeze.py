@@ -12,4 +12,4 @@ async def test_nothing_old_arrives_after_a_freeze_and_the_stop_is_last() -> None
     """All of it, a hundred times: `bench/motion_freeze.py`."""
     freezes: list[Freeze] = []
     while not judged(freezes, 3):
-        freezes += await freeze(2, queues=2, lasts_s=5.0, seed=3 + len(freezes))
+        freezes += await freeze(2, robot_count=2, lasts_s=5.0, seed=3 + len(freezes))
