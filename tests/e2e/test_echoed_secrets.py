@@ -3,6 +3,7 @@
 import asyncio
 import json
 from collections.abc import AsyncIterator, Callable
+from contextlib import suppress
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -51,9 +52,11 @@ async def parrot(tmp_path: Path) -> AsyncIterator[str]:
                     await asyncio.sleep(0.05)
 
         talking = asyncio.create_task(chatter())
-        while line := await reader.readline():
-            is_login = line.startswith(b"login ")
-            writer.write((f"ok {WORD}\n" if is_login else f"NO {WORD}\n").encode())
+        # A client that ends with unread data resets the connection.
+        with suppress(ConnectionResetError):
+            while line := await reader.readline():
+                is_login = line.startswith(b"login ")
+                writer.write((f"ok {WORD}\n" if is_login else f"NO {WORD}\n").encode())
         talking.cancel()
         writer.close()
 

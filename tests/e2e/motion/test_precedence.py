@@ -13,8 +13,8 @@ pytestmark = [
 TIMEOUT_S = 60
 PROGRAM = """
 import os
-from urc.guard.real_time_priority import Precedence
-refusal = Precedence().ask()
+from urc.guard.real_time_priority import RealTimePriority
+refusal = RealTimePriority().request()
 ordinary = os.SCHED_OTHER
 reset = os.SCHED_RESET_ON_FORK
 print(refusal or "granted", flush=True)

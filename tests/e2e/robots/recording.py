@@ -82,7 +82,7 @@ class _Overheard(EmulatedRobot):
             notes.append(data)
             return ask(data, now_s)
 
-        vars(line).update(receive=received, ask=asked)
+        vars(line).update(receive=received, request=asked)
         return line
 
 

@@ -40,7 +40,7 @@ async def refusal(said: bytes, *, is_deaf: bool, most_bytes: int) -> str:
 async def test_order_without_its_values_is_told() -> None:
     """A notification of the pins that says nothing of the pins."""
     text = await refusal(b"\xff\xfa\x2c\x6b\xff\xf0" * 100, is_deaf=False, most_bytes=10_000_000)
-    assert "no rfc 2217" in text
+    assert "does not speak rfc 2217" in text
 
 
 @pytest.mark.parametrize("is_deaf", [False, True])

@@ -149,7 +149,7 @@ async def test_a_header_without_end_is_given_up() -> None:
     async with liar(talk) as port, line(http.from_setup, f"http://127.0.0.1:{port}/") as robot:
         with bounded(20_000_000):
             told = await asked(robot)
-        assert "not HTTP" in str(told.attributes["reason"])
+        assert "does not speak HTTP" in str(told.attributes["reason"])
 
 
 @pytest.mark.parametrize("kind", ["mjpeg", "sse", "stills", "lines"])
@@ -279,7 +279,7 @@ async def test_pings_without_end_and_no_ear_end_the_line() -> None:
         line(websocket.from_setup, f"ws://127.0.0.1:{port}/") as robot,
     ):
         with bounded(30_000_000):
-            assert "takes none" in await ended(robot)
+            assert "does not read the replies to its pings" in await ended(robot)
 
 
 @pytest.mark.parametrize(

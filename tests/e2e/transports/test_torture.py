@@ -168,7 +168,7 @@ class Ear:
             return hear(line, data, *more)
 
         # Every server passes its frames here, as a stream or one at a time.
-        patch.setattr(EmulatedConnection, "_heard", heard)
+        patch.setattr(EmulatedConnection, "_receive", heard)
 
     async def hears_more(self) -> None:
         """Wait until a few more numbers have come."""
