@@ -125,7 +125,6 @@ async def test_the_page_at_the_door_stops_a_robot(
     key = key_of(address)
     await page.evaluate("address => location.assign(address)", f"{address}robots/tello/")
     await expect(page.locator("h1")).to_have_text("Open the printed address")
-    await page.wait_for_load_state()  # the script has armed the button
     await page.get_by_role("button", name="STOP").click()
     await expect(page.get_by_role("status")).to_have_text(re.compile("confirmed it$"))
     latch = tmp_path / "latches" / "emulated" / "tello.latch.json"

@@ -21,6 +21,7 @@ export default {
       note.textContent = words(state, isCut, t);
     }
     whenPressed(main, stop, signal);
+    main.removeAttribute("data-early-stop"); // armed: the page's first script leaves it alone
     onStop(show);
     return {};
   },

@@ -87,7 +87,7 @@ def test_a_socket_of_a_stranger_is_closed_with_the_reason() -> None:
 def test_stop_is_open_to_everyone() -> None:
     """The page at the door has it for each robot that moves, and for the one that was asked for."""
     with at(ACCESS) as browser:
-        assert re.findall(r'data-stop-url="([^"]+)"', browser.get("/").text) == [STOP]
+        assert re.findall(r'data-stop="([^"]+)"', browser.get("/").text) == [STOP]
         assert STOP in browser.get("/robots/puppet/").text
         answer = browser.post(STOP, headers=OURS)
     assert answer.status_code == 200
@@ -104,7 +104,7 @@ def test_what_the_page_at_the_door_loads_is_open() -> None:
     with at(ACCESS) as browser:
         page = browser.get("/").text
         files = re.findall(r'(?:src|href)="(/(?:static|words)/[^"]+|/app\.webmanifest)"', page)
-        assert "/static/control/access_page.js" in files
+        assert "/static/control/early_stop.js" in files
         assert {browser.get(file).status_code for file in files} == {200}
         assert browser.get("/healthz").json()["status"] == "ok"
 

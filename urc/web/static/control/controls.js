@@ -36,6 +36,7 @@ export class Controls {
       });
     }
     whenPressed(this.stop, () => stop.press());
+    this.stop.removeAttribute("data-early-stop"); // armed: early_stop.js leaves it alone
     stop.follow((state) => this.showStop(state));
   }
 

@@ -74,6 +74,19 @@ export class StopButton {
   }
 
   /**
+   * Take the presses over from `early_stop.js`, and repeat one that it could not deliver.
+   *
+   * @param {HTMLElement} root the element with the URL of STOP
+   */
+  takeOver(root) {
+    root.addEventListener("urc-early-stop", (event) => {
+      event.preventDefault();
+      this.press();
+    });
+    if (root.dataset["stopSent"] === "fault") this.press();
+  }
+
+  /**
    * @param {(state: StopState) => void} listener
    * @param {AbortSignal} [signal]
    */

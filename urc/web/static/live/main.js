@@ -320,6 +320,7 @@ backSafely(part(root, "[data-back]"), {
   close: () => socket.close(),
 });
 offerSystems((system) => store.setUnits(system));
+stop.takeOver(root);
 socket.open();
 setInterval(wake, AGE_EVERY_MS);
 
