@@ -1,1 +1,1 @@
-"""Frozen values that hold the content of a document."""
+"""Immutable data classes for the content of a document."""

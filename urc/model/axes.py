@@ -20,7 +20,7 @@ _HALF: Final = math.sqrt(0.5)
 
 
 def turns(here: Axes, there: Axes) -> bool:
-    """Return whether values convert between the two: body to body, or world to world."""
+    """Return whether values convert between two conventions: body to body, or world to world."""
     if here == there or not here or not there:
         return here == there
     world = (*_WORLD, "bearing")
@@ -28,7 +28,7 @@ def turns(here: Axes, there: Axes) -> bool:
 
 
 def turn_vector(vector: Sequence[float], here: Axes, there: Axes) -> tuple[float, ...]:
-    """Return a vector of two or three numbers in the axes `there`."""
+    """Convert a vector of two or three numbers from the axes `here` to the axes `there`."""
     if here == there:
         return tuple(vector)
     if here in _BODY and there in _BODY:
@@ -43,10 +43,10 @@ def turn_vector(vector: Sequence[float], here: Axes, there: Axes) -> tuple[float
 def turn_quaternion(
     quaternion: Sequence[float], here: Axes, there: Axes
 ) -> tuple[float, float, float, float]:
-    """Return an orientation [x, y, z, w] in the axes `there`.
+    """Convert an orientation [x, y, z, w] from the axes `here` to the axes `there`.
 
-    Between body axes, the result is the same rotation, expressed in the other axes. Between ENU and
-    NED, both ends change: a FLU body in ENU becomes a FRD body in NED, as in autopilots.
+    Between body axes, the result is the same rotation in the new axes. Between ENU and NED, the
+    body axes change too: an FLU body in ENU becomes an FRD body in NED, as in autopilots.
     """
     x, y, z, w = quaternion
     if here == there:
@@ -61,14 +61,14 @@ def turn_quaternion(
 def turn_angle(
     angle: float, here: Axes, there: Axes, *, about: str = "z", unit: str = "rad"
 ) -> float:
-    """Return an angle or a rate about one body axis, or a heading, in the axes `there`.
+    """Convert a heading, or an angle or rate about one body axis, to the axes `there`.
 
     Args:
-        angle: in `unit`.
-        here: present axes; ENU, NED or bearing for a heading.
-        there: wanted axes.
-        about: ``x`` (roll), ``y`` (pitch) or ``z`` (yaw), for body axes.
-        unit: ``rad``, ``deg`` or ``°``, for headings, which wrap at a full turn.
+        angle: angle, rate or heading, in `unit`.
+        here: current axes; ENU, NED or bearing for a heading.
+        there: target axes.
+        about: rotation axis for body axes: ``x`` (roll), ``y`` (pitch) or ``z`` (yaw).
+        unit: ``rad``, ``deg`` or ``°``; needed for headings, because headings wrap at a full turn.
     """
     if here == there:
         return angle

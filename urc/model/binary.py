@@ -1,8 +1,8 @@
-"""Items of a binary frame, in the order of the frame, for both directions.
+"""Items of a binary frame, in frame order, for reading and writing.
 
-The loader makes them from ``struct:`` and resolves every named type. The readers and writers of
-`urc.protocol` compile them. The loader and these readers share the rules of this module: names of
-nested fields, and items that give the sizes of others.
+The loader creates the items from ``struct:`` and resolves every named type. The readers and writers
+of `urc.protocol` compile the items. All share two rules of this module: the names of nested fields,
+and the sizes that earlier items determine.
 """
 
 from collections.abc import Iterator, Mapping
@@ -32,23 +32,23 @@ __all__ = [
 ]
 
 FRAME_NAMES: Final = frozenset(("_size", "_left"))
-"""Names that expressions of a struct know besides its items. `_size` has the bytes of the whole
-frame, `_left` the bytes from the first byte of the item to the end."""
+"""Names that expressions of a struct can use in addition to its items. `_size` is the size of the
+whole frame in bytes. `_left` is the number of bytes from the start of the item to the end."""
 OUTER_NAMES: Final = frozenset(("settings", COUNTERS))
-"""Outer names that the items of a named type may use, too."""
+"""Outer names that items of a named type may also use."""
 WORDS_OF_TYPES: Final = ("bytes", "text")
 
 
 class Extent(NamedTuple):
-    """A number of units: bytes of a text, or items of an array."""
+    """The size of a text in bytes, or the length of an array in items."""
 
     kind: Literal["fixed", "rest", "prefix", "expression"]
     number: int = 0
-    """Of ``fixed``."""
+    """Size or length, for ``fixed``."""
     prefix: Number | None = None
     """Length field in front of the data, for ``prefix``."""
     expression: Template | None = None
-    """Formula over the items before, for ``expression``."""
+    """Formula over earlier items, for ``expression``."""
 
 
 class Item(NamedTuple):
@@ -57,45 +57,46 @@ class Item(NamedTuple):
     kind: Literal[
         "number", "coded", "packed", "bytes", "text", "padding", "bits", "struct", "switch"
     ]
-    """``coded`` numbers have an encoding of their own. ``packed`` arrays ignore byte boundaries."""
+    """``coded`` numbers have a special encoding. ``packed`` arrays ignore byte boundaries."""
     id: str = ""
     """Name of the field or argument; "" for a nameless item."""
     number: Number = Number("integer", 8)
     """Type of a ``number``, or of the container of ``bits``."""
     size: Extent | None = None
-    """Size of bytes, text, padding or the window of a struct; None: unlimited."""
+    """Size of bytes, text, padding or a struct's window; None: unlimited."""
     times: Extent | None = None
-    """Length of an array. The name ``count`` is taken: every tuple has a method of that name."""
+    """Length of an array. The name ``count`` is unavailable, because tuples have a ``count``
+    method."""
     condition: Template | None = None
-    """Condition for the presence of the item."""
+    """Condition under which the item is present; None: always present."""
     const: int | float | bool | bytes | None = None
-    """Required raw value. A frame with another value is another kind of frame."""
+    """Required raw value; a frame with a different value does not match. None: any value."""
     scale: float = 1
     offset: float = 0
     """value = raw · scale + offset"""
     enum: tuple[tuple[int, str], ...] = ()
-    """Raw number → word. A number without a word stays a number."""
+    """Pairs of a raw number and its word. A number without a word stays a number."""
     valid: tuple[float, float] | None = None
-    """Smallest and largest scaled value; a value outside is a violation."""
+    """Valid range of the scaled value; a value outside the range is a violation."""
     value: Template | None = None
-    """Value to send when the caller gives none."""
+    """Default value to send; None: the caller must give a value."""
     encoding: str = ""
-    """Encoding of text; "" means that of the connection."""
+    """Text encoding; "": the encoding of the connection."""
     pad: int = 0
-    """Padding byte after text or bytes that are shorter than a fixed size."""
+    """Padding byte after text or bytes shorter than the fixed size."""
     until: bytes = b""
     """Terminator of bytes or text without a declared size."""
     trim: int | None = None
-    """Padding byte that the window of a struct may omit at its end, any number of times."""
+    """Padding byte that may be missing at the end of a struct's window, any number of times."""
     is_lsb_first: bool = False
-    """Whether the first one of ``bits`` is the least significant."""
+    """Whether the first item of ``bits`` is the least significant."""
     items: tuple["Item", ...] = ()
     """Items of a ``struct``, or the parts of ``bits``."""
     switch: "Switch | None" = None
 
     @property
     def is_given(self) -> bool:
-        """Whether its value is a field when reading, and an argument when sending."""
+        """Whether the item is a field when reading, and an argument when sending."""
         return bool(self.id) and self.const is None and self.value is None
 
 
@@ -105,7 +106,7 @@ class Switch(NamedTuple):
     by: Template
     cases: tuple[tuple[int | str, tuple[Item, ...]], ...]
     default: tuple[Item, ...] | None = None
-    """Items for any other value; None: another value means another kind of frame."""
+    """Items for any other value; None: a frame with another value does not match."""
 
 
 def packed_size(number: Number, count: Extent) -> int:
@@ -114,7 +115,7 @@ def packed_size(number: Number, count: Extent) -> int:
 
 
 def case_key(text: str) -> int | str:
-    """Return a key of ``cases`` as a value: ``0x10`` is 16, ``idle`` a word."""
+    """Return a key of ``cases`` as a number or a word: 16 for ``0x10``, ``idle`` for ``idle``."""
     try:
         return int(text, 0)
     except ValueError:
@@ -122,7 +123,7 @@ def case_key(text: str) -> int | str:
 
 
 def joined_name(outer: str, inner: str) -> str:
-    """Return the name of `inner` in the struct called `outer`; a private name stays private."""
+    """Return the name of field `inner` in the struct `outer`; a private name stays private."""
     if not outer:
         return inner
     if inner.startswith("_") and not outer.startswith("_"):
@@ -131,7 +132,7 @@ def joined_name(outer: str, inner: str) -> str:
 
 
 def scope_of(items: tuple[Item, ...]) -> Iterator[Item]:
-    """Yield every item whose id is in scope, including those of nameless structs and cases."""
+    """Yield every item with an id in scope, including items of nameless structs and of cases."""
     for item in items:
         if item.switch is not None:
             for _, case in item.switch.cases:
@@ -146,11 +147,11 @@ def scope_of(items: tuple[Item, ...]) -> Iterator[Item]:
 
 
 def names_of(items: tuple[Item, ...], *, sent: bool = False) -> Iterator[str]:
-    """Yield the names of all fields, nested ones included, in the order of the frame.
+    """Yield the names of all fields, including nested fields, in frame order.
 
     Args:
-        items: items of one level.
-        sent: leave out the values that URC computes when it sends.
+        items: items at one nesting level.
+        sent: whether to omit values that URC computes when sending.
     """
     for item in scope_of(items):
         if not item.id or item.const is not None or (sent and item.value is not None):
@@ -162,12 +163,12 @@ def names_of(items: tuple[Item, ...], *, sent: bool = False) -> Iterator[str]:
 
 
 def least_size(items: tuple[Item, ...]) -> int:
-    """Return the least number of bytes that the items take."""
+    """Return the minimum size of the items, in bytes."""
     return sum(map(_least, items))
 
 
 def fixed_size(items: tuple[Item, ...]) -> int | None:
-    """Return the number of bytes of the items; None when it varies."""
+    """Return the size of the items in bytes; None for a variable size."""
     sizes = [_fixed(item) for item in items]
     return None if None in sizes else sum(size for size in sizes if size)
 
@@ -207,9 +208,9 @@ def _least(item: Item) -> int:
 
 
 def derived_sizes(items: tuple[Item, ...]) -> Mapping[str, Template]:
-    """Return the items that hold the size or count of a later one → formula in that later item.
+    """Return the formulas for sizes and counts, by the name of the item that contains the number.
 
-    When a frame is sent, URC computes their values from the data.
+    When sending, URC computes these items from the data.
     """
     given = {
         one.id
@@ -228,7 +229,7 @@ def derived_sizes(items: tuple[Item, ...]) -> Mapping[str, Template]:
 
 
 def _with_extents(items: tuple[Item, ...]) -> Iterator[Item]:
-    """Yield the items of one scope, the nameless structs themselves included."""
+    """Yield the items of one scope, including the nameless structs."""
     for item in items:
         yield item
         if item.switch is not None:

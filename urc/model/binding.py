@@ -1,6 +1,6 @@
 """Mapping of the output values of a widget to the arguments of a command. Pure.
 
-The check of a binding and the page share this function, so that they agree.
+The loader's check of bindings and the dashboard share this function, so their results agree.
 """
 
 from urc.model.driver import Command
@@ -11,10 +11,11 @@ __all__ = ["targets"]
 
 
 def targets(command: Command, port: WidgetPort, given: OutputBinding) -> dict[str, str]:
-    """Return argument of the command → argument of the output that supplies it.
+    """Return the output arguments by the names of the command arguments that receive them.
 
     The binding decides. Without a binding, a value goes to the argument of the same name. A single
-    value that is not held goes to the only open argument, even if the names differ.
+    value of an output that is not a hold-to-run control goes to the only free argument, even
+    under a different name.
     """
     open_ones = [name for name in command.arguments if name not in given.fixed]
     if not port.is_held and not given.names and len(port.arguments) == 1 and len(open_ones) == 1:

@@ -1,4 +1,4 @@
-"""A driver: transports, signals, commands, messages and polls of one kind of robot."""
+"""Driver of one kind of robot: transports, signals, commands, messages and polls."""
 
 from collections.abc import Mapping
 from typing import Final, Literal, NamedTuple
@@ -49,29 +49,29 @@ class Timeouts(NamedTuple):
     connect_s: float = 3.0
     reply_s: float = 2.0
     idle_s: float | None = None
-    """Idle time after which the connection is closed; None: never."""
+    """Idle time before the connection is closed, in seconds; None: never."""
     on_connect_s: float | None = None
-    """Timeout for all steps of ``on_connect`` together; None: only the timeouts of the steps
-    count."""
+    """Timeout for all steps of ``on_connect`` together, in seconds; None: only each step's own
+    timeout."""
 
 
 class Backoff(NamedTuple):
-    """Waits between attempts to connect, doubling from `initial_s` to `max_s`, in seconds."""
+    """Delays between connection attempts, doubling from `initial_s` to `max_s`, in seconds."""
 
     initial_s: float = 0.25
     max_s: float = 5.0
     jitter: float = 0.2
-    """Random share of each wait, 0 to 1."""
+    """Random fraction of each delay, 0 to 1."""
 
 
 class TransportSpec(NamedTuple):
-    """One connection of a driver. `type` is a row of the transports table."""
+    """A transport of a driver. `type` is a row of the transports table."""
 
     name: str
     type: str
     options: Mapping[str, object] = NOTHING
-    """Options of the transport, such as ``host`` and ``port``: plain values, templates over
-    settings, and lists and mappings of them."""
+    """Options of the transport, such as ``host`` and ``port``. Values are plain values, templates
+    over settings, or lists and mappings of both."""
     connection: Literal["persistent", "per_request"] = "persistent"
     framing: FramingSpec = FramingSpec()
     encoding: str = "utf-8"
@@ -79,26 +79,26 @@ class TransportSpec(NamedTuple):
     timeouts: Timeouts = Timeouts()
     backoff: Backoff = Backoff()
     min_gap_s: float = 0.0
-    """Shortest time between two requests on this connection, in seconds."""
+    """Minimum time between two requests on this connection, in seconds."""
     queue: Queue = Queue()
     keepalive: Keepalive | None = None
     on_connect: tuple[Step, ...] = ()
-    """Steps that make a new connection usable; other requests wait for their end."""
+    """Steps that prepare a new connection; other requests wait for the last step."""
     on_close: tuple[Step, ...] = ()
-    """Steps before an orderly close of the connection."""
+    """Steps before the connection is closed in an orderly way."""
     stale_after_s: float | None = None
-    """Silence after which the connection counts as stale, in seconds; None: never."""
+    """Time without received data before the connection is stale, in seconds; None: never."""
     tunnel: str = ""
-    """Name of the transport that tunnels this one; "" without a tunnel."""
+    """Name of the transport that tunnels this connection; "": no tunnel."""
     is_half_duplex: bool = False
-    """Whether only one side sends at a time. Until the robot has replied, only a stop may be
+    """Whether the connection is half-duplex. Until the robot has replied, only a stop may be
     sent."""
     never_replies: bool = False
-    """Whether the robot never sends on this connection, so that silence is no sign of a loss."""
+    """Whether the robot never sends on this connection, so silence does not indicate a loss."""
     errors: tuple[Pattern, ...] = ()
     """Patterns of error replies to any request."""
     faults: tuple[ErrorReply, ...] = ()
-    """Error replies to any request, read by any form."""
+    """Error replies to any request, decoded with any form."""
 
 
 class Reply(NamedTuple):
@@ -109,19 +109,19 @@ class Reply(NamedTuple):
     timeout_s: float | None = None
     """Reply timeout, in seconds; None: ``timeouts.reply`` of the transport."""
     match: Template | None = None
-    """Correlation over the fields, the arguments of the command, and ``seq.NAME``, the counters in
-    the request. Without a correlation, replies arrive in the order of the requests."""
+    """Correlation condition over the fields, the arguments of the command, and the counters in the
+    request (``seq.NAME``). None: replies arrive in the order of the requests."""
     stages: tuple[Stage, ...] = ()
     """Further replies that complete the request."""
     faults: tuple[ErrorReply, ...] = ()
-    """Error replies in addition to `errors`, read by any form."""
+    """Error replies in addition to `errors`, decoded with any form."""
     framing: FramingSpec | None = None
     """Framing of the reply; None: the framing of the connection."""
     asides: ProvisionalReplies = ProvisionalReplies()
     """Provisional replies that may precede the first reply."""
 
     def with_errors(self, errors: tuple[Pattern, ...], faults: tuple[ErrorReply, ...]) -> "Reply":
-        """Return the reply with additional error replies, at every stage."""
+        """Return the reply with additional error replies at every stage."""
         if not (errors or faults):
             return self
         return self._replace(
@@ -135,19 +135,19 @@ class Reply(NamedTuple):
 
     @property
     def names(self) -> set[str]:
-        """Names that a step that runs the request provides: each field as ``_field``."""
+        """Names that later steps can use after the request: each field as ``_field``."""
         reads = (self.read, *(stage.read for stage in self.stages))
         return {f"_{name.lstrip('_')}" for read in reads for name in read.fields}
 
     @property
     def is_asked_again(self) -> bool:
-        """Whether the robot may ask for a retransmission of the request, at any stage."""
+        """Whether the robot may request a retransmission at any stage."""
         asides = (self.asides, *(stage.asides for stage in self.stages))
         return any(one.resend is not None for one in asides)
 
 
 MOST_ELEMENTS: Final = 1024
-"""Largest number of elements in an array argument."""
+"""Maximum number of elements in an array argument."""
 
 
 class Argument(NamedTuple):
@@ -163,15 +163,14 @@ class Argument(NamedTuple):
     default: Reading = None
     is_required: bool = True
     allows_control: bool = False
-    """Whether a string may contain control characters. Without control characters, no argument can
-    end a frame."""
+    """Whether a string may contain control characters, such as the end of a frame."""
     description: str = ""
     items: ElementType = "number"
-    """Type of the elements of an array; range and choices apply to each of them."""
+    """Type of the elements of an array; range and choices apply to each element."""
     size: int | None = None
-    """Number of elements of an array; None: any number up to `MOST_ELEMENTS`."""
+    """Required number of elements of an array; None: any number up to `MOST_ELEMENTS`."""
     confirm: Mapping[str, Confirm] = NOTHING
-    """Value, as written → confirmation question for it."""
+    """Confirmation questions, by argument value as written in the document."""
 
 
 STOPPED: Final = "STOP was pressed meanwhile: give it anew"
@@ -181,7 +180,7 @@ STOPPED: Final = "STOP was pressed meanwhile: give it anew"
 class Command(NamedTuple):
     """A named action.
 
-    A command without a reply is done once its bytes have been handed to the transport.
+    A command without a reply is complete when the transport has accepted its bytes.
     """
 
     name: str
@@ -195,28 +194,29 @@ class Command(NamedTuple):
     is_latest_only: bool = False
     """Whether a newer call replaces a queued one."""
     rate_per_s: float | None = None
-    """Average rate limit, in calls per second, with bursts of two; None: unlimited."""
+    """Average rate limit in calls per second, with bursts of two calls; None: unlimited."""
     is_idempotent: bool = False
-    """Whether a repetition has the same effect as one execution."""
+    """Whether repeated execution has the same effect as a single execution."""
     retries: int = 0
-    """Largest number of retries, after a timeout of an idempotent command or on request of the
-    robot. The value 0 means `RESENDS`, if the robot may ask for retransmissions."""
+    """Maximum number of retries after a timeout of an idempotent command, or at the robot's
+    request. 0 means `RESENDS` if the robot may request retransmissions."""
     retry: Retry = Retry()
-    """Waits before the retries."""
+    """Delays before the retries."""
     hold: Hold | None = None
     moves: bool = False
-    """Whether the command starts autonomous motion. True of a sequence that runs such a command or
-    a held one."""
+    """Whether the command starts autonomous motion. Also true for a sequence that runs a held
+    command or a command with autonomous motion."""
     moves_if: Template | None = None
-    """Condition for autonomous motion, over the arguments; None: always, if `moves`."""
+    """Condition over the arguments for autonomous motion; None: every call moves if `moves` is
+    true."""
     stops: bool = False
-    """Whether STOP sends this command, once."""
+    """Whether STOP sends this command; each STOP sends it once."""
     confirm: Confirm | None = None
     requires: tuple[Requirement, ...] = ()
     verify: Verify | None = None
     steps: tuple[Step, ...] = ()
-    """Steps of a sequence, instead of `send`, which is empty. `transport` is then the first one
-    that the sequence uses."""
+    """Steps of a sequence. With steps, `send` is empty, and `transport` is the first transport of
+    the sequence."""
 
     def moves_with(self, arguments: Mapping[str, object]) -> bool:
         """Return whether these arguments start motion; True when `moves_if` cannot be evaluated."""
@@ -233,35 +233,35 @@ class Poll(NamedTuple):
     """A request that is repeated while the robot is connected."""
 
     name: str
-    """``polls.0``, or the value of ``name:``."""
+    """Value of ``name:``, or a generated name such as ``polls.0``."""
     transport: str
     every_s: float
     send: WriteSpec
     reply: Reply | None = None
     phase_s: float = 0.0
-    """Delay of the first request after the connection, in seconds."""
+    """Delay between connecting and the first request, in seconds."""
     run: str = ""
-    """Command that supplies `send` and `reply`; "" when the poll declares its own."""
+    """Command that supplies `send` and `reply`; "": the poll declares both."""
     arguments: Mapping[str, Reading] = NOTHING
-    """Arguments of the command in `run`, defaults included."""
+    """Arguments of the command in `run`, including defaults."""
     when: Template | None = None
-    """Condition for the request, over fresh signals and settings."""
+    """Condition over fresh signals and settings for sending the request; None: always."""
     priority: Priority = "low"
     offline: Offline | None = None
 
 
 class Message(NamedTuple):
-    """An unsolicited frame: how it is recognised, and the signals that it sets."""
+    """An unsolicited frame: its pattern, and the signals that it updates."""
 
     name: str
     transport: str
     read: ReadSpec
     acknowledge: WriteSpec | None = None
-    """Frame that acknowledges the message at once."""
+    """Frame that immediately acknowledges the message; None: no acknowledgement."""
 
 
 class Driver(NamedTuple):
-    """The complete declaration of one kind of robot. The loader guarantees its validity."""
+    """The complete declaration of one kind of robot, validated by the loader."""
 
     transports: Mapping[str, TransportSpec] = NOTHING
     signals: Mapping[str, Signal] = NOTHING
@@ -269,12 +269,12 @@ class Driver(NamedTuple):
     messages: Mapping[str, Message] = NOTHING
     polls: tuple[Poll, ...] = ()
     discovery: tuple[str, ...] = ()
-    """DNS-SD service types that identify such robots: ``_rosbridge._tcp``."""
+    """DNS-SD service types of these robots, such as ``_rosbridge._tcp``."""
 
     def learnt(self, transport: str) -> frozenset[str]:
-        """Return the names that the login of a connection reads, such as ``_nonce``.
+        """Return the names of the fields that a login reads, such as ``_nonce``.
 
-        These names are known while the connection is open.
+        The fields are available while the connection is open.
         """
         names: set[str] = set()
         for step in all_steps(self.transports[transport].on_connect):

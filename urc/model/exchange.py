@@ -1,6 +1,6 @@
-"""Flow of requests: queues, stages of a reply, and conditions.
+"""Request handling: queues, reply stages and conditions.
 
-Data only: `urc.config` makes these values, and `urc.protocol` acts on them.
+This module contains only data: `urc.config` creates the values, and `urc.protocol` applies them.
 """
 
 from collections.abc import Mapping
@@ -29,59 +29,60 @@ __all__ = [
 ]
 
 RESENDS = 3
-"""Default number of retransmissions for a robot that asks, without ``retries``."""
+"""Default number of retransmissions at the robot's request, without ``retries``."""
 
 Priority = Literal["realtime", "high", "normal", "low"]
-"""``realtime`` bypasses the queue, the gap between requests, and outstanding replies."""
+"""Priority of a request. ``realtime`` requests ignore the queue, the minimum gap and pending
+replies."""
 
 
 class Queue(NamedTuple):
     """Limits of the request queue of one connection."""
 
     in_flight: int = 1
-    """Largest number of requests in flight at the same time, 1 to 64."""
+    """Maximum number of requests in flight at the same time, 1 to 64."""
     depth: int = 64
-    """Largest number of queued requests; a further one is refused."""
+    """Maximum number of queued requests; further requests are refused."""
     most_bytes: int | None = None
-    """Largest number of unacknowledged request bytes, framing included; None: unlimited."""
+    """Maximum number of unacknowledged request bytes, including framing; None: unlimited."""
 
 
 class Keepalive(NamedTuple):
-    """A frame that is sent when the connection has been idle for a while."""
+    """A frame that keeps an idle connection open."""
 
     every_s: float
-    """Longest time without a sent frame, in seconds."""
+    """Maximum time without a sent frame, in seconds."""
     run: str = ""
     """Command to run; "" when `send` declares the frame."""
     send: WriteSpec | None = None
     watchdog_s: float | None = None
-    """Watchdog of the robot, in seconds: silence after which it closes the connection or stops,
-    according to its manufacturer."""
+    """Watchdog timeout of the robot according to its manufacturer, in seconds. After this time
+    without a frame, the robot closes the connection or stops."""
     after: tuple[str, ...] = ()
-    """Commands that reset the watchdog of the robot; () for all frames."""
+    """Commands that reset the watchdog of the robot; (): every frame resets the watchdog."""
 
 
 class ErrorReply(NamedTuple):
-    """A reply that reports a failure, read by any form."""
+    """A reply that reports a failure, decoded with any form."""
 
     read: ReadSpec
     text: Template | None = None
-    """Text for the operator, over the fields of the reply; None: the reply as received."""
+    """Message for the operator, a template over the reply fields; None: the raw reply."""
 
 
 class ProvisionalReplies(NamedTuple):
-    """Provisional replies that may precede the reply to a request."""
+    """Provisional replies that may arrive before the final reply to a request."""
 
     resend: ReadSpec | None = None
-    """Frame that asks for a retransmission; None: not supported."""
+    """Frame that requests a retransmission; None: not supported."""
     extend: ReadSpec | None = None
     """Frame that reports a busy robot and extends the timeout; None: not supported."""
     extend_s: float = 600.0
-    """Longest total extension, in seconds, 0.001 to 3600."""
+    """Maximum total extension of the timeout, in seconds, 0.001 to 3600."""
 
 
 class Stage(NamedTuple):
-    """A further reply to a request, after the first one."""
+    """A reply that follows the first reply to a request."""
 
     read: ReadSpec
     errors: tuple[Pattern, ...] = ()
@@ -92,7 +93,7 @@ class Stage(NamedTuple):
 
 
 MOST_STOPS: Final = 11
-"""Largest number of transmissions of a stop; on a lossy transport, the stop is repeated."""
+"""Maximum number of transmissions of a stop, which is repeated on a lossy transport."""
 
 
 class Hold(NamedTuple):
@@ -101,38 +102,38 @@ class Hold(NamedTuple):
     repeat_s: float
     """Period of the setpoints, in seconds."""
     release: Mapping[str, Reading] = NOTHING
-    """Arguments that stop the motion; omitted ones take their defaults."""
+    """Arguments that stop the motion; omitted arguments have their default values."""
     lease_s: float = 0.25
-    """Lease of the motion without a renewal by the operator, 0.1 to 1.0 s."""
+    """Duration of the motion lease without a renewal by the operator, 0.1 to 1.0 s."""
     watchdog_s: float | None = None
-    """Watchdog of the robot, in seconds: motion continues this long after the last value. The value
-    ``inf`` means without end, and None unknown. Only the rules of the loader read the value."""
+    """Watchdog timeout of the robot, in seconds: motion continues for this time after the last
+    setpoint. ``inf``: no watchdog; None: unknown. Only the loader's rules use the value."""
     slew: Mapping[str, float] = NOTHING
-    """Argument → largest increase per second, away from the value that stops the motion."""
+    """Maximum increase per second away from the stop value, by argument."""
     on_stall: Literal["abort", "wait"] | None = None
-    """Reaction to a connection that stalls during motion; None: the default of its transport."""
+    """Reaction to a stalled connection during motion; None: the default of the transport."""
     step_s: float | None = None
-    """Longest duration of a step, in seconds. The robot then stops by itself, so no stop is sent.
-    Without a duration, the robot moves until it is stopped."""
+    """Maximum duration of a motion step that the robot ends itself, in seconds; no stop is sent.
+    None: the robot moves until a stop arrives."""
 
 
 class Confirm(NamedTuple):
-    """A confirmation question before the command is sent."""
+    """A confirmation question before a command is sent."""
 
     level: Literal["normal", "hazardous"] = "normal"
     text: str = ""
     is_two_person: bool = False
-    """Whether the two-person rule applies: the engine refuses the command without a second name."""
+    """Whether the engine requires the name of a second person (two-person rule)."""
 
 
 class Retry(NamedTuple):
-    """Waits before a request is sent again, doubling from `initial_s` to `max_s`, in seconds."""
+    """Delays before retries of a request, doubling from `initial_s` to `max_s`, in seconds."""
 
     initial_s: float = 0.0
     max_s: float = 0.0
 
     def wait_s(self, tries: int) -> float:
-        """Return the wait after `tries` unanswered requests, 1 or more, in seconds."""
+        """Return the delay in seconds after `tries` unanswered requests; `tries` is at least 1."""
         return min(self.initial_s * 2.0 ** min(tries - 1, 32), self.max_s)
 
 
@@ -140,23 +141,23 @@ class Requirement(NamedTuple):
     """A precondition for sending a command."""
 
     condition: Template
-    """Condition over fresh signals, settings and the arguments of the command."""
+    """Condition over fresh signals, settings and the command's arguments."""
     text: str
-    """Text for the operator when the condition is false."""
+    """Message for the operator when the condition is false."""
 
 
 class Verify(NamedTuple):
     """A condition that confirms the effect of a command."""
 
     condition: Template
-    """Condition over settings, the arguments, and signals that were read after the command."""
+    """Condition over settings, arguments, and signals received after the command."""
     within_s: float
 
 
 class Offline(NamedTuple):
-    """Polling of a robot, or of a part of it, that does not reply."""
+    """Polling of a robot, or part of a robot, that does not reply."""
 
     after: int
-    """Number of missed replies in a row."""
+    """Number of consecutive missed replies before the robot is offline."""
     retry_s: float
-    """Poll period until the next reply, in seconds."""
+    """Poll period while the robot is offline, in seconds."""

@@ -1,7 +1,7 @@
-"""Layout of a frame: constant bytes, length field, checksum, and the place of the payload.
+"""Layout of a frame: constant bytes, length field, checksum, and the position of the payload.
 
-The loader resolves every default. A non-negative place counts from the first byte of the frame, a
-negative one from behind its last byte.
+The loader resolves every default. A position of 0 or more counts from the first byte of the frame.
+A negative position counts back from the end of the frame.
 """
 
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 Spelling = Literal["raw", "hex", "HEX", "dec"]
-"""Notation of a number in a frame: raw bytes, or digits (``HEX``: in capitals)."""
+"""Notation of a number in a frame: raw bytes, or digits (``HEX``: upper case)."""
 Digits = Literal["", "hex", "HEX", "base64"]
 """Notation of the bytes between the start and end markers; "" for raw bytes."""
 
@@ -49,13 +49,13 @@ class Salt(NamedTuple):
     size: int = 1
     is_big: bool = False
     table: Mapping[Any, bytes] = NOTHING
-    """Number → bytes."""
+    """Secret bytes, by the selecting number in the frame."""
     otherwise: Literal["fault", "skip", "pass"] = "fault"
-    """Treatment of a frame with an unknown number: drop and report it, drop it silently, or accept
-    it without a check."""
+    """Handling of a frame with an unknown number: ``fault`` drops and reports the frame, ``skip``
+    drops the frame silently, ``pass`` accepts the frame unchecked."""
 
     def number(self, frame: bytes | bytearray) -> int | None:
-        """Return the number that selects the row; None when the frame is too short."""
+        """Return the number that selects the secret bytes; None when the frame is too short."""
         field = frame[self.offset : self.offset + self.size]
         if len(field) < self.size:
             return None
@@ -63,10 +63,10 @@ class Salt(NamedTuple):
 
 
 class ChecksumSpec(NamedTuple):
-    """A number over part of a frame that detects damage."""
+    """A checksum over part of a frame."""
 
     algorithm: CrcSpec | FoldSpec | str
-    """Parameters, or the name of an algorithm without parameters: ``fletcher16``, ``adler32`` …"""
+    """Algorithm parameters, or the name of an algorithm without parameters, such as ``adler32``."""
     bits: int
     over: ByteRange
     at: int
@@ -74,7 +74,7 @@ class ChecksumSpec(NamedTuple):
     spelling: Spelling = "raw"
     salt: Salt = Salt()
     is_from_hex: bool = False
-    """Whether the range holds hex digits, whose bytes enter the checksum."""
+    """Whether the range contains hex digits to decode before the checksum is computed."""
     closes: bool = False
     """Whether a mismatch closes the connection instead of dropping the frame."""
     before: bytes = b""
@@ -87,20 +87,20 @@ class ChecksumSpec(NamedTuple):
 
 
 class TrailerSpec(NamedTuple):
-    """A checksum behind a text of variable length."""
+    """A checksum after a text of variable length."""
 
     checksum: ChecksumSpec
-    """Parameters. The range counts in the text without the checksum; `at` is unused."""
+    """Checksum parameters. The range refers to the text without the checksum; `at` is unused."""
     mark: bytes = b""
     """Separator between the text and the checksum."""
     is_padded: bool = True
     """Whether the digits have leading zeros."""
     is_optional: bool = False
-    """Whether a text without the separator is valid, too."""
+    """Whether a text without separator and checksum is also valid."""
     each: bytes = b""
-    """Separator of the lines of a frame, each of which has its own checksum."""
+    """Line separator of a frame with one checksum per line."""
     skip: int = 0
-    """Number of first lines without a checksum."""
+    """Number of leading lines without a checksum."""
 
 
 class LengthSpec(NamedTuple):
@@ -108,71 +108,75 @@ class LengthSpec(NamedTuple):
 
     offset: int
     size: int
-    """Bytes of the field, or its digits when it is spelt out."""
+    """Size of the length field in bytes, or in digits for a text notation."""
     is_big: bool = True
     adjust: int = 0
     unit: int = 1
     bits: int = 64
-    """Number of low bits that hold the length; the others belong to the payload."""
+    """Number of low bits with the length; the remaining bits belong to the payload."""
     spelling: Spelling = "raw"
     is_counted: bool = False
-    """Whether `size` digits give the number of digits that follow, which are the length."""
+    """Whether the first `size` digits are the number of length digits that follow."""
     until: bytes = b""
-    """Terminator of the field, which then has at most `size` digits."""
+    """Terminator of a length field with at most `size` digits; b"": no terminator."""
     flag_at: int = -1
-    """Offset of a flag byte that tells whether the field is a length; -1: it always is."""
+    """Offset of the flag byte that marks a valid length field; -1: the length field is always
+    valid."""
     flag_mask: int = 0
-    """Mask of the flag byte. If any of these bits is set, the field is a length; otherwise the
+    """Mask of the flag byte. If any masked bit is set, the length field is valid; otherwise the
     frame has `adjust` bytes."""
 
     @property
     def is_loose(self) -> bool:
-        """Whether its own bytes determine its size."""
+        """Whether the length field has a variable size."""
         return self.is_counted or bool(self.until)
 
 
 class EscapeSpec(NamedTuple):
-    """Byte stuffing: escape sequences for bytes with a meaning in the framing."""
+    """Byte stuffing: escape sequences for bytes with a special meaning in the framing."""
 
     byte: int = 0
     """Escape byte in front of a stuffed byte."""
     table: Mapping[Any, int] = NOTHING
-    """Stuffed byte → its replacement after `byte`."""
+    """Replacements that follow the escape byte, by stuffed byte."""
     xor: int | None = None
-    """XOR mask behind the table. A sender may also stuff other bytes."""
+    """XOR mask for decoding any stuffed byte, because a robot may stuff bytes outside `table`.
+    None: only the pairs of `table` are valid."""
     after: bytes = b""
     """Sequence after which `insert` is stuffed; `byte` and `table` are then unused."""
     insert: int = 0
     is_of_payload: bool = False
-    """Whether length and checksum count the stuffed bytes; otherwise, the original ones."""
+    """Whether length and checksum cover the stuffed bytes instead of the original bytes."""
 
 
 class FrameLayout(NamedTuple):
-    """Places of all parts of a frame."""
+    """Positions of all parts of a frame."""
 
     start: bytes = b""
     end: bytes = b""
     head: int = 0
-    """Size of the header in front of the payload, in bytes."""
+    """Size of the header before the payload, in bytes."""
     tail: int = 0
-    """Size of the trailer behind the payload, in bytes."""
+    """Size of the trailer after the payload, in bytes."""
     size: int | None = None
-    """Size of the whole frame, if constant."""
+    """Size of the whole frame in bytes; None for a variable size."""
     length: LengthSpec | None = None
     checksum: ChecksumSpec | None = None
-    """The last checksum; a sender computes it after all others."""
+    """The last checksum, computed after all other checksums."""
     checksums: tuple[ChecksumSpec, ...] = ()
-    """Those before it."""
+    """Checksums computed before `checksum`."""
     escape: EscapeSpec | None = None
-    """Byte stuffing of the payload alone."""
+    """Byte stuffing of the payload only; None: no stuffing."""
     trailer: TrailerSpec | None = None
-    """Trailing checksum, removed before all other checks and added after all others."""
+    """Trailing checksum: the first check of a received frame, and the last part added to a sent
+    frame."""
     digits: Digits = ""
-    """Notation of the bytes between start and end; places and `checksums` count decoded bytes."""
+    """Notation of the bytes between start and end; positions and `checksums` refer to decoded
+    bytes."""
 
 
 def spelt_size(bits: int, spelling: Spelling) -> int:
-    """Return the number of frame bytes of a number with `bits` bits."""
+    """Return the size in the frame of a number with `bits` bits, in bytes."""
     size = (bits + 7) // 8
     if spelling == "raw":
         return size

@@ -8,46 +8,46 @@ from urc.model.values import NOTHING, Value
 __all__ = ["DEBUG", "OutputBinding", "Layout", "Interface", "SCREENS", "Slot", "Tab", "WidgetUse"]
 
 SCREENS: Final = ("landscape", "portrait", "phone_portrait", "phone_landscape")
-"""Kinds of screen that have a layout of their own."""
+"""Kinds of screen with separate layouts."""
 
 DEBUG: Final = "debug"
-"""The built-in interface of every robot; documents must not use its name."""
+"""Name of the built-in interface of every robot; documents must not use this name."""
 
 
 class OutputBinding(NamedTuple):
-    """Values that an output of a widget gives to the arguments of its command."""
+    """The mapping of a widget output's values to command arguments."""
 
     names: Mapping[str, str] = NOTHING
-    """Argument of the command → argument of the output, where the names differ."""
+    """Output arguments with different names, by command argument."""
     fixed: Mapping[str, Value] = NOTHING
-    """Argument of the command → constant value."""
+    """Constant values, by command argument."""
 
 
 class WidgetUse(NamedTuple):
-    """The widget in a slot, with its bindings and options."""
+    """A widget in a slot, with its bindings and options."""
 
     slot: str
     widget: str
-    """Name of a widget folder."""
+    """Name of the widget, equal to the name of its folder."""
     inputs: Mapping[str, str] = NOTHING
-    """Input of the widget → signal of the driver."""
+    """Signals of the driver, by widget input."""
     outputs: Mapping[str, str] = NOTHING
-    """Output of the widget → command of the driver."""
+    """Commands of the driver, by widget output."""
     options: Mapping[str, object] = NOTHING
-    """Options with defaults, validated against the schema of the widget."""
+    """Option values including defaults, validated against the widget's schema."""
     title: str = ""
     given: Mapping[str, OutputBinding] = NOTHING
-    """Output of the widget → its binding, where one is declared."""
+    """Declared argument mappings, by widget output."""
     lists: Mapping[str, tuple[str, ...]] = NOTHING
-    """List input of the widget → signals of the driver, in order."""
+    """Lists of driver signals, by multiple input of the widget."""
     files: Mapping[str, str] = NOTHING
-    """File name in an option → path of the file."""
+    """File paths, by the file name in an option."""
     pages: Mapping[str, tuple[str, ...]] = NOTHING
-    """Option → validated URLs of third-party pages."""
+    """Validated URLs of third-party pages, by option."""
 
 
 class Slot(NamedTuple):
-    """A rectangle of a layout; rows and columns are 0-based, spans at least 1."""
+    """A rectangle of a layout. Rows and columns are 0-based; spans are at least 1."""
 
     name: str
     row: int
@@ -57,7 +57,7 @@ class Slot(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """One layout: numbers of rows and columns, and its slots."""
+    """A layout: numbers of rows and columns, and the slots."""
 
     rows: int
     columns: int
@@ -67,36 +67,36 @@ class Layout(NamedTuple):
 class Tab(NamedTuple):
     """One page of an interface.
 
-    `layouts` has the layout of each screen of `SCREENS` that is drawn.
+    `layouts` contains the declared layouts, by screen of `SCREENS`.
     """
 
     name: str = ""
-    """Name of the page; "" for an interface without tabs."""
+    """Name of the page; "": an interface without tabs."""
     title: str = ""
     layouts: Mapping[str, Layout] = NOTHING
     left_handed: Mapping[str, Layout] = NOTHING
-    """Screen → declared left-handed layout."""
+    """Declared left-handed layouts, by screen."""
     is_mirrored: bool = True
-    """Whether all other layouts are mirrored for left-handed operators."""
+    """Whether layouts without a left-handed version are mirrored for left-handed operators."""
 
 
 class Interface(NamedTuple):
-    """A named interface: its own layouts, or several pages of them."""
+    """A named interface: one page of layouts, or several tabs."""
 
     name: str
     title: str = ""
     layouts: Mapping[str, Layout] = NOTHING
-    """Screen → layout; empty when there are tabs."""
+    """Layouts by screen; empty for an interface with tabs."""
     background: str = ""
-    """Name of the slot behind all others; "" for no background."""
+    """Name of the background slot; "": no background."""
     widgets: Mapping[str, WidgetUse] = NOTHING
-    """Overrides of the widgets of the driver, by slot."""
+    """Widgets that override the driver's widgets, by slot."""
     summary: str = ""
     licence: str = ""
-    """SPDX identifier from the document."""
+    """SPDX licence identifier from the document."""
     author: str = ""
     left_handed: Mapping[str, Layout] = NOTHING
-    """Left-handed layouts, as in a tab."""
+    """Declared left-handed layouts, by screen."""
     is_mirrored: bool = True
     tabs: Mapping[str, Tab] = NOTHING
 
@@ -108,7 +108,7 @@ class Interface(NamedTuple):
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """All visible slots, each once: the background first, then in reading order."""
+        """Names of all visible slots: the background first, then in reading order."""
         names = dict.fromkeys((self.background,) if self.background else ())
         for page in self.pages:
             for grid in (*page.layouts.values(), *page.left_handed.values()):

@@ -1,11 +1,11 @@
-"""Declarations of how frames are read and written: a form, and its parsed options.
+"""Declarations for reading and writing frames: a form and its parsed options.
 
 A *form* is one notation for the content of a frame (``regex``, ``struct``, ``json`` …). Each form
 has a parser in `urc.config`, which fills `options`, and a factory in `urc.protocol`, which reads
-them. Parser and factory agree on the content of `options`; no other module reads it.
+them. Only the parser and the factory of a form use the content of `options`.
 
-Decoding gives *fields*: name → raw value. A field with the name of a signal sets that signal. A
-field whose name starts with ``_`` stays inside the document (conditions, correlation, command
+Decoding returns *fields*: raw values by name. A field with the name of a signal sets that signal. A
+field name that starts with ``_`` is private to the document (conditions, correlation, command
 replies).
 """
 
@@ -38,17 +38,17 @@ class Envelope(NamedTuple):
     """The unit of a transport that carries messages instead of bytes."""
 
     verb: str
-    """Operation. The driver sends ``publish``, ``call``, ``goal``, ``cancel`` and ``request``. The
-    transport delivers ``message``, ``response``, ``feedback`` and its own ``notice``."""
+    """Operation of the envelope. The driver sends ``publish``, ``call``, ``goal``, ``cancel`` and
+    ``request``. The transport delivers ``message``, ``response``, ``feedback`` and ``notice``."""
     attributes: Mapping[str, object] = NOTHING
-    """Address and options: topic, type, method, path, headers, quality of service … A request has
-    an ``id``, and its response the same one. A response has ``ok``, and on failure a ``reason``."""
+    """Address and options: topic, type, method, path, headers, quality of service … A request and
+    its response have the same ``id``. A response has ``ok``, and on failure a ``reason``."""
     body: object = None
-    """JSON-like data, or bytes."""
+    """Content of the envelope: JSON-like data, or bytes."""
 
 
 NUMBERED: Final = frozenset(("call", "goal", "request"))
-"""Verbs of requests. Each request gets a ``response`` with the same ``id``."""
+"""Verbs of requests. The ``response`` to a request has the same ``id``."""
 
 Payload = bytes | Envelope
 """The content of one frame, without its framing."""
@@ -58,20 +58,20 @@ class Count(NamedTuple):
     """The effect of a frame on the counters of its connection."""
 
     before: dict[str, int]
-    """Last number of each counter before the frame; a missing counter is unused so far."""
+    """Last number of each counter before the frame; unused counters are missing."""
     after: dict[str, int]
     """Last number of each counter after the frame."""
 
 
 class Numbered(NamedTuple):
-    """A frame with counters. The frame may be sent only while its numbers are the next ones."""
+    """A frame with counters; the frame is valid only while its numbers are next."""
 
     data: Payload
     takes: Count
 
 
 class FrameVariants(NamedTuple):
-    """One frame, rendered once for each set of numbers that may be next when it is sent."""
+    """One frame, rendered once for each possible set of next counter numbers."""
 
     frames: tuple[Numbered, ...]
 
@@ -81,35 +81,34 @@ class CountedFrame(NamedTuple):
 
     numbered: Numbered
     again: Callable[[], Numbered | None]
-    """Render the frame with the next numbers; None: the frame has become impossible."""
+    """Function that renders the frame with the next numbers; None: the frame is impossible."""
 
 
 class FramingSpec(NamedTuple):
-    """How a byte stream is cut into frames. `type` is a row of the framings table."""
+    """Rules for cutting a byte stream into frames. `type` is a row of the framings table."""
 
     type: str = "delimiter"
     options: Mapping[str, object] = NOTHING
-    """Parsed options; for ``delimiter``, `tx` and `rx` as bytes."""
+    """Parsed options of the framing, such as `tx` and `rx` as bytes for ``delimiter``."""
     max_bytes: int = 65536
-    """Longest accepted frame, in bytes; a longer one is dropped and counted."""
+    """Maximum size of a frame, in bytes; a larger frame is dropped and counted."""
     timeout_s: float | None = None
-    """Timeout within a frame, in seconds, after which an incomplete frame is dropped; None:
-    never."""
+    """Timeout after which an incomplete frame is dropped, in seconds; None: never."""
     strips_ansi: bool = False
     """Whether terminal escape sequences are removed from received data."""
     sent: "FramingSpec | None" = None
-    """Framing of sent data, where it differs from that of received data; None: the same."""
+    """Framing of sent data; None: the framing of received data."""
 
 
 def size_of(payload: Payload) -> int:
-    """Return the size of a payload in bytes; an estimate for an envelope."""
+    """Return the size of a payload in bytes; the size of an envelope is an estimate."""
     if not isinstance(payload, Envelope):
         return len(payload)
     return 256 + (len(payload.body) if isinstance(payload.body, bytes) else 0)
 
 
 def traffic_of(payload: Payload) -> bytes:
-    """Return a payload as the traffic view shows it: ``publish topic=/cmd_vel {"x":1}``."""
+    """Return a payload as text for traffic views: ``publish topic=/cmd_vel {"x":1}``."""
     if not isinstance(payload, Envelope):
         return payload
     words = [f"{name}={value}" for name, value in payload.attributes.items() if value is not None]
@@ -122,58 +121,62 @@ def traffic_of(payload: Payload) -> bytes:
 
 
 class Collect(NamedTuple):
-    """A value that is collected from several frames."""
+    """A value assembled from several frames."""
 
     value: Template
-    """Expression over the fields of each frame: one value, a list of values, or bytes."""
+    """Expression over the fields of one frame; the result is one value, a list of values, or
+    bytes."""
     begin: Template | None = None
-    """Condition that marks the first frame of a new value."""
+    """Condition for the first frame of a new value."""
     end: Template | None = None
-    """Condition that marks the last frame. Without a condition, the first frame of the next value
-    ends this one."""
+    """Condition for the last frame of a value; None: the first frame of the next value ends the
+    previous value."""
     max: int = 4096
-    """Largest number of values, or of bytes, in total."""
+    """Maximum total number of values or bytes."""
 
 
 class ReadSpec(NamedTuple):
-    """How a frame is decoded into fields."""
+    """Rules for decoding a frame into fields."""
 
     form: str
-    """Row of the readers' table, such as ``regex``."""
+    """Name of a reader in the readers' table, such as ``regex``."""
     options: Mapping[str, object] = NOTHING
     fields: tuple[str, ...] = ()
-    """Names of all possible fields, in the order of the frame, then the names of `sets`."""
+    """Names of all possible fields in frame order, followed by the names in `sets`."""
     conversions: Mapping[str, Conversion] = NOTHING
-    """Field → conversion for this frame; the conversion of the signal follows it."""
+    """Conversions for this frame by field, applied before the conversion of the signal."""
     sets: Mapping[str, Template] = NOTHING
-    """Signal → expression over the converted fields."""
+    """Expressions over the converted fields, by signal."""
     when: Template | None = None
-    """Condition over the converted fields; false means another kind of frame."""
+    """Condition over the converted fields; if false, the frame does not match. None: always
+    true."""
     lines: int | Pattern | None = None
-    """Number of frames in the reply, or a pattern that finds the last one. LF joins them."""
+    """Number of frames in the reply, or a pattern for the last frame. The frames are joined by
+    LF."""
     topic: Template | None = None
-    """Source topic, over settings, on a transport that carries messages; None: any topic."""
+    """Template over settings for the source topic, on transports for messages; None: any topic."""
     collects: Mapping[str, Collect] = NOTHING
-    """Signal → rule that collects it; these names come last in `fields`."""
+    """Rules for values from several frames, by signal; these signals are last in `fields`."""
     head: Mapping[str, str] = NOTHING
-    """Field → header of an HTTP response in lower case, or ``status``."""
+    """Lower-case names of HTTP response headers, or ``status``, by field."""
     listen: Mapping[str, Value] = NOTHING
     """Subscription options of `topic`: type, throttle in seconds, quality of service …"""
 
 
 class WriteSpec(NamedTuple):
-    """How arguments are encoded into a frame."""
+    """Rules for encoding arguments into a frame."""
 
     form: str
-    """Row of the writers' table, such as ``text``; ``frames`` has several specifications."""
+    """Name of a writer in the writers' table, such as ``text``; ``frames`` contains several
+    specifications."""
     options: Mapping[str, object] = NOTHING
     names: frozenset[str] = frozenset()
-    """Root names that its templates use."""
+    """Root names in the templates."""
     settings: frozenset[str] = frozenset()
-    """Names of the settings that its templates use, as ``settings.NAME``."""
+    """Names of the settings in the templates, from ``settings.NAME``."""
 
 
 def each_of(send: WriteSpec) -> tuple[WriteSpec, ...]:
-    """Return the frames of `send`: `send` itself, or all frames of a group."""
+    """Return all frames of `send`: only `send`, or the frames of a group."""
     frames = send.options.get("frames")
     return frames if send.form == "frames" and isinstance(frames, tuple) else (send,)

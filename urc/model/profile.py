@@ -27,61 +27,61 @@ __all__ = [
 
 
 class Setting(NamedTuple):
-    """A value that the operator fills in or overrides by ``--set``."""
+    """A value that the operator fills in or sets with ``--set``."""
 
     name: str
     type: Literal["string", "host", "port", "integer", "number", "boolean", "choice", "path"]
     title: str = ""
     default: Value = None
-    """Default value; None: the operator has to fill it in before Connect."""
+    """Default value; None: the operator must enter a value before connecting."""
     choices: tuple[str, ...] = ()
     min: float | None = None
     max: float | None = None
     is_secret: bool = False
     description: str = ""
     is_required: bool = True
-    """Whether a value is required before Connect, if there is no default."""
+    """Whether a setting without a default must have a value before connecting."""
 
     @property
     def empty(self) -> Value:
-        """Value of an empty setting in templates: an empty text, or None."""
+        """Value of an empty setting in templates: "", or None for numbers and booleans."""
         return None if self.type in ("port", "integer", "number", "boolean") else ""
 
     def is_missing(self, value: Value) -> bool:
-        """Return whether `value` prevents the connection of the robot.
+        """Return whether `value` is missing, so that the robot cannot connect.
 
-        A value from a document counts as filled in, even an empty text.
+        An empty default from a document is a valid value.
         """
         return self.is_required and (value is None or (value == "" and self.default != ""))
 
 
 Fed = str | bytes | Envelope
-"""Text in the encoding of the connection, bytes, or an envelope."""
+"""Test data: text in the encoding of the connection, bytes, or an envelope."""
 
 
 def pieces_of(fed: Fed | tuple[Fed, ...]) -> tuple[Fed, ...]:
-    """Return the pieces of the input; each arrives separately."""
+    """Return the pieces of the input, which arrive separately."""
     return (fed,) if isinstance(fed, (str, bytes, Envelope)) else fed
 
 
 class ExpectedState(NamedTuple):
-    """The expected state of a signal, in addition to its value."""
+    """The expected state of a signal: value, alarm and age."""
 
     has_value: bool = False
-    """Whether `value` is compared."""
+    """Whether the test compares `value`."""
     value: Value | tuple[Value, ...] = None
     alarm: Alarm | None = None
-    """Expected alarm, "" for normal; None: any."""
+    """Expected alarm of a signal; "": no alarm; None: any."""
     age: Literal["", "fresh", "stale", "never"] = ""
-    """Expected age: fresh, old or never set; "": any."""
+    """Expected age of a signal: fresh, stale or never received; "": any."""
 
 
 Expected = Value | tuple[Value, ...] | ExpectedState
-"""Expected value of a signal, or of all elements of an array."""
+"""Expected value of a signal, or expected elements of an array."""
 
 
 class DialogueStep(NamedTuple):
-    """One step of a test: at most one action, then the expected results."""
+    """One step of a test: at most one action, followed by the expected results."""
 
     line: int = 1
     """1-based line in the document."""
@@ -90,50 +90,50 @@ class DialogueStep(NamedTuple):
     source: str = ""
     """Text of the line in the document."""
     feed: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
-    """Transport → input from the robot."""
+    """Input from the robot, by transport."""
     run: str = ""
     """Name of the command to run."""
     arguments: Mapping[str, Reading] = NOTHING
     wait_s: float | None = None
-    """Time that passes on the clock of the test, in seconds."""
+    """Duration of a pause on the test's clock, in seconds."""
     connects: str = ""
-    """Name of the transport that connects."""
+    """Name of the transport to connect."""
     closes: str = ""
-    """Name of the transport whose connection the robot closes."""
+    """Name of the transport that the robot disconnects."""
     leaves: bool = False
-    """Whether the operator leaves: all connections close in order."""
+    """Whether the operator disconnects: all connections close in an orderly way."""
     sent: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
-    """Transport → all output since the last check of it; () for no output."""
+    """All output since the previous check, by transport; (): no output."""
     expect: Mapping[str, Expected] = NOTHING
     reply: Mapping[str, Value | tuple[Value, ...]] | None = None
-    """Expected reply values of the first completed command that no step has checked yet."""
+    """Expected reply values of the first completed, unchecked command."""
     of: str = ""
-    """Command of `reply` or `fails`; "" for any."""
+    """Command for `reply` or `fails`; "": any command."""
     fails: str = ""
     """Expected failure message."""
     closed: str = ""
-    """Name of the transport that URC has closed."""
+    """Name of the transport that URC must have closed."""
 
 
 class DocumentTest(NamedTuple):
-    """A test that a document carries for itself."""
+    """A test in a document."""
 
     name: str
     line: int
     """1-based line in the document."""
     feed: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
-    """Transport → input from the robot, in one piece or several; see `pieces_of`."""
+    """Input from the robot, by transport, in one piece or several; see `pieces_of`."""
     reply_to: int | str | None = None
-    """Index of the poll, or name of the command, that awaits the reply."""
+    """Index of the poll or name of the command that waits for the reply."""
     run: str | None = None
     """Command to run."""
     arguments: Mapping[str, Reading] = NOTHING
     expect: Mapping[str, Expected] = NOTHING
-    """Signal → expected value after the test."""
+    """Expected values after the test, by signal."""
     sent: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
-    """Transport → exact payload without framing, or all bytes on the wire."""
+    """Exact payload without framing, or all bytes on the wire, by transport."""
     fails: str | None = None
-    """Expected failure message, for a test of a failure."""
+    """Expected failure message; None: the test expects success."""
     file: str = ""
     """Path of the document."""
     column: int = 1
@@ -141,30 +141,30 @@ class DocumentTest(NamedTuple):
     source: str = ""
     """Text of the line in the document, for error messages."""
     settings: Mapping[str, Value] = NOTHING
-    """Setting → value, where it differs from the default."""
+    """Values that differ from the default, by setting."""
     steps: tuple[DialogueStep, ...] = ()
-    """Steps in order, instead of a single instant."""
+    """Steps of the test in order; () for a test without steps."""
     polls: tuple[str, ...] = ()
-    """Names of the polls that run on schedule during the steps."""
+    """Names of the polls that run periodically during the steps."""
     is_ready: bool = False
-    """Whether the connections are ready before the first step."""
+    """Whether all connections are ready before the first step."""
 
 
 class Reaction(NamedTuple):
-    """One reaction of the emulated robot; the attributes are in the order of execution."""
+    """One reaction of the emulated robot. Its actions run in the order of the attributes."""
 
     after_s: float = 0.0
     """Time since the previous reaction, in seconds."""
     sets: Mapping[str, Template | Reading] = NOTHING
-    """Signal or state variable of the robot → its new value, or a template for it."""
+    """New values, or templates for new values, by signal or state variable."""
     answers: bool = False
-    """Whether the robot sends the reply that the driver declares for the request."""
+    """Whether the robot sends the declared reply to the request."""
     send: WriteSpec | None = None
     """Frame to send; None: no frame."""
     message: str = ""
-    """Name of the declared message to send."""
+    """Name of the message to send; "": no message."""
     framing: FramingSpec | None = None
-    """Framing of `send`; None: that of the connection, or of the reply to the request."""
+    """Framing of `send`; None: the framing of the request's reply, or of the connection."""
     closes: bool = False
     """Whether the robot closes the connection."""
 
@@ -174,20 +174,20 @@ class SimulatorRule(NamedTuple):
 
     transport: str
     match: Pattern | ReadSpec | None = None
-    """Matching frames: a pattern of their text, or a form that reads them."""
+    """Matching frames: a text pattern, or a form for decoding."""
     request: str = ""
-    """Command or poll whose frames match."""
+    """Name of the command or poll with the matching frames."""
     every_s: float | None = None
-    """Period of a timed rule, in seconds."""
+    """Period of a timed rule, in seconds; None: the rule is not timed."""
     when: Template | None = None
-    """Condition of the rule; the rule is skipped while it is false."""
+    """Condition for the rule; the rule is inactive while the condition is false."""
     reactions: tuple[Reaction, ...] = (Reaction(),)
     name: str = ""
-    """Name by which other documents override the rule; "" for none."""
+    """Name for overriding the rule in other documents; "": no name."""
 
 
 class Profile(NamedTuple):
-    """One robot, ready to connect once its settings are complete."""
+    """One robot, ready to connect when its settings are complete."""
 
     name: str
     title: str
@@ -196,17 +196,17 @@ class Profile(NamedTuple):
     settings: Mapping[str, Setting] = NOTHING
     driver: Driver = Driver()
     slots: Mapping[str, WidgetUse] = NOTHING
-    """Slot → widget of the driver, unless an interface overrides it."""
+    """Widgets of the driver by slot; an interface may override a widget."""
     interfaces: Mapping[str, Interface] = NOTHING
-    """Name → interface; never empty, since ``default`` is added if missing."""
+    """Interfaces by name; never empty, because a missing ``default`` is added."""
     widgets: Mapping[str, Widget] = NOTHING
-    """Name → widget, for all widgets of the profile."""
+    """All widgets of the profile, by name."""
     tests: tuple[DocumentTest, ...] = ()
     simulator: tuple[SimulatorRule, ...] = ()
     emulated: Mapping[str, Reading] = NOTHING
-    """Initial values of the emulated robot: signals and its own state variables."""
+    """Initial values of the emulated robot, by signal or state variable."""
     world: WorldSpec | None = None
     """Body and surroundings of the emulated robot; None: no world."""
     licence: str = ""
-    """SPDX identifier from the document."""
+    """SPDX licence identifier from the document."""
     author: str = ""

@@ -1,6 +1,6 @@
-"""Steps of a sequence: a class for each kind, and `Step` for any of them.
+"""Steps of a sequence: one class for each kind of step, and the union type `Step`.
 
-A module that handles every kind imports this one whole, as `sequence`.
+Modules that handle every kind of step import this module as `sequence`.
 """
 
 from collections.abc import Iterator, Mapping
@@ -32,11 +32,11 @@ __all__ = [
 ]
 
 MAX_STEPS = 200
-"""Largest number of steps in one sequence, including those in its branches."""
+"""Maximum number of steps in one sequence, including all branches."""
 MAX_STEPS_DONE = 10_000
-"""Largest number of steps in one run, counting every round of every ``repeat``."""
+"""Maximum number of steps in one run, counting every round of every ``repeat``."""
 MAX_STEP_S = 600.0
-"""Longest wait of one step, in seconds."""
+"""Maximum wait in one step, in seconds."""
 
 
 class SendStep(NamedTuple):
@@ -45,11 +45,11 @@ class SendStep(NamedTuple):
     transport: str
     send: WriteSpec
     is_secret: bool = False
-    """Whether the text must not appear in any message."""
+    """Whether the sent text is redacted in all logs and messages."""
 
 
 class ExpectStep(NamedTuple):
-    """Wait for a frame; its ``_fields`` are names in the later steps."""
+    """Wait for a frame; later steps can use its private fields."""
 
     transport: str
     read: ReadSpec
@@ -58,15 +58,15 @@ class ExpectStep(NamedTuple):
     timeout_s: float | None = None
     """Reply timeout, in seconds; None: ``timeouts.reply`` of the transport."""
     otherwise: "tuple[Step, ...] | None" = None
-    """Steps after a timeout; None: the sequence fails."""
+    """Steps to run after a timeout; None: the sequence fails."""
     text: str = ""
-    """Message after a timeout; "" for a generated one."""
+    """Error message after a timeout; "": a generated message."""
     framing: FramingSpec | None = None
-    """Framing of the connection during the wait; None: unchanged."""
+    """Framing of the connection during the wait; None: the usual framing."""
 
 
 class PromptStep(NamedTuple):
-    """Wait for text without a terminator, such as a password prompt."""
+    """Wait for unterminated text, such as a password prompt."""
 
     transport: str
     pattern: Pattern
@@ -76,36 +76,36 @@ class PromptStep(NamedTuple):
 
 
 class WaitStep(NamedTuple):
-    """Pause for some time."""
+    """Wait for a fixed time."""
 
     seconds: float
 
 
 class UntilStep(NamedTuple):
-    """Wait for a condition to come true."""
+    """Wait until a condition is true."""
 
     condition: Template
-    """Condition over fresh signals, settings and the fields that earlier steps have read."""
+    """Condition over fresh signals, settings and the fields from earlier steps."""
     timeout_s: float
     otherwise: "tuple[Step, ...] | None" = None
     text: str = ""
 
 
 class RepeatStep(NamedTuple):
-    """Repeat the same steps, a bounded number of times."""
+    """Repeat steps a limited number of times."""
 
     body: "tuple[Step, ...]"
     times: int
-    """Largest number of rounds."""
+    """Maximum number of rounds."""
     until: Template | None = None
-    """Condition after each round that ends the loop; None: all rounds run."""
+    """Condition that ends the loop, evaluated after each round; None: all rounds run."""
     otherwise: "tuple[Step, ...] | None" = None
-    """Steps when `until` is still false after the last round; None: the sequence fails."""
+    """Steps to run if `until` is false after the last round; None: the sequence fails."""
     text: str = ""
 
 
 class RunStep(NamedTuple):
-    """Run a command or another sequence, and wait for its end."""
+    """Run a command or another sequence, and wait for completion."""
 
     command: str
     arguments: Mapping[str, Template | Value] = NOTHING
@@ -118,7 +118,7 @@ class SetStep(NamedTuple):
 
 
 class IfStep(NamedTuple):
-    """Choose between two branches."""
+    """Run one of two branches."""
 
     condition: Template
     then: "tuple[Step, ...]"
@@ -126,7 +126,7 @@ class IfStep(NamedTuple):
 
 
 class FailStep(NamedTuple):
-    """End without success."""
+    """End the sequence with a failure."""
 
     text: Template
 
@@ -146,7 +146,7 @@ Step = (
 
 
 def all_steps(steps: tuple[Step, ...]) -> Iterator[Step]:
-    """Yield the steps, including those in branches."""
+    """Yield all steps, including the steps in branches."""
     for step in steps:
         yield step
         if isinstance(step, IfStep):
@@ -160,7 +160,7 @@ def all_steps(steps: tuple[Step, ...]) -> Iterator[Step]:
 
 
 def most_steps(steps: tuple[Step, ...]) -> int:
-    """Return the largest number of steps in one run, counting both branches of a choice."""
+    """Return the maximum number of steps in one run, counting both branches of every ``if``."""
     total = 0
     for step in steps:
         total += 1

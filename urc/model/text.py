@@ -1,4 +1,4 @@
-"""Parsed options of the text forms; `urc.config` makes them, `urc.protocol` reads them."""
+"""Parsed options of the text forms, from `urc.config` to `urc.protocol`."""
 
 from typing import Literal, NamedTuple
 
@@ -8,36 +8,36 @@ FieldKind = Literal["integer", "number", "word", "text", "rest", "hex"]
 
 
 class PatternField(NamedTuple):
-    """A field in a pattern, and the literal text before it."""
+    """A field in a pattern, with the preceding literal text."""
 
     before: str
-    """Literal text; a run of blanks counts as one blank."""
+    """Literal text before the field; consecutive blanks count as one blank."""
     name: str
-    """Name of the field; "" for a skipped one."""
+    """Name of the field; "" for a skipped field."""
     kind: FieldKind
     width: int = 0
-    """Fixed width in characters; 0: variable."""
+    """Fixed width of the field in characters; 0: variable width."""
 
 
 JsonPath = tuple[str | int, ...]
-"""Object keys and array indices, from the root of the document."""
+"""Path in a JSON document: object keys and array indices, from the root."""
 
 
 class XmlStep(NamedTuple):
     """One element on the path to a field."""
 
     tag: str
-    """Local name, without its namespace."""
+    """Local name of the element, without namespace."""
     place: int = 1
-    """1-based position among the elements with this name and these attributes."""
+    """1-based position among the elements with the same name and attributes."""
     attributes: tuple[tuple[str, str], ...] = ()
-    """Name and value of each required attribute."""
+    """Required attributes of the element, as pairs of name and value."""
 
 
 class XmlPath(NamedTuple):
-    """The path of a field in an XML document."""
+    """The path to a field in an XML document."""
 
     steps: tuple[XmlStep, ...]
-    """Elements of the path, from the root."""
+    """Elements on the path, from the root."""
     attribute: str = ""
-    """Name of the attribute; "" for the text of the element."""
+    """Name of an attribute of the last element; "": the text of the element."""

@@ -1,7 +1,7 @@
 """Units by quantity, and the conversion of values between them. Pure.
 
-The table has only the units of robot documents. Symbols follow UCUM, except where the UCUM symbol
-is uncommon. An unknown unit converts only to itself.
+The table contains only units that occur in robot documents. Symbols follow UCUM, except for
+uncommon UCUM symbols. An unknown unit converts only to the same unit.
 """
 
 import math
@@ -17,7 +17,7 @@ class Scale(NamedTuple):
     offset: float = 0.0
 
     def __call__(self, value: float) -> float:
-        """Return the value in the other unit."""
+        """Convert the value to the target unit."""
         return value * self.factor + self.offset
 
 
@@ -115,9 +115,9 @@ _KIND_OF: Final = {symbol: kind for kind, units in _KINDS.items() for symbol in 
 
 
 def conversion(have: str, want: str) -> Scale | None:
-    """Return the conversion from the unit `have` to `want`; None when they don't fit.
+    """Return the conversion from unit `have` to unit `want`; None for incompatible units.
 
-    A symbol always fits itself, known or not.
+    Two equal symbols are always compatible, even for an unknown unit.
     """
     if have == want:
         return Scale(1)
@@ -129,14 +129,14 @@ def conversion(have: str, want: str) -> Scale | None:
 
 
 def are_apart(one: str, other: str) -> bool:
-    """Return whether the same number certainly means different values in the two units.
+    """Return whether a number certainly has different meanings in the two units.
 
-    A missing unit may mean any unit.
+    A missing unit can be any unit.
     """
     scale = conversion(one, other)
     return bool(one and other) and (scale is None or scale != (1.0, 0.0))
 
 
 def quantity_of(unit: str) -> str:
-    """Return the quantity of a unit, such as ``length``; "" if it is unknown."""
+    """Return the quantity of a unit, such as ``length``; "" for an unknown unit."""
     return _KIND_OF.get(unit, "")

@@ -1,8 +1,9 @@
-"""Signals: the named, typed values of a robot, and their samples.
+"""Signals (named, typed values of a robot) and their samples.
 
-The values of the model are named tuples. Named tuples are as immutable and typed as frozen
-dataclasses. The definition of a named tuple takes a tenth of the time, which every start of the
-command line saves. The construction takes a third, which every sample saves.
+All values in `urc.model` are named tuples. Named tuples are as immutable and typed as frozen
+dataclasses. Compared with a dataclass, defining a named tuple takes a tenth of the time, and
+constructing one takes a third. Definitions matter at every start of the command line, and
+constructions at every sample.
 """
 
 from collections.abc import Mapping
@@ -27,24 +28,24 @@ __all__ = [
 ]
 
 NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
-"""An empty mapping, the default of every mapping attribute."""
+"""Immutable empty mapping, the default of every mapping attribute."""
 
 ElementType = Literal["integer", "number", "boolean", "string"]
-"""Element types, in the words of JSON Schema."""
+"""Element types of an array, named as in JSON Schema."""
 SignalType = Literal["integer", "number", "boolean", "string", "array", "object", "image", "blob"]
-"""Types of a signal: one value, several values of one type, a mapping, or bytes."""
+"""Signal types: a single value, an array of one type, a mapping, or bytes."""
 Value = bool | int | float | str | None
-"""One plain value; None means that the robot reports "not available"."""
+"""A plain value; None: the robot reports "not available"."""
 Reading = Value | bytes | tuple[Any, ...] | Mapping[str, Any]
-"""A value of a signal: bytes for ``image`` and ``blob``, a tuple for ``array``."""
+"""Value of a signal: bytes for ``image`` and ``blob``, a tuple for ``array``."""
 Axes = Literal["", "FLU", "FRD", "ENU", "NED", "bearing"]
-"""Axis conventions; "" if undeclared."""
+"""Axis convention of a value; "": not declared."""
 Alarm = Literal["", "lolo", "low", "high", "hihi"]
-"""The limit that a value has passed; "" for normal."""
+"""Alarm limit that a value has crossed; "": no alarm."""
 
 
 class AlarmLimits(NamedTuple):
-    """Alarm limits in the unit of the signal, with the names of EPICS."""
+    """Alarm limits in the unit of the signal, named as in EPICS."""
 
     lolo: float | None = None
     low: float | None = None
@@ -53,22 +54,23 @@ class AlarmLimits(NamedTuple):
     hysteresis: float = 0.0
     """Hysteresis of the alarm, in the unit of the signal."""
     for_s: float = 0.0
-    """Time past a limit before the alarm begins, in seconds."""
+    """Minimum time beyond a limit before the alarm, in seconds."""
 
 
 class Conversion(NamedTuple):
-    """The conversion of a raw field to a value; the attributes apply in their order."""
+    """The conversion from a raw field to a value. The attributes apply in the order below."""
 
     base: int = 0
-    """Base of whole numbers in text, 2 to 36; 0: text stays text."""
+    """Base of whole numbers in text, 2 to 36; 0: text is not converted."""
     not_available: tuple[Value, ...] = ()
     """Raw values that mean "not available"."""
     polynomial: tuple[float, ...] = ()
-    """Coefficients c0, c1, c2 …: value = c0 + c1·raw + c2·raw² …; () for no polynomial."""
+    """Polynomial coefficients c0, c1, c2 …: value = c0 + c1·raw + c2·raw² …; (): no polynomial."""
     points: tuple[tuple[float, float], ...] = ()
-    """(raw, value) pairs with rising raw values; linear between them, clamped outside."""
+    """Interpolation table of (raw, value) pairs with increasing raw values, linear between points
+    and clamped outside the table."""
     states: tuple[tuple[str, str], ...] = ()
-    """Raw text → word."""
+    """Pairs of a raw text and its word."""
 
 
 PLAIN = Conversion()
@@ -82,40 +84,40 @@ class Signal(NamedTuple):
     type: SignalType = "number"
     title: str = ""
     unit: str = ""
-    """UCUM-like symbol as in documents: ``%``, ``m/s``, ``rad``, ``degC``."""
+    """Unit symbol, similar to UCUM: ``%``, ``m/s``, ``rad``, ``degC``."""
     min: float | None = None
-    """Smallest valid value; a smaller one is a violation and no sample."""
+    """Minimum valid value; a smaller value is a violation and is discarded."""
     max: float | None = None
     precision: int | None = None
-    """Number of significant digits after the decimal point."""
+    """Number of digits after the decimal point."""
     states: tuple[tuple[str, str], ...] = ()
-    """Raw text → displayed word, for enumerated signals."""
+    """Pairs of a raw text and its displayed word, for enumerated signals."""
     limits: AlarmLimits = AlarmLimits()
     stale_after_s: float = 0.0
-    """Age in seconds after which a sample is stale. Always > 0 in a loaded driver."""
+    """Age in seconds after which a sample is stale; greater than 0 in a loaded driver."""
     description: str = ""
     conversion: Conversion = PLAIN
-    """Conversion from the raw value to `unit`; for an array, of each element."""
+    """Conversion from the raw value to `unit`, applied to each element of an array."""
     items: ElementType = "number"
     """Type of the elements of an array."""
     size: int | None = None
-    """Number of elements of an array; most bytes of an image or blob."""
+    """Number of elements of an array; maximum number of bytes of an image or blob."""
     axes: Axes = ""
     """Axis convention of the value."""
     formula: Template | None = None
-    """Formula over other signals; None: frames set the signal."""
+    """Formula over other signals; None: the signal is set by frames."""
     deadband: float = 0.0
-    """Dead band in `unit`: smaller changes are not reported. An array is reported if any element
-    changes enough."""
+    """Dead band in `unit`: smaller changes are not reported. An array is reported when any element
+    changes by the dead band or more."""
     debounce_s: float = 0.0
-    """Debounce time, in seconds: shorter-lived values are not reported."""
+    """Debounce time in seconds: a new value is reported only if it lasts this long."""
 
 
 class Sample(NamedTuple):
-    """One reading: the value, the arrival time of its first byte, and the passed limit."""
+    """One reading: the value, the arrival time of its first byte, and the alarm."""
 
     signal: str
     value: Reading
     time_s: float
-    """Monotonic time in seconds, from the clock of the engine."""
+    """Arrival time in seconds, from the engine's monotonic clock."""
     alarm: Alarm = ""

@@ -1,4 +1,4 @@
-"""Widgets: declared inputs, outputs and options of graphic parts."""
+"""Widgets: declared inputs, outputs and options."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,52 +14,53 @@ class WidgetPort(NamedTuple):
 
     name: str
     types: tuple[str, ...] = ("number",)
-    """Signal types that an input accepts, or value types of an output; () for any."""
+    """Signal types accepted by an input, or value types of an output; (): any type."""
     unit: str = ""
-    """Required unit; "" accepts any."""
+    """Required unit of an input or output; "": any unit."""
     quantity: str = ""
-    """For an input: required quantity, in any of its units without conversion; "" accepts any."""
+    """For an input: required quantity, in any unit and without conversion; "": any quantity."""
     unit_of: str = ""
-    """Input or output of the same widget with which the unit is shared; "" for none."""
+    """Input or output of the same widget with the same unit; "": none."""
     is_required: bool = True
     description: str = ""
     is_held: bool = False
     """For an output: whether it is a hold-to-run control. A hold-to-run output takes only motion
     commands."""
     arguments: tuple[str, ...] = ()
-    """For an output: names of its values; those of a held output range from -1 to 1."""
+    """For an output: names of its values; hold-to-run values range from -1 to 1."""
     items: tuple[str, ...] = ()
-    """For an array input: accepted element types; () for any."""
+    """For an array input: accepted element types; (): any type."""
     size: int | None = None
-    """For an array input: required number of elements; None for any."""
+    """For an array input: required number of elements; None: any number."""
     is_multiple: bool = False
-    """For an input: whether it takes a list of signals, each of which must fit."""
+    """For an input: whether the input takes a list of signals, all of an accepted type."""
     keeps_all: bool = False
-    """For an input: whether it receives every sample, not only the newest."""
+    """For an input: whether the widget receives every sample, not only the newest."""
     replaces: tuple[str, ...] = ()
-    """For an input: inputs and options of the same widget that it replaces when bound."""
+    """For an input: inputs and options of the same widget that a bound input replaces."""
 
 
 class Widget(NamedTuple):
-    """A widget as its ``widget.yaml`` declares it."""
+    """A widget, as declared in its ``widget.yaml``."""
 
     name: str
-    """Name of the widget, equal to that of its folder."""
+    """Name of the widget, equal to the name of its folder."""
     title: str
     folder: Path
     inputs: Mapping[str, WidgetPort] = NOTHING
     outputs: Mapping[str, WidgetPort] = NOTHING
     options: Mapping[str, object] = NOTHING
-    """JSON Schema ``properties`` of its options."""
+    """JSON Schema ``properties`` of the widget's options."""
     at_least_one_of: tuple[str, ...] = ()
-    """Inputs, outputs and options, at least one of which is required; () for none."""
+    """Inputs, outputs and options; at least one is required. (): no requirement."""
     required_together: tuple[tuple[str, ...], ...] = ()
-    """Groups of inputs or outputs that work only when all of a group are bound."""
+    """Groups of inputs or outputs; a group works only when all its members are bound."""
     min_cells: tuple[int, int] = (1, 1)
-    """Columns, rows."""
+    """Minimum numbers of columns and rows."""
     is_dead_man: bool = False
-    """Whether it is a dead-man control: while it is released, no motion is sent."""
+    """Whether the widget is a dead-man control; no motion is sent while a dead-man control is
+    released."""
     summary: str = ""
     licence: str = ""
-    """SPDX identifier from the manifest."""
+    """SPDX licence identifier from the manifest."""
     author: str = ""

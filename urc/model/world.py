@@ -1,7 +1,7 @@
-"""The small world of an emulated robot, as a document declares it.
+"""The world of an emulated robot, as declared in a document.
 
 Lengths are in metres, angles in radians, times in seconds. Directions follow REP-103: x forward, y
-left, z up, angles counter-clockwise. `READINGS` has the names of all sensor values.
+left, z up, angles counter-clockwise. `READINGS` lists the names of all sensor values.
 """
 
 from collections.abc import Mapping
@@ -38,7 +38,7 @@ INPUTS: Final[Mapping[str, tuple[str, ...]]] = {
     "swimmer": ("forward", "turn"),
     "quadrotor": ("flies", "forward", "sideways", "climb", "turn", "cut"),
 }
-"""Type of body → its inputs for `drive`."""
+"""Inputs for `drive`, by body type."""
 
 BODY_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "track": ("differential", "tracks"),
@@ -53,7 +53,7 @@ BODY_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "climb": ("quadrotor",),
     "hover": ("quadrotor",),
 }
-"""Key of a body → the types with that key; a missing key is common to all types."""
+"""Body types with each key, by key; a missing key applies to all body types."""
 
 
 def _words(text: str) -> frozenset[str]:
@@ -78,7 +78,8 @@ READINGS: Final[Mapping[str, frozenset[str]]] = {
         " cliff_front_right drop"
     ),
 }
-"""Names under ``world.NAME``; for a group, the parts under ``world.NAME.PART``."""
+"""Names of sensor values under ``world.NAME``, with the parts of a group under
+``world.NAME.PART``."""
 
 
 class Wall(NamedTuple):
@@ -93,14 +94,14 @@ class Wall(NamedTuple):
 
 
 class Box(NamedTuple):
-    """An axis-aligned box, given by its centre."""
+    """An axis-aligned box; x and y are the coordinates of its centre."""
 
     x: float
     y: float
     width: float
-    """Along x."""
+    """Size along the x axis."""
     depth: float
-    """Along y."""
+    """Size along the y axis."""
     height: float = 0.8
     colour: str = "#a5794b"
 
@@ -111,77 +112,77 @@ class PlanSpec(NamedTuple):
     walls: tuple[Wall, ...] = ()
     boxes: tuple[Box, ...] = ()
     holes: tuple[Box, ...] = ()
-    """Areas without ground; their height and colour are unused."""
+    """Areas without ground; height and colour are unused."""
     ground: Literal["floor", "grass", "water"] = "floor"
 
 
 class BodySpec(NamedTuple):
-    """How the robot moves."""
+    """The kinematics of the robot's body."""
 
     type: BodyType = "differential"
     radius: float = 0.18
-    """Radius of the collision circle."""
+    """Radius of the collision circle of the body."""
     speed: float = 1.0
-    """Most, in m/s."""
+    """Maximum speed, in m/s."""
     turn: float = 2.0
-    """Most, in rad/s."""
+    """Maximum turn rate, in rad/s."""
     acceleration: float = 1.5
-    """In m/s²."""
+    """Maximum acceleration, in m/s²."""
     turn_acceleration: float = 6.0
-    """Limit in rad/s²; for `ackermann`, the steering rate of the front wheels in rad/s."""
+    """Maximum angular acceleration, in rad/s²; for `ackermann`, the steering rate in rad/s."""
     track: float | None = None
-    """Distance from the left to the right wheel; None: 1.6 times the radius."""
+    """Distance between the left and right wheels; None: 1.6 times the radius."""
     slip: float = 0.15
-    """Share of a turn that tracks lose to slip."""
+    """Fraction of a turn that tracks lose to slip."""
     roughness: float = 0.01
-    """Amplitude of the tilt from rough ground, in rad."""
+    """Amplitude of the tilt on rough ground, in rad."""
     wheelbase: float = 0.4
     steer: float = 0.52
-    """Largest steering angle of the front wheels, in rad."""
+    """Maximum steering angle of the front wheels, in rad."""
     joints: int = 8
     legs: int = 0
     amplitude: float = 0.7
-    """Amplitude of the wave at full drive, in rad."""
+    """Amplitude of the swimming motion at full drive, in rad."""
     frequency: float = 1.0
-    """Frequency of the wave at full drive, in Hz."""
+    """Frequency of the swimming motion at full drive, in Hz."""
     climb: float = 0.8
-    """Most, in m/s."""
+    """Maximum climb rate, in m/s."""
     hover: float = 0.8
-    """Height after take-off."""
+    """Hover height after take-off."""
 
 
 class OdometrySpec(NamedTuple):
-    """Error of the odometry of the robot."""
+    """Error of the robot's odometry."""
 
     scale: float = 0.01
-    """Largest relative error of distances and turns, constant during a run."""
+    """Maximum relative error of distances and turns, constant during a run."""
 
 
 class LaserSpec(NamedTuple):
-    """A rotating laser scanner at the height of the centre of the robot."""
+    """A rotating laser scanner at the centre of the robot."""
 
     rays: int = 36
     first: float = -pi
     """Direction of the first ray."""
     last: float = pi
-    """Direction after the last ray; the rays divide the field of view evenly."""
+    """End of the field of view, one step after the last ray; the rays are evenly spaced."""
     max: float = 8.0
-    """Farther is nothing."""
+    """Maximum range."""
     noise: float = 0.01
-    """Standard deviation."""
+    """Standard deviation of the range noise."""
 
 
 class CameraSpec(NamedTuple):
-    """A camera that looks forward."""
+    """A forward-facing camera."""
 
     width: int = 320
     height: int = 240
     fov: float = 1.2
-    """Horizontal field of view."""
+    """Horizontal field of view of the camera."""
     mount_height: float = 0.25
     """Height of the camera above the ground."""
     tilt: float = 0.0
-    """Upward tilt of the camera."""
+    """Upward tilt angle of the camera."""
     flip: Template | bool = False
     """Whether the picture is upside down."""
     mirror: Template | bool = False
@@ -191,9 +192,9 @@ class BatterySpec(NamedTuple):
     """The battery of the robot."""
 
     capacity: float = 2.6
-    """In A·h."""
+    """Capacity of the battery, in A·h."""
     level: float = 90.0
-    """Initial level, in %."""
+    """Initial charge level of the battery, in %."""
     full: float = 12.6
     """Voltage of the full battery."""
     empty: float = 10.2
@@ -205,30 +206,30 @@ class BatterySpec(NamedTuple):
 
 
 class Failsafe(NamedTuple):
-    """The reaction of the robot to missing commands."""
+    """The robot's reaction to missing commands."""
 
     after_s: float
     without: tuple[str, ...]
-    """Commands that reset the timer of the fail-safe."""
+    """Commands that reset the fail-safe timer."""
     sets: Mapping[str, Template | Reading] = NOTHING
-    """State variables to set; if empty, the body stops."""
+    """New values by state variable; if empty, the body stops."""
 
 
 class WorldSpec(NamedTuple):
-    """A robot body, its inputs, and its sensors."""
+    """A robot body, its inputs and sensors, and its surroundings."""
 
     body: BodySpec = BodySpec()
     drive: Mapping[str, Template | float | bool] = NOTHING
-    """Input of the body → its present value."""
+    """Expressions for the inputs of the body, by input."""
     senses: Mapping[str, Template] = NOTHING
-    """Signal → its present value."""
+    """Expressions for sensor values, by signal."""
     failsafe: Failsafe | None = None
     map: PlanSpec | None = None
-    """Surroundings; None: the default room."""
+    """Surroundings of the robot; None: the default room."""
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Initial x, y and direction."""
+    """Initial x, y and direction of the robot."""
     datum: tuple[float, float, float] = (46.5191, 6.5668, 400.0)
-    """Latitude and longitude of x = y = 0 in degrees, and its altitude in metres."""
+    """Latitude and longitude in degrees, and altitude in metres, of the origin x = y = 0."""
     seed: int = 1
     odometry: OdometrySpec = OdometrySpec()
     laser: LaserSpec = LaserSpec()
