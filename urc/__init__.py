@@ -1,6 +1,6 @@
-"""URC: describe a robot in one YAML file and drive it from any browser.
+"""URC: describe a robot in one YAML file, and drive the robot from any browser.
 
-This module has only the names for Python users, imported on first use: ``urc --version`` must not
+This module contains only the public Python names, imported on first use: ``urc --version`` must not
 load a web server.
 """
 

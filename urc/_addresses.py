@@ -1,8 +1,8 @@
-"""Addresses of the network interfaces of this machine, without sending a packet.
+"""Addresses of this machine's network interfaces, determined without sending a packet.
 
 Name servers and the host name are unreliable: many machines resolve themselves only as 127.0.1.1.
-Linux, macOS and the BSDs have getifaddrs in the C library. Elsewhere, the routing table gives the
-source address of an outgoing packet.
+Linux, macOS and the BSDs have getifaddrs in the C library. On other systems, the routing table
+determines the source address of an outgoing packet.
 """
 
 import ctypes
@@ -22,7 +22,7 @@ _ROUTED_TO = ("192.0.2.1", "10.255.255.254", "172.31.255.254", "192.168.255.254"
 
 
 class _Interface(ctypes.Structure):
-    """Start of ``struct ifaddrs`` in C; the remaining fields differ between systems."""
+    """First fields of ``struct ifaddrs`` in C; the remaining fields differ between systems."""
 
     _fields_ = (
         ("next", ctypes.c_void_p),
@@ -33,9 +33,9 @@ class _Interface(ctypes.Structure):
 
 
 def local_addresses() -> tuple[Address, ...]:
-    """Return the addresses under which others may reach this machine, IPv4 first.
+    """Return the addresses for reaching this machine from the network, IPv4 first.
 
-    Loopback and link-local IPv6 addresses are left out: browsers cannot open them.
+    Loopback and link-local IPv6 addresses are excluded, because browsers cannot open them.
     """
     found = _all()
     usable = [each for each in found if not each.is_loopback and not each.is_unspecified]
@@ -46,14 +46,14 @@ def local_addresses() -> tuple[Address, ...]:
 def is_of_this_machine(address: Address) -> bool:
     """Return whether `address` belongs to an interface of this machine.
 
-    The result is False for an address that a router or a container host forwards to this machine.
+    Addresses of a router or container host that forwards packets do not count.
     """
     plain = unmapped(address)
     return plain.is_loopback or plain.is_unspecified or plain in _all()
 
 
 def unmapped(address: Address) -> Address:
-    """Return the IPv4 address of an IPv4-mapped IPv6 address; else `address`, without its scope."""
+    """Return `address` without its scope, and an IPv4-mapped IPv6 address as IPv4."""
     if address.version == 4:
         return address
     return address.ipv4_mapped or ipaddress.IPv6Address(int(address))
@@ -83,7 +83,7 @@ def _of_interfaces() -> Iterator[Address]:
 
 
 def _decoded(place: int) -> Iterator[Address]:
-    """Yield the address in the ``struct sockaddr`` at `place`, if it is IPv4 or IPv6."""
+    """Yield the IPv4 or IPv6 address in the ``struct sockaddr`` at `place`, if present."""
     head = ctypes.string_at(place, 2)
     # BSD systems, including macOS, store a length before the family.
     is_bsd = sys.platform == "darwin" or "bsd" in sys.platform
@@ -95,7 +95,7 @@ def _decoded(place: int) -> Iterator[Address]:
 
 
 def _of_routes() -> Iterator[Address]:
-    """Yield the source addresses of routes; connecting a UDP socket sends no packet."""
+    """Yield the source addresses of routes, using UDP sockets that send no packet."""
     for target in _ROUTED_TO:
         family = socket.AF_INET6 if ":" in target else socket.AF_INET
         with suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as asker:

@@ -1,7 +1,7 @@
-"""Checksum algorithms: their parameters, and the functions from bytes to numbers.
+"""Checksum algorithms: parameters, and functions that compute checksums of bytes.
 
-A library computes CRCs (`anycrc`, or the standard library for its own two); each sum or fold is one
-call of a C function.
+The libraries `anycrc` and, for two CRCs, `zlib` and `binascii` compute CRCs. Each sum or fold is
+one call of a C function.
 """
 
 import binascii
@@ -29,7 +29,7 @@ MAX_BYTES: Final = 65536
 
 
 class CrcSpec(NamedTuple):
-    """A cyclic redundancy check by its Rocksoft parameters."""
+    """The Rocksoft parameters of a cyclic redundancy check (CRC)."""
 
     width: int
     poly: int
@@ -40,22 +40,22 @@ class CrcSpec(NamedTuple):
 
 
 class FoldSpec(NamedTuple):
-    """A checksum that combines all numbers of a range by one operation."""
+    """A checksum that combines all numbers of a range with one operation."""
 
     operation: Literal["sum", "xor"]
     bits: int = 8
-    """Width of the result in bits."""
+    """Width of the checksum, in bits."""
     of: int = 8
-    """Width of the numbers in bits; the last one is padded with zeros."""
+    """Width of the numbers in bits; the last number is padded with zeros."""
     complement: Literal["none", "ones", "twos"] = "none"
     mask: int | None = None
-    """Bits of the result to keep."""
+    """Mask that selects the bits of the result; None: all bits."""
     added: int = 0
     """Number to add to the result, after the mask."""
     ored: int = 0
-    """Bits of the result to set in the last step."""
+    """Mask of bits to set in the result, in the last step."""
     is_odd_xored: bool = False
-    """Whether an odd last byte is combined by exclusive or, with numbers of 16 bits."""
+    """Whether an odd last byte is combined by XOR; only for 16-bit numbers."""
 
 
 FOLDED: Final = {
@@ -65,7 +65,7 @@ FOLDED: Final = {
     "xor8": FoldSpec("xor"),
     "lrc": FoldSpec("sum", complement="twos"),
 }
-"""Names of common folds."""
+"""Parameters of common folds, by name."""
 PLAIN_CHECKSUMS: Final = {
     "adler32": 32,
     "fletcher8": 8,
@@ -74,11 +74,11 @@ PLAIN_CHECKSUMS: Final = {
     "fletcher32": 32,
     "internet": 16,
 }
-"""Algorithms without parameters, and the bits of their results."""
+"""Result widths in bits of the algorithms without parameters, by name."""
 
 
 def algorithm_of(name: str) -> CrcSpec | FoldSpec | str | None:
-    """Return the algorithm called `name`; None for an unknown name."""
+    """Return the algorithm with this name; None for an unknown name."""
     if name in PLAIN_CHECKSUMS:
         return name
     if name in FOLDED:
@@ -91,7 +91,7 @@ def algorithm_of(name: str) -> CrcSpec | FoldSpec | str | None:
 
 
 def algorithm_names() -> Iterable[str]:
-    """Return the names of all algorithms."""
+    """Return the names of all checksum algorithms."""
     from anycrc import aliases, models
 
     return {one.lower() for one in (*models, *aliases)} | FOLDED.keys() | PLAIN_CHECKSUMS.keys()
@@ -118,11 +118,11 @@ def sum_of(value: Any, name: Any) -> int:
 
 
 def build_algorithm(spec: CrcSpec | FoldSpec | str, *, is_big: bool = True) -> Compute:
-    """Return the function from bytes to the checksum.
+    """Return a function that computes the checksum of bytes.
 
     Args:
-        spec: the algorithm.
-        is_big: byte order of numbers wider than one byte; only folds have such numbers.
+        spec: parameters or name of the algorithm.
+        is_big: whether numbers are big-endian; used only by folds of numbers wider than one byte.
     """
     if isinstance(spec, str):
         return NAMED[spec]
@@ -169,7 +169,7 @@ def _numbers(data: bytes, size: int, order: str) -> list[int]:
 
 
 def _fletcher(modulus: int, bits: int, size: int = 1) -> Compute:
-    """Return Fletcher's checksum; `size` is the width of its little-endian numbers in bytes."""
+    """Return Fletcher's checksum of little-endian numbers of `size` bytes."""
 
     def compute(data: bytes) -> int:
         numbers = data if size == 1 else _numbers(data, size, "little")
@@ -195,7 +195,7 @@ NAMED: Final[Mapping[str, Compute]] = {
     "fletcher32": _fletcher(65535, 16, 2),
     "internet": _internet,
 }
-"""Functions of the algorithms without parameters."""
+"""Functions that compute the algorithms without parameters, by name."""
 
 _BUILT_IN: Final[Mapping[CrcSpec, Compute]] = {
     CrcSpec(32, 0x04C11DB7, 0xFFFFFFFF, True, True, 0xFFFFFFFF): zlib.crc32,

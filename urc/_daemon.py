@@ -1,7 +1,7 @@
-"""Blocking work in a thread that delays neither the loop nor the exit of the process.
+"""Blocking work in a daemon thread, without delaying the event loop or the exit of the process.
 
-A closing loop waits for threads of `asyncio.to_thread`, so this module has its own. A repository
-that hangs for two minutes must not delay Ctrl-C by two minutes.
+A closing event loop waits for the threads of `asyncio.to_thread`. A repository that does not answer
+for two minutes must not delay Ctrl-C by two minutes.
 """
 
 import asyncio
@@ -16,9 +16,9 @@ _T = TypeVar("_T")
 
 
 def in_daemon(work: Callable[[], _T], name: str) -> "asyncio.Future[_T]":
-    """Start `work` in a new thread; return a future of its result or exception.
+    """Start `work` in a new thread; return a future for the result or exception.
 
-    A cancelled future does not stop the thread, whose result is then discarded.
+    Cancelling the future does not stop the thread; its result is then discarded.
     """
     loop = asyncio.get_running_loop()
     future: asyncio.Future[_T] = loop.create_future()

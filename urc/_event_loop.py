@@ -1,4 +1,4 @@
-"""The event loop of processes that move robots: uvloop if installed."""
+"""Event loop for processes that move robots: uvloop, if installed."""
 
 import asyncio
 import sys
@@ -11,13 +11,13 @@ _Result = TypeVar("_Result")
 
 
 def run(work: Coroutine[Any, Any, _Result]) -> _Result:
-    """Run `work` to its end, as `asyncio.run` does."""
+    """Run `work` to completion, like `asyncio.run`."""
     with asyncio.Runner(loop_factory=_fastest()) as runner:
         return runner.run(work)
 
 
 def _fastest() -> Callable[[], asyncio.AbstractEventLoop] | None:
-    """Return the factory of the fastest available loop; None for the default of Python."""
+    """Return the factory of the fastest available event loop; None for Python's default."""
     if sys.platform == "win32":  # the default loop of Windows cannot watch the pipe to the guard
         return asyncio.SelectorEventLoop
     try:

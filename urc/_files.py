@@ -1,4 +1,4 @@
-"""Bounded reading of ordinary files, never of directories or pipes.
+"""Size-limited reading of ordinary files, excluding directories and pipes.
 
 Private to `urc.source`.
 """
@@ -12,7 +12,7 @@ __all__ = ["read_bytes", "refused", "similar_file", "too_large"]
 
 
 def read_bytes(path: str, most: int) -> bytes:
-    """Return the content of an ordinary file.
+    """Return the content of an ordinary file, as bytes.
 
     Raises:
         ProblemsError: the file cannot be read, or has more than `most` bytes.
@@ -23,7 +23,7 @@ def read_bytes(path: str, most: int) -> bytes:
             raise refused(
                 path,
                 "is-directory",
-                "this is a directory, a document is a file",
+                "expected a file, found a directory",
                 _documents_in(path),
             )
         # Opening a pipe or a device could block.
@@ -55,12 +55,12 @@ def read_bytes(path: str, most: int) -> bytes:
 
 
 def too_large(most: int) -> str:
-    """Return the message for a file that is too large."""
+    """Return the error message for a file of more than `most` bytes."""
     return f"a document has at most {most // 1024} KiB"
 
 
 def refused(file: str, code: str, message: str, hint: str = "") -> ProblemsError:
-    """Return the error for a completely rejected file."""
+    """Return the error for a file that is rejected as a whole."""
     return ProblemsError([Problem(code, message, file, hint=hint)])
 
 
@@ -73,7 +73,7 @@ def _documents_in(folder: str) -> str:
 
 
 def similar_file(path: str) -> str:
-    """Return a similar name in the folder of `path`, or ""."""
+    """Return a similar file name in the folder of `path`; "" for none."""
     from difflib import get_close_matches
 
     folder, name = os.path.split(path)

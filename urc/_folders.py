@@ -1,4 +1,4 @@
-"""Location of the data that URC keeps for this user on this machine."""
+"""Location of the user's URC data on this machine."""
 
 import os
 import sys
@@ -9,10 +9,10 @@ __all__ = ["data_folder"]
 
 
 def data_folder(environ: Mapping[str, str] = os.environ) -> Path:
-    """Return the data folder of URC; it may not exist yet.
+    """Return the data folder of URC, which may not exist yet.
 
-    ``URC_DATA_DIR`` overrides the default of the system: ``XDG_DATA_HOME`` or ``~/.local/share``,
-    ``~/Library/Application Support``, or ``LOCALAPPDATA``.
+    ``URC_DATA_DIR`` overrides the system's default. The default is in ``XDG_DATA_HOME`` or
+    ``~/.local/share``, in ``~/Library/Application Support``, or in ``LOCALAPPDATA``.
     """
     if named := environ.get("URC_DATA_DIR"):
         return Path(named).expanduser()

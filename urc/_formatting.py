@@ -1,8 +1,8 @@
-"""Text forms of values: in templates, joined lists, paths, topics and messages.
+"""Text forms of values in templates, joined lists, paths, topics and messages.
 
-Private to expressions. The same number always has the same text, whether it arrived as 20 or as
-20.0. The text has the fewest decimal digits that identify the number. It has no exponent, because
-few robots can read exponents.
+Private to expressions. Equal numbers have the same text, whether received as 20 or 20.0. The text
+has the minimum number of digits that identify the number. Exponents are avoided, because few robots
+can read exponents.
 """
 
 import json
@@ -13,7 +13,7 @@ from urc.problems import printable
 __all__ = ["quoted", "spelt"]
 
 _ENDS = {"\n": "\\n", "\r": "\\r", "\t": "\\t"}
-"""Control characters with short escapes."""
+"""Short escapes of control characters."""
 
 
 def spelt(value: object) -> str:
@@ -32,13 +32,13 @@ def spelt(value: object) -> str:
 
 
 def quoted(value: object, most: int = 40) -> str:
-    """Return a value for a message to people: quoted text, or bytes as hex digits.
+    """Return the text of a value for messages to people: quoted text, or bytes as hex digits.
 
     Terminal control characters are escaped exactly once.
 
     Args:
         value: any value from a robot, a page or a document.
-        most: limit of the result in characters; longer results are cut.
+        most: maximum length of the result in characters; a longer result is truncated.
     """
     if value is None:
         return "“not available”"
@@ -56,7 +56,7 @@ def quoted(value: object, most: int = 40) -> str:
 
 
 def _json(value: object) -> str:
-    """Return a list or mapping as JSON, with numbers in the form of `spelt`."""
+    """Return a list or mapping as JSON, with numbers formatted by `spelt`."""
     if isinstance(value, Mapping):
         parts = (
             f"{json.dumps(str(key), ensure_ascii=False)}: {_json(one)}"
@@ -71,7 +71,7 @@ def _json(value: object) -> str:
 
 
 def _decimal(text: str) -> str:
-    """Return a float without an exponent, and without a decimal point if it is whole."""
+    """Return a float without an exponent; a whole number also has no decimal point."""
     digits, _, exponent = text.partition("e")
     if exponent:
         sign = "-" if digits[0] == "-" else ""

@@ -1,12 +1,12 @@
-"""The grammar of expressions: text → Python source, for the supported subset of Jinja.
+"""Translation of expressions into Python source, for the supported subset of Jinja.
 
 Private to `urc.expressions`. Grammar and precedence are those of Jinja ("Expressions" in its
-template designer documentation). A parser of our own gives the column of every error, and saves 40
-ms for importing a template engine. `tests/unit/test_expressions.py` compares this parser with
+template designer documentation). A custom parser reports the column of every error, and saves the
+40 ms for importing a template engine. `tests/unit/test_expressions.py` compares this parser with
 Jinja.
 
-WARNING: the result is passed to eval. The Python source may contain only the `repr()` of constants,
-the text that `resolve` returns, and names of `urc.filters.table.SCOPE`.
+WARNING: the generated Python source is passed to eval. The source may contain only the `repr()` of
+constants, results of `resolve`, and names of `urc.filters.table.SCOPE`.
 """
 
 import math
@@ -22,7 +22,7 @@ from urc.problems import UrcError
 __all__ = ["COUNTERS", "MAX_DEPTH", "NONCE", "ExpressionSyntaxError", "translate"]
 
 MAX_DEPTH: Final = 40
-"""Largest nesting depth, and largest number of consecutive operators of one kind."""
+"""Maximum nesting depth, and maximum number of consecutive operators of one kind."""
 
 _CONSTANTS = {
     "true": "True",
@@ -42,9 +42,9 @@ _TESTS = (
 )  # fmt: skip
 _PATTERNS = ("match", "search")
 COUNTERS: Final = "seq()"
-"""Root name of the counters of a namespace; documents cannot have this name."""
+"""Root name for counters in a namespace; the name is invalid in documents."""
 NONCE: Final = "nonce()"
-"""Root name of the nonce of a namespace."""
+"""Root name for the nonce in a namespace; the name is invalid in documents."""
 _MOST_NONCE: Final = 64
 _NONCE_ALONE = re.compile(r"\(\d+\)")
 _COUNTER = re.compile(r"[a-z][a-z0-9_]{0,63}")
@@ -58,17 +58,17 @@ def translate(
     *,
     allows_bytes: bool = False,
 ) -> str:
-    """Return Python for the expression `text`.
+    """Return the Python source for the expression `text`.
 
     Args:
-        text: expression without braces.
-        resolve: root name → Python source that reads it.
-        names: receives the root names used.
-        settings: receives every NAME of ``settings.NAME``.
-        allows_bytes: whether the value may be bytes.
+        text: an expression without braces.
+        resolve: function that returns the Python source for reading a root name.
+        names: set that receives the root names in the expression.
+        settings: set that receives every NAME of ``settings.NAME``.
+        allows_bytes: whether the expression's value may be bytes.
 
     Raises:
-        Refused: the text is not a valid expression.
+        ExpressionSyntaxError: the text is not a valid expression.
     """
     parser = _Parser(tokens_of(text), resolve, names, settings)
     parser.allows_bytes = allows_bytes
@@ -81,7 +81,7 @@ def translate(
 
 
 class _Parser:
-    """A recursive descent parser with one method per level of precedence, loosest first."""
+    """A recursive descent parser with one method per precedence level, lowest precedence first."""
 
     def __init__(
         self,
@@ -100,7 +100,7 @@ class _Parser:
         """Whether the last filter may return bytes."""
 
     def expression(self) -> str:
-        """Parse ``a if test else b``, and everything with tighter precedence."""
+        """Parse ``a if test else b``, and everything with higher precedence."""
         self._depth += 1
         if self._depth > MAX_DEPTH:
             raise ExpressionSyntaxError("the expression is nested too deeply", self._next.offset)
@@ -114,7 +114,7 @@ class _Parser:
         return value
 
     def expect_end(self) -> None:
-        """Raise an error for text after the expression."""
+        """Raise an error if any text follows the expression."""
         if self._next.kind != "end":
             raise self._surprise()
 
@@ -128,7 +128,7 @@ class _Parser:
         return token
 
     def _accept(self, text: str) -> bool:
-        """Skip `text` if it is next; a string literal does not count."""
+        """Skip the token `text` if next, unless the token is a string literal."""
         if self._next.text == text and self._next.kind in ("operator", "name"):
             self._place += 1
             return True
@@ -288,7 +288,7 @@ class _Parser:
         raise self._surprise()
 
     def _counter(self, token: Token) -> str:
-        """Parse ``seq('name', low, high)``: the next number of a counter."""
+        """Parse ``seq('name', low, high)``, the next number of a counter."""
         name, low, high = self._next, None, None
         self._place += 1
         if name.kind != "string" or not _COUNTER.fullmatch(string_of(name)):
@@ -309,7 +309,7 @@ class _Parser:
         return f"{self._resolve(COUNTERS)}({string_of(name)!r}, {low}, {high})"
 
     def _nonce(self, token: Token) -> str:
-        """Parse ``nonce()`` or ``nonce(8)``: 16 nonce bytes, or the given number."""
+        """Parse ``nonce()`` or ``nonce(8)``: a nonce of 16 or the given number of bytes."""
         size = 16 if self._next.text == ")" else self._whole()
         if size is None or not self._accept(")"):
             raise ExpressionSyntaxError(
@@ -349,7 +349,7 @@ class _Parser:
                 return value
 
     def _pattern(self, test: Token) -> str:
-        """Parse ``('regular expression')`` after a test, and compile the pattern."""
+        """Parse ``('regular expression')`` after a test, and compile the regular expression."""
         self._expect("(")
         token = self._advance()
         if token.kind != "string":
@@ -388,7 +388,7 @@ class _Parser:
         return f"_filter_{token.text}({', '.join((subject, *arguments))})"
 
     def _check_word(self, name: str, first: Token, arguments: list[str]) -> None:
-        """Raise an error for a constant that the filter `name` does not accept."""
+        """Raise an error for a constant argument that is invalid for the filter `name`."""
         refuses = table.FILTERS[name].refuses
         if refuses is None or first.kind != "string" or not arguments:
             return

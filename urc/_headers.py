@@ -1,7 +1,7 @@
-"""HTTP headers reserved for URC, because they identify the sender or delimit the request.
+"""Reserved HTTP headers, which identify the sender or delimit the request.
 
-Browsers forbid scripts these headers for the same reason. With these headers, a document could
-pretend to be a page of the dashboard, a page of another program, or a proxy.
+With these headers, a document could impersonate a page of the dashboard, a page of another program,
+or a proxy. Browsers forbid scripts to set these headers for the same reason.
 """
 
 from typing import Final
@@ -19,6 +19,6 @@ _PREFIXES: Final = ("sec-", "proxy-", "x-forwarded-")
 
 
 def is_reserved(name: str) -> bool:
-    """Return whether `name`, in any case, is a reserved header."""
+    """Return whether `name` is a reserved header, ignoring case."""
     low = name.strip().lower()
     return low in _NAMES or low.startswith(_PREFIXES)

@@ -9,7 +9,7 @@ __all__ = ["Mark", "Span", "UnfilledText"]
 
 
 class Span(NamedTuple):
-    """A range of the text: lines and columns are 1-based, the end is exclusive."""
+    """A range of text. Lines and columns are 1-based; the end is exclusive."""
 
     line: int
     column: int
@@ -18,7 +18,7 @@ class Span(NamedTuple):
 
 
 class Mark:
-    """The position of one value and of its key, and the marks of its children."""
+    """The positions of a value and its key, and the marks of the value's children."""
 
     __slots__ = ("children", "key", "origin", "span", "style", "written")
 
@@ -27,30 +27,32 @@ class Mark:
     ) -> None:
         self.span = span
         self.style = style
-        """Style of the value: "" plain, "'", '"', "|", ">", "{" a mapping or list, "*" an alias."""
+        """YAML style of the value: "" (plain), "'", '"', "|", ">", "{" (mapping or list) or "*"
+        (alias)."""
         self.key: Span | None = None
         self.children = {} if children is None else children
         self.origin: Any = None
-        """Document that contains this value and its children; None for the parent's document."""
+        """Document that contains the value and its children; None: the document of the parent
+        value."""
         self.written: UnfilledText | None = None
         """Original text of a computed value."""
 
     def copy(self, children: "dict[str | int, Mark] | None" = None) -> "Mark":
-        """Return a mark of the same place, with `children` if given."""
+        """Return a copy of the mark, with new `children` if given."""
         mark = Mark(self.span, self.style, self.children if children is None else children)
         mark.key, mark.origin, mark.written = self.key, self.origin, self.written
         return mark
 
 
 class UnfilledText(NamedTuple):
-    """A text before the substitution of its names."""
+    """A text before the substitution of names."""
 
     text: str
     edits: tuple[tuple[int, int, int], ...]
-    """Start of each name, its length, and the length of its replacement."""
+    """Start offset, length and replacement length of each name."""
 
     def offset(self, offset: int) -> int:
-        """Return the offset in the original text for character `offset` of the value."""
+        """Return the offset in the original text that corresponds to `offset` in the final text."""
         shift = 0
         for start, before, after in self.edits:
             begin = start + shift

@@ -1,8 +1,8 @@
 """Conversion between numbers and bytes, for every type of `urc._number_types`.
 
-``varint`` is LEB128 as in Protocol Buffers, ``zigzag`` their signed form. ``bcd`` has a decimal
-digit in each half of a byte. ``f32cdab`` has swapped words of 16 bits, and ``u14by7le`` seven bits
-in each byte.
+``varint`` is LEB128 as in Protocol Buffers, and ``zigzag`` is its signed form. ``bcd`` has two
+decimal digits per byte. ``f32cdab`` has swapped 16-bit words, and ``u14by7le`` has seven bits per
+byte.
 """
 
 import struct
@@ -22,7 +22,7 @@ __all__ = [
 ]
 
 _MOST_BYTES: Final = 10
-"""Longest varint of 64 bits, in bytes."""
+"""Maximum size of a 64-bit varint, in bytes."""
 _CODES = {
     ("integer", 8): "B",
     ("integer", 16): "H",
@@ -36,18 +36,18 @@ _CODES = {
 
 
 def format_of(number: Number) -> str:
-    """Return the format character of a number for `struct`; "" for 24, 40, 48 and 56 bits."""
+    """Return the `struct` format character of a number; "" for 24, 40, 48 and 56 bits."""
     code = _CODES.get((number.kind, number.bits), "")
     return code.lower() if number.is_signed and number.kind == "integer" else code
 
 
 def order_of(number: Number) -> str:
-    """Return the byte order character for `struct`."""
+    """Return the `struct` character for the byte order of a number."""
     return "<" if number.endian == "little" else ">"
 
 
 def plain_reader(number: Number) -> Callable[[bytes, int], Any]:
-    """Return the function from bytes and an offset to the raw number; the bytes must be present."""
+    """Return a function that reads the raw number at an offset of complete data."""
     code = format_of(number)
     if code:
         unpack = struct.Struct(order_of(number) + code).unpack_from
@@ -57,9 +57,9 @@ def plain_reader(number: Number) -> Callable[[bytes, int], Any]:
 
 
 def plain_writer(number: Number) -> Callable[[Any], bytes]:
-    """Return the function from a raw number, which must fit, to its bytes.
+    """Return a function that encodes a raw number within the range of the type.
 
-    The function raises `OverflowError` or `struct.error` for a float too large for 16 or 32 bits.
+    The function raises `OverflowError` or `struct.error` if a float is too large for 16 or 32 bits.
     """
     code = format_of(number)
     if not code:
@@ -71,7 +71,7 @@ def plain_writer(number: Number) -> Callable[[Any], bytes]:
 def reader_of(
     number: Number, fault: type[Exception]
 ) -> Callable[[bytes, int, int], tuple[Any, int]]:
-    """Return the function from data, begin and end to the raw number and its end.
+    """Return a function that reads a raw number within bounds, and returns the number and its end.
 
     The function raises `fault` for an invalid number.
     """
@@ -94,7 +94,7 @@ def reader_of(
 
 
 def writer_of(number: Number) -> Callable[[Any], bytes]:
-    """Return the function from a raw number, which must fit, to its bytes."""
+    """Return a function that encodes a raw number within the range of the type."""
     if number.kind == "varint":
         return _written_varint
     if number.kind == "zigzag":
@@ -109,7 +109,7 @@ def writer_of(number: Number) -> Callable[[Any], bytes]:
 
 
 def words_turned(data: bytes) -> bytes:
-    """Return the words of 16 bits in reverse order."""
+    """Return the 16-bit words of `data` in reverse order."""
     return b"".join(data[place : place + 2] for place in range(len(data) - 2, -1, -2))
 
 

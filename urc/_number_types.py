@@ -1,6 +1,6 @@
-"""Types of numbers in bytes, such as ``u16be``, ``bcd24le`` or ``f32cdab``.
+"""Number types in binary data, such as ``u16be``, ``bcd24le`` or ``f32cdab``.
 
-Items of a ``struct:`` and filters of expressions share these names.
+Items of a ``struct:`` and filters of expressions have the same type names.
 """
 
 import re
@@ -19,41 +19,42 @@ class Number(NamedTuple):
 
     kind: Literal["integer", "float", "boolean", "varint", "zigzag", "bcd"]
     bits: int
-    """Width: 8 to 64 in steps of 8; 1 to 64 inside ``bits:`` and in packed arrays."""
+    """Width of the number in bits: 8 to 64 in steps of 8; 1 to 64 inside ``bits:`` and in packed
+    arrays."""
     is_signed: bool = False
     endian: Literal["big", "little"] = "big"
     are_words_swapped: bool = False
-    """Whether the words of 16 bits are in reverse order; `endian` is the byte order of each word.
+    """Whether the 16-bit words are in reverse order; `endian` is the byte order within each word.
     """
     is_by_seven: bool = False
-    """Whether each byte has seven bits of the number after a zero bit."""
+    """Whether each byte contains a zero bit and seven bits of the number."""
 
     @property
     def size(self) -> int:
-        """Size in bytes; the smallest size of a number with variable size."""
+        """Size of the number in bytes; the minimum size for a variable-size number."""
         if self.is_by_seven:
             return self.bits // 7
         return 1 if self.is_variable else self.bits // 8
 
     @property
     def is_coded(self) -> bool:
-        """Whether the number has a special encoding."""
+        """Whether the encoding is special: varint, BCD, swapped words or seven bits per byte."""
         is_odd = self.is_variable or self.kind == "bcd"
         return is_odd or self.are_words_swapped or self.is_by_seven
 
     @property
     def is_variable(self) -> bool:
-        """Whether the size depends on the value."""
+        """Whether the size of the number depends on its value."""
         return self.kind in ("varint", "zigzag")
 
     @property
     def least(self) -> int:
-        """Smallest whole number of the type."""
+        """Minimum whole number of this type."""
         return -(1 << self.bits - 1) if self.is_signed else 0
 
     @property
     def most(self) -> int:
-        """Largest whole number of the type."""
+        """Maximum whole number of this type."""
         if self.kind == "boolean":
             return 1
         if self.kind == "bcd":
@@ -62,7 +63,7 @@ class Number(NamedTuple):
 
 
 def number_of(name: str) -> Number | None:
-    """Return the type called ``u16be``; None for an unknown name or a missing byte order."""
+    """Return the number type of a name such as ``u16be``; None for an invalid name."""
     if name == "bool":
         return Number("boolean", 8)
     if name in ("varint", "zigzag"):
@@ -80,7 +81,7 @@ def number_of(name: str) -> Number | None:
 
 
 def _odd_number(name: str) -> Number | None:
-    """Return the type called ``f32cdab`` or ``u14by7le``."""
+    """Return the number type of a name such as ``f32cdab`` or ``u14by7le``."""
     found = _SWAPPED.fullmatch(name)
     if found is not None:
         letters: str = found[2] or found[3]
@@ -96,7 +97,7 @@ def _odd_number(name: str) -> Number | None:
 
 
 def width_of(name: str) -> Number | None:
-    """Return the type called ``u11``, for packed arrays only; None for an unknown name."""
+    """Return the number type of a packed array, such as ``u11``; None for an unknown name."""
     found = _WIDTH.fullmatch(name)
     return None if found is None else Number("integer", int(found[2]), found[1] == "i")
 
@@ -118,4 +119,4 @@ def _names() -> tuple[str, ...]:
 
 
 NUMBER_NAMES: Final = _names()
-"""Names of all types that `number_of` knows."""
+"""Names of all number types, valid for `number_of`."""

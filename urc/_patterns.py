@@ -1,18 +1,18 @@
 r"""Regular expressions of documents, with matching in linear time.
 
-Private to `urc.patterns` and `urc.filters.lists`. The dialect is RE2: no look-around, no
-back-references; ``$`` matches only the end, and ``\d`` only ASCII digits. A pattern that
-`_is_linear` proves harmless runs on `re`, ten times faster on short lines; all others run on RE2.
-Without an installed RE2, unproven patterns are refused.
+Private to `urc.patterns` and `urc.filters.lists`. The dialect is RE2, without look-around and
+back-references. ``$`` matches only the end, and ``\d`` only ASCII digits. Patterns that
+`_is_linear` proves linear run on `re`, which is ten times faster for short lines. Other patterns
+run on RE2, or are refused if RE2 is not installed.
 
-Theory of operation: backtracking exceeds linear time only if two parts of a pattern can share the
-same characters in many ways. A proven pattern must therefore be anchored at the start, and
-alternatives must differ in their first character. Every repeat must be over one set of characters,
-disjoint from the possible next characters.
+Theory of operation: backtracking exceeds linear time only if two parts of a pattern can divide the
+same characters in many ways. A proven pattern must therefore have a start anchor, and alternatives
+with different first characters. Every repeat must be over one set of characters, disjoint from the
+possible next characters.
 
-The time of RE2 is proportional to the text and to its program, in which ``{n}`` is expanded. The
-size of an unproven pattern is therefore bounded. This module computes the size from the source, so
-that the result is the same without RE2.
+The run time of RE2 is proportional to the size of the text and of the compiled program, with
+expanded ``{n}``. The size of an unproven pattern is therefore limited. This module computes the
+size from the source, so the result does not depend on RE2.
 """
 
 import re
@@ -36,21 +36,21 @@ __all__ = [
 
 MAX_SOURCE: Final = 1024
 MAX_REPEAT: Final = 1000
-"""Limit of ``n`` in ``{n}`` in RE2."""
+"""Maximum ``n`` of a repeat ``{n}`` in RE2."""
 MAX_COST: Final = 1000
-"""Size limit of an unproven pattern with expanded repeats, approximately in instructions of RE2.
+"""Maximum size of an unproven pattern with expanded repeats, approximately in RE2 instructions.
 
-A sentence of NMEA 0183, ``\\$[^\\r\\n]{1,80}\\r\\n``, has the size 802. The worst pattern at the
-limit takes about half a second for a frame of 64 KiB.
+The pattern ``\\$[^\\r\\n]{1,80}\\r\\n`` for an NMEA 0183 sentence has size 802. The slowest pattern
+within the limit takes about half a second for a frame of 64 KiB.
 """
 _RE2_BYTES: Final = 4 << 20
-"""Memory limit of RE2 for one pattern. With 1 MiB, repeats of optional parts leave its fast
-automaton and take a hundred times as long."""
+"""Memory limit of RE2 for one pattern. With 1 MiB, RE2 falls back to a hundred times slower
+algorithm for repeats of optional parts."""
 _BEYOND_ASCII: Final = 6
-"""Instructions of RE2 for all characters outside ASCII, which are matched byte by byte."""
+"""Number of RE2 instructions for all non-ASCII characters, which RE2 matches byte by byte."""
 
 _OTHER = 128
-"""Represents all characters outside ASCII."""
+"""Code that represents all non-ASCII characters."""
 _ALL = frozenset(range(129))
 _DIGITS = frozenset(range(48, 58))
 _SPACES = frozenset(b" \t\n\r\f\v")
@@ -74,13 +74,13 @@ _REFUSED: dict[Any, str] = {
 
 
 _INSTEAD: dict[Any, str] = dict.fromkeys(_REFUSED, "")
-_INSTEAD[_constants.ASSERT] = "; match the text itself, and let a named group take the part wanted"
+_INSTEAD[_constants.ASSERT] = "; match the text itself, and capture the part with a named group"
 _INSTEAD[_constants.ASSERT_NOT] = "; match the allowed text instead, or exclude frames by 'when'"
 _INSTEAD[_constants.GROUPREF] = "; name both groups and compare them by 'when: a == b'"
 
 
 class PatternError(UrcError):
-    """An unusable pattern; `offset` is the 0-based character of the error."""
+    """An invalid pattern; `offset` is the 0-based character position of the error."""
 
     def __init__(self, message: str, offset: int = 0) -> None:
         super().__init__(message)
@@ -92,22 +92,22 @@ class _Match(Protocol):
 
 
 class Pattern:
-    """A compiled pattern. Equal if the source is equal; safe to share."""
+    """A compiled, immutable pattern. Patterns with equal source are equal."""
 
     __slots__ = ("_search", "groups", "is_proven", "source")
 
     def __init__(self, source: str, groups: tuple[str, ...], search: Any, is_proven: bool) -> None:
         self.source = source
-        """Source as in the document."""
+        """Source of the pattern, as in the document."""
         self.groups = groups
-        """Names of its groups, in order."""
+        """Names of the pattern's groups, in order."""
         self.is_proven = is_proven
         """Whether the pattern runs on `re` instead of RE2."""
         self._search = search
 
     @property
     def places(self) -> Mapping[str, int]:
-        """Name of a group → its number."""
+        """Numbers of the groups, by name."""
         tree = _parser.parse(self.source, re.ASCII)
         return dict(tree.state.groupdict)
 
@@ -135,12 +135,11 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
     """Compile a pattern.
 
     Args:
-        text: source as in the document.
-        is_over_bytes: whether it matches bytes, each as one character, instead of text.
+        text: source of the pattern, as in the document.
+        is_over_bytes: whether the pattern matches bytes, each as one character, instead of text.
 
     Raises:
-        PatternError: the pattern is invalid, outside of the dialect, or needs RE2, which is
-            missing.
+        PatternError: the pattern is invalid or unsupported, or needs RE2, which is not installed.
     """
     if len(text) > MAX_SOURCE:
         raise PatternError(f"a pattern has at most {MAX_SOURCE} characters, found {len(text)}")
@@ -173,16 +172,16 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
 
 
 def example(pattern: Pattern, groups: Mapping[str, str], variant: int = 0) -> str:
-    """Return a short text for `pattern`, with `groups` as its named groups.
+    """Return a short text that matches `pattern`, with `groups` as named groups.
 
-    The caller must check that the pattern matches the text.
+    The text may still not match `pattern`; the caller must check.
 
     Args:
-        pattern: pattern of the text.
-        groups: name of a group → its text.
-        variant: with 0, the text omits optional parts without given groups, and has the first
-            alternative and the first printable character of a class. Other numbers select other
-            alternatives, characters and repeats.
+        pattern: pattern to match.
+        groups: texts of the named groups, by name.
+        variant: number of the variant. Variant 0 omits optional parts without given groups, and
+            contains the first alternatives and the first printable characters. Other variants
+            contain other alternatives, characters and repeats.
     """
     tree = _parser.parse(pattern.source, re.ASCII)
     names = {number: name for name, number in tree.state.groupdict.items()}
@@ -190,7 +189,7 @@ def example(pattern: Pattern, groups: Mapping[str, str], variant: int = 0) -> st
 
 
 def literal_prefix(pattern: Pattern) -> str:
-    """Return the literal beginning of all matches of a proven pattern."""
+    """Return the literal prefix of all matches of a proven pattern; "" for other patterns."""
     if not pattern.is_proven:
         return ""
     prefix = ""
@@ -202,20 +201,20 @@ def literal_prefix(pattern: Pattern) -> str:
 
 
 def is_plain_group(pattern: Pattern, name: str) -> bool:
-    """Return whether a group can contain neither ``_`` nor characters outside ASCII."""
+    """Return whether a group never contains ``_`` or non-ASCII characters."""
     tree = _parser.parse(pattern.source, re.ASCII)
     found = _alphabet(tree, tree.state.groupdict[name])
     return found is not None and not found & {_OTHER, ord("_")}
 
 
 def can_be_empty(pattern: Pattern, name: str) -> bool:
-    """Return whether a group can match an empty text."""
+    """Return whether a group can match the empty text."""
     tree = _parser.parse(pattern.source, re.ASCII)
     return bool(_least_width(tree, tree.state.groupdict[name]) == 0)
 
 
 def _least_width(tree: Any, number: int) -> int | None:
-    """Return the least length of the group, or None for a group outside of `tree`."""
+    """Return the minimum length of the group; None for a group outside of `tree`."""
     for operation, argument in tree:
         if operation is _constants.SUBPATTERN and argument[0] == number:
             return int(argument[3].getwidth()[0])
@@ -227,7 +226,7 @@ def _least_width(tree: Any, number: int) -> int | None:
 
 
 def _alphabet(tree: Any, number: int) -> frozenset[int] | None:
-    """Return all possible characters of the group, or None for a group outside of `tree`."""
+    """Return all possible characters of the group; None for a group outside of `tree`."""
     for operation, argument in tree:
         if operation is _constants.SUBPATTERN and argument[0] == number:
             return _letters(argument[3])
@@ -305,7 +304,7 @@ def _check_dialect(tree: Any, text: str) -> None:
 
 
 def _parts(operation: Any, argument: Any) -> list[Any]:
-    """Return the sequences inside one node."""
+    """Return the sequences directly inside one node."""
     if operation is _constants.SUBPATTERN:
         return [argument[3]]
     if operation in (_constants.MAX_REPEAT, _constants.MIN_REPEAT):
@@ -319,7 +318,7 @@ def cost_of(source: str) -> int:
 
 
 def _cost(tree: Any, beyond: int = _BEYOND_ASCII) -> int:
-    """Return the size of a program; `beyond` is the size of all characters outside ASCII."""
+    """Return the size of the RE2 program; `beyond` is the size of all non-ASCII characters."""
     return sum(_cost_of_item(operation, argument, beyond) for operation, argument in tree)
 
 
@@ -363,7 +362,7 @@ def _re2_search(text: str) -> Any:
 
 
 class _NotProven(Exception):
-    """The proof does not cover a part of the pattern, which may still be harmless."""
+    """A part of a pattern without proof of linear time; the part may still be harmless."""
 
 
 def _is_linear(tree: Any, text: str) -> bool:
@@ -383,9 +382,10 @@ def _is_linear(tree: Any, text: str) -> bool:
 
 
 def _first_of(items: list[Any], follow: frozenset[int]) -> frozenset[int]:
-    """Return the possible first characters of `items` followed by `follow`; check each item.
+    """Check each item; return the possible first characters of `items` followed by `follow`.
 
-    The check goes backwards, so that the next characters of each item are known.
+    The check runs from the last item to the first, because each item needs the possible next
+    characters.
     """
     for operation, argument in reversed(items):
         follow = _first_of_item(operation, argument, follow)
@@ -439,7 +439,7 @@ def _first_of_repeat(argument: Any, follow: frozenset[int]) -> frozenset[int]:
 
 
 def _characters(operation: Any, argument: Any) -> frozenset[int] | None:
-    """Return the character set of a single-character item, else None."""
+    """Return the character set of a single-character item; None for other items."""
     if operation is _constants.LITERAL:
         return frozenset((min(argument, _OTHER),))
     if operation is _constants.NOT_LITERAL:

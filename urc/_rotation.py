@@ -2,7 +2,7 @@
 
 Private to `urc.filters.table`. A quaternion is [x, y, z, w] or {x, y, z, w}, of any norm except
 zero. The angles are rotations about x, then y, then z, in the axes of REP-103. Without an
-orientation the angles are not-a-number, which any arithmetic preserves: "not available".
+orientation, all angles are not-a-number ("not available"), which arithmetic preserves.
 """
 
 import math
@@ -14,7 +14,7 @@ _Parts = tuple[float, float, float, float]
 
 
 def roll(value: object) -> float:
-    """Return the angle about x, -pi to pi; not-a-number without an orientation."""
+    """Return the roll angle (about x), -pi to pi; not-a-number without an orientation."""
     q = _parts(value)
     if q is None:
         return math.nan
@@ -23,7 +23,7 @@ def roll(value: object) -> float:
 
 
 def pitch(value: object) -> float:
-    """Return the angle about y, -pi/2 to pi/2; not-a-number without an orientation."""
+    """Return the pitch angle (about y), -pi/2 to pi/2; not-a-number without an orientation."""
     q = _parts(value)
     if q is None:
         return math.nan
@@ -32,7 +32,7 @@ def pitch(value: object) -> float:
 
 
 def yaw(value: object) -> float:
-    """Return the angle about z, -pi to pi; not-a-number without an orientation."""
+    """Return the yaw angle (about z), -pi to pi; not-a-number without an orientation."""
     q = _parts(value)
     if q is None:
         return math.nan
@@ -41,7 +41,7 @@ def yaw(value: object) -> float:
 
 
 def _parts(value: object) -> _Parts | None:
-    """Return a unit quaternion, or None for an absent, zero or infinite quaternion."""
+    """Return a unit quaternion; None for a missing, zero or infinite quaternion."""
     if value is None:
         return None
     if isinstance(value, Mapping):

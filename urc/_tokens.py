@@ -1,4 +1,4 @@
-"""Tokens of expressions: text → tokens, and tokens → constants.
+"""Tokenizer of expressions, and conversion of tokens to constants.
 
 Private to `urc._grammar`.
 """
@@ -23,7 +23,7 @@ _MAX_DIGITS: Final = 400
 
 
 class ExpressionSyntaxError(Exception):
-    """An invalid expression, with the 0-based character of the error."""
+    """An invalid expression, with the 0-based character position of the error."""
 
     def __init__(self, message: str, offset: int) -> None:
         super().__init__(message)

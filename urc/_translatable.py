@@ -1,7 +1,7 @@
 """Translatable texts for people.
 
-A phrase keeps its English text and its parts, so that a catalogue can translate it later; see
-`urc.web.words`. `scripts.translations` finds the texts by the name `phrase`.
+A phrase keeps its English text and its values for a later translation; see `urc.web.words`.
+`scripts.translations` finds the texts as arguments of `phrase`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -18,12 +18,12 @@ class Phrase(str):
     """Text with ``{name}`` for each of `names`."""
     names: Mapping[str, str]
     pieces: tuple[str, ...]
-    """Parts of a joined phrase, which has no `text`."""
+    """Parts of a joined phrase; a joined phrase has no `text`."""
     between: str
 
 
 def phrase(text: str, /, **names: object) -> Phrase:
-    """Return a phrase; its values may be phrases, too."""
+    """Return a phrase with these values, which may be phrases."""
     said = {name: one if isinstance(one, str) else str(one) for name, one in names.items()}
     made = Phrase(text.format_map(said))
     made.text, made.names, made.pieces, made.between = text, said, (), ""
@@ -31,7 +31,7 @@ def phrase(text: str, /, **names: object) -> Phrase:
 
 
 def joined(between: str, pieces: Iterable[str]) -> Phrase:
-    """Return several phrases as one."""
+    """Return the concatenation of several phrases as one phrase."""
     some = tuple(pieces)
     made = Phrase(between.join(some))
     made.text, made.names, made.pieces, made.between = "", {}, some, between

@@ -1,7 +1,7 @@
 """Translation of YAML parser errors into messages and hints for people.
 
-Private to `urc.source`. The module handles both parsers of PyYAML (C and pure Python). Their
-messages differ, so the module uses the text at the error where possible.
+Private to `urc.source`. The module supports both parsers of PyYAML (C and pure Python). Their
+messages differ, so most decisions depend on the text at the error.
 """
 
 import re
@@ -20,7 +20,7 @@ _SIGN: Final = "{!r} at the start of a value is YAML syntax, not text"
 
 
 class SyntaxFault(NamedTuple):
-    """One syntax error; `line` and `column` are 0-based, as in the parser."""
+    """A YAML syntax error; `line` and `column` are 0-based, as in the parser."""
 
     line: int
     column: int
@@ -30,7 +30,7 @@ class SyntaxFault(NamedTuple):
 
 
 class _Clue(NamedTuple):
-    """A parser message, and the text at its place."""
+    """A parser message, with the text at its position."""
 
     said: str
     context: str
@@ -53,7 +53,7 @@ class _Clue(NamedTuple):
 
 
 def explain(error: yaml.YAMLError, lines: Sequence[str]) -> SyntaxFault:
-    """Translate `error` into a syntax error at the most useful place."""
+    """Translate `error` into a syntax error at the most useful position."""
     mark = getattr(error, "problem_mark", None)
     opened = getattr(error, "context_mark", None) or mark
     said = str(getattr(error, "problem", None) or error).splitlines()[0]
@@ -91,7 +91,7 @@ def _directive(at: _Clue) -> SyntaxFault | None:
         0,
         "unquoted",
         "a line that starts with '%' is a directive of YAML",
-        "quote it, if it is text; documents of URC need no directives",
+        "quote the value if it is text; documents of URC need no directives",
     )
 
 
@@ -226,14 +226,14 @@ def _block(at: _Clue) -> SyntaxFault | None:
         return SyntaxFault(
             *place,
             "indentation",
-            "this does not belong to the block that it stands in",
+            "the indentation of this line does not match its block",
             "indent it like the other lines of its block; quote values with special characters",
         )
     if "<document start>" in said:
         return SyntaxFault(
             *place,
             "indentation",
-            "this does not belong to the lines above",
+            "this line does not continue the lines above",
             "start every top-level key in column 1, as 'key: value'",
         )
     return None
@@ -277,7 +277,10 @@ def _rest(at: _Clue) -> SyntaxFault | None:
                 *place, "not-yaml", "a value is expected here", "close the open brackets and quotes"
             )
         return SyntaxFault(
-            *place, "not-yaml", f"{char!r} where a value is expected", "quote it, if it is text"
+            *place,
+            "not-yaml",
+            f"{char!r} where a value is expected",
+            "quote the value if it is text",
         )
     if "block scalar" in at.context:
         return SyntaxFault(
@@ -304,7 +307,7 @@ _RULES: tuple[Callable[[_Clue], SyntaxFault | None], ...] = (
 
 
 def advice(text: str, column: int, *, has_comment: bool = True) -> str:
-    """Return how to quote the value that starts at `column` (0-based) of the line `text`."""
+    """Return a hint for quoting the value at the 0-based `column` of the line `text`."""
     rest = text[column:].split(" #")[0] if has_comment else text[column:]
     before = text[:column]
     if before.count("{") > before.count("}") or before.count("[") > before.count("]"):

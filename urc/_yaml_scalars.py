@@ -11,8 +11,8 @@ from typing import Final
 __all__ = ["DIGITS_MAX", "resolve_plain"]
 
 DIGITS_MAX: Final = 40
-"""Longest number of a robot. The conversion in Python takes quadratic time and refuses thousands of
-digits."""
+"""Maximum number of characters in a number. Python converts long numbers in quadratic time, and
+refuses thousands of digits."""
 _SCALAR = re.compile(
     r"""(?P<null>~|null|Null|NULL|)
     |(?P<true>true|True|TRUE)|(?P<false>false|False|FALSE)

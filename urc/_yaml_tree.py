@@ -1,8 +1,9 @@
-"""Conversion of YAML events into plain data and a tree of marks of the same shape.
+"""Conversion of YAML events into plain data and a parallel tree of marks.
 
-Private to `urc.source`. The reader processes the events of the parser without the composer of the
-library. Nesting and aliases are thus bounded *while* reading: an alias bomb costs only its first
-lines. Every key and value has its place, and scalars follow the core schema of YAML 1.2.
+Private to `urc.source`. The reader processes the events of the YAML parser directly, without the
+library's composer. Nesting and aliases are therefore limited *while* reading: a document with
+exponentially many aliases is rejected early. Every key and value has a position, and scalars follow
+the core schema of YAML 1.2.
 """
 
 import re
@@ -20,23 +21,23 @@ __all__ = ["DocumentLimits", "StoppedError", "TreeReader"]
 _TAGS: Final = "tag:yaml.org,2002:"
 _PATH_SHOWN: Final = 12
 _PROBLEMS_MOST: Final = 100
-"""Largest number of problems in one text, because each problem reads its line, which may be
-long."""
+"""Maximum number of problems in one text. The limit is needed because each problem copies its line,
+which may be long."""
 _CUT_COMMENT = re.compile(r" #[^\s#!]")
 
 
 class DocumentLimits(NamedTuple):
-    """Bounds of a document."""
+    """Size limits of a document."""
 
     size_bytes: int = 1 << 20
     depth: int = 64
-    """Largest nesting depth of mappings and lists, through aliases."""
+    """Maximum nesting depth of mappings and lists, including aliases."""
     nodes: int = 10_000
-    """Largest number of keys, values, mappings and lists, with every alias expanded."""
+    """Maximum number of keys, values, mappings and lists, with every alias expanded."""
 
 
 class StoppedError(Exception):
-    """The end of reading at an error; the last problem of the reader gives the reason."""
+    """Reading has stopped at an error; the last problem of the reader has the reason."""
 
 
 class _Built(NamedTuple):
@@ -47,7 +48,7 @@ class _Built(NamedTuple):
 
 
 class TreeReader:
-    """Reads one document from the events of a parser; `problems` has the problems found."""
+    """A reader that builds one document from parser events, and collects `problems`."""
 
     def __init__(self, parser: Any, lines: list[str], file: str, limits: DocumentLimits) -> None:
         self.problems: list[Problem] = []
@@ -58,10 +59,10 @@ class TreeReader:
         self._nodes = 0
         self._path: list[str] = []
         self._anchors: dict[str, _Built | None] = {}
-        """Anchors by name; None while the node of the anchor is being read."""
+        """Anchored nodes by anchor name; None while the node is being read."""
 
     def read(self) -> tuple[object, Mark] | None:
-        """Return data and marks, or None for a text without any document.
+        """Return the data and marks of the document; None for a text without a document.
 
         Raises:
             StoppedError: the rest of the text cannot be parsed.
@@ -78,7 +79,7 @@ class TreeReader:
                 rest,
                 "several-documents",
                 "a second document starts here",
-                hint="one file holds one document: put the rest into a file of its own",
+                hint="one file holds one document: move the second document to a separate file",
             )
         return built.value, built.mark
 
@@ -111,7 +112,7 @@ class TreeReader:
         built = self._anchors.get(name)
         if built is None:
             if name in self._anchors:
-                self._report(event, "alias-loop", f"'*{name}' stands inside its own anchor")
+                self._report(event, "alias-loop", f"'*{name}' is inside its own anchor")
                 raise StoppedError
             self._report(
                 event,
@@ -175,7 +176,7 @@ class TreeReader:
         return items, height + 1
 
     def _key(self, event: Any, start: Any, depth: int) -> str | None:
-        """Return the key, or None for a reported key whose value is skipped."""
+        """Return the key; report an invalid key, skip its value and return None."""
         if type(event) is not yaml.ScalarEvent:
             self._node(event, depth + 1)
             self._report_complex_key(event, start)
@@ -217,7 +218,7 @@ class TreeReader:
                 event,
                 "number-too-long",
                 f"found {error}, at most {DIGITS_MAX} are read",
-                hint="quote it, if it is text",
+                hint="quote the value if it is text",
             )
             return None
         if not is_key and (value is None or isinstance(value, str)):
@@ -248,7 +249,7 @@ class TreeReader:
         self._report(
             event,
             "unknown-tag",
-            f"{shown!r} at the start of a value is a tag of YAML, and documents of URC have none",
+            f"{shown!r} at the start of a value is a YAML tag; tags are not supported",
             hint=f"if it is text, {self._advice(event)}",
         )
 
@@ -259,7 +260,7 @@ class TreeReader:
             event,
             "duplicate-key",
             f"{key!r} is given twice; the first is at {place}",
-            hint="keep one of them: the last one never overrides the others",
+            hint="keep one of them: a later key never overrides an earlier key",
         )
 
     def _report_complex_key(self, event: Any, start: Any) -> None:
@@ -281,7 +282,7 @@ class TreeReader:
         self._report(event, "key-not-text", f"a key must be text, found {what}")
 
     def _is_bare(self, key: Any, value: Any) -> bool:
-        """Return whether a key has no colon after it."""
+        """Return whether the key is not followed by a colon."""
         is_text = _is_plain(key) and type(value) is yaml.ScalarEvent
         if not is_text or value.value or value.style:
             return False
@@ -289,11 +290,11 @@ class TreeReader:
         return not self._line(end.line)[end.column :].lstrip().startswith(":")
 
     def _report_comma(self, event: Any, before: Any) -> None:
-        """Report a key without a colon: the rest of the text `before`."""
+        """Report a key without a colon as the rest of the text `before`."""
         self._report(
             event,
             "unquoted",
-            "a comma ends a text inside of { }, so this is a key of its own",
+            "a comma ends a text inside { }, so this is a separate key",
             hint=f'quote the text: "{before.value}, {event.value}"',
             length=max(1, len(event.value)),
         )
@@ -377,12 +378,12 @@ def _span(event: Any) -> Span:
 
 
 def path_text(path: Iterable[str | int]) -> str:
-    """Return ``("polls", 0, "send")`` as ``polls.0.send``."""
+    """Return the text of a path: ``("polls", 0, "send")`` becomes ``polls.0.send``."""
     parts = (str(part) for part in path)
     return ".".join(part if len(part) <= 64 else part[:63] + "…" for part in parts)
 
 
 def _close(mark: Mark, end: Any) -> None:
-    """Extend the mark of a mapping or list to its end event."""
+    """Extend the mark of a mapping or list to the position of its end event."""
     line, column = end.end_mark.line + 1, end.end_mark.column + 1
     mark.span = mark.span._replace(end_line=line, end_column=column)

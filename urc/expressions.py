@@ -1,12 +1,12 @@
-"""Templates and expressions of documents: a subset of Jinja, compiled to Python functions.
+"""Templates and expressions in documents: a subset of Jinja, compiled to Python functions.
 
 `urc._grammar` defines the supported subset. Expressions are a sandbox: no attributes of Python
 objects, no loops, and no operator that expands a short text. The only calls are the filters of
-`urc.filters.table`. Literal text is preserved to the byte, whereas Jinja converts CR to LF and
-drops a final newline. Where Jinja hides an error (``'abc' | int`` is 0), URC raises: a reading must
-not become zero by accident.
+`urc.filters.table`. Literal text is preserved exactly, whereas Jinja converts CR to LF and drops a
+final newline. URC raises errors that Jinja hides (``'abc' | int`` is 0), because a wrong reading
+must not become zero.
 
-A template of exactly one ``{{ expression }}`` keeps the type of the expression.
+The result of a template with only one ``{{ expression }}`` keeps the type of the expression.
 """
 
 import ast
@@ -39,29 +39,29 @@ __all__ = [
 ]
 
 NOW: Final = "now"
-"""Root name of the time of day, in seconds since 1970."""
+"""Root name for the current Unix time, in seconds."""
 _HASHES: Final = frozenset(f"_filter_{name}" for name in ("md5", "sha1", "sha256", "hmac_sha256"))
 _SUMMARIES: Final = frozenset(("_filter_length", "_is_defined", "_is_none", "_match", "_search"))
-"""Functions whose results reveal almost nothing of their operands."""
+"""Functions with results that reveal almost nothing about the operands."""
 _NONCE: Final = re.compile(rf"ns\['{re.escape(NONCE)}'\]\(\d+\)")
 MAX_SOURCE: Final = 4096
-"""Longest template, in characters."""
+"""Maximum length of a template, in characters."""
 MAX_OUTPUT: Final = 65536
-"""Longest result of a rendering, in characters."""
+"""Maximum length of a rendered text, in characters."""
 
 
 _INSTEAD: Final = {
     "for": "; write {{ items | join(',') }} for a list",
     "if": "; write {{ 'a' if test else 'b' }}",
-    "set": "; write the expression where its value stands",
+    "set": "; write the expression in the place of the variable",
 }
-"""Jinja statement → hint."""
+"""Hints for unsupported Jinja statements, by keyword."""
 
 
 class ExpressionError(UrcError):
-    """A failure to compile a template, or to evaluate it with the given values.
+    """An error in compiling a template, or in evaluating a template with given values.
 
-    `offset` is the 0-based character of the error in the template.
+    `offset` is the 0-based character position of the error in the template.
     """
 
     def __init__(self, message: str, offset: int = 0) -> None:
@@ -78,16 +78,16 @@ class Template:
         self.source = source
         """Source as in the document."""
         self.python = python
-        """Compiled Python expression, over a mapping `ns`."""
+        """Source of the Python expression, over a mapping `ns`."""
         self.names = names
-        """Root names in the expression: ``settings``, an argument, a signal."""
+        """Root names in the expression, such as ``settings``, arguments and signals."""
         self.settings = settings
-        """Names of settings in the expression, from ``settings.NAME``."""
+        """Names of the settings in the expression, from ``settings.NAME``."""
         self.is_constant = not names
         self._function: Callable[[Mapping[str, object]], Any] = _function(python)
 
     def evaluate(self, namespace: Mapping[str, object]) -> Any:
-        """Return the value; raise `ExpressionError` for a missing name or a wrong operand."""
+        """Return the value; raise `ExpressionError` for a missing name or an invalid operand."""
         try:
             value = self._function(namespace)
         except ExpressionError:
@@ -101,7 +101,7 @@ class Template:
         return value
 
     def render(self, namespace: Mapping[str, object]) -> str:
-        """Return the value as text."""
+        """Return the value of the expression as text."""
         return text_of(self.evaluate(namespace))
 
     def __eq__(self, other: object) -> bool:
@@ -115,10 +115,10 @@ class Template:
 
 
 def compile_template(text: str) -> Template:
-    """Compile text that contains ``{{ expression }}``.
+    """Compile a template: text with any number of ``{{ expression }}``.
 
     Raises:
-        ExpressionError: an invalid template; the error has its offset in `text`.
+        ExpressionError: the template is invalid; `offset` is the position of the error in `text`.
     """
     _check_length(text)
     parts: list[str] = []
@@ -155,7 +155,7 @@ def compile_expression(text: str, *, allows_bytes: bool = False) -> Template:
 
 
 def text_of(value: object) -> str:
-    """Return `value` in its text form."""
+    """Return the text form of `value`, as in templates."""
     if isinstance(value, bytes):
         raise ExpressionError("bytes are not text; send them by 'hex:' or 'bytes:'")
     return value if isinstance(value, str) else spelt(value)
@@ -178,7 +178,7 @@ def _function(python: str) -> Callable[[Mapping[str, object]], Any]:
 
 
 def split_template(text: str) -> Iterator[tuple[int, str, str | None]]:
-    """Yield (offset, literal, None) and (offset, "", expression) in order."""
+    """Yield (offset, literal, None) or (offset, "", expression) for each part of a template."""
     position = 0
     while position < len(text):
         start = text.find("{", position)
@@ -203,7 +203,7 @@ def split_template(text: str) -> Iterator[tuple[int, str, str | None]]:
 
 
 def _word_behind(text: str, start: int) -> str:
-    """Return the keyword of the statement at `start`."""
+    """Return the keyword of the Jinja statement at `start`."""
     return next(iter(text[start + 2 :].lstrip("-+ ").split(maxsplit=1)), "")
 
 
@@ -234,7 +234,7 @@ def _closing(text: str, start: int) -> int:
 def _translate(
     text: str, offset: int, names: set[str], settings: set[str], *, allows_bytes: bool = False
 ) -> str:
-    """Return the Python for one expression; add its names to `names` and `settings`."""
+    """Return the Python source for one expression; add its names to `names` and `settings`."""
     try:
         return translate(text, "ns[{!r}]".format, names, settings, allows_bytes=allows_bytes)
     except ExpressionSyntaxError as error:
@@ -243,13 +243,13 @@ def _translate(
 
 
 def last_filter(template: Template) -> str:
-    """Return the outermost filter of an expression, or ""."""
+    """Return the name of the outermost filter of an expression; "" without a filter."""
     name = template.python.partition("(")[0]
     return name.removeprefix("_filter_") if name.startswith("_filter_") else ""
 
 
 def defaulted_names(template: Template) -> frozenset[str]:
-    """Return the optional root names of an expression: each has a ``default``."""
+    """Return the root names of an expression that always have a ``default``."""
     if "_filter_default(" not in template.python:
         return frozenset()
     needed, spare = set[str](), set[str]()
@@ -258,7 +258,7 @@ def defaulted_names(template: Template) -> frozenset[str]:
 
 
 def _gather(node: ast.AST, needed: set[str], spare: set[str], *, has_default: bool) -> None:
-    """Sort the root names under `node` into required and optional ones."""
+    """Add the root names under `node` to `needed` or `spare` (with a default)."""
     if isinstance(node, ast.Subscript) and ast.unparse(node.value) == "ns":
         (spare if has_default else needed).add(str(ast.literal_eval(node.slice)))
         return
@@ -269,9 +269,9 @@ def _gather(node: ast.AST, needed: set[str], spare: set[str], *, has_default: bo
 
 
 def digested_settings(template: Template) -> frozenset[str]:
-    """Return the settings that appear only in tests and in hashes with a nonce or time.
+    """Return the settings that appear only in tests, and in hashes with a nonce or time.
 
-    A hash with a nonce or time reveals nothing about the setting, and is useless for a replay.
+    A hash with a nonce or time does not reveal the setting, and is useless for a replay.
     """
     if not template.settings:
         return frozenset()
@@ -281,7 +281,7 @@ def digested_settings(template: Template) -> frozenset[str]:
 
 
 def _sort(node: ast.AST, shown: set[str], digested: set[str], *, is_digested: bool) -> None:
-    """Sort the settings under `node` into visible and hashed ones."""
+    """Add the settings under `node` to the visible or the hashed settings."""
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         if node.func.id in _HASHES:
             roots = {one.value for one in ast.walk(node) if isinstance(one, ast.Constant)}
@@ -298,7 +298,7 @@ def _sort(node: ast.AST, shown: set[str], digested: set[str], *, is_digested: bo
 
 
 def is_nonce(template: Template) -> bool:
-    """Return whether the value of an expression is only ``nonce()``."""
+    """Return whether an expression is only ``nonce()``."""
     return _NONCE.fullmatch(template.python) is not None
 
 

@@ -1,7 +1,7 @@
-"""Media type and size of a picture from its first bytes, without decoding it.
+"""Media type and size of an image, from its first bytes and without decoding.
 
-A few kilobytes may decode to gigabytes in a browser, so the picture's size matters, not the file's
-size. Sources: PNG (ISO/IEC 15948, 11.2.2), JPEG (ITU-T T.81, B.2.2), GIF89a (section 18), WebP (RFC
+A small file may need gigabytes in a browser, so the size in pixels matters, not the file size.
+Sources: PNG (ISO/IEC 15948, 11.2.2), JPEG (ITU-T T.81, B.2.2), GIF89a (section 18), WebP (RFC
 9649), BMP (BITMAPINFOHEADER).
 """
 
@@ -11,7 +11,7 @@ from typing import Final
 __all__ = ["MAX_PIXELS", "media_type", "picture_size", "pixels"]
 
 MAX_PIXELS: Final = 16_000_000
-"""Limit of a picture in pixels, which take 64 MB in a browser."""
+"""Maximum number of pixels of an image, which takes 64 MB in a browser."""
 
 _OTHER: Final = "application/octet-stream"
 _SIGNS: Final = (
@@ -21,13 +21,13 @@ _SIGNS: Final = (
     (b"BM", "image/bmp"),
 )
 _SIZE_MARKERS: Final = frozenset((*range(0xC0, 0xD0),)) - {0xC4, 0xC8, 0xCC}
-"""JPEG markers that start a frame (SOF); the three excluded ones are tables and an extension."""
+"""JPEG markers that start a frame (SOF), without the three markers for tables and an extension."""
 _ALONE: Final = frozenset((0x01, *range(0xD0, 0xD9)))
-"""JPEG markers without a length."""
+"""JPEG markers without a length field."""
 
 
 def media_type(data: bytes) -> str:
-    """Return the media type by the first bytes; ``application/octet-stream`` if unknown."""
+    """Return the media type of an image; ``application/octet-stream`` if unknown."""
     for sign, name in _SIGNS:
         if data.startswith(sign):
             return name
@@ -39,9 +39,9 @@ def media_type(data: bytes) -> str:
 
 
 def picture_size(data: bytes) -> tuple[int, int] | None:
-    """Return width and height in pixels, or None if the first bytes do not contain them.
+    """Return the width and height of an image in pixels; None if the first bytes lack the size.
 
-    AVIF gives None, too: the size is in nested boxes, and browsers limit AVIF themselves.
+    AVIF is not supported: its size is in nested boxes, and browsers limit AVIF themselves.
     """
     read = _READERS.get(media_type(data))
     try:
@@ -51,7 +51,7 @@ def picture_size(data: bytes) -> tuple[int, int] | None:
 
 
 def pixels(data: bytes) -> int:
-    """Return the number of pixels of a picture; 0 if its first bytes do not contain the size."""
+    """Return the number of pixels of an image; 0 if the first bytes lack the size."""
     width, height = picture_size(data) or (0, 0)
     return width * height
 

@@ -1,6 +1,6 @@
-"""Regular expressions of documents: matched in linear time, or refused.
+"""Regular expressions in documents, limited to patterns with linear run time.
 
-`urc._patterns` has the implementation, which expressions use, too.
+The implementation is in `urc._patterns`, which expressions also use.
 """
 
 from urc._patterns import (

@@ -1,6 +1,6 @@
-"""Atomic writing of private files, safe against a power failure.
+"""Atomic writing of private files that survives a power failure.
 
-The files contain data that outlives a run: settings, a latched STOP, host keys.
+The files contain persistent data: settings, a latched STOP, host keys.
 """
 
 import os
@@ -14,12 +14,12 @@ _OWN = 0o700
 
 
 def make_private(folder: Path) -> None:
-    """Make a folder and its missing parents, accessible to their owner only.
+    """Create a folder and its missing parents, accessible only to the owner.
 
-    An existing folder stays unchanged.
+    The permissions of an existing folder stay unchanged.
 
     Raises:
-        OSError: the folder cannot be made.
+        OSError: the folder cannot be created.
     """
     missing = [one for one in (folder, *folder.parents) if not one.exists()]
     for one in reversed(missing):
@@ -29,15 +29,15 @@ def make_private(folder: Path) -> None:
 
 
 def put_private(file: Path, data: bytes) -> None:
-    """Write a file atomically: after a power failure it has either the old or the new content.
+    """Write a file atomically: a power failure leaves either the old or the new content.
 
     Args:
-        file: path of the file; its folder is created, private to its owner.
+        file: path of the file; a missing folder is created, accessible only to the owner.
         data: complete content.
 
     Raises:
         OSError: the file cannot be written, for example on a full disk. The old content then
-            remains, unless only the sync of the folder failed.
+            remains, unless only the folder's sync failed.
     """
     make_private(file.parent)
     # `mkstemp` makes files that only their owner can read.
@@ -56,7 +56,7 @@ def put_private(file: Path, data: bytes) -> None:
 
 
 def _keep_name(folder: Path) -> None:
-    """Sync the folder to disk, where the system supports it."""
+    """Sync the folder to disk, if the system supports syncing folders."""
     if hasattr(os, "O_DIRECTORY"):
         number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:

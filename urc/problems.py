@@ -1,8 +1,8 @@
-"""Problems of documents, and their output for people and programs.
+"""Problems in documents, and their output for people and programs.
 
-This module is independent of YAML, robots and the command line. All passes of the loader, the tests
-of documents and the widget manifests report a `Problem`. Text, JSON and the web editor show the
-same values.
+This module is independent of YAML, robots and the command line. The loader's passes, document tests
+and widget manifests report mistakes as `Problem`. Text output, JSON output and the web editor show
+the same values.
 """
 
 from collections.abc import Iterable, Sequence
@@ -32,11 +32,14 @@ _IN_JSON = {code: f"\\u{code:04x}" for code in (*_CONTROLS[0x20:], *_MARKS, *_HA
 
 
 class UrcError(Exception):
-    """An error with a one-line message for people. Any other exception is a bug in URC."""
+    """An expected error, with a one-line message for people.
+
+    Any other exception is a bug in URC.
+    """
 
 
 class ProblemsError(UrcError):
-    """An unusable document, with every problem of the pass that rejected it."""
+    """An invalid document, with all problems of the pass that rejected the document."""
 
     def __init__(self, problems: Sequence["Problem"]) -> None:
         self.problems = tuple(problems)
@@ -47,54 +50,53 @@ class ProblemsError(UrcError):
 
 
 class Problem(NamedTuple):
-    """One problem: the place, the found and the expected text, and a hint."""
+    """One problem: position, message and hint."""
 
     code: str
-    """Name of the fault, such as ``unknown-key``."""
+    """Code of the problem, such as ``unknown-key``."""
     message: str
-    """The found and the expected text, in one line."""
+    """One-line message with the found and the expected content."""
     file: str
     line: int = 1
     """1-based."""
     column: int = 1
     """1-based, in characters."""
     end_column: int = 0
-    """End of the underlined text: 1-based, exclusive, on the same line; 0 if only the start is
-    known.
+    """End column of the underlined text on the same line, 1-based and exclusive; 0 if unknown.
     """
     path: str = ""
-    """Path in the document, as ``transports.wire.port``."""
+    """Path in the document, such as ``transports.wire.port``."""
     hint: str = ""
-    """Advice, if there is a sensible one."""
+    """Suggested correction; "": no suggestion."""
     source: str = ""
-    """Text of the line, shown above the caret."""
+    """Source line, shown above the caret."""
     severity: Severity = "error"
 
     @property
     def headline(self) -> str:
-        """The line ``file:line:column: severity CODE path: message``."""
+        """Headline ``file:line:column: severity CODE path: message``."""
         where = f" {self.path}" if self.path else ""
         text = f"{self.file}:{self.line}:{self.column}: {self.severity} {self.code}{where}: "
         return printable(text + self.message)
 
 
 def printable(text: str) -> str:
-    """Return `text` with control and reordering characters written as escapes."""
+    """Return `text` with control and bidirectional characters as escapes."""
     return text.translate(_CONTROL)
 
 
 def printable_json(text: str) -> str:
-    """Return equivalent JSON with control and reordering characters written as JSON escapes."""
+    """Return equivalent JSON with control and bidirectional characters as JSON escapes."""
     return text.translate(_IN_JSON)
 
 
 def has_errors(problems: Iterable[Problem]) -> bool:
-    """Return whether any problem is more than a warning."""
+    """Return whether any problem is an error, not only a warning."""
     return any(problem.severity == "error" for problem in problems)
 
 
 def to_text(problem: Problem) -> str:
-    """Return the headline, the source line with a caret under the error, and the hint."""
+    """Return the problem as text: headline, source line, caret line and hint."""
     lines = [problem.headline]
     if problem.source.strip():
         lines += _excerpt(problem)
@@ -119,7 +121,7 @@ def to_json(problem: Problem) -> dict[str, object]:
 
 
 def _excerpt(problem: Problem, width: int = 96) -> list[str]:
-    """Return the source line, cut to `width` around the error, and the caret line below it."""
+    """Return the source line, truncated to `width` around the error, and the caret line."""
     start = problem.column - 1
     end = max(problem.end_column - 1, start + 1)
     left = max(0, start - width // 2) if len(problem.source) > width else 0

@@ -1,9 +1,9 @@
-"""Tables from words of documents to their implementations.
+"""Tables that map words in documents to implementations.
 
-A row names its factory as text, which is imported on first use: a robot on TCP never loads SSH. The
-top layer passes all tables down as one `Registries`, so that modules of one layer need not import
-each other. Third parties add rows through the entry-point groups ``urc.transports`` and
-``urc.framings``.
+Each row contains the import path of a factory. Imports happen on first use, so a robot on TCP never
+loads SSH. The top layer passes all tables as one `Registries` to lower layers. Modules of one layer
+therefore need not import each other. Third-party packages add rows through the entry-point groups
+``urc.transports`` and ``urc.framings``.
 """
 
 from collections.abc import Iterator, Mapping
@@ -15,14 +15,14 @@ __all__ = ["Registries", "RegistryEntry", "Table"]
 
 
 class RegistryEntry:
-    """A row of a table: a word of documents, and the place of its code."""
+    """A row of a table: a word in documents, and the import path of the factory."""
 
     __slots__ = ("factory", "name")
 
     def __init__(self, name: str, factory: str) -> None:
         self.name = name
         self.factory = factory
-        """``module:attribute.path``, imported by `load`."""
+        """Import path ``module:attribute.path`` of the factory, imported by `load`."""
 
     def load(self) -> Any:
         """Import and return the factory."""
@@ -31,7 +31,7 @@ class RegistryEntry:
 
 
 class Table:
-    """Built-in rows, then those of installed packages in the same entry-point group."""
+    """A table of built-in rows and of rows from installed packages (entry points)."""
 
     def __init__(self, group: str, rows: Mapping[str, str]) -> None:
         self.group = group
@@ -43,9 +43,9 @@ class Table:
         return iter(self._rows)
 
     def get(self, name: str) -> RegistryEntry | None:
-        """Return the row of this name, or None.
+        """Return the row with this name; None for an unknown name.
 
-        Entry points are read only if no built-in row has the name.
+        Entry points are read only if the name is not a built-in row.
         """
         if name not in self._rows:
             self._read_entry_points()
@@ -68,7 +68,7 @@ class Table:
 
 
 class Registries(NamedTuple):
-    """All tables of one running URC."""
+    """All tables of one URC process."""
 
     transports: Table
     framings: Table

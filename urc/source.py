@@ -1,7 +1,7 @@
-"""Conversion of YAML text into a `Document`: plain data, and the position of every value.
+"""Conversion of YAML text into a `Document`: plain data with the position of every value.
 
-This module knows YAML, but nothing about robots. All errors are raised as `ProblemsError`, whose
-problems have the place and a hint. Time and memory are bounded for any content.
+This module is independent of robots. All errors are raised as `ProblemsError` with the position and
+a hint. Time and memory are bounded for any content.
 """
 
 import re
@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 Path = tuple[str | int, ...]
-"""Keys and list indices from the root of a document to a value."""
+"""Path of a value in a document: keys and list indices, from the root."""
 
 _LIMITS: Final = DocumentLimits()
 # Line ends as in the YAML reader, so that marks count the same lines. The Unicode patterns take
@@ -41,9 +41,10 @@ _ESCAPE = re.compile(r"\\(?:x.{2}|u.{4}|U.{8}|.)", re.DOTALL)
 
 
 class Document:
-    """The data of one file, with the position of every key and value. Immutable after reading.
+    """The content of one file, with the position of every key and value. Immutable after reading.
 
-    Parts of the data may come from other documents; their marks name the origin (`source_of`).
+    Parts of the data may originate from other documents; `source_of` returns the document of a
+    value.
     """
 
     __slots__ = ("data", "file", "lines", "mark", "problems", "text")
@@ -58,18 +59,19 @@ class Document:
         problems: tuple[Problem, ...] = (),
     ) -> None:
         self.file = file
-        """Original text, for messages and references."""
+        """Original text of the file, for messages and references."""
         self.text = text
         self.lines = lines
         self.data = data
-        """Mappings with text keys, lists, text, numbers, booleans and None."""
+        """Content of the document: mappings with text keys, lists, text, numbers, booleans and
+        None."""
         self.mark = mark
-        """Marks of the whole document; `at` finds one of them."""
+        """Mark of the root value; `at` returns the mark of any value."""
         self.problems = problems
-        """Warnings of the reader; errors raise an exception."""
+        """Warnings from reading the document; errors raise an exception instead."""
 
     def at(self, path: Path) -> Mark | None:
-        """Return the marks of the value at `path`, or None for a missing value."""
+        """Return the mark of the value at `path`; None for a missing value."""
         mark = self.mark
         for part in path:
             inner = mark.children.get(part)
@@ -79,7 +81,7 @@ class Document:
         return mark
 
     def line_starts(self) -> list[int]:
-        """Return the 0-based character of `text` at which each line starts."""
+        """Return the 0-based character offset of each line in `text`."""
         ends = _LINE_END if self.text.isascii() else re.compile(_LINE_END_UNICODE)
         return [0, *(end.end() for end in ends.finditer(self.text))]
 
@@ -99,15 +101,15 @@ class Document:
         length: int = 1,
         severity: Severity = "error",
     ) -> Problem:
-        """Return a problem at the value of `path`, with its source line.
+        """Return a problem for the value at `path`, with the source line.
 
         Args:
-            path: the place; for a missing value, the nearest existing parent is shown.
-            code: name of the problem.
-            message: the found and the expected text.
+            path: path of the value; for a missing value, the problem points at the nearest parent.
+            code: code of the problem, such as ``unknown-key``.
+            message: one line with the found and the expected content.
             hint: advice.
-            key: whether to point at the key instead of the value.
-            offset: 0-based character to point at in the text at `path`.
+            key: whether the problem points at the key instead of the value.
+            offset: 0-based character position in the value at `path`.
             length: number of characters to underline from `offset`.
             severity: ``error`` or ``warning``.
         """
@@ -131,7 +133,7 @@ class Document:
         )
 
     def _nearest(self, path: Path) -> tuple["Document", Mark, int]:
-        """Return document and marks of `path` or its nearest parent, and their depth."""
+        """Return the document, mark and depth of `path` or its nearest parent."""
         home: Document = self.mark.origin or self
         mark, depth = self.mark, 0
         for part in path:
@@ -149,7 +151,7 @@ class Document:
         return value if isinstance(value, str) else None
 
     def inside(self, mark: Mark, text: str | None, offset: int, length: int) -> Span | None:
-        """Return the place of some characters of a text of this document, or None if unknown."""
+        """Return the position of some characters in a text of this document; None if unknown."""
         written = mark.written
         if written is not None:
             end = written.offset(offset + length)
@@ -168,7 +170,7 @@ class Document:
 
 
 def _span(mark: Mark, *, key: bool, is_inside: bool) -> Span:
-    """Return the span to underline for a value: its key, itself, or its first character."""
+    """Return the span to underline for a value: the key, the value, or the first character."""
     wants_key = key or is_inside or mark.style == "{"
     if wants_key and mark.key is not None and (key or "{" in mark.style):
         return mark.key
@@ -186,7 +188,7 @@ def read_document(path: str, limits: DocumentLimits = _LIMITS) -> Document:
 
 
 def parse_document(content: bytes | str, file: str, limits: DocumentLimits = _LIMITS) -> Document:
-    """Parse text; `file` is its name in messages.
+    """Parse YAML text into a document; `file` is the file name in messages.
 
     Raises:
         ProblemsError: the text is not a YAML document within `limits`.
@@ -285,13 +287,13 @@ def _check_characters(text: str, file: str, lines: Sequence[str]) -> None:
         [
             Problem(
                 "control-character",
-                f"the character U+{ord(found[0]):04X} may not stand in YAML",
+                f"the character U+{ord(found[0]):04X} is not allowed in YAML",
                 file,
                 line,
                 column,
                 column + 1,
                 source=lines[line - 1],
-                hint='write it as an escape in double quotes, such as "\\x07"',
+                hint='write the character as an escape in double quotes, such as "\\x07"',
             )
         ]
     )
@@ -330,10 +332,10 @@ def _raw_column(raw: str, start: int, style: str, offset: int) -> int:
 def _inside_lines(
     lines: Sequence[str], span: Span, value: str, offset: int, length: int
 ) -> Span | None:
-    """Return the place of a character in a scalar of several lines.
+    """Return the position of a character in a multi-line scalar.
 
-    The function searches the lines in the value one after another. The search works for blocks,
-    plain text and quoted text without escapes.
+    The function searches the source lines one after another in the value. The search supports block
+    scalars, plain text, and quoted text without escapes.
     """
     position = 0
     last = min(span.end_line, len(lines))
