@@ -1,7 +1,7 @@
-"""Access control of pages: lets in browsers with the printed address, and shows others how.
+"""Access control of pages: admits browsers with a key, and tells other browsers how to get one.
 
-Layer 5. ASGI middleware inside the page policy. STOP passes without a key, and so do the files of
-the access page.
+Layer 5. An ASGI middleware inside the page policy. STOP and the files of the access page need no
+key.
 """
 
 import re
@@ -21,19 +21,19 @@ from urc.web.wire.messages import CLOSE_NOT_LET_IN, encode_error
 __all__ = ["AccessMiddleware", "AccessPage", "Stoppable"]
 
 SAID = "open the address that URC printed when it started: it has the key"
-"""Refusal for programs and sockets; `words.js` translates it."""
+"""Refusal message for programs and sockets; `words.js` translates the message."""
 _OPEN = re.compile(
     r"/healthz|/favicon\.ico|/app\.webmanifest|/sw\.js|/(?:static|vendor|words)/.+\.\w+"
 )
-"""Paths of files that contain nothing about a robot."""
+"""Paths of static files without any data about a robot."""
 _CODE = re.compile(r"/(?:static|vendor|words|widgets)/.+\.\w+")
-"""Paths of files for frames, below a secret prefix."""
+"""Paths of the files that frames load, without their secret prefix."""
 _HEADERS = {"cache-control": "no-store"}
 _REFUSED = {**_HEADERS, "www-authenticate": 'Bearer realm="URC"'}
 
 
 class Stoppable(NamedTuple):
-    """A robot with a STOP."""
+    """A robot that has a STOP."""
 
     name: str
     """Name of the robot in URLs."""
@@ -41,21 +41,21 @@ class Stoppable(NamedTuple):
 
     @property
     def stop_url(self) -> str:
-        """The URL of its STOP."""
+        """The URL of the robot's STOP."""
         return f"/api/v1/robots/{quote(self.name, safe='')}/stop"
 
 
 @dataclass(frozen=True, slots=True)
 class AccessPage:
-    """``door.html.j2``: instructions or a link to the page, and STOP."""
+    """Context of ``door.html.j2``: instructions or a link to the page, and STOP."""
 
     head: PageHead
     url: str
-    """Path of the page behind; "" if only the printed address helps."""
+    """Path of the requested page; "" if only the printed address gives access."""
     is_old: bool
-    """Whether the request had an invalid key, which the page reports first."""
+    """Whether the request had an invalid key; the page then says this first."""
     path: str
-    """Path of this page, for a new request: a link of another site sends no cookie."""
+    """Path of this page, for the reload link: a link from another site sends no cookie."""
     robots: tuple[Stoppable, ...]
 
 
@@ -68,8 +68,8 @@ class AccessMiddleware:
         """Prepare.
 
         Args:
-            app: the application behind it.
-            access: the keys and sessions.
+            app: the wrapped application.
+            access: the keys and sessions of the server.
             robots: returns the robots with a STOP.
         """
         self._app = app
@@ -77,7 +77,7 @@ class AccessMiddleware:
         self._robots = robots
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Hand on allowed requests, and answer the others."""
+        """Forward allowed requests to the application, and refuse all others."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -109,7 +109,7 @@ class AccessMiddleware:
         return scope["method"] in ("GET", "HEAD") and _OPEN.fullmatch(path) is not None
 
     def _answer_to(self, word: str, query: list[tuple[str, str]], scope: Scope) -> HTMLResponse:
-        """Return the response to a browser that hands in a key."""
+        """Return the response to a request with a key in its query."""
         rest = urlencode([pair for pair in query if pair[0] != PARAMETER])
         # Never "//…", which would be another host.
         path = "/" + quote(scope["path"].lstrip("/"))
@@ -147,7 +147,7 @@ class AccessMiddleware:
 
 
 async def _turn_away(receive: Receive, send: Send) -> None:
-    """Accept a socket and close it with the reason: a refused handshake gives a page no reason."""
+    """Accept a socket, then close it with the reason, because a page cannot read a refusal."""
     await receive()
     await send({"type": "websocket.accept"})
     await send({"type": "websocket.send", "text": encode_error("refused", SAID)})

@@ -1,7 +1,7 @@
-"""The OpenAPI 3.1 document of ``/api/v1``, made from the types that the server decodes.
+"""The OpenAPI 3.1 document of ``/api/v1``, generated from the types that the server decodes.
 
-Layer 5. The schemas come from `urc.web.manage.wire`, so document and server agree. A test compares
-the paths with the routes.
+Layer 5. The schemas are generated from `urc.web.manage.wire`, so the document matches the server. A
+test compares the documented paths with the routes.
 """
 
 from functools import cache
@@ -51,10 +51,10 @@ class _Call(NamedTuple):
 
 
 _CALLS: Final = (
-    _Call("/healthz", "Whether the server runs, and its version.", HealthStatus, is_post=False),
+    _Call("/healthz", "The health of the server, and its version.", HealthStatus, is_post=False),
     _Call(
         "/api/v1/packages",
-        "Installed packages, packages of repositories, and the current job.",
+        "Installed packages, packages available from repositories, and the current job.",
         PackageList,
         is_post=False,
         query=("kinds", "words"),
@@ -66,7 +66,7 @@ _CALLS: Final = (
         RefreshRequest,
         status=202,
     ),
-    _Call("/api/v1/repositories", "Add a repository; it must respond.", ResultLine, Url),
+    _Call("/api/v1/repositories", "Add a repository, which must respond.", ResultLine, Url),
     _Call("/api/v1/repositories/remove", "Forget a repository.", ResultLine, Url),
     _Call(
         "/api/v1/packages/install",
@@ -77,14 +77,14 @@ _CALLS: Final = (
     ),
     _Call(
         "/api/v1/packages/add",
-        "Start a job with a package at a path in a repository or on this machine.",
+        "Start a job for a package given by its path in a repository or on this machine.",
         JobNews,
         Add,
         status=202,
     ),
     _Call(
         "/api/v1/packages/upload",
-        "Start a job with an uploaded package, bundle or interface.yaml; the body is the file.",
+        "Start a job for an uploaded package, bundle or interface.yaml in the request body.",
         JobNews,
         bytes,
         status=202,
@@ -92,35 +92,37 @@ _CALLS: Final = (
     ),
     _Call(
         "/api/v1/packages/update",
-        "Start a job that downloads a newer version and lists its changes.",
+        "Start a job that downloads a newer version of a package and lists the changes.",
         JobNews,
         InstallRequest,
         status=202,
     ),
     _Call(
         "/api/v1/packages/back",
-        "Restore the version before an update.",
+        "Restore the version of a package before its last update.",
         RemovedPackages,
         InstallRequest,
     ),
     _Call(
         "/api/v1/packages/remove",
-        "Remove a package; without yes, only list the packages that would go.",
+        "Remove a package; without yes, only list the packages that would be removed.",
         RemovedPackages,
         InstallRequest,
     ),
-    _Call("/api/v1/job/agree", "Install the planned package.", JobNews, JobDecision),
-    _Call("/api/v1/job/cancel", "Cancel the job; nothing has changed.", JobNews, JobDecision),
+    _Call(
+        "/api/v1/job/agree", "Install the planned package after its approval.", JobNews, JobDecision
+    ),
+    _Call("/api/v1/job/cancel", "Cancel the job before it changes anything.", JobNews, JobDecision),
     _Call(
         "/api/v1/robots/{name}/settings",
-        "Test settings with the robot, store them, and use them at once.",
+        "Test the settings with the robot, then store and use them immediately.",
         SettingsAnswer,
         SettingsAsked,
     ),
-    _Call("/api/v1/robots/{name}/stop", "Stop a robot and latch.", StopResult),
+    _Call("/api/v1/robots/{name}/stop", "Stop a robot and latch its STOP.", StopResult),
     _Call(
         "/api/v1/robots/{name}/controls",
-        "The operator who drives a robot, and the latch of STOP.",
+        "The operator who drives a robot, and the state of its STOP latch.",
         ControlState,
         is_post=False,
     ),
@@ -133,19 +135,19 @@ _CALLS: Final = (
     ),
     _Call(
         "/api/v1/robots/{name}/recording",
-        "State of a playback.",
+        "State of the playback of a recording.",
         PlaybackState,
         is_post=False,
     ),
     _Call(
         "/api/v1/robots/{name}/recording/move",
-        "Play, pause or move a playback.",
+        "Play, pause or seek the playback of a recording.",
         PlaybackState,
         PlaybackRequest,
     ),
     _Call(
         "/api/v1/robots/{name}/dev/start",
-        "Reload a robot's documents; needs --dev and the start key.",
+        "Reload the documents of a robot; needs --dev and the start key.",
         ReloadResult,
     ),
 )
@@ -172,8 +174,8 @@ def api_document() -> bytes:
         "info": {
             "title": "URC",
             "version": __version__,
-            "description": "Each change is a POST from the server's own origin;"
-            " the header Origin is compared.",
+            "description": "Each change is a POST request from the server's own origin;"
+            " the server checks the Origin header.",
         },
         "paths": paths,
         "components": {"schemas": components},
@@ -188,7 +190,7 @@ def _operation(call: _Call) -> dict[str, Any]:
     parameters += [
         {"name": one, "in": "query", "required": False, "schema": text} for one in call.query
     ]
-    failure = {"description": "The reason of the failure, in one line.", "content": _json(Failure)}
+    failure = {"description": "Reason for the failure, in one line.", "content": _json(Failure)}
     found: dict[str, Any] = {
         "summary": call.summary,
         "responses": {

@@ -1,6 +1,6 @@
 """The dashboard as one ASGI application: routes to pages, files and sockets. Only wires.
 
-Layer 5. `build_app` gets the robots and all options; `serve` runs the application.
+Layer 5. `build_app` takes the robots and all options; `serve` runs the application.
 """
 
 import asyncio
@@ -81,17 +81,20 @@ def build_app(
 
     Args:
         robots: the robots, by the name in their URL.
-        access: the keys; None makes keys that stay unknown.
-        allowed_hosts: accepted names of this server, besides addresses, ``localhost`` and its own.
-        linger_s: time for which a robot stays connected after its last client, in seconds.
-        data: folder of the latches and the audit log, or None.
-        tiles: folder of map tiles, ``z/x/y.png``, or None.
-        remake: makes a robot from its saved document; None for a server without developer pages.
-        robot_options: options of the robot factory; None without managers and settings.
-        trusted: third-party widgets that run in the page all the same.
+        access: the keys of the server; None creates keys that are never shown.
+        allowed_hosts: further accepted host names, besides addresses, ``localhost`` and the
+            server's own names.
+        linger_s: time for which a robot stays connected after its last client has left, in seconds.
+        data: folder of the latches and the audit log; None stores neither.
+        tiles: folder of map tiles, ``z/x/y.png``; None for no tiles.
+        remake: functions that create a robot from its saved document; None for a server without
+            developer pages.
+        robot_options: options of the robot factory; None for a server without managers and
+            settings.
+        trusted: names of third-party widgets that run in the page instead of a frame.
 
     Raises:
-        UrcError: two robots bring different widgets of one name.
+        UrcError: two robots use different widgets of the same name.
     """
     audit = AuditLog(data / "audit.sqlite") if data else None
     fleet = Fleet(
@@ -139,7 +142,7 @@ def _recorder(audit: AuditLog | None, name: str, robot: Robot) -> AuditRecorder 
 
 
 class _Dashboard(Starlette):
-    """Starlette with the page policy outermost, so that its error responses pass through it."""
+    """Starlette with the page policy as outermost middleware, also for error responses."""
 
     def __init__(
         self,
@@ -188,7 +191,7 @@ class _Dashboard(Starlette):
         )
 
     def build_middleware_stack(self) -> ASGIApp:
-        """Put the policy around everything, also around the handler of unexpected errors."""
+        """Put the page policy around the whole application, with its error handlers."""
         door = AccessMiddleware(super().build_middleware_stack(), self._access, self._stoppable)
         return Policy(
             words.LanguageMiddleware(door), self._access, allowed_hosts=self._allowed_hosts
@@ -214,18 +217,18 @@ class _Routes:
 
     @property
     def stations(self) -> Mapping[str, RobotService]:
-        """The stations of the robots, by the same name."""
+        """The stations of the robots, by the name in their URL."""
         return self.fleet.stations
 
     def manage_routes(self) -> list[Route]:
-        """Return the routes of the managers, or none."""
+        """Return the routes of the managers; empty without managers."""
         if self.manager is None:
             return []
         manage = ManageRoutes(self.manager, self.ways, is_here, may_manage)
         return [*manage.routes(), *SettingsRoutes(self.manager, manage, self.ways).routes()]
 
     def stoppable(self) -> list[Stoppable]:
-        """Return the robots with a STOP."""
+        """Return all robots that have a STOP."""
         return [
             Stoppable(name, each.profile.title or name)
             for name, each in self.robots.items()
@@ -237,11 +240,11 @@ class _Routes:
         return [each.profile for each in self.robots.values()]
 
     def widget_files(self) -> tuple[Assets, ...]:
-        """Return the files of widgets: those of the robots, then those of the gallery."""
+        """Return the widget files of the robots, then those of the gallery."""
         return self.fleet.widgets, self.gallery.assets
 
     def renew(self, name: str, robot: Robot, latch: LatchStore | None) -> None:
-        """Switch to another version of a robot; raise `UrcError` when its widgets clash."""
+        """Switch to another version of a robot; raise `UrcError` when widgets conflict."""
         robot = self.fleet.renew(name, robot)
         secrets = secret_texts(robot.profile, robot.settings)
         self.stations[name].controls.recorder.hide(secrets)
@@ -249,7 +252,7 @@ class _Routes:
 
     @asynccontextmanager
     async def lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        """Run one supervisor for each robot while the server runs."""
+        """Run one session supervisor for each robot while the server runs."""
         try:
             async with self.fleet.running() as group:
                 if self.manager is not None:
@@ -311,7 +314,7 @@ class _Routes:
         return JSONResponse({"status": "ok", "version": __version__}, headers=_PAGE)
 
     async def stop(self, request: Request) -> Response:
-        """Stop a robot and latch, for a page whose socket is down."""
+        """Stop a robot and latch; pages without a working socket use this request."""
         service = self.stations.get(request.path_params["name"])
         if service is None:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)
@@ -358,7 +361,7 @@ class _Routes:
             await BrowserClient(websocket, service, flow, peer).serve()
 
     async def spare(self, websocket: WebSocket) -> None:
-        """Serve a redundant socket of a page that drives."""
+        """Serve the redundant socket of a page that drives."""
         service = await self._accepted(websocket)
         if service is not None:
             flow = websocket.scope["state"]["flow"]

@@ -1,1 +1,1 @@
-"""The developer page of a robot: traffic log, parser try-out, command preview."""
+"""The developer page of a robot: traffic log, parser try-out and command preview."""

@@ -1,8 +1,8 @@
-"""The WebSocket of one developer page: traffic of the robot, and replies to requests of the page.
+"""The WebSocket of one developer page: sends the robot's traffic, and answers requests.
 
-Layer 5. Traffic waits in a backlog for each page; the oldest rows are dropped and counted. A page
-that takes nothing for `STALL_S` is disconnected. Requests are handled one after the other in a
-thread, with a limit on their number.
+Layer 5. Each page has its own backlog of traffic; the oldest rows are dropped and counted. A page
+that reads nothing for `STALL_S` seconds is disconnected. A thread handles the requests one by one;
+the number of pending requests is limited.
 """
 
 import asyncio
@@ -42,25 +42,26 @@ MESSAGES_PER_S = 20
 BAD_MESSAGES = 10
 QUESTIONS = 8
 MOST_ANSWERS = 32
-"""Most replies that wait to be sent."""
+"""Maximum number of replies in the send queue."""
 ROWS_KEPT = 1000
 BYTES_KEPT = 1 << 20
 ROWS_AT_ONCE = 200
 BEHIND_S = 0.05
-"""Interval of messages with rows, in seconds. A robot may produce a thousand rows a second."""
+"""Interval between messages with rows, in seconds. A robot may produce a thousand rows per
+second."""
 HELD_S = 0.5
-"""Time after which withheld text is shown, although it may begin a secret, in seconds."""
+"""Time after which withheld text is shown even if it may be the start of a secret, in seconds."""
 RETRY_S = 1.0
 
 log = logging.getLogger(__name__)
 
 
 class Backlog:
-    """A queue of rows for one page."""
+    """The queue of traffic rows for one page."""
 
     def __init__(self) -> None:
         self.first = 0
-        """Number of the oldest row."""
+        """Number of the oldest row in the queue."""
         self._rows: deque[TrafficRow] = deque()
         self._bytes = 0
 
@@ -68,7 +69,7 @@ class Backlog:
         return len(self._rows)
 
     def push(self, row: TrafficRow) -> None:
-        """Add a row; drop the oldest ones beyond the limit."""
+        """Append a row; drop the oldest rows above the limit."""
         row.n = self.first + len(self._rows)
         self._rows.append(row)
         self._bytes += row.weight
@@ -76,7 +77,7 @@ class Backlog:
             self._pop()
 
     def pop(self) -> list[TrafficRow]:
-        """Remove and return the oldest rows, up to the limit of one message."""
+        """Remove and return the oldest rows, at most as many as one message may contain."""
         return [self._pop() for _ in range(min(ROWS_AT_ONCE, len(self._rows)))]
 
     def _pop(self) -> TrafficRow:
@@ -87,11 +88,11 @@ class Backlog:
 
 
 class _Known(NamedTuple):
-    """The running version of the robot, for the handling of requests."""
+    """The running version of the robot, for requests of the page."""
 
     profile: Profile
     settings: dict[str, Value]
-    """Values of settings: stand-ins for secrets, samples for missing ones."""
+    """Values of the settings: placeholders for secrets, sample values for missing settings."""
 
 
 class DevClient:
@@ -115,7 +116,7 @@ class DevClient:
         self._edition = -1
 
     async def serve(self) -> None:
-        """Serve this page from the accepted socket to its end."""
+        """Serve the developer page over the accepted socket until either side closes."""
         self._watch.listeners.add(self._news.set)
         try:
             async with asyncio.TaskGroup() as group:
@@ -135,7 +136,7 @@ class DevClient:
     # -- traffic
 
     async def _follow(self) -> None:
-        """Put the traffic of the robot into the backlog, session after session."""
+        """Append the robot's traffic to the backlog, through all its sessions."""
         while True:
             if missing_settings(self._service.robot) or self._service.is_full:
                 await self._clock.sleep(RETRY_S)
@@ -248,7 +249,7 @@ class DevClient:
                 self._log(encode_error("bad-message", str(error)))
             return
         if len(self._answers) > MOST_ANSWERS:
-            self._close(CLOSE_TOO_FAST, "the page does not take its replies")
+            self._close(CLOSE_TOO_FAST, "the page does not read its replies")
             return
         if isinstance(asked, Ping):
             self._log(encode_pong(asked, now_s))
@@ -267,7 +268,7 @@ class DevClient:
         self._news.set()
 
     async def _answer(self) -> None:
-        """Handle the requests one after the other, in a thread."""
+        """Handle the requests one by one, in a thread."""
         while True:
             asked = await self._questions.get()
             robot = self._watch.robot

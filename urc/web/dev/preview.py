@@ -1,7 +1,7 @@
-"""Preview of a command: its exact bytes or messages, or the reason of its refusal. Sends nothing.
+"""Preview of a command: its exact bytes or messages, or the reason for its refusal. Sends nothing.
 
-Layer 5, pure. A command may wait for a reply between two steps. The preview shows each frame that
-can be built in advance.
+Layer 5, pure. A command with several steps may wait for a reply between two steps. The preview
+shows each frame that can be built before the command runs.
 """
 
 from collections.abc import Iterator, Mapping
@@ -22,29 +22,29 @@ __all__ = ["Preview", "PreviewLine", "preview"]
 
 MOST_FRAMES = 200
 MOST_WITHIN = 8
-"""Deepest nesting of sequences that run each other."""
+"""Maximum nesting depth of sequences that run other sequences."""
 
 
 class PreviewLine(NamedTuple):
     """One line of a preview: a frame, or a step between two frames."""
 
     transport: str
-    """Name of the transport; "" for a line without frame."""
+    """Name of the transport; "" for a line without a frame."""
     payload: Payload
     text: str
-    """Description of a step without frame, or the reason why the frame is not shown."""
+    """Description of a step without a frame, or the reason for not showing the frame."""
 
 
 class Preview(NamedTuple):
     """The effect of a command."""
 
     refusal: str
-    """Reason of a refusal, or ""."""
+    """Reason for the refusal; "" if the command is allowed."""
     frames: tuple[PreviewLine, ...] = ()
     questions: tuple[str, ...] = ()
-    """Questions to the operator before the command runs."""
+    """Confirmations that the operator is asked for before the command runs."""
     requires: tuple[str, ...] = ()
-    """Conditions on signals of the robot, which a preview cannot check."""
+    """Interlock conditions on signals of the robot; a preview cannot check them."""
 
 
 def preview(
@@ -57,9 +57,9 @@ def preview(
 
     Args:
         driver: the loaded driver.
-        settings: value of every setting; the given stand-in of a secret is shown.
+        settings: value of every setting; for a secret, a placeholder that is shown.
         command: its name.
-        arguments: some of its arguments; the others take their defaults.
+        arguments: values for some arguments of the command; the others take their defaults.
     """
     found = driver.commands.get(command)
     if found is None:

@@ -1,7 +1,7 @@
 """Routes of the developer pages: traffic log, parser try-out and command preview of each robot.
 
 Layer 5. These routes exist only with ``--dev``, and only for holders of the start key, because the
-pages show all traffic of a robot. `urc.web.app` has at most one `Dev`.
+pages show all traffic of a robot. `urc.web.app` creates at most one `Dev`.
 """
 
 import asyncio
@@ -27,23 +27,23 @@ __all__ = ["HOW_TO_TURN_ON", "Dev", "DevPage", "dev_url", "no_dev_routes"]
 HOW_TO_TURN_ON = "The dev page is off. Start URC with --dev to turn it on."
 _ONLY_HERE = "The dev page needs the key in the address that URC printed."
 CLIENTS = 16
-"""Most developer pages that may be open at a time."""
+"""Maximum number of open developer pages."""
 
 
 @dataclass(frozen=True, slots=True)
 class DevPage:
-    """``dev.html.j2``; the two sockets bring all other data."""
+    """Context of ``dev.html.j2``; all other data reaches the page over two sockets."""
 
     head: PageHead
     title: str
     url: str
     """Path of the robot's own page."""
     values: str
-    """Path and query of the dashboard's WebSocket: values, links and commands."""
+    """Path and query of the dashboard's WebSocket, which carries values, links and commands."""
     socket: str
     """Path of the developer page's WebSocket."""
     timeline: str
-    """Path of the audit log of motion."""
+    """Path of the robot's audit log of motion."""
 
 
 def dev_url(name: str) -> str:
@@ -52,7 +52,7 @@ def dev_url(name: str) -> str:
 
 
 def no_dev_routes() -> list[BaseRoute]:
-    """Return the routes of a server without ``--dev``: they say how to turn the pages on."""
+    """Return routes that explain how to enable the developer pages with ``--dev``."""
 
     async def tell(_: Request) -> Response:
         raise HTTPException(404, HOW_TO_TURN_ON)
@@ -74,9 +74,9 @@ class Dev:
 
         Args:
             stations: the robots, by the name in their URL.
-            remake: makes the robot of a new version of its profile; by the same name.
-            take: switches to the new robot; may raise `UrcError`.
-            is_here: returns whether a request has the start key.
+            remake: functions that create a robot from a new version of its profile, by name.
+            take: switches to a new version of a robot; may raise `UrcError`.
+            is_here: returns whether the request has the start key.
         """
         self._is_here = is_here
         self._open = 0
@@ -86,13 +86,13 @@ class Dev:
         }
 
     async def run(self) -> None:
-        """Watch the documents until cancelled."""
+        """Watch the documents of all robots until cancelled."""
         async with asyncio.TaskGroup() as group:
             for watch in self._watches.values():
                 group.create_task(watch.run())
 
     def routes(self) -> list[BaseRoute]:
-        """Return the routes of the pages and their sockets."""
+        """Return the routes of the developer pages and their sockets."""
         return [
             Route("/robots/{name}/dev", self._page),
             WebSocketRoute("/robots/{name}/dev/ws", self._socket),

@@ -1,4 +1,4 @@
-"""Rows of the traffic log: the shown part of each frame and each note.
+"""Rows of the traffic log: frames, shortened for display, and notes.
 
 Layer 5, pure.
 """
@@ -22,12 +22,12 @@ __all__ = [
 ]
 
 SHOWN_BYTES = 4096
-"""Most bytes that are shown of one frame; the others are only counted."""
+"""Maximum number of bytes shown of one frame; the rest is only counted."""
 THUMBNAIL_BYTES = 48 * 1024
-"""Largest image that is shown as one, in bytes."""
+"""Maximum size of an image that is shown as an image, in bytes."""
 _SHOWN = ("image/png", "image/jpeg", "image/gif")
 _NAMES = ("topic", "action", "service", "method", "path", "url")
-"""Attributes with the source or target of a message, by priority."""
+"""Attributes that name the source or target of a message, by priority."""
 
 
 class TrafficRow(msgspec.Struct, omit_defaults=True):
@@ -35,25 +35,25 @@ class TrafficRow(msgspec.Struct, omit_defaults=True):
 
     n: int
     time_s: float
-    """Monotonic time; the page gets the age."""
+    """Monotonic time of the row in seconds; the page receives the age."""
     kind: str
     """``sent``, ``received`` or ``note``."""
     line: str
-    """Name of the transport."""
+    """Name of the transport that carried the data."""
     size: int = 0
     data: bytes = b""
     verb: str = ""
     address: str = ""
     more: str = ""
-    """Further attributes of a message."""
+    """Further attributes of the message."""
     text: str = ""
     level: str = ""
     picture: str = ""
-    """Media type if `data` is a whole image, else ""."""
+    """Media type if `data` is a complete image, else ""."""
 
     @property
     def weight(self) -> int:
-        """Memory that the row takes, in bytes, roughly."""
+        """Approximate memory used by the row, in bytes."""
         return 100 + len(self.data) + len(self.text) + len(self.more)
 
 
@@ -68,12 +68,12 @@ def traffic_row(traffic: Traffic) -> TrafficRow:
 
 
 def note_row(note: LogEntry) -> TrafficRow:
-    """Return the row of a fault or a change of state."""
+    """Return the row of a fault or a state change."""
     return TrafficRow(0, note.time_s, "note", note.source, level=note.level, text=cut(note.text))
 
 
 def fill(row: TrafficRow, envelope: Envelope) -> None:
-    """Write a message into a row: verb, address, other attributes and body."""
+    """Fill a row with a message: its verb, address, other attributes and body."""
     named = [name for name in _NAMES if envelope.attributes.get(name) is not None]
     told = [str(envelope.attributes[name]) for name in named]
     row.verb, row.address = envelope.verb, cut(" ".join(told))

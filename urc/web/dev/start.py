@@ -1,8 +1,8 @@
-"""The developer start page: one robot with fixed values, whose documents are read at each start.
+"""The developer start page: one robot with fixed values; each start reloads its documents.
 
 Layer 5. These routes exist only with ``--dev``, and only for holders of the start key. The
-developer page loads a saved document at once. This page reads all documents again, even without a
-noticed change.
+developer page loads a document as soon as the document is saved. The start page reloads all
+documents, even if no change was noticed.
 """
 
 import asyncio
@@ -33,7 +33,7 @@ _NO_STORE = {"cache-control": "no-store"}
 
 @dataclass(frozen=True, slots=True)
 class PinnedRobot:
-    """One robot with its fixed values."""
+    """One robot, and the values that are fixed for it."""
 
     name: str
     title: str
@@ -46,7 +46,7 @@ class PinnedRobot:
 
 @dataclass(frozen=True, slots=True)
 class DevStartPage:
-    """``dev_start.html.j2``: the fixed values, and the start button."""
+    """Context of ``dev_start.html.j2``: the fixed values, and the start button."""
 
     head: PageHead
     nav: Nav
@@ -54,7 +54,7 @@ class DevStartPage:
 
 
 class DevStart:
-    """The page and the action of its button."""
+    """The developer start page, and the action of its start button."""
 
     def __init__(
         self,
@@ -68,9 +68,9 @@ class DevStart:
 
         Args:
             fleet: the robots.
-            remake: makes a robot from a new version of its profile, by name.
+            remake: functions that create a robot from a new version of its profile, by name.
             take: switches to the new robot; may raise `UrcError`.
-            ways: the pages of this server, for links.
+            ways: navigation links of this server.
             is_here: returns whether a request has the start key.
         """
         self._fleet = fleet
@@ -80,14 +80,14 @@ class DevStart:
         self._is_here = is_here
 
     def routes(self) -> list[Route]:
-        """Return the routes of the page and of its action."""
+        """Return the routes of the start page and of its button."""
         return [
             Route("/dev", self.page),
             Route("/api/v1/robots/{name}/dev/start", self.start, methods=["POST"]),
         ]
 
     async def page(self, request: Request) -> Response:
-        """Show the fixed values."""
+        """Show the page with the fixed values."""
         if not self._is_here(request):
             raise HTTPException(
                 403, t("The dev interface needs the key in the address that URC printed.")
@@ -102,7 +102,7 @@ class DevStart:
         return HTMLResponse(render("dev_start.html.j2", page), headers=_NO_STORE)
 
     async def start(self, request: Request) -> Response:
-        """Read all documents again, and return the URL of the robot."""
+        """Reload all documents, and return the URL of the robot."""
         name = request.path_params["name"]
         if not self._is_here(request):
             return told(403, "the dev interface needs the key in the address that URC printed")
@@ -123,7 +123,7 @@ class DevStart:
 
 
 def no_dev_start() -> list[Route]:
-    """Return the route of a server without ``--dev``, which explains how to enable the page."""
+    """Return a route that explains how to enable the page, for a server without ``--dev``."""
 
     async def tell(_: Request) -> Response:
         raise HTTPException(404, t("The dev interface is off. Start URC with --dev to turn it on."))

@@ -1,8 +1,8 @@
-"""The audit log of one robot, as JSON for the developer page: why did it move?
+"""The audit log of one robot as JSON, for the developer page: the causes of its motion.
 
-Layer 5. The timeline contains traffic of the robot, so it needs the start key, like the developer
-page. ``?last=`` is the number of entries, newest first; ``?since=`` is the earliest time (UTC,
-seconds).
+Layer 5. The timeline contains traffic of the robot, so it requires the start key, like the
+developer page. ``?last=`` is the number of entries, newest first; ``?since=`` is the earliest time
+in seconds since 1970 (UTC).
 """
 
 import asyncio
@@ -23,11 +23,11 @@ _SETTLE_S = 0.5
 async def timeline(
     request: Request, log: AuditLog | None, robot: str, *, is_here: bool
 ) -> JSONResponse:
-    """Return the entries about a robot, newest first.
+    """Return the audit log entries of a robot, newest first.
 
     Args:
-        request: its query limits the entries.
-        log: the audit log, or None.
+        request: the request; its query limits the entries.
+        log: the audit log; None if the server has none.
         robot: name of the robot.
         is_here: whether the request has the start key.
     """

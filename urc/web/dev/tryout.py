@@ -1,8 +1,8 @@
-"""Try-out of the parser: the frames in pasted bytes, their consumers, or the reasons for none.
+"""Try-out of the parser: the frames in pasted bytes, and the consumers of each frame.
 
-Layer 5, pure: it builds readers of its own and touches no live robot. The order is that of the
-engine: an unsolicited frame goes to the first message that matches. Matching replies are listed
-too, because the try-out has no pending request.
+A pure module of layer 5: it builds separate readers and never touches a live robot. As in the
+engine, an unsolicited frame goes to the first message that matches. Matching replies are also
+listed, because the try-out has no pending request.
 """
 
 import json
@@ -28,7 +28,7 @@ __all__ = ["MOST_BYTES", "ParseResult", "ParsedPiece", "FrameConsumer", "pasted_
 
 MOST_BYTES = 64 * 1024
 MOST_PIECES = 200
-"""Most frames in the result of one try-out."""
+"""Maximum number of frames in the result of one try-out."""
 MOST_REASONS = 30
 _ESCAPES = {"n": b"\n", "r": b"\r", "t": b"\t", "0": b"\0", "e": b"\x1b", "\\": b"\\"}
 _ESCAPE = re.compile(r"\\(x[0-9A-Fa-f]{2}|.|$)", re.DOTALL)
@@ -40,12 +40,12 @@ class FrameConsumer(NamedTuple):
     kind: str
     """``message``, ``reply`` or ``refusal`` (an error reply)."""
     names: tuple[str, ...]
-    """Names of messages or replies; several replies may match."""
+    """Names of the messages or replies; several replies may match one frame."""
     fields: Mapping[str, object]
     samples: tuple[tuple[str, object, str], ...]
     """Signal, value, alarm."""
     refused: tuple[str, ...]
-    """Invalid values with the reason; of an error reply, its text for people."""
+    """Invalid values with the reasons; for an error reply, the text of its error."""
 
 
 class ParsedPiece(NamedTuple):
@@ -55,12 +55,12 @@ class ParsedPiece(NamedTuple):
     """Offset of the frame's first byte in the input."""
     end: int
     data: bytes
-    """Payload of the frame, without delimiter, length or checksum."""
+    """Payload of the frame, without delimiter, length field and checksum."""
     fault: str
-    """Why the bytes are no frame; "" for a frame."""
+    """Reason why the bytes are not a frame; "" for a frame."""
     takers: tuple[FrameConsumer, ...] = ()
     reasons: tuple[str, ...] = ()
-    """Reason of each candidate that does not match, if none does."""
+    """For a frame that nothing matches: the reason of each candidate."""
 
 
 class ParseResult(NamedTuple):
@@ -69,13 +69,13 @@ class ParseResult(NamedTuple):
     size: int
     pieces: tuple[ParsedPiece, ...]
     left: int
-    """Bytes of an incomplete frame at the end."""
+    """Number of bytes in an incomplete frame at the end."""
     more: int
-    """Frames beyond `MOST_PIECES`, which are not parsed."""
+    """Number of frames beyond `MOST_PIECES`; these frames are not parsed."""
 
 
 class _Candidate(NamedTuple):
-    """A message or reply that a frame is matched against."""
+    """A message or reply that may match a frame."""
 
     kind: str
     name: str
@@ -85,16 +85,17 @@ class _Candidate(NamedTuple):
 
 
 def pasted_bytes(text: str, *, is_hex: bool, encoding: str) -> bytes:
-    r"""Return the bytes that a pasted text stands for.
+    r"""Return the bytes that a pasted text represents.
 
     Args:
         text: the input.
-        is_hex: whether it is pairs of hex digits; blanks, commas, colons and ``0x`` between them
-            are ignored. Else it is text with the escapes ``\n \r \t \0 \e \\`` and ``\xHH``.
-        encoding: encoding of the text.
+        is_hex: whether the text is pairs of hex digits; blanks, commas, colons and ``0x`` between
+            the pairs are ignored. Other text may contain the escapes ``\n \r \t \0 \e \\`` and
+            ``\xHH``.
+        encoding: character encoding of the text, if not hex.
 
     Raises:
-        UrcError: the text is invalid or too long; the message has the position.
+        UrcError: the text is invalid or too long; the message gives the position.
     """
     data = _from_hex(text) if is_hex else _from_text(text, encoding)
     if len(data) > MOST_BYTES:
@@ -115,11 +116,11 @@ def try_out(
         driver: the loaded driver.
         settings: value of every setting.
         transport: name of the transport that receives the data.
-        data: bytes as the robot sends them; on a message transport, the body of one message.
-        topic: topic of that message; "" for a reply to a request.
+        data: bytes from the robot; on a message transport, the body of one message.
+        topic: topic of the message; "" for a reply to a request.
 
     Raises:
-        UrcError: the transport is unknown, or the body must be JSON and is not.
+        UrcError: the transport is unknown, or the body is not valid JSON on a JSON transport.
     """
     spec = driver.transports.get(transport)
     if spec is None:
@@ -145,7 +146,7 @@ def try_out(
 def _cut(
     spec: TransportSpec, data: bytes
 ) -> tuple[list[tuple[int, int, bytes | FrameFault]], int, int]:
-    """Return frames and faults with their places, leftover bytes, and the number of more frames."""
+    """Return frames and faults with positions, and the counts of leftover bytes and frames."""
     decoder = build_framing(spec.framing).decoder()
     decoder.push(data, 0.0)
     cut: list[tuple[int, int, bytes | FrameFault]] = []
@@ -195,7 +196,7 @@ def _take(
 
 
 def _add(takers: list[FrameConsumer], taker: FrameConsumer) -> None:
-    """Add a consumer; merge it into an equal one."""
+    """Add a consumer; merge it with an equal consumer in the list."""
     for place, other in enumerate(takers):
         if other._replace(names=()) == taker._replace(names=()) and taker.kind != "message":
             takers[place] = other._replace(names=(*other.names, *taker.names))
@@ -223,7 +224,7 @@ def _taken(frame: Frame, one: _Candidate) -> FrameConsumer | None:
 def _why_not(
     frame: Frame, one: _Candidate, spec: TransportSpec, settings: Mapping[str, object]
 ) -> str:
-    """Return why a frame does not match, in words."""
+    """Return the reason why a frame does not match, for people."""
     read = one.read
     if read.topic is not None and (topic := topic_of(read, settings)) != frame.topic:
         came = "an answer" if frame.topic is None else repr(frame.topic)
@@ -266,7 +267,7 @@ def _candidates(
 
 
 def _replies(driver: Driver, spec: TransportSpec) -> Iterator[tuple[str, Reply]]:
-    """Yield all expected replies on a transport; each stage and step counts as one reply."""
+    """Yield all expected replies on a transport; each stage and each step is one reply."""
     asked = [(f"reply to {one.name}", one.transport, one.reply) for one in driver.commands.values()]
     asked += [
         (f"reply to poll {one.name}", one.transport, one.reply)
@@ -289,7 +290,7 @@ def _replies(driver: Driver, spec: TransportSpec) -> Iterator[tuple[str, Reply]]
 
 
 def _anew(frame: Frame) -> Frame:
-    """Return a copy of the frame without cached results."""
+    """Return a copy of the frame without its cached results."""
     other = Frame(frame.payload, frame.encoding)
     other.topic = frame.topic
     return other

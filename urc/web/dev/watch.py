@@ -1,7 +1,8 @@
 """Watches the documents of one robot, and switches to the new version when a document is saved.
 
-Layer 5. A broken version changes nothing: the old one keeps running, and its problems are reported.
-A good one waits until the robot is not driven, because the switch disconnects it for a moment.
+Layer 5. A version with errors changes nothing: the previous version keeps running, and the problems
+are reported. A valid version waits until no operator drives the robot, because the switch briefly
+disconnects it.
 """
 
 import asyncio
@@ -22,24 +23,24 @@ from urc.web.fleet.robots import Robot, RobotService
 __all__ = ["CheckedProfile", "ProfileWatch", "Remake", "examine"]
 
 Remake = Callable[[Profile], Robot]
-"""Makes the robot of a new version of its profile; may raise `UrcError`."""
+"""Creates the robot of a new version of its profile; may raise `UrcError`."""
 State = Literal["running", "waiting", "broken"]
 
 log = logging.getLogger(__name__)
 
 
 class CheckedProfile(NamedTuple):
-    """The result of `urc validate` for a file."""
+    """The result of `urc validate` for one file."""
 
     profile: Profile | None
-    """None if the file has errors."""
+    """The loaded profile; None if the file has errors."""
     problems: tuple[Problem, ...]
     files: tuple[str, ...]
-    """Paths of all documents of the profile."""
+    """Paths of all documents that the profile uses."""
 
 
 def examine(file: str) -> CheckedProfile:
-    """Check a document and run its tests."""
+    """Check a document, and run the tests that it contains."""
     checked = check(file, built_in_catalog(), widget_folder_of(file))
     problems = checked.problems
     if checked.profile is not None:
@@ -49,30 +50,30 @@ def examine(file: str) -> CheckedProfile:
 
 @dataclass(slots=True)
 class ProfileWatch:
-    """The watch over the documents of one robot."""
+    """Watches the documents of one robot."""
 
     service: RobotService
     remake: Remake
     take: Callable[[Robot], None]
-    """Switches all users to another version; may raise `UrcError`."""
+    """Switches all users of the robot to another version; may raise `UrcError`."""
     state: State = "running"
     told: str = ""
-    """Last event, for people."""
+    """Description of the last event, for people."""
     problems: tuple[Problem, ...] = ()
     edition: int = 0
-    """Counter of changes to the published state."""
+    """Number of changes to the published state."""
     listeners: set[Callable[[], None]] = field(default_factory=set)
     _next: Profile | None = None
     _robot: Robot | None = None
 
     @property
     def robot(self) -> Robot:
-        """The newest accepted version; the session of the version before may still be closing."""
+        """The newest accepted version; the session of the previous version may still be closing."""
         return self._robot or self.service.robot
 
     @property
     def file(self) -> str:
-        """The path of the robot's document."""
+        """Path of the robot's document."""
         return self.robot.profile.file
 
     async def run(self) -> None:
@@ -98,7 +99,7 @@ class ProfileWatch:
                 self._report("broken", f"the check failed ({type(bug).__name__}: {bug})")
 
     async def _settled(self, watched: FileWatcher) -> None:
-        """Wait until the files are stable: a program may write a file in several steps."""
+        """Wait until the files no longer change: a program may write a file in several steps."""
         before: list[object] = []
         while (now := watched.states()) != before:
             before = now
@@ -124,7 +125,7 @@ class ProfileWatch:
                 self._report("waiting", text)
 
     def _try_switch(self) -> bool:
-        """Switch to the new version if there is one and the robot is at rest."""
+        """Switch to a pending version if the robot is at rest; return whether this was tried."""
         if self._next is None or not self.service.is_at_rest:
             return False
         profile, self._next = self._next, None

@@ -1,6 +1,7 @@
 """Message types of the developer page's WebSocket, without behaviour.
 
-Layer 5. JSON text both ways; bytes travel as base64. Server → page, by ``t``::
+Layer 5. Messages are JSON text in both directions; bytes are encoded as base64. Messages from the
+server to the page, by ``t``::
 
     hello    once, first
     profile  the profile, its state and its problems
@@ -9,7 +10,7 @@ Layer 5. JSON text both ways; bytes travel as base64. Server → page, by ``t``:
     shown    the reply to `PreviewRequest`
     pong, error   as on the dashboard's WebSocket
 
-Page → server: ``ping``, ``try`` and ``show``.
+Messages from the page to the server: ``ping``, ``try`` and ``show``.
 """
 
 import json
@@ -44,7 +45,7 @@ MOST_PROBLEMS = 100
 class ParseRequest(
     msgspec.Struct, tag_field="t", tag="try", forbid_unknown_fields=True, frozen=True
 ):
-    """Requests a try-out of the parser with pasted text."""
+    """A request to parse a pasted text."""
 
     id: int
     transport: str
@@ -59,7 +60,7 @@ _Scalar = bool | int | float | str
 class PreviewRequest(
     msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True
 ):
-    """Requests a preview of a command."""
+    """A request to preview a command."""
 
     id: int
     command: str
@@ -71,7 +72,7 @@ _decoder: msgspec.json.Decoder[Inbound] = msgspec.json.Decoder(Inbound)
 
 
 def decode(text: str | bytes) -> Inbound:
-    """Return the message; raise `BadMessage` with the reason if it is invalid."""
+    """Return the decoded message; raise `BadMessage` with the reason if the text is invalid."""
     return decoded(_decoder, text)
 
 
@@ -87,13 +88,13 @@ class _Rows(Outbound, tag="rows", omit_defaults=False, frozen=True):
     first: int
     now: int
     rows: list[TrafficRow]
-    """Rows with their ages in milliseconds; see `encode_rows`."""
+    """Rows with ages in milliseconds; see `encode_rows`."""
 
 
 class _Found(msgspec.Struct, frozen=True):
     severity: str
     text: str
-    """Headline, source line, caret and hint, as `urc validate` prints them."""
+    """Headline, source line, caret and hint, in the format of `urc validate`."""
 
 
 class _Argument(msgspec.Struct, frozen=True):
@@ -124,7 +125,7 @@ class _Line(msgspec.Struct, frozen=True):
     framing: str
     encoding: str
     messages: bool
-    """Whether it carries messages instead of bytes."""
+    """Whether the transport carries messages instead of bytes."""
 
 
 class _Profile(Outbound, tag="profile", omit_defaults=False, frozen=True):
@@ -183,12 +184,12 @@ class _Shown(Outbound, tag="shown", omit_defaults=False, frozen=True):
 
 
 def encode_hello(robot: str, now_s: float) -> str:
-    """Return the first message."""
+    """Return the first message of a connection."""
     return encoded(_Hello(robot, milliseconds(now_s)))
 
 
 def encode_rows(rows: Iterable[TrafficRow], first: int, now_s: float) -> str:
-    """Return rows of the traffic log; `first` is the number of the first row."""
+    """Return a message with rows of the traffic log; `first` is the number of the first row."""
     aged = [
         msgspec.structs.replace(row, time_s=max(0, milliseconds(now_s - row.time_s)))
         for row in rows
@@ -206,16 +207,17 @@ def encode_profile(
     told: str,
     problems: Iterable[Problem],
 ) -> str:
-    """Return the profile and the problems of its file.
+    """Return a message with the profile and the problems of its file.
 
     Args:
         driver: the running driver.
-        messaging: types of transports that carry messages.
-        edition: counter of changes.
-        state: ``running``; ``waiting``: a good new version waits; ``broken``: it has errors.
-        file: path of the document.
-        told: last event, for people.
-        problems: all problems of the file.
+        messaging: types of the transports that carry messages.
+        edition: number of changes so far.
+        state: ``running``; ``waiting``, while a valid new version is pending; or ``broken``, for a
+            file with errors.
+        file: path of the robot's document.
+        told: description of the last event, for people.
+        problems: all problems of the document.
     """
     kinds = frozenset(messaging)
     lines = [
@@ -228,7 +230,7 @@ def encode_profile(
 
 
 def encode_tried(number: int, finding: ParseResult | None, error: str = "") -> str:
-    """Return the result of a try-out."""
+    """Return a message with the result of a try-out."""
     if finding is None:
         return encoded(_Tried(number, cut(error)))
     pieces = tuple(_piece(one) for one in finding.pieces)
@@ -236,7 +238,7 @@ def encode_tried(number: int, finding: ParseResult | None, error: str = "") -> s
 
 
 def encode_shown(number: int, shown: Preview) -> str:
-    """Return the preview of a command."""
+    """Return a message with the preview of a command."""
     frames = [_frame(one) for one in shown.frames]
     return encoded(_Shown(number, cut(shown.refusal), frames, shown.questions, shown.requires))
 

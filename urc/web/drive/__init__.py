@@ -1,1 +1,1 @@
-"""Control of a robot from pages: leases, held commands, commands, STOP and confirmations."""
+"""Control of a robot by pages: leases, held commands, other commands, STOP and confirmations."""

@@ -1,8 +1,8 @@
 """The controls of one robot: one motion controller, and one operator session for each page.
 
-Layer 5. No call blocks: a page gets the newest lease, the newest heartbeat and one notice for each
-control when its socket is free. Ticks faster than any robot's rate are thinned: the newest wins,
-and the last one always arrives.
+Layer 5. No call blocks. When the socket of a page is free, the page gets the newest lease, the
+newest heartbeat and one notice for each control. Ticks above the rate limit are thinned: the newest
+tick replaces older ones, and the last tick always takes effect.
 """
 
 import asyncio
@@ -29,19 +29,21 @@ from urc.web.wire import drive as wire
 __all__ = ["BEAT_S", "ControlService", "Drivable", "OperatorSession"]
 
 BEAT_S = 0.05
-"""Interval of the heartbeat numbers to the page that drives, in seconds; its ticks echo them."""
+"""Interval of the heartbeat numbers to the page that drives, in seconds; the ticks of that page
+echo the numbers."""
 THINNED_S = 0.01
-"""Shortest mean time between two applied ticks of one control, in seconds."""
+"""Minimum mean interval between two applied ticks of one control, in seconds."""
 PATIENCE_S = 0.25
-"""A late tick is not reported while the control has moved within this time, in seconds."""
+"""A late tick is not reported if the control has moved within this time, in seconds."""
 
 
 Offered = Literal["in time", "one more", "no tick"]
-"""A tick within the rate of any robot, a faster one, or another message."""
+"""The kind of a message: a tick within the rate limit, a tick above the limit, or another
+message."""
 
 
 class ControlService:
-    """The motion controller of one robot and its pages."""
+    """The motion controller of one robot, and the sessions of its pages."""
 
     def __init__(
         self,
@@ -50,10 +52,10 @@ class ControlService:
         file: LatchStore | None = None,
         recorder: AuditRecorder | None = None,
     ) -> None:
-        """Restore the latch from its file.
+        """Restore the latch from `file`.
 
-        The held commands of `driver` are the controls. `file` keeps the latch over a restart, and
-        `recorder` receives the events of the audit log; both may be None.
+        The controls are the held commands of `driver`. `file` preserves the latch over a restart,
+        and `recorder` receives the events of the audit log; both may be None.
         """
         self.recorder = recorder or AuditRecorder("", _unread, utc=lambda: 0.0)
         self.controller = self._controller(
@@ -76,19 +78,19 @@ class ControlService:
 
     @property
     def operators(self) -> tuple[OperatorSession, ...]:
-        """The pages that watch the robot."""
+        """The sessions of all pages that watch the robot."""
         return tuple(self._operators.values())
 
     @property
     def commands(self) -> tuple[str, ...]:
-        """Names of the held commands."""
+        """Names of all held commands."""
         return tuple(name for name, one in self._driver.commands.items() if one.hold is not None)
 
     def renew(self, driver: Driver, file: LatchStore | None) -> None:
         """Switch to another version of the driver, between two sessions.
 
-        A latched STOP stays latched, and an unacknowledged one is still sent. All leases end, and
-        nothing stays armed.
+        A latched STOP stays latched, and a STOP without acknowledgement is still sent. All leases
+        end, and all controls are disarmed.
         """
         kept = Latch(self.controller.lease.state, not self.controller.is_confirmed)
         for operator in self._operators.values():
@@ -113,7 +115,7 @@ class ControlService:
     # -- sessions
 
     async def serve(self, session: Drivable) -> None:
-        """Let a session be driven until this task is cancelled."""
+        """Let pages drive the robot over a session until this task is cancelled."""
         if not self.controller.can_move:
             return
         self._hub = session.hub
@@ -142,12 +144,12 @@ class ControlService:
     # -- pages
 
     def add_page(self, place: str, role: Role, wake: Callable[[], None]) -> OperatorSession:
-        """Add a page; raise `UrcError` when there are too many.
+        """Add a page; raise `UrcError` when the robot has too many pages.
 
         Args:
-            place: its address, shown to others; "" for this machine.
+            place: address of the page, shown to other operators; "" for this machine.
             role: its rights.
-            wake: callback for new messages to the page.
+            wake: callback that is called when new messages for the page exist.
         """
         self._peers += 1
         name = f"screen {self._peers}{f' at {place}' if place else ''}"
@@ -157,7 +159,7 @@ class ControlService:
         return operator
 
     def remove_page(self, operator: OperatorSession) -> None:
-        """Remove a page; its held controls stop."""
+        """Remove a page, and stop its held controls."""
         for command in list(operator.alarms):
             operator.forget(command)
         self._operators.pop(operator.client.id, None)
@@ -166,7 +168,7 @@ class ControlService:
         self.controller.part(operator.client.id)
 
     def operator_of(self, key: str) -> OperatorSession | None:
-        """Return the page with this key, or None."""
+        """Return the session of the page with this key, or None."""
         said = key.encode()
         return next(
             (one for one in self._operators.values() if compare_digest(one.key.encode(), said)),
@@ -174,7 +176,7 @@ class ControlService:
         )
 
     def changes(self, operator: OperatorSession) -> list[str]:
-        """Return the messages that bring a page up to date."""
+        """Return all messages that the page has not received."""
         texts: list[str] = []
         is_told = (
             self.controller.can_move or operator.client.role == "viewer"
@@ -194,10 +196,10 @@ class ControlService:
     # -- messages from pages
 
     def offer(self, operator: OperatorSession, data: bytes) -> Offered:
-        """Take a tick as raw bytes; return its kind.
+        """Accept a tick as raw bytes; return its kind.
 
-        A tick that arrives while another is pending replaces it without being decoded. Many of
-        them pause the socket, so a flood costs nothing.
+        A new tick replaces a pending tick without being decoded. Many such ticks pause the socket,
+        so a flood of ticks costs little time.
         """
         if operator.alarms and operator.doubled is None:
             command = wire.command_of(data)
@@ -226,7 +228,7 @@ class ControlService:
         return "one more"
 
     def handle(self, operator: OperatorSession, said: wire.Driving) -> None:
-        """Handle a message from a page."""
+        """Handle a message from the page."""
         match said:
             case wire.Tick():
                 self._thin(operator, said)
@@ -287,7 +289,7 @@ class ControlService:
             self._wait(operator, tick.command, tick)
 
     def _wait(self, operator: OperatorSession, command: str, tick: wire.Tick | bytes) -> None:
-        """Keep a tick until its turn; the newest wins."""
+        """Store a tick until the rate limit allows it; a newer tick replaces it."""
         operator.dropped += command in operator.pending
         operator.pending[command] = tick
 
@@ -338,7 +340,7 @@ class ControlService:
             operator.notice(command, wire.encode_stopped(command, reason))
 
     def _refused(self, command: str, why: str) -> None:
-        """Tell every page why the robot refused to move."""
+        """Tell every page why the robot refused the motion."""
         self.recorder.stopped(command, why, self._clock.now())
         for operator in self._operators.values():
             operator.forget(command)
@@ -350,7 +352,7 @@ class ControlService:
             file.on_fault = self._latch_fault
 
     def _latch_fault(self, fault: str) -> None:
-        """Report that STOP would not survive a restart, or that it would again."""
+        """Report that STOP would no longer survive a restart, or that it would survive again."""
         if fault:
             text = f"STOP works, but would not survive a restart of the server: {fault}"
             self._log("error", text)
@@ -387,7 +389,7 @@ class ControlService:
             self._heartbeat()
 
     def _heartbeat(self) -> None:
-        """Send a heartbeat to the page that drives, and schedule the next one."""
+        """Send a heartbeat number to the page that drives, and schedule the next heartbeat."""
         self._beating = None
         holder = self.controller.lease.state.holder
         operator = self._operators.get(holder.id) if holder is not None else None
@@ -413,4 +415,4 @@ class ControlService:
 
 
 def _unread(entry: AuditEntry) -> None:
-    """Ignore an entry of the audit log."""
+    """Ignore the entry: this robot has no audit log."""

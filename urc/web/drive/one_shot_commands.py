@@ -1,9 +1,9 @@
-"""Commands without a held control: the check of permission, and the effect of STOP.
+"""Commands without a held control: their permission check, and the effect of STOP.
 
-Layer 5. Only held commands need the lease. A command without a lease needs the role of an operator;
-a watcher cannot give commands. A command that starts autonomous motion (``moves``) also fails while
-a STOP is latched or another operator drives. The engine checks the latch a second time, because a
-command may have waited in a queue or for a confirmation.
+Layer 5. Only held commands require the lease. All other commands require the role of an operator: a
+watcher cannot send commands. A command that starts autonomous motion (``moves``) also fails while
+STOP is latched or another operator drives. The engine checks the latch again, because a command may
+have waited in a queue or for a confirmation.
 """
 
 import asyncio
@@ -24,22 +24,22 @@ from urc.web.drive.operator_session import Drivable
 __all__ = ["HELD", "CommandRefused", "OneShotCommands", "can_move", "needs_holding"]
 
 AGAIN_S = 1.0
-"""Delay before the next try while a STOP has not reached the robot, in seconds."""
+"""Delay before the next attempt while a STOP has not reached the robot, in seconds."""
 _STOP = Operator("", "STOP")
 HELD = "this command moves the robot only while a control is held; it cannot be sent once"
 
 
 class CommandRefused(CommandFailed):
-    """The refusal of a command before anything was sent to the robot."""
+    """The refusal of a command before anything is sent to the robot."""
 
 
 def can_move(driver: Driver) -> bool:
-    """Return whether the robot can move, and so needs STOP and its latch."""
+    """Return whether the robot can move, and therefore needs STOP and its latch."""
     return any(one.hold is not None or one.moves or one.stops for one in driver.commands.values())
 
 
 def needs_holding(driver: Driver, command: str) -> bool:
-    """Return whether a command is continuous motion, which must not run without a held control."""
+    """Return whether a command causes continuous motion, which requires a held control."""
     known = driver.commands.get(command)
     return known is not None and known.hold is not None
 
@@ -64,7 +64,7 @@ class OneShotCommands:
         clock: Clock,
         recorder: AuditRecorder,
     ) -> None:
-        """Prepare; `controller` returns the current motion controller."""
+        """Prepare the commands; `controller` returns the current motion controller."""
         self.driver = driver
         self._controller = controller
         self._clock = clock
@@ -77,7 +77,7 @@ class OneShotCommands:
     def admit(
         self, client: Operator, command: str, arguments: Mapping[str, object], stops: int | None
     ) -> None:
-        """Raise `CommandRefused` if this page may not run the command or sequence."""
+        """Raise `CommandRefused` if the page may not run this command or sequence."""
         is_held = needs_holding(self.driver, command)
         reason = HELD if is_held else self.refusal(client, command, arguments, stops)
         if reason:
@@ -90,9 +90,10 @@ class OneShotCommands:
         arguments: Mapping[str, object] = NOTHING,
         stops: int | None = None,
     ) -> str:
-        """Return why this page may not run a command or sequence now, or "".
+        """Return the reason why the page may not run a command or sequence now; "" if it may.
 
-        `stops` is the page's count of STOPs at the operator's click; None means now.
+        `stops` is the number of STOPs that the page knew at the operator's click; None means the
+        current number.
         """
         known = self.driver.commands.get(command)
         if known is not None and _moves(known, arguments):
@@ -100,7 +101,7 @@ class OneShotCommands:
         return WATCHES if client.role == "viewer" else ""
 
     def pull_refusal(self, client: Operator, sequence: str, what: Pull) -> str:
-        """Return why this page may not steer a sequence; any operator may pause or end one."""
+        """Return why the page may not steer a sequence; any operator may pause or end one."""
         if what in ("pause", "abort"):
             return WATCHES if client.role == "viewer" else ""
         return self.refusal(client, sequence)
@@ -108,7 +109,7 @@ class OneShotCommands:
     # -- session
 
     async def serve(self, session: Drivable) -> None:
-        """Let STOP reach a session, at once if it is latched or not yet acknowledged."""
+        """Deliver STOP to a session, immediately if STOP is latched or not yet acknowledged."""
         self._session = session
         self._pressed.clear()
         if self._controller().lease.latched or self._controller().owed:
@@ -126,19 +127,19 @@ class OneShotCommands:
             self._session = None
 
     def stopped(self) -> None:
-        """Start a stop: STOP was pressed."""
+        """Start a stop after a press of STOP."""
         self.on_stopped()
         if self._session is not None:
             self._session.latch(self._controller().lease.latched)
             self._pressed.set()
 
     def reset(self) -> None:
-        """End the stop after a reset."""
+        """End the stop after its reset."""
         if self._session is not None:
             self._session.latch("")
 
     async def _give_stops(self, session: Drivable) -> None:
-        """Repeat the stop commands until the robot has acknowledged each."""
+        """Repeat the stop commands until the robot has acknowledged each command."""
         while owed := self._controller().owed:
             async with asyncio.TaskGroup() as group:
                 for command in owed:

@@ -1,4 +1,4 @@
-"""The state of one page that may drive a robot: pending ticks, pending notices and its lease.
+"""The state of one page that may drive a robot: its pending ticks, pending notices and lease.
 
 Layer 5.
 """
@@ -21,25 +21,26 @@ from urc.web.wire import drive as wire
 __all__ = ["FLOOD", "Drivable", "OperatorSession", "RedundantLine"]
 
 FLOOD = 4
-"""Ticks that may arrive while one is pending; further ones stay in the socket's buffer."""
+"""Maximum number of ticks accepted while one tick is pending; further ticks stay in the socket's
+buffer."""
 
 
 class RedundantLine(Protocol):
-    """A redundant socket of a page, see `urc.web.drive.redundant_socket`."""
+    """The redundant socket of a page; see `urc.web.drive.redundant_socket`."""
 
     def heartbeat(self, number: int) -> None:
-        """Send a heartbeat number."""
+        """Send a heartbeat number to the page."""
 
     def end(self) -> None:
-        """Stop reading from the socket."""
+        """Close the socket."""
 
 
 class Drivable(MotionSession, Protocol):
-    """The part of a session that the controls need."""
+    """The interface of a session that the controls use."""
 
     @property
     def hub(self) -> Hub:
-        """The hub, for values that all pages see."""
+        """The hub with the values that all pages see."""
 
     async def command(
         self,
@@ -48,10 +49,10 @@ class Drivable(MotionSession, Protocol):
         *,
         on_sent: Callable[[Payload], None] | None = None,
     ) -> Replied:
-        """Run one command and return its reply; raise `CommandFailed` without one."""
+        """Run a command and return its reply; raise `CommandFailed` if the command fails."""
 
     def latch(self, reason: str) -> None:
-        """Latch, end sequences and block autonomous motion; "" as reason resets the latch."""
+        """Latch STOP, end sequences and block autonomous motion; a `reason` of "" resets."""
 
 
 class OperatorSession:
@@ -62,43 +63,43 @@ class OperatorSession:
         self.wake = wake
         self.heartbeat: int | None = None
         self.notices: dict[str, str] = {}
-        """Control or verb → newest notice about it."""
+        """Maps a control or verb to the newest notice about it."""
         self.seen = -1
-        """Number of the newest lease that was sent to the page."""
+        """Number of the newest lease sent to the page."""
         self.pending: dict[str, wire.Tick | bytes] = {}
-        """Control → newest pending tick, decoded or still as bytes."""
+        """Maps a control to its newest pending tick, decoded or as raw bytes."""
         self.paces: dict[str, RateLimiter] = {}
         self.alarms: dict[str, Timer] = {}
         self.moved_s: dict[str, float] = {}
-        """Control → time of its last applied tick."""
+        """Maps a control to the time of its last applied tick."""
         self.moved_at_s = float("-inf")
         """Time of the last applied tick of any control."""
         self.key = secrets.token_urlsafe(16)
-        """Secret by which a redundant socket joins this page."""
+        """Secret key with which a redundant socket joins this page."""
         self.spare: RedundantLine | None = None
         self.doubled: DuplicateElimination | None = None
-        """Duplicate filter, once the page has a redundant socket."""
+        """Filter of duplicate messages, used once the page has a redundant socket."""
         self.hold_back: Callable[[bool], None] = _nothing
-        """Pauses (True) or resumes (False) reading from the page's socket."""
+        """Callback that pauses (True) or resumes (False) reading from the page's socket."""
         self.crowd = 0
-        """Ticks since one became pending; more than a few pause the socket."""
+        """Number of ticks since one became pending; too many pause the socket."""
         self.dropped = 0
-        """Pending ticks that a newer one replaced."""
+        """Number of pending ticks that a newer tick replaced."""
 
     def notice(self, key: str, text: str) -> None:
-        """Queue a notice; it replaces an unsent one with the same key."""
+        """Queue a notice, in place of an unsent notice with the same key."""
         self.notices[key] = text
         self.wake()
 
     def lease(self, state: LeaseState, now: float, *, is_confirmed: bool) -> str:
-        """Return the lease message for this page."""
+        """Return the lease message for the page."""
         left_s = max(0.0, state.asked_until - now) if state.asked_by is not None else 0.0
         return wire.encode_lease(
             state, self.client, left_s=left_s, is_confirmed=is_confirmed, spare=self.key
         )
 
     def is_first(self, about: str, number: int) -> bool:
-        """Return whether a message is the first with its number; the other is a duplicate."""
+        """Return whether a message is the first copy with its number, not a duplicate."""
         return self.doubled is None or not number or self.doubled.accept(about, number)
 
     def forget(self, command: str) -> None:

@@ -1,12 +1,13 @@
-"""The redundant socket of a page, for links that lose packets.
+"""The redundant socket of a page, for links with packet loss.
 
-Layer 5. A lost packet delays all later data of its TCP connection by a round trip or more. The
-delay doubles when the repeat is lost too, and is then longer than a lease. Two connections rarely
-lose packets at the same time. On such a link a page sends everything about held controls on both,
-and gets heartbeats on both. The first copy counts: each message carries the page's number.
+Layer 5. A lost packet delays all later data of its TCP connection by at least one round trip. If
+the retransmission is lost too, the delay doubles and exceeds the duration of a lease. Packet losses
+rarely hit two connections at the same time. On a link with packet loss, a page sends each message
+about held controls over both sockets, and receives heartbeats over both. Each message has a number,
+and only the first copy of a message takes effect.
 
-A redundant socket has no rights of its own. The socket joins the page by a key that only that page
-has, and closes with it.
+A redundant socket has no rights without its page. The socket joins the page with a key that only
+this page has, and closes with the page.
 """
 
 import msgspec
@@ -24,7 +25,7 @@ __all__ = ["CLOSE_NO_SEAT", "CLOSE_NOT_TAKEN", "KEY_WITHIN_S", "RedundantSocket"
 CLOSE_NO_SEAT = 4404
 CLOSE_NOT_TAKEN = 4400
 KEY_WITHIN_S = 5.0
-"""Longest wait for the join message of a socket, in seconds."""
+"""Maximum wait for the join message of a socket, in seconds."""
 MESSAGES_PER_S = 2000
 
 _hello = msgspec.json.Decoder(wire.JoinRedundant)
@@ -38,7 +39,7 @@ class RedundantSocket:
     def __init__(
         self, line: ClientSocket, controls: ControlService, clock: Clock, flow: FlowControl
     ) -> None:
-        """Prepare; `line` is accepted, and `flow` is its flow control."""
+        """Prepare the accepted socket `line`; `flow` is its flow control."""
         self._line = line
         self._controls = controls
         self._clock = clock
@@ -47,7 +48,7 @@ class RedundantSocket:
         self._allowance = TokenBucket(MESSAGES_PER_S, clock.now())
 
     async def serve(self) -> None:
-        """Serve this socket until either side closes."""
+        """Serve the socket until either side closes."""
         try:
             operator = await self._operator()
             if operator is None:
@@ -65,12 +66,12 @@ class RedundantSocket:
             pass
 
     def heartbeat(self, number: int) -> None:
-        """Send a heartbeat number, unless an older one is still in the buffer."""
+        """Send a heartbeat number, unless an older number is still in the buffer."""
         if self._flow.is_free():
             self._flow.write(as_frame(wire.encode_beat(number).encode(), is_text=True))
 
     def end(self) -> None:
-        """Stop: the page has closed, or has a newer redundant socket."""
+        """Close the socket, because its page has closed or opened a newer redundant socket."""
         self._is_over = True
         self._flow.abort()
 

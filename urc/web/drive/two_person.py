@@ -1,11 +1,11 @@
-"""The two-person rule: a second page must approve the command, or it fails.
+"""The two-person rule: a command fails unless a second page approves it.
 
-Layer 5. Users do not sign in, so each page that may drive counts as a person. The asking page can
-never be the second one. The number of questions and their waiting time are bounded.
+Layer 5. Users do not sign in, so each page that may drive counts as one person. A page cannot
+approve its own command. The number of pending questions and the wait for an answer are limited.
 
-A token of the server stands for a confirmation. A token counts once, for a few seconds, on that
-page, and only for the same command with the same arguments. A recorded, changed or delayed
-confirmation is therefore void.
+A token from the server represents a confirmation. A token is valid once, for a few seconds, on one
+page, for one command with unchanged arguments. Therefore a replayed, changed or delayed
+confirmation is invalid.
 """
 
 import asyncio
@@ -29,11 +29,11 @@ from urc.web.wire import ask as wire
 __all__ = ["TOKEN_S", "WAIT_S", "TwoPersonRule"]
 
 WAIT_S: Final = 30.0
-"""Longest wait for the second person, in seconds."""
+"""Maximum wait for the approval of the second person, in seconds."""
 TOKEN_S: Final = 5.0
-"""Lifetime of a token, in seconds."""
+"""Time for which a token is valid, in seconds."""
 _MOST: Final = 8
-"""Most pending questions, and most tokens of one page."""
+"""Maximum number of pending questions, and of tokens for one page."""
 
 
 @dataclass(slots=True)
@@ -56,10 +56,10 @@ class _Yes(NamedTuple):
 
 
 class TwoPersonRule:
-    """The questions of one robot."""
+    """The pending questions of one robot."""
 
     def __init__(self, operators: Callable[[], tuple[OperatorSession, ...]], clock: Clock) -> None:
-        """Begin without questions; `operators` returns the pages that watch the robot."""
+        """Prepare without questions; `operators` returns the pages that watch the robot."""
         self._operators = operators
         self._clock = clock
         self._numbers = count(1)
@@ -67,7 +67,7 @@ class TwoPersonRule:
         self._tokens: dict[str, _Yes] = {}
 
     def prepare(self, asker: OperatorSession, said: wire.ApprovalRequest) -> str:
-        """Return a token for a confirmation on this page."""
+        """Return a new token for a confirmation on this page."""
         now = self._clock.now()
         self._tokens = {key: yes for key, yes in self._tokens.items() if yes.until_s > now}
         mine = [key for key, yes in self._tokens.items() if yes.asker is asker]
@@ -86,14 +86,14 @@ class TwoPersonRule:
         arguments: Mapping[str, Reading],
         token: str,
     ) -> tuple[str, ...]:
-        """Return the names of the people who confirmed a command; () if it needs no confirmation.
+        """Return the names of the people who confirmed a command; () if none is required.
 
         Args:
-            asker: the page that runs it.
-            run: number of the command on that page.
+            asker: the page that runs the command.
+            run: number of the command on the page.
             known: the command.
             arguments: its arguments.
-            token: from `prepare`; valid once.
+            token: the token from `prepare`, valid once; "" without a confirmation.
 
         Raises:
             CommandFailed: a confirmation is missing.
@@ -115,7 +115,7 @@ class TwoPersonRule:
         return (asker.client.name, await self.second(asker, run, known.title or known.name, two))
 
     async def second(self, asker: OperatorSession, run: int, command: str, confirm: Confirm) -> str:
-        """Ask all other pages that may drive; return the name of the second person.
+        """Ask all other pages that may drive for approval; return the name of the second person.
 
         `run` is the number of the command on the asking page.
 
@@ -145,19 +145,19 @@ class TwoPersonRule:
         return second.client.name
 
     def stop(self) -> None:
-        """End every question and revoke every token: STOP was pressed."""
+        """End every question and revoke every token, after a press of STOP."""
         self._tokens.clear()
         for one in self._questions.values():
             if not one.answer.done():
                 one.answer.set_exception(CommandFailed("not-confirmed", STOPPED))
 
     def welcome(self, operator: OperatorSession) -> None:
-        """Send the pending questions to a new page."""
+        """Send all pending questions to a new page."""
         for one in self._questions.values():
             self._send(operator, one)
 
     def handle(self, operator: OperatorSession, said: wire.Approval) -> None:
-        """Take the answer of a page; ignore it when the question is over."""
+        """Handle the answer of a page; ignore an answer to a question that is over."""
         one = self._questions.get(said.n)
         if one is None or one.answer.done() or operator.client.role == "viewer":
             return

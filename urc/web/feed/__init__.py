@@ -1,1 +1,1 @@
-"""Values and images of one robot, on their way to all its pages."""
+"""Distribution of one robot's values and images to all its pages."""

@@ -15,7 +15,7 @@ __all__ = ["TokenBucket", "FlowControl", "SocketPeer", "ClientSocket", "SocketFl
 
 
 class ClientSocket(Protocol):
-    """The part of an accepted WebSocket that a client needs."""
+    """The interface of an accepted WebSocket, as far as clients need it."""
 
     async def receive(self) -> Message:
         """Return the next ASGI message."""
@@ -31,30 +31,30 @@ class FlowControl(Protocol):
     """Flow control of a client's socket."""
 
     def is_free(self) -> bool:
-        """Whether the kernel has taken everything written so far."""
+        """Whether the kernel has accepted all written data."""
 
     async def drained(self) -> None:
-        """Return when the kernel has taken everything written so far."""
+        """Wait until the kernel has accepted all written data."""
 
     def write(self, frame: bytes) -> None:
         """Write whole WebSocket frames."""
 
     def listen(self, sink: Callable[[bytes], bool]) -> None:
-        """Hand each whole text to `sink` before `ClientSocket.receive` gets it.
+        """Pass each whole text message to `sink` before `ClientSocket.receive` gets the message.
 
-        The direct call saves two task switches. A text for which `sink` returns False goes to
-        `receive`.
+        The direct call saves two task switches per message. If `sink` returns False, the message
+        goes to `receive`.
         """
 
     def hold_back(self, is_held: bool) -> None:
         """Pause or resume reading; unread data stays in the kernel's buffer."""
 
     def abort(self) -> None:
-        """Close the connection at once, without a handshake."""
+        """Close the connection immediately, without a handshake."""
 
 
 class SocketFlow:
-    """Lets a client write whole frames, wait until the buffer is empty, or abort."""
+    """Flow control of a socket: writes whole frames, waits for an empty buffer, or aborts."""
 
     def __init__(self) -> None:
         self.sink: Callable[[bytes], bool] | None = None
@@ -67,12 +67,12 @@ class SocketFlow:
     # Called by the protocol
 
     def connected(self, transport: asyncio.Transport) -> None:
-        """Take the transport, and make it report the first byte that the kernel does not take."""
+        """Store the transport, and make it report as soon as the kernel accepts no more bytes."""
         self._transport = transport
         transport.set_write_buffer_limits(high=0)
 
     def lost(self) -> None:
-        """Wake a waiting writer, so that it notices the end of the connection."""
+        """Wake a waiting writer, so that the writer notices the closed connection."""
         self.resume()
 
     def pause(self) -> None:
@@ -88,7 +88,7 @@ class SocketFlow:
     # Called by the client
 
     def is_free(self) -> bool:
-        """Return whether the kernel has taken everything written so far."""
+        """Return whether the kernel has accepted all written data."""
         return self._is_free
 
     def is_closing(self) -> bool:
@@ -96,7 +96,7 @@ class SocketFlow:
         return self._transport is None or self._transport.is_closing()
 
     async def drained(self) -> None:
-        """Return when the kernel has taken everything written so far."""
+        """Wait until the kernel has accepted all written data."""
         await self._writable.wait()
 
     def write(self, frame: bytes) -> None:
@@ -105,16 +105,16 @@ class SocketFlow:
             transport.write(frame)
 
     def listen(self, sink: Callable[[bytes], bool]) -> None:
-        """Hand each whole text to `sink`."""
+        """Pass each whole text message to `sink`."""
         self.sink = sink
 
     def hold_back(self, is_held: bool) -> None:
-        """Pause or resume reading."""
+        """Pause or resume reading from the socket."""
         if self._transport and not self.is_closing():
             (self._transport.pause_reading if is_held else self._transport.resume_reading)()
 
     def abort(self) -> None:
-        """Close the connection at once, without a handshake."""
+        """Close the connection immediately, without a handshake."""
         if self._transport:
             self._transport.abort()
 
@@ -128,7 +128,7 @@ class TokenBucket:
         self._time_s = now_s
 
     def allow(self, now_s: float) -> bool:
-        """Count one message; return False above the limit."""
+        """Count one message; return False if the message exceeds the limit."""
         earned = (now_s - self._time_s) * self._rate_hz
         self._left = min(self._rate_hz, self._left + earned)
         self._time_s = now_s
@@ -139,12 +139,12 @@ class TokenBucket:
 
 
 class SocketPeer(NamedTuple):
-    """The person or program at the other end."""
+    """The person or program at the remote end of a socket."""
 
     place: str = ""
-    """Address, shown to other pages; "" for this machine."""
+    """Network address, shown to other pages; "" for this machine."""
     role: Role = "driver"
     who: str = ""
-    """Identity for the count of sockets: a browser, program or address; "" is not counted."""
+    """Identity for the limit on sockets: a browser, program or address; "" for no limit."""
     is_known: bool = False
-    """Whether it has a key; else `who` is an address."""
+    """Whether the visitor has a key; if not, `who` is an address."""

@@ -1,8 +1,9 @@
-"""Sends the readings of one robot to every page that shows it, at most once a display frame.
+"""Sends the readings of one robot to every page that shows it, at most once per display frame.
 
-Layer 5. No client has a queue. A flush wakes every client. Each client takes everything newer than
-its last frame as soon as its own line is free. A frame is encoded once for all clients at the same
-place. A slow client gets the newest values in one frame, and delays no other client.
+Layer 5. Clients have no queue of their own. A flush wakes every client. As soon as its socket is
+free, each client receives all values newer than its last frame. A frame is encoded once for all
+clients with the same position. A slow client receives the newest values in one frame, and delays no
+other client.
 """
 
 import asyncio
@@ -23,46 +24,47 @@ __all__ = ["FRAMES_PER_SECOND", "Fanout", "FanoutPosition", "Pacer", "Place"]
 FRAMES_PER_SECOND = 60.0
 LOG_LINES_FOR_NEWCOMERS = 50
 SHARED_FOR_S = 0.005
-"""Reuse of an encoded frame, in seconds; its ages count from its encoding."""
+"""Time for which an encoded frame is reused, in seconds; the ages in a frame are those at its
+encoding."""
 
 
 class FanoutPosition(NamedTuple):
-    """A client's position in the robot's state."""
+    """The position of a client in the state of the robot."""
 
     revision: int = 0
-    """Hub revision of its newest values."""
+    """Hub revision of the newest values that the client has."""
     links: int = 0
-    """Number of its link state."""
+    """Number of the newest link states that the client has."""
     progress: int = 0
-    """Number of its state of the sequences."""
+    """Number of the newest sequence states that the client has."""
     notes: int = 0
-    """Log lines that it has received or missed."""
+    """Number of log lines that the client has received or missed."""
     joined: int = 0
-    """Hub revision at which it joined; 0 after its first values."""
+    """Hub revision when the client joined; 0 after its first values."""
 
 
 @dataclass(slots=True)
 class Place:
-    """One client's position in values and images."""
+    """The position of one client in values and images."""
 
     known: FanoutPosition = field(default_factory=FanoutPosition)
     subscription: ImageSubscription = field(default_factory=ImageSubscription)
 
 
 class _Update(NamedTuple):
-    """The news for every client with the same `FanoutPosition`."""
+    """The update for all clients with the same `FanoutPosition`."""
 
     after: FanoutPosition
     frames: bytes
-    """WebSocket frames, one after the other."""
+    """Consecutive WebSocket frames."""
     time_s: float
 
 
 class Pacer:
-    """A rate limiter that passes the first event of a burst at once, then a steady rate.
+    """A rate limiter that passes the first event of a burst immediately, then a steady rate.
 
-    The limiter tolerates one period of jitter, so a source at exactly this rate is never delayed.
-    No second has more than one event above the rate.
+    The limiter tolerates a jitter of one period, so a source at exactly this rate is never delayed.
+    Within any second, at most one event more than the rate passes.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -77,7 +79,7 @@ class Pacer:
 
 
 class Fanout:
-    """The shared flush of one open session."""
+    """The flush that all clients of one open session share."""
 
     def __init__(
         self,
@@ -87,7 +89,7 @@ class Fanout:
         clock: Clock | None = None,
         each: Iterable[str] = (),
     ) -> None:
-        """Start without clients; `each` names the signals whose every reading is sent."""
+        """Start without clients; `each` names the signals for which every reading is sent."""
         hub.streams.watch(each)
         self.hub = hub
         self._wakes: set[Callable[[], None]] = set()
@@ -95,20 +97,20 @@ class Fanout:
         self._clock: Clock = clock or LoopClock()
         self._pacer = Pacer(rate_hz)
         self._head = 0
-        """Hub revision of the last flush: newer values wait for the next one."""
+        """Hub revision of the last flush; newer values wait for the next flush."""
         self._updates: dict[FanoutPosition, _Update] = {}
         self._encoded_at = -1
-        """Hub revision of `_updates`."""
+        """Hub revision for which `_updates` were encoded."""
         self._due: Timer | None = None
         """The next flush."""
         self._loop: asyncio.AbstractEventLoop | None = None
-        """The event loop while this runs."""
+        """The event loop while `run` is active."""
         self._broken: asyncio.Future[None] | None = None
         self._pictures = {name for name, signal in hub.signals.items() if is_picture(signal)}
         self.cache = ImageCache(hub, self._clock)
 
     async def run(self) -> None:
-        """Flush until cancelled, or raise the exception of a flush."""
+        """Flush until cancelled; raise the exception of a failed flush."""
         self._loop = asyncio.get_running_loop()  # cached: it costs a system call
         self._broken = self._loop.create_future()
         try:
@@ -121,7 +123,7 @@ class Fanout:
                 self._due.cancel()
 
     def _changed(self) -> None:
-        """Schedule a flush, as soon as the rate allows, in a later turn of the loop."""
+        """Schedule a flush in a later turn of the loop, as soon as the rate allows."""
         if self._due is not None or self._loop is None:
             return
         free_s = self._pacer.free_s
@@ -147,7 +149,7 @@ class Fanout:
             wake()
 
     def join(self, wake: Callable[[], None]) -> Place:
-        """Call `wake`, which must not block, at each flush; return the client's position."""
+        """Call `wake` at each flush and return the client's position; `wake` must not block."""
         self._wakes.add(wake)
         notes = max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS)
         return Place(FanoutPosition(notes=notes, joined=self.hub.revision))
@@ -157,7 +159,7 @@ class Fanout:
         self._wakes.discard(wake)
 
     def frames_for(self, place: Place) -> bytes:
-        """Return the frames that bring `place` up to date, and advance it; may be empty."""
+        """Return the frames that bring `place` up to date, possibly none, and advance `place`."""
         if self._encoded_at != self.hub.revision:
             self._encoded_at = self.hub.revision
             self._updates.clear()
@@ -189,7 +191,7 @@ class Fanout:
         return _Update(after, frames, now_s)
 
     def _without_pictures(self, samples: Sequence[Sample]) -> Sequence[Sample]:
-        """Remove images, which only go to pages that show them; the end of an image stays."""
+        """Remove image data, which only pages that show it receive; keep the end of an image."""
         pictures = self._pictures
         if not pictures:
             return samples

@@ -1,7 +1,7 @@
 """The newest image of each signal, encoded once for all pages that show it.
 
-Layer 5. Nothing is queued: a client takes the newest image when its socket is free, and skips the
-older ones.
+Layer 5. Images are never queued: when its socket is free, a client receives the newest image and
+skips older images.
 """
 
 from collections.abc import Iterable
@@ -16,45 +16,45 @@ from urc.web.wire.picture import as_frame, encode_picture
 __all__ = ["EncodedImage", "ImageSubscription", "ImageCache", "is_picture"]
 
 SHARED_FOR_S = 0.05
-"""Reuse of an encoded image, in seconds. The age of an image counts from the encoding, and a few
-milliseconds are not worth another copy of some ten kilobytes.
+"""Time for which an encoded image is reused, in seconds. The age in the message is the age at its
+encoding; an error of some milliseconds does not justify another copy of several kilobytes.
 """
 
 
 class EncodedImage(NamedTuple):
-    """An image, ready for any client."""
+    """An encoded image for any client."""
 
     frame: bytes
-    """The whole WebSocket frame."""
+    """The complete WebSocket frame."""
     sample: Sample
     number: int
-    """Counter of images; grows with each new image of any signal."""
+    """Number of the image, counted over the images of all signals."""
     made_s: float
 
 
 @dataclass(slots=True)
 class ImageSubscription:
-    """The images that one client shows, and the newest ones that it has."""
+    """The images that one client shows, and the newest images that it has."""
 
     names: tuple[str, ...] = ()
     seen: dict[str, int] = field(default_factory=dict)
-    """Signal → number of its last image at the client."""
+    """Maps a signal to the number of the last image sent to the client."""
     turn: int = 0
-    """Round-robin position, so that one fast camera leaves room for another."""
+    """Round-robin position, so that a fast camera does not block other cameras."""
 
     def show(self, names: Iterable[str]) -> None:
-        """Set the shown images; a hidden one is sent again when it is shown again."""
+        """Set the shown images; an image that was hidden is sent again."""
         self.names = tuple(dict.fromkeys(names))
         self.seen = {name: number for name, number in self.seen.items() if name in self.names}
 
 
 def is_picture(signal: Signal | None) -> bool:
-    """Return whether a signal's values go as binary messages."""
+    """Return whether the values of a signal are sent as binary messages."""
     return signal is not None and signal.type in ("image", "blob")
 
 
 class ImageCache:
-    """The encoded images of one session, for all its clients."""
+    """The encoded images of one session, shared by all its clients."""
 
     def __init__(self, hub: Hub, clock: Clock) -> None:
         self._hub = hub
@@ -63,7 +63,7 @@ class ImageCache:
         self._count = 0
 
     def next_image(self, subscription: ImageSubscription) -> EncodedImage | None:
-        """Return a shown image that the client lacks, or None; it then counts as sent."""
+        """Return a shown image that the client lacks, or None; count the image as sent."""
         count = len(subscription.names)
         for step in range(count):
             name = subscription.names[(subscription.turn + step) % count]

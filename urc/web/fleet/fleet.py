@@ -1,6 +1,6 @@
-"""The served robots by the name in their URL, each with its station. The set changes at run time.
+"""The served robots and their stations, by the name in their URL.
 
-Layer 5. Removing a robot first stops its motion.
+Layer 5. Robots can be added and removed at run time. Removal of a robot first stops its motion.
 """
 
 import asyncio
@@ -17,28 +17,28 @@ from urc.web.words import t
 __all__ = ["BrokenRobot", "Fleet"]
 
 _END_S = 15.0
-"""Longest wait for the end of a robot's session, in seconds."""
+"""Maximum wait for the end of a robot's session, in seconds."""
 
 
 class BrokenRobot(NamedTuple):
-    """A robot whose documents or widgets cannot be used."""
+    """A robot with unusable documents or widgets."""
 
     title: str
     fault: str
-    """Reason, in one line."""
+    """Reason for the failure, in one line."""
 
 
 class Fleet:
-    """All robots of one dashboard."""
+    """All robots of a dashboard."""
 
     def __init__(
         self, robots: Mapping[str, Robot], service: Callable[[str, Robot], RobotService]
     ) -> None:
-        """Prepare the robots from the start.
+        """Prepare the robots that are known at the start.
 
         Args:
             robots: the robots, by the name in their URL.
-            service: makes the station of a robot.
+            service: creates the station of a robot.
 
         Raises:
             UrcError: two robots bring different widgets of one name.
@@ -50,13 +50,13 @@ class Fleet:
             name: service(name, robot) for name, robot in robots.items()
         }
         self.broken: dict[str, BrokenRobot] = {}
-        """Robots that cannot be used, by name."""
+        """Robots that cannot be used, by the name in their URL."""
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._group: asyncio.TaskGroup | None = None
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[asyncio.TaskGroup]:
-        """Run one supervisor for each robot while the context lasts."""
+        """Run one session supervisor for each robot while the context lasts."""
         async with asyncio.TaskGroup() as group:
             self._group = group
             for name in self.stations:
@@ -69,7 +69,7 @@ class Fleet:
                     task.cancel()
 
     def add(self, name: str, robot: Robot) -> None:
-        """Serve another robot; raise `UrcError` when its widgets cannot be served."""
+        """Add a robot; raise `UrcError` when its widgets cannot be served."""
         robot = self._apart(name, robot)
         self.widgets = _assets({**self.robots, name: robot})
         self.robots[name] = robot
@@ -78,12 +78,12 @@ class Fleet:
         self._start(name)
 
     def renew(self, name: str, robot: Robot) -> Robot:
-        """Register another version of a robot, and return it in its served form.
+        """Register another version of a robot; return the robot with its served widget names.
 
-        The caller then passes it to the station: see `RobotService.replace`.
+        The caller must pass the returned robot to its station with `RobotService.replace`.
 
         Raises:
-            UrcError: its widgets cannot be served.
+            UrcError: the widgets of the robot cannot be served.
         """
         robot = self._apart(name, robot)
         self.widgets = _assets({**self.robots, name: robot})
@@ -103,10 +103,11 @@ class Fleet:
             await asyncio.wait((task,), timeout=_END_S)
 
     def driven_by(self, name: str) -> str:
-        """Return the name of the operator who drives a robot, or "".
+        """Return the name of the operator who drives a robot; "" if no operator drives it.
 
-        A pending stop counts while a session can deliver it. Without a session, for example because
-        of a wrong address, it must not block a change of that address.
+        A pending stop counts as driving while a session can deliver the stop. Without a session,
+        for example because of a wrong address, a pending stop must not block a change of the
+        address.
         """
         service = self.stations.get(name)
         if service is None or service.is_at_rest:
@@ -126,7 +127,7 @@ class Fleet:
 
 
 def _assets(robots: Mapping[str, Robot]) -> Assets:
-    """Return the files of all widgets; equal widgets of different robots are one."""
+    """Return the files of all widgets; equal widgets of several robots are merged."""
     return widget_assets(
         unified(one for robot in robots.values() for one in robot.profile.widgets.values())
     )

@@ -1,7 +1,7 @@
-"""Makes the robots of a dashboard: from documents, settings and installed packages.
+"""Creates the robots of a dashboard from documents, settings and installed packages.
 
-Layer 5. The factory reads files and stores settings; it has no session. Reading takes a while, so
-the event loop calls it in a thread.
+Layer 5. The factory reads files and stores settings, but opens no session of a served robot.
+Reading files takes time, so the event loop calls the factory in a thread.
 """
 
 import logging
@@ -36,32 +36,32 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class RobotOptions:
-    """Options of the robot factory, chosen at the start of the dashboard."""
+    """Options of the robot factory, set when the dashboard starts."""
 
     data: Path
-    """Folder of settings and packages."""
+    """Folder of the settings and packages."""
     make: Callable[[Profile, Mapping[str, Value]], Robot]
-    """Return the robot of a profile with settings."""
+    """Returns a robot with these settings."""
     tried: Callable[[Profile, Mapping[str, Value]], AbstractAsyncContextManager[Session]]
-    """Open a session that only tests the transports, without any control."""
+    """Opens a session that only tests the transports, without any control of the robot."""
     given: Callable[[Profile], Mapping[str, Value]]
-    """Return the settings from the start of the server; stored settings never change them.
-    Raise `UrcError` for settings that no longer fit."""
+    """Returns the settings given at the start of the server; these settings override stored
+    settings. Raises `UrcError` for given settings that no longer fit the profile."""
     shows_installed: bool = False
-    """Whether the menu shows the installed robots and drivers."""
+    """Whether the menu lists the installed robots and drivers."""
 
 
 class ResolvedSettings(NamedTuple):
     """The resolved settings of a robot."""
 
     values: dict[str, Value]
-    """Values of all settings that may be used."""
+    """Values of all settings that may be used, by name."""
     given: dict[str, Value]
-    """Values from the start of the server."""
+    """Values given at the start of the server, by name."""
     destination: str
     """Hosts and ports of the robot's transports."""
     withheld: frozenset[str]
-    """Secrets that were entered for another destination."""
+    """Names of secrets that were entered for another destination."""
 
 
 class InstalledInterface(NamedTuple):
@@ -72,18 +72,20 @@ class InstalledInterface(NamedTuple):
 
 
 class RobotFactory:
-    """The documents of the robots."""
+    """Reads the documents of the robots."""
 
     def __init__(self, robot_options: RobotOptions) -> None:
-        """List the installed packages; no document is read yet."""
+        """List the installed packages, without reading their documents."""
         self.robot_options = robot_options
         self.store = Store(robot_options.data / "packages")
         self._there = self._roots()
-        """Packages that were installed at the start."""
+        """Packages that were installed at the start of the server."""
         self._begun: dict[str, str] = {}
-        """Robot → its first destination, for which the settings from the start are valid."""
+        """Maps a robot to its destination at the start, which limits the settings given at the
+        start."""
         self._manifests: dict[tuple[str, int, int], Manifest] = {}
-        """Cache by digest and state of the archive, because pages need all manifests often."""
+        """Manifests by digest and state of the archive, cached because pages often need all of
+        them."""
 
     def _roots(self) -> frozenset[str]:
         try:
@@ -92,7 +94,7 @@ class RobotFactory:
             return frozenset()
 
     def stamp(self) -> object:
-        """Return a value that changes with every install and removal."""
+        """Return a value that changes with every installation and removal."""
         try:
             found = (self.store.folder / "state.json").stat()
         except OSError:
@@ -100,16 +102,16 @@ class RobotFactory:
         return found.st_mtime_ns, found.st_size, found.st_ino
 
     def kept(self, name: str) -> SettingsStore:
-        """Return the file with the settings of a robot."""
+        """Return the store of a robot's settings."""
         return SettingsStore(self.robot_options.data / "robots", name)
 
     def robot(self, name: str, profile: Profile, kept: StoredSettings | None = None) -> Robot:
-        """Return a robot with its settings and all interfaces that fit; raise `UrcError`.
+        """Return a robot with its settings and all interfaces that fit it; raise `UrcError`.
 
         Args:
-            name: its name in URLs.
-            profile: the profile from its document.
-            kept: its stored settings; None reads them from the file.
+            name: name of the robot in URLs.
+            profile: the profile as its document defines it.
+            kept: the stored settings of the robot; None reads them from the file.
         """
         chosen = self.kept(name).load() if kept is None else kept
         filled = self.filled(profile, chosen)
@@ -125,9 +127,9 @@ class RobotFactory:
     def filled(self, profile: Profile, kept: StoredSettings) -> ResolvedSettings:
         """Return the resolved settings of a robot; raise `UrcError`.
 
-        A value from the start wins over a stored one, and a stored one over the default. A stored
-        value that no longer fits, for example after an update, counts as missing. A secret is only
-        used for the destination for which it was entered.
+        A value given at the start overrides a stored value, and a stored value overrides the
+        default. A stored value that no longer fits counts as missing, for example after an update.
+        A secret is used only for the destination for which it was entered.
         """
         defaults: dict[str, Value] = {
             name: setting.default
@@ -164,14 +166,14 @@ class RobotFactory:
         return ResolvedSettings(everything, given, place, frozenset(withheld))
 
     def _begun_at(self, profile: Profile, package: str, values: Mapping[str, Value]) -> str:
-        """Return the robot's destination at the start; "" if it was installed later."""
+        """Return the robot's destination at the start; "" if the robot was installed later."""
         if package and package not in self._there:
             return ""
         place = destination_of(profile, package, values)
         return self._begun.setdefault(package or profile.name, place)
 
     def package_of(self, profile: Profile) -> str:
-        """Return the installed package of a robot, as ``drivers/puppet``; "" for a file."""
+        """Return the installed package of a robot, such as ``drivers/puppet``; "" for a file."""
         home = (self.store.folder / "ecosystems").resolve()
         try:
             parts = Path(profile.file).resolve().relative_to(home).parts
@@ -180,7 +182,7 @@ class RobotFactory:
         return "/".join(parts[1:3])
 
     def furnished(self, profile: Profile, first: str = "") -> Profile:
-        """Return a profile with the fitting installed interfaces; `first` comes first."""
+        """Return the profile with all installed interfaces that fit it, starting with `first`."""
         interfaces, widgets = dict(profile.interfaces), dict(profile.widgets)
         for added in self.interfaces():
             found = self.fitted(added, profile)
@@ -192,13 +194,13 @@ class RobotFactory:
         return profile._replace(interfaces=interfaces, widgets=widgets)
 
     def fitted(self, added: InstalledInterface, profile: Profile) -> InterfaceFit:
-        """Return an installed interface with its bindings on a robot."""
+        """Return an installed interface, bound to the signals and commands of a robot."""
         if added.lock.key.name in profile.interfaces:
             return InterfaceFit(None, fault="this robot has an interface of that name already")
         return fit_interface(added.document, profile, widget_folder_of(added.document))
 
     def interfaces(self) -> list[InstalledInterface]:
-        """Return the newest version of each interface that a user installed directly."""
+        """Return the newest version of each interface that a user has installed directly."""
         newest = {lock.root: lock for lock in _ascending(self.store.installed())}
         found = []
         for lock in newest.values():
@@ -210,9 +212,9 @@ class RobotFactory:
         return found
 
     def parked(self) -> dict[str, list[Lock]]:
-        """Return the installed packages with a robot: name → its versions, oldest first.
+        """Return the installed packages with a robot, as a map from name to versions, oldest first.
 
-        If a robot and a driver share a name, only the one in use is listed.
+        If a robot and a driver have the same name, only the package in use is listed.
         """
         locks = self.store.installed()
         found: dict[str, list[Lock]] = {}
@@ -222,7 +224,7 @@ class RobotFactory:
         return dict(sorted(found.items()))
 
     def chosen(self, locks: list[Lock], version: str) -> Lock:
-        """Return the chosen version for a robot; the newest one if it is missing."""
+        """Return the chosen version of a robot's package; if not installed, the newest."""
         return next((lock for lock in locks if lock.version == version), locks[-1])
 
     def profile(self, lock: Lock) -> Profile:
@@ -232,7 +234,7 @@ class RobotFactory:
         return profile
 
     def reread(self, profile: Profile) -> Profile:
-        """Return the present profile of a robot from the start; raise `UrcError`."""
+        """Reread the profile of a robot that was given at the start; raise `UrcError`."""
         return open_document(profile.file)
 
     def manifest(self, lock: Lock) -> Manifest:

@@ -1,7 +1,8 @@
-"""A robot as the dashboard sees it, and the lifetime of its session.
+"""A robot that the dashboard serves, and the lifetime of its session.
 
-Layer 5. The session opens for the first client. The session closes a short while after the last
-client has disconnected, so that a reload keeps the robot connected, and Back disconnects it.
+Layer 5. The session opens when the first client connects. The session closes a short time after the
+last client has disconnected: a reload of the page keeps the robot connected, but leaving the page
+disconnects it.
 """
 
 import asyncio
@@ -43,7 +44,7 @@ __all__ = [
 
 
 class Playback(Protocol):
-    """A recording with its playback position."""
+    """A recording that plays in place of a robot."""
 
     @property
     def began_s(self) -> float:
@@ -59,20 +60,20 @@ class Playback(Protocol):
 
     @property
     def is_playing(self) -> bool:
-        """Whether the playback is running."""
+        """Whether the playback is playing."""
 
     @property
     def speed(self) -> float:
         """Playback speed; 1 is real time."""
 
     def play(self) -> None:
-        """Play; start again at the beginning if the position is the end."""
+        """Play, from the beginning if the position is at the end."""
 
     def pause(self) -> None:
         """Pause at the current position."""
 
     def seek(self, position_s: float) -> None:
-        """Move to a position."""
+        """Seek to a position."""
 
 
 LINGER_S = 2.0
@@ -80,22 +81,23 @@ OPEN_TIMEOUT_S = 10.0
 RETRY_S = 1.0
 CLIENTS = 256
 SEATS, KNOWN_SEATS = 8, 64
-"""Most clients of one robot from one unknown address, and from one visitor with a key."""
+"""Maximum number of clients of one robot: from one unknown address, and from one visitor with a
+key."""
 CLOSE_TIMEOUT_S = 8.0
-"""Longest wait for the end of a session, in seconds."""
+"""Maximum wait for the end of a session, in seconds."""
 STOP_WITHIN_S = 1.0
-"""Longest wait of a STOP over HTTP for its delivery, in seconds."""
+"""Maximum time for which a STOP over HTTP waits for its delivery, in seconds."""
 _LOOK_S = 0.01
 
 log = logging.getLogger(__name__)
 
 
 class SessionLike(MotionSession, Protocol):
-    """The part of an opened profile that the dashboard needs."""
+    """The interface of an opened profile that the dashboard uses."""
 
     @property
     def hub(self) -> Hub:
-        """Latest values and link states."""
+        """The latest values and link states."""
 
     async def command(
         self,
@@ -108,51 +110,53 @@ class SessionLike(MotionSession, Protocol):
         """Run one command and return its reply; raise `CommandFailed` without one."""
 
     def pull(self, sequence: str, what: Pull) -> None:
-        """Pause, step, resume or end a sequence."""
+        """Pause, step, resume or end a running sequence."""
 
     def latch(self, reason: str) -> None:
         """Latch, end sequences and block autonomous motion; "" as reason resets the latch."""
 
 
 Glimpse = bytes | Mapping[str, Reading] | None
-"""An image, or values by signal; None if nothing is known about the robot."""
+"""An image, or values by signal; None if the state of the robot is unknown."""
 
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """One robot to serve."""
+    """One robot that the dashboard serves."""
 
     profile: Profile
     settings: Mapping[str, Value]
-    """Current values, with defaults."""
+    """Current values of the settings, with defaults."""
     open_session: Callable[[], AbstractAsyncContextManager[SessionLike]]
-    """Connects while the context lasts. Must not wait for a reply of the robot."""
+    """Keeps the robot connected while the context lasts. Entering the context must not wait for a
+    reply from the robot."""
     glimpse: Callable[[], Glimpse] | None = None
-    """View of an emulated robot without a connection; None for a real one."""
+    """Returns a view of an emulated robot without a connection; None for a real robot."""
     is_emulated: bool = False
-    """Whether it is emulated: real and emulated robots of one name share no stored state."""
+    """Whether the robot is emulated: real and emulated robots of the same name share no stored
+    state."""
     playback: Playback | None = None
-    """The recording in place of the robot, or None."""
+    """The recording that plays in place of the robot; None for a robot."""
 
 
 @dataclass(frozen=True, slots=True)
 class LiveSession:
-    """An open session with its fan-out."""
+    """An open session and its fan-out."""
 
     session: SessionLike
     fanout: Fanout
     number: str
-    """Unique number of this session, also across restarts of the server."""
+    """Number of the session, unique even across restarts of the server."""
     ended: asyncio.Event
-    """Set when the session is over, for any reason."""
+    """Set when the session has ended for any reason."""
 
 
 class SessionFailed(UrcError):
-    """The error of a session that did not open, or has ended."""
+    """The error of a session that could not open, or that has ended."""
 
 
 def missing_settings(robot: Robot) -> tuple[Setting, ...]:
-    """Return the required settings that have no value; without them the robot cannot connect."""
+    """Return the required settings without a value, which prevent a connection to the robot."""
     return tuple(
         setting
         for name, setting in robot.profile.settings.items()
@@ -161,7 +165,7 @@ def missing_settings(robot: Robot) -> tuple[Setting, ...]:
 
 
 def each_counts(profile: Profile) -> frozenset[str]:
-    """Return the signals whose every reading is shown by a widget of the robot."""
+    """Return the signals for which a widget of the robot shows every reading."""
     uses = [*profile.slots.values()]
     for interface in profile.interfaces.values():
         uses += interface.widgets.values()
@@ -175,7 +179,7 @@ def each_counts(profile: Profile) -> frozenset[str]:
 
 
 class RobotService:
-    """Opens and closes the session of one robot as clients come and go."""
+    """Opens the session of one robot for the first client, and closes it after the last client."""
 
     def __init__(
         self,
@@ -186,14 +190,15 @@ class RobotService:
         latch: LatchStore | None = None,
         recorder: AuditRecorder | None = None,
     ) -> None:
-        """Wait for the first client.
+        """Prepare the station, without a session until the first client.
 
         Args:
             robot: the robot.
-            linger_s: time for which the session stays open after its last client, in seconds.
+            linger_s: time for which the session stays open after its last client has left, in
+                seconds.
             clock: the clock.
-            latch: keeps a STOP over a restart.
-            recorder: receives the events of the audit log.
+            latch: stores a latched STOP over a restart; None stores nothing.
+            recorder: receives the events of the audit log; None records nothing.
         """
         self.robot = robot
         self.clock: Clock = clock or LoopClock()
@@ -207,22 +212,22 @@ class RobotService:
         self._next: asyncio.Future[LiveSession] | None = None
         self._is_open = False
         self._held_off = 0
-        """Number of users that need the robot disconnected."""
+        """Number of callers that need the robot disconnected."""
         self._successor: tuple[Robot, LatchStore | None] | None = None
 
     @property
     def is_full(self) -> bool:
-        """Whether the limit of clients is reached."""
+        """Whether the maximum number of clients is reached."""
         return self._visitors >= CLIENTS
 
     def has_place_for(self, peer: SocketPeer) -> bool:
-        """Return whether another client of `peer` still leaves places for other visitors."""
+        """Return whether `peer` may open another client without exceeding its share."""
         most = KNOWN_SEATS if peer.is_known else SEATS
         return not peer.who or self._operators[peer.who] < most
 
     @contextmanager
     def visit(self, who: str = "") -> Iterator[None]:
-        """Count as a client while the context lasts; `who` is that of its `SocketPeer`."""
+        """Count as a client while the context lasts; `who` is the identity from `SocketPeer`."""
         self._visitors += 1
         self._operators[who] += 1
         self._stirred.set()
@@ -235,7 +240,7 @@ class RobotService:
             self._stirred.set()
 
     async def live(self) -> LiveSession:
-        """Return the open session; raise `SessionFailed` if it does not open."""
+        """Return the open session; raise `SessionFailed` if the session does not open."""
         try:
             async with asyncio.timeout(OPEN_TIMEOUT_S):
                 return await asyncio.shield(self._coming())
@@ -243,7 +248,7 @@ class RobotService:
             raise SessionFailed("the robot's session did not open in time") from None
 
     def glimpse(self) -> Glimpse:
-        """Return the current view of the robot, without a connection."""
+        """Return a view of the robot, without opening a connection."""
         if self.robot.glimpse is not None:
             return self.robot.glimpse()
         coming = self._next
@@ -256,7 +261,7 @@ class RobotService:
         return next(pictures, None) or values or None
 
     async def deliver_stop(self) -> bool:
-        """Connect the robot if needed, and wait briefly until it has the stop; return success."""
+        """Connect if necessary, and wait briefly; return whether the robot received the stop."""
         controller = self.controls.controller
         end_s = self.clock.now() + STOP_WITHIN_S
         with self.visit():
@@ -265,7 +270,7 @@ class RobotService:
         return controller.is_confirmed and controller.has_own_stop
 
     def who(self) -> dict[str, str | bool]:
-        """Return lease and STOP as `urc.web.manage.wire.ControlState`."""
+        """Return the lease and the state of STOP, as `urc.web.manage.wire.ControlState`."""
         state = self.controls.controller.lease.state
         holder = "" if state.holder is None else state.holder.name or "another screen"
         is_emulated = self.robot.is_emulated or self.robot.playback is not None
@@ -273,7 +278,7 @@ class RobotService:
 
     @property
     def is_at_rest(self) -> bool:
-        """Whether the robot is not driven and every stop has reached it."""
+        """Whether no operator drives the robot, and every stop has reached the robot."""
         controller = self.controls.controller
         return controller.lease.state.holder is None and controller.is_confirmed
 
@@ -284,9 +289,10 @@ class RobotService:
 
     @asynccontextmanager
     async def held_off(self) -> AsyncIterator[None]:
-        """Keep the robot disconnected while the context lasts: many robots accept one connection.
+        """Keep the robot disconnected while the context lasts.
 
-        For a robot that is not driven. An open session ends first; clients wait for the next one.
+        Many robots accept only one connection. The robot must not be driven. An open session ends
+        first, and clients wait for the next session.
         """
         self._held_off += 1
         self._stirred.set()
@@ -300,9 +306,9 @@ class RobotService:
             self._stirred.set()
 
     def replace(self, robot: Robot, latch: LatchStore | None = None) -> None:
-        """Switch to another version of the robot; an open session ends, the next one uses it.
+        """Switch to another version of the robot, for its next session; end an open session.
 
-        For a robot that `is_at_rest`: the switch disconnects it for a moment.
+        The robot must be at rest (`is_at_rest`), because the switch disconnects it briefly.
         """
         self._successor = (robot, latch)
         if not self._is_open:
@@ -329,7 +335,7 @@ class RobotService:
                 await self.clock.sleep(RETRY_S)
             except Exception:  # a supervisor: one robot's bug must not end the others
                 log.exception("the session of %s failed", self.robot.profile.name)
-                self._fail("the robot's session failed; the server's log has the reason")
+                self._fail("the robot's session failed; the reason is in the server's log")
                 await self.clock.sleep(RETRY_S)
 
     async def _serve(self, session: SessionLike) -> None:
@@ -375,11 +381,11 @@ class RobotService:
 
     @property
     def _is_unwanted(self) -> bool:
-        """Return whether an open session must end despite its clients."""
+        """Return whether an open session must end, despite its clients."""
         return self._successor is not None or self._held_off > 0
 
     async def _wait_for(self, *, present: bool) -> None:
-        """Wait until the robot needs a session, or until it no longer does."""
+        """Wait until the robot needs a session; if not `present`, until no session is needed."""
         while not (self._is_wanted if present else self._visitors == 0 or self._is_unwanted):
             self._stirred.clear()
             await self._stirred.wait()

@@ -1,7 +1,7 @@
-"""Files that a page may load: known before the first request, and never a path from a URL.
+"""Files that a page may load: known before the first request, never looked up by path.
 
 Layer 5. Every table is filled from folders that ship with URC, or from widget manifests; a request
-is a look-up. A changed file is read again, so an edit shows at once.
+only looks up its URL. A changed file is read again, so edits are visible immediately.
 """
 
 import hashlib
@@ -32,10 +32,10 @@ KIT = (
     "offscreen_canvas",
     "path_simplify",
 )
-"""Modules of URC that widgets import as ``urc/…``."""
+"""URC's modules that widgets import as ``urc/…``."""
 WIDGET_FILES = ("widget.js", "widget.css")
 MOST_FILES = 200
-"""Most files that pages may load of one widget."""
+"""Maximum number of files of one widget that pages may load."""
 MEDIA_TYPES = {
     ".css": "text/css; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
@@ -63,7 +63,7 @@ class _File:
     tag: str = ""
 
     def refresh(self) -> None:
-        """Read the file if it has changed; raise OSError if it no longer exists."""
+        """Read the file again if it has changed; raise OSError if the file no longer exists."""
         found = self.path.stat()
         stamp = (found.st_mtime_ns, found.st_size)
         if stamp != self.stamp:
@@ -74,12 +74,12 @@ class _File:
 
 @dataclass(slots=True)
 class Assets:
-    """A table of files by their name in the URL."""
+    """A table of files by their relative URL."""
 
     files: dict[str, _File] = field(default_factory=dict)
 
     def respond(self, name: str, request: Request) -> Response:
-        """Return the file, or 304 if the browser's copy is current; raise 404."""
+        """Return the file, or status 304 if the browser's copy is current; raise status 404."""
         file = self.files.get(name)
         if file is None:
             raise HTTPException(404)
@@ -91,7 +91,7 @@ class Assets:
 
 
 def script(source: str, request: Request) -> Response:
-    """Return a generated module, or 304 if the browser's copy is current."""
+    """Return a generated module, or status 304 if the browser's copy is current."""
     body = source.encode()
     return _kept(body, _tag(body), MEDIA_TYPES[".js"], request)
 
@@ -108,7 +108,7 @@ def _tag(body: bytes) -> str:
 
 
 def folder_assets(folder: Path) -> Assets:
-    """Return every file of `folder` with a web media type, by its relative name."""
+    """Return all files in `folder` with a web media type, by relative path."""
     root = folder.resolve()
     found = Assets()
     for path in sorted(root.rglob("*")):
@@ -119,13 +119,14 @@ def folder_assets(folder: Path) -> Assets:
 
 
 def widget_assets(widgets: Iterable[Widget]) -> Assets:
-    """Return the files of each widget that pages load: modules, style sheet and small assets.
+    """Return the widget files that pages load: modules, style sheets and small assets.
 
-    The names are ``<widget>/<path in its folder>``. Hidden files, and links that lead out of the
-    folder, are left out.
+    Each file is listed as ``<widget>/<path in its folder>``. Hidden files, and links to places
+    outside the folder, are left out.
 
     Raises:
-        UrcError: two widgets of one name come from different folders, or one has too many files.
+        UrcError: widgets of the same name come from different folders, or a widget has too many
+            files.
     """
     found = Assets()
     folders: dict[str, Path] = {}
@@ -157,7 +158,7 @@ def _is_hidden(part: str) -> bool:
 
 
 def import_map(vendor: Path | None) -> Mapping[str, object]:
-    """Return the page's import map: URC's modules and the third-party modules of the build."""
+    """Return the page's import map, with URC's modules and the third-party modules of the build."""
     imports = {f"urc/{name}": f"/static/widgets/{name}.js" for name in KIT}
     imports["urc/words"] = "/words/en.js"
     place = vendor / "importmap.json" if vendor else None

@@ -1,6 +1,6 @@
 """Routes of the files that pages load: modules, styles, widgets, catalogues and map tiles.
 
-Layer 5. Each is a look-up in a table; see `urc.web.load.assets`.
+Layer 5. Each request is looked up in a table; see `urc.web.load.assets`.
 """
 
 from collections.abc import Callable
@@ -22,9 +22,9 @@ class FileRoutes:
     """The routes.
 
     Args:
-        vendor: folder of the third-party modules of the build, or None.
+        vendor: folder of the third-party modules of the build; None without a build.
         tiles: folder of map tiles, ``z/x/y.png``, or None.
-        widgets: returns the tables of the widgets' files; the first table with a name counts.
+        widgets: returns the tables of widget files; the first table that contains a file is used.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class FileRoutes:
         self._widgets = widgets
 
     def routes(self) -> list[Route]:
-        """Return the routes; they go after the pages of the widgets."""
+        """Return the routes, for use after the routes of the widget pages."""
         return [
             Route("/favicon.ico", self._favicon),
             Route("/app.webmanifest", self._manifest),
@@ -49,7 +49,7 @@ class FileRoutes:
         ]
 
     def has_widget(self, name: str) -> bool:
-        """Return whether pages load files of a widget of that name."""
+        """Return whether pages load files of a widget with this name."""
         return any(f"{name}/widget.js" in table.files for table in self._widgets())
 
     async def _favicon(self, request: Request) -> Response:
@@ -59,11 +59,11 @@ class FileRoutes:
         return self._static.respond("app.webmanifest", request)
 
     async def _worker(self, request: Request) -> Response:
-        """Serve the service worker from the root, because its scope is the folder of its URL."""
+        """Serve the service worker from the root folder, because the URL limits its scope."""
         return self._static.respond("sw.js", request)
 
     async def _words(self, request: Request) -> Response:
-        """Serve the catalogue of one language as a module."""
+        """Serve the catalogue of one language as a JavaScript module."""
         tag = request.path_params["tag"]
         if tag not in words.LANGUAGES:
             raise HTTPException(404)
@@ -84,7 +84,7 @@ class FileRoutes:
         return answer
 
     async def _tile(self, request: Request) -> Response:
-        """Serve a map tile, if a folder of tiles is configured."""
+        """Serve a map tile if a folder of tiles is configured, else 404."""
         if self._tiles is None:
             raise HTTPException(404)
         return tile(self._tiles, **request.path_params, request=request)

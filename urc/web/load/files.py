@@ -1,8 +1,8 @@
-"""Files that a robot's documents name for their widgets, and map tiles.
+"""Map tiles, and the files that a robot's documents name for their widgets.
 
-Layer 5. A URL is a key into a table made from the loaded profile, or three numbers. No path is ever
-made from text of a browser. Pages of third parties work alike; ``framed.py`` makes the document
-around them.
+Layer 5. A URL contains either a key into a table of the loaded profile, or the three numbers of a
+tile. Text from a browser never becomes part of a path. Third-party pages are looked up in the same
+way; ``framed.py`` builds the document around them.
 """
 
 import hashlib
@@ -35,7 +35,7 @@ MEDIA_TYPES = {
     ".ogg": "audio/ogg",
     **dict.fromkeys((".md", ".txt", ".csv"), "text/plain; charset=utf-8"),
 }
-"""Media types by suffix; any other file is sent as bytes."""
+"""Media types by file suffix; all other files are sent as plain bytes."""
 
 TILE_TYPES = {"png": "image/png", "jpg": "image/jpeg", "jpeg": "image/jpeg", "webp": "image/webp"}
 DEEPEST_ZOOM = 25
@@ -44,13 +44,13 @@ EMPTY_TILE = bytes.fromhex(
     "89504e470d0a1a0a0000000d4948445200000001000000010804000000b51c0c020000"
     "000b49444154789c636060000000030001b8ad3a630000000049454e44ae426082"
 )
-"""A transparent pixel: layers below a missing tile stay visible."""
+"""A transparent pixel that replaces missing tiles, so that layers below remain visible."""
 
 
 def linked_options(use: WidgetUse, robot: str) -> dict[str, object]:
-    """Return a widget's options for its page, with URLs in place of files.
+    """Return a widget's options for its page, with URLs in place of file names.
 
-    The URL of a third-party page becomes the URL of the document that frames it.
+    The URL of a third-party page is replaced by the URL of the document that frames the page.
     """
     files = {name: _url(robot, name, place) for name, place in use.files.items()}
     options = {name: _linked(value, files) for name, value in use.options.items()}
@@ -74,12 +74,12 @@ def _framed(robot: str, url: str) -> str:
 
 
 def page_key(url: str) -> str:
-    """Return the key of a third-party page that an option names."""
+    """Return the key of a third-party page in the URL of its frame document."""
     return hashlib.blake2b(url.encode(), digest_size=8).hexdigest()
 
 
 def uses_of(profile: Profile) -> Iterator[WidgetUse]:
-    """Yield every filled slot of the profile and of its interfaces."""
+    """Yield the widget use of every filled slot in the profile and its interfaces."""
     yield from profile.slots.values()
     for interface in profile.interfaces.values():
         yield from interface.widgets.values()
@@ -92,7 +92,7 @@ def _key(name: str, place: str) -> str:
 
 
 def robot_file(profile: Profile, key: str, request: Request) -> Response:
-    """Return a file that the profile names for a widget; raise 404 for any other."""
+    """Return a file that the profile names for a widget; raise status 404 for any other key."""
     uses = uses_of(profile)
     table = {_key(name, place): place for use in uses for name, place in use.files.items()}
     if key not in table:
@@ -104,10 +104,10 @@ def robot_file(profile: Profile, key: str, request: Request) -> Response:
 
 
 def tile(folder: Path, z: int, x: int, y: int, kind: str, request: Request) -> Response:
-    """Return one map tile from ``folder/z/x/y.kind``; a transparent one if the file is missing.
+    """Return a map tile from ``folder/z/x/y.kind``; a missing file gives a transparent tile.
 
     Raises:
-        HTTPException: 404 when the numbers or the media type name no tile.
+        HTTPException: 404 when the numbers or the media type are out of range.
     """
     if kind not in TILE_TYPES or not 0 <= z <= DEEPEST_ZOOM or not (0 <= x < 2**z > y >= 0):
         raise HTTPException(404)

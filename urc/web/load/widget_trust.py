@@ -1,7 +1,7 @@
-"""Decides which widgets run in the page and which in a frame of their own.
+"""Decides which widgets run in the page and which widgets run in a sandboxed frame.
 
-Layer 5. Widgets that ship with URC are part of the page. Every other widget is third-party code: it
-runs in a sandboxed frame, unless the server was started with it as trusted.
+Layer 5. Widgets that ship with URC run in the page. Every other widget is third-party code and runs
+in a sandboxed frame, unless the server was started with the option to trust this widget.
 """
 
 from collections.abc import Iterable
@@ -21,37 +21,38 @@ OURS = frozenset({
     "slider", "speed", "state", "stop", "switch", "table", "terminal", "text", "tilt", "value",
     "vector-pad",
 })  # fmt: skip
-"""Widgets that ship with URC, listed so that another folder next to theirs is not trusted."""
+"""Names of the widgets that ship with URC; the list excludes folders that others add next to
+them."""
 
 
 @dataclass(frozen=True, slots=True)
 class WidgetTrust:
-    """Tells third-party widgets from trusted ones."""
+    """Distinguishes third-party widgets from trusted widgets."""
 
     trusted: frozenset[str] = frozenset()
     """Names of third-party widgets that run in the page."""
 
     @classmethod
     def of(cls, trusted: Iterable[str]) -> "WidgetTrust":
-        """Return the rule that trusts these widgets."""
+        """Return the rule that trusts the named widgets."""
         return cls(frozenset(trusted))
 
     def is_foreign(self, widget: Widget) -> bool:
-        """Return whether the widget has to run in a frame."""
+        """Return whether the widget must run in a frame."""
         if widget.name in self.trusted:
             return False
         home = shipped("widgets")
         return widget.name not in OURS or widget.folder.resolve() != (home / widget.name).resolve()
 
     def styles(self, widgets: Iterable[Widget]) -> tuple[str, ...]:
-        """Return the URLs of the widgets' style sheets, for a page.
+        """Return the URLs of the widgets' style sheets for a page.
 
-        Style sheets of third-party widgets are left out: they could change the whole page.
+        Style sheets of third-party widgets are left out, because they could restyle the whole page.
         """
         mine = dict.fromkeys(one.name for one in widgets if not self.is_foreign(one))
         return tuple(f"/widgets/{quote(name)}/widget.css" for name in mine)
 
 
 def frame_url(widget: Widget) -> str:
-    """Return the URL of the frame of a third-party widget."""
+    """Return the frame URL of a third-party widget."""
     return f"/frames/{quote(widget.name)}"

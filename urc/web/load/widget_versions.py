@@ -1,6 +1,7 @@
-"""Two versions of one widget on one dashboard: each robot keeps the installed version.
+"""Different versions of one widget on a dashboard: each robot keeps its installed version.
 
-Layer 5. Pages load widgets by name. Where two widgets share a name, the second one is renamed.
+Layer 5. Pages load widgets by name. If two different widgets have the same name, the second widget
+is renamed.
 """
 
 import filecmp
@@ -16,7 +17,7 @@ __all__ = ["apart", "is_same", "unified"]
 
 
 def apart(profile: Profile, others: Iterable[Profile]) -> Profile:
-    """Return the profile with each widget renamed whose name another profile uses differently."""
+    """Return the profile with new names for widgets that differ from those of other profiles."""
     taken: dict[str, Path] = {}
     for other in others:
         for widget in other.widgets.values():
@@ -30,7 +31,7 @@ def apart(profile: Profile, others: Iterable[Profile]) -> Profile:
 
 
 def unified(widgets: Iterable[Widget]) -> list[Widget]:
-    """Return the widgets, with copies of one widget in different folders merged into one."""
+    """Return the widgets; equal copies of a widget in several folders become one."""
     found: dict[str, Widget] = {}
     every = []
     for widget in widgets:
@@ -40,7 +41,7 @@ def unified(widgets: Iterable[Widget]) -> list[Widget]:
 
 
 def is_same(one: Path, other: Path) -> bool:
-    """Return whether two folders hold the same files."""
+    """Return whether two folders contain the same files."""
     if one == other:
         return True
     mine, theirs = _files(one), _files(other)
@@ -73,7 +74,7 @@ def _uses(uses: Mapping[str, WidgetUse], names: Mapping[str, str]) -> dict[str, 
 
 
 def _digest(folder: Path) -> str:
-    """Return a short hash of the files of a folder."""
+    """Return a short hash of all files in a folder."""
     digest = hashlib.blake2b(digest_size=5)
     for name, file in sorted(_files(folder).items()):
         data = file.read_bytes()
