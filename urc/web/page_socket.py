@@ -1,6 +1,6 @@
-"""The WebSocket of one page: its messages are checked, and no page waits for another.
+"""The WebSocket of one page: it checks each message, and lets no page wait for another page.
 
-Layer 5. Reads and writes are two tasks of one group. The writer takes the newest state when the
+Layer 5. Two tasks of one group read and write. The writer sends the newest state as soon as the
 socket is free, so a slow page skips frames. A page that takes nothing for `STALL_S` is
 disconnected.
 """
@@ -32,9 +32,10 @@ __all__ = ["TokenBucket", "BrowserClient", "FlowControl", "SocketPeer", "ClientS
 
 MESSAGES_PER_S = 100
 TICKS_PER_S = 2000
-"""Rate at which ticks of held controls close the socket. Slower ones are thinned, not refused."""
+"""Maximum rate of ticks of held controls; a higher rate closes the socket. Below this rate, excess
+ticks are thinned instead of refused."""
 TICK = b'{"t":"tick",'
-"""First bytes of a page's tick; a tick in another spelling takes the slower path."""
+"""First bytes of a page's tick; ticks in any other form are decoded more slowly."""
 BAD_MESSAGES = 10
 COMMANDS_AT_ONCE = 16
 COMMAND_TIMEOUT_S = 30.0
@@ -64,7 +65,7 @@ class BrowserClient:
         self._pong = ""
         self._place = Place()
         self._live: LiveSession | None = None
-        """Set once the page has the indices of its values."""
+        """The robot's open session, once the page has received the indexes of its values."""
         self._is_listening = False
         self._closing: tuple[int, str] | None = None
         self._commands: set[asyncio.Task[None]] = set()
@@ -160,9 +161,9 @@ class BrowserClient:
             await self._news.wait()
 
     def _flushed(self) -> None:
-        """Send a flush of the fan-out at once if the socket is free; leave all else to the writer.
+        """Send a flush of the fan-out now if the socket is free; leave all else to the writer.
 
-        Waking the writer for every flush would cost three times as much as the send.
+        Waking the writer for every flush would take three times as long as sending it here.
         """
         live = self._live
         if live is not None and self._flow.is_free() and not self._closing:
@@ -172,7 +173,7 @@ class BrowserClient:
         self._news.set()
 
     def _send_shared(self, live: LiveSession) -> None:
-        """Send the data that all pages share, and images until the kernel's buffer is full."""
+        """Send the data shared by all pages, then images until the kernel's buffer is full."""
         if frames := live.fanout.frames_for(self._place):
             self._flow.write(frames)
         while self._place.subscription.names and self._flow.is_free():
@@ -211,7 +212,7 @@ class BrowserClient:
             self._is_listening = False
 
     def _offered(self, data: bytes) -> bool:
-        """Take a tick that just arrived with nothing before it; `_take` handles all else."""
+        """Handle a tick while no earlier message is pending; return False for any other message."""
         operator = self._operator
         if operator is None or not (self._is_listening and data.startswith(TICK)) or self._closing:
             return False
@@ -333,12 +334,12 @@ class BrowserClient:
             self._reply(asked, values=replied.values, people=people, sent=_last(sent))
 
     def _limit_s(self, command: str) -> float | None:
-        """Return the time limit of a command; a sequence has its own end."""
+        """Return the time limit of a command, in seconds; None for a sequence."""
         known = self._service.robot.profile.driver.commands.get(command)
         return None if known is not None and known.steps else COMMAND_TIMEOUT_S
 
     async def _confirmed(self, asked: wire.CommandRequest) -> tuple[str, ...]:
-        """Return who confirmed a command; raise `CommandFailed` if it is not allowed."""
+        """Return the people who confirmed a command; raise `CommandFailed` if it is not allowed."""
         if self._operator is None:
             return ()
         known = self._service.robot.profile.driver.commands.get(asked.command)
@@ -363,7 +364,7 @@ class BrowserClient:
         sent: Payload = b"",
         is_ours: bool = False,
     ) -> None:
-        """Reply to a command, and write its outcome to the audit log."""
+        """Send the reply to a command, and write the outcome to the audit log."""
         self._answer(wire.encode_reply(asked, values=values, code=code, message=message))
         if self._operator is None:
             return

@@ -1,8 +1,8 @@
 """A robot that the dashboard serves, and the lifetime of its session.
 
 Layer 5. The session opens when the first client connects. The session closes a short time after the
-last client has disconnected: a reload of the page keeps the robot connected, but leaving the page
-disconnects it.
+last client has disconnected. So a reload of the page keeps the robot connected, but leaving the
+page disconnects it.
 """
 
 import asyncio

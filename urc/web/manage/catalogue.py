@@ -1,7 +1,7 @@
-"""The package lists of the repositories: refreshed in the background, read from memory.
+"""The package lists of the repositories, kept in memory and refreshed in the background.
 
-Layer 5. A page starts a refresh and shows the last known lists at once, so no page waits for a
-server that is off.
+Layer 5. A page starts a refresh and shows the last known lists immediately, so no page waits for an
+unreachable server.
 """
 
 import asyncio
@@ -22,18 +22,18 @@ from urc.web.manage.wire import RepositoryInfo
 __all__ = ["FRESH_S", "PackageCatalog"]
 
 FRESH_S: Final = 20.0
-"""Age below which a list is not refreshed again, in seconds."""
+"""Age below which a package list is not refreshed again, in seconds."""
 
 
 class PackageCatalog:
-    """The packages of all repositories that this user added."""
+    """The packages of all repositories that the user has added."""
 
     def __init__(self, folder: Path, now: Callable[[], float]) -> None:
-        """Prepare; no repository is contacted yet.
+        """Prepare without contacting any repository.
 
         Args:
-            folder: folder of the packages, with the list of repositories.
-            now: returns the time, in seconds.
+            folder: folder of the packages and of the list of repositories.
+            now: returns the current time, in seconds.
         """
         self._folder = folder
         self._now = now
@@ -41,9 +41,9 @@ class PackageCatalog:
         self._asking: asyncio.Task[None] | None = None
         self.places: tuple[RepositoryInfo, ...] = ()
         self.found: dict[PackageId, list[tuple[IndexEntry, str]]] = {}
-        """Every version of every package, with the URL of its repository."""
+        """Every version of every package, and the URL of its repository."""
         self.fault = ""
-        """Why the list of repositories cannot be read, or ""."""
+        """Reason why the list of repositories cannot be read; "" if it can."""
 
     @property
     def is_asking(self) -> bool:
@@ -55,7 +55,7 @@ class PackageCatalog:
         return Repositories(self._folder, complain)
 
     def refresh(self, *, force: bool = False) -> None:
-        """Start a refresh from all repositories, unless the last one is recent."""
+        """Start a refresh from all repositories, unless the last refresh is recent."""
         is_fresh = self._asked_s is not None and self._now() - self._asked_s < FRESH_S
         if self.is_asking or (is_fresh and not force):
             return
@@ -72,22 +72,22 @@ class PackageCatalog:
         return [entry for some in self.found.values() for entry, _ in some]
 
     def hits(self, words: str, kinds: tuple[str, ...]) -> list[IndexEntry]:
-        """Return the newest version of each package of some kinds that has all words."""
+        """Return the newest version of each package of these kinds that matches all words."""
         entries = [entry for entry in self.entries() if entry.kind in kinds]
         return search(entries, words.split())
 
     def versions(self, key: PackageId) -> list[IndexEntry]:
-        """Return all offered versions of a package, newest first."""
+        """Return all versions of a package that are not withdrawn, newest first."""
         some = [entry for entry, _ in self.found.get(key, ()) if not entry.why_withdrawn]
         return sorted(some, key=lambda entry: entry.number, reverse=True)
 
     def withdrawn(self, lock: Lock) -> list[str]:
-        """Return the withdrawn parts of an installed package, for people, one a line."""
+        """Return the withdrawn parts of an installed package for people, one per line."""
         keys = map(parse_key, lock.packages)
         return withdrawn_lines(lock, [one for key in keys for one, _ in self.found.get(key, ())])
 
     def origin(self, entry: IndexEntry) -> str:
-        """Return the URL of its repository."""
+        """Return the URL of the repository that offers an entry; "" if unknown."""
         return next((url for one, url in self.found.get(entry.key, ()) if one is entry), "")
 
     async def _refresh(self) -> None:
@@ -110,7 +110,7 @@ class PackageCatalog:
         self._asked_s = self._now()
 
     def _answer(self, repository: Repository) -> tuple[RepositoryInfo, tuple[IndexEntry, ...]]:
-        """Contact one repository, in a thread."""
+        """Request the list of one repository, in a thread."""
         said: list[str] = []
         url, is_plain = repository.name, repository.name.startswith("http:")
         try:
@@ -127,4 +127,4 @@ class PackageCatalog:
 
 
 def _unheard(_: str) -> None:
-    """Ignore a warning: the result has it."""
+    """Ignore a warning, because the result already contains it."""

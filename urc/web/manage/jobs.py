@@ -1,7 +1,7 @@
-"""The install job: planned, reviewed, approved and done, or cancelled at any moment.
+"""The installation job: planned, reviewed, approved and done, or cancelled at any step.
 
-Layer 5. Nothing here blocks the loop. Downloads run in a thread that a cancel abandons, and the
-store changes in one step at the end.
+Layer 5. Nothing here blocks the loop. Downloads run in a thread that is abandoned on cancellation;
+the package store changes in one step at the end.
 """
 
 import asyncio
@@ -32,18 +32,19 @@ from urc.web.words import spoken
 __all__ = ["Busy", "Job", "Jobs", "Wanted"]
 
 _WIRE_MOST: Final = 100
-"""Most reported lines about changes in the frames to the robot."""
+"""Maximum number of reported changes in the frames to the robot."""
 _INSTALLING: Final = phrase("installing")
 _LEFT_MOST: Final = 4
-"""Most abandoned threads that still wait for a server."""
+"""Maximum number of abandoned threads that still wait for a server."""
 
 
 Wanted = PackageRequirement | Path | FileSource | Lock
-"""A package by name, a path of this machine, an upload, or an update of a lock."""
+"""The source of a job: a package by name, a path on this machine, an upload, or the lock of a
+package to update."""
 
 
 class Busy(UrcError):
-    """The refusal of a job while another one runs."""
+    """The refusal of a job or change that cannot run now."""
 
 
 class _Planned(NamedTuple):
@@ -51,19 +52,19 @@ class _Planned(NamedTuple):
     origins: tuple[str, ...]
     may: tuple[str, ...]
     risks: tuple[str, ...] = ()
-    """Resources of this machine that the package uses without a user's action."""
+    """Resources of this machine that the package uses without any action by the user."""
     old: Lock | None = None
-    """The version that an update replaces."""
+    """The version that the update replaces; None for a new installation."""
     stays: Lock | None = None
-    """The version in use, which stays in use: the new one is installed in addition."""
+    """The version in use, if it stays in use after the installation of another version."""
     changes: UpdateDiff | None = None
 
 
 @dataclass
 class Job:
-    """One install, from the request to its end.
+    """One installation job, from the request to its end.
 
-    The thread of an install only writes texts and numbers.
+    The thread of a job only writes texts and numbers.
     """
 
     number: int
@@ -101,7 +102,7 @@ class Job:
 
 
 class _Watched:
-    """A source that reports progress to a job, and stops after a cancel."""
+    """A package source that reports progress to a job, and fails after the job's cancellation."""
 
     def __init__(self, source: Source, job: Job) -> None:
         self._source = source
@@ -133,7 +134,7 @@ class _Watched:
 
 
 class Jobs:
-    """The jobs of one store: one at a time; the newest stays visible."""
+    """The jobs of one package store: one job at a time; the newest job stays visible."""
 
     def __init__(
         self,
@@ -144,9 +145,9 @@ class Jobs:
         """Prepare.
 
         Args:
-            store: the store of packages.
-            sources: returns the repositories; their warnings go to its argument.
-            used: returns the version of a package in use, also under its name alone.
+            store: the store of installed packages.
+            sources: returns the repositories, and passes warnings to its argument.
+            used: returns the version in use of a package, also of a package with the same name.
         """
         self._store = store
         self._used = used
@@ -157,7 +158,7 @@ class Jobs:
         self.newest: Job | None = None
 
     def begin(self, what: Wanted) -> Job:
-        """Plan an install; raise `Busy` while another job runs."""
+        """Start to plan an installation; raise `Busy` while another job is working."""
         if self.newest is not None and self.newest.state == "working":
             raise Busy(f"{self.newest.title} is under way: wait for it, or cancel it")
         if self._left >= _LEFT_MOST:
@@ -169,7 +170,7 @@ class Jobs:
         return job
 
     def touched(self, number: int) -> tuple[PackageId | None, Lock | None]:
-        """Return the package that a job installs, and the version in use that must stay."""
+        """Return the package that a job installs, and the version in use that must stay in use."""
         planned = self._asked(number).planned
         if planned is None:
             return None, None
@@ -183,8 +184,8 @@ class Jobs:
             takes_risks: whether the user also approved the package's own access to this machine.
 
         Raises:
-            Busy: the job does not wait for approval.
-            PackageError: the package needs `takes_risks`.
+            Busy: the job is not waiting for approval.
+            PackageError: the package requires `takes_risks`.
         """
         job = self._asked(number)
         planned = job.planned
@@ -206,13 +207,13 @@ class Jobs:
         return job
 
     async def planned(self) -> Job | None:
-        """Wait until the newest job needs approval or has ended; return it."""
+        """Wait until the newest job needs approval or has ended; return the job."""
         if self._task is not None:
             await asyncio.wait((self._task,))
         return self.newest
 
     def cancel(self, number: int) -> Job:
-        """Cancel a job that has changed nothing yet; raise `Busy` if it is not the newest."""
+        """Cancel a job before it changes anything; raise `Busy` if it is not the newest job."""
         job = self._asked(number)
         if job.state in ("working", "asks") and job.line != _INSTALLING:
             job.is_given_up = True
@@ -252,7 +253,7 @@ class Jobs:
             thread.exception()  # marks the exception as retrieved
 
     def _plan(self, job: Job, what: Wanted) -> _Planned:
-        """Download everything and read its permissions; in a thread."""
+        """Download all packages and read their permissions, in a thread."""
         known = [_Watched(one, job) for one in self._sources(job.notes.append)]
         plan = self._fetched(job, what, known)
         if job.is_given_up:
@@ -282,7 +283,7 @@ class Jobs:
     def _changes(
         self, job: Job, before: Lock | None, plan: InstallPlan, folder: Path, look: PreviewWorker
     ) -> UpdateDiff | None:
-        """Return the differences from the version before, as far as they are known."""
+        """Return the differences from the installed version, as far as they are known."""
         if before is None:
             return None
         if before.key != plan.lock.key:
@@ -335,6 +336,6 @@ def _clean(lines: Iterable[str]) -> tuple[str, ...]:
 
 
 def _line(error: Exception) -> str:
-    """Return a failure in one line: the first of several problems."""
+    """Return a failure in one line; of several problems, the first."""
     text = str(error).strip().splitlines()
     return text[0] if text else type(error).__name__

@@ -1,6 +1,6 @@
-"""Keeps the robots of the menu in step with the installed packages.
+"""Keeps the robots on the menu consistent with the installed packages.
 
-Layer 5. The manager has no route and no page: `urc.web.manage.routes` uses it.
+Layer 5. The manager has no routes and no pages: `urc.web.manage.routes` uses it.
 """
 
 import asyncio
@@ -44,10 +44,10 @@ class Manager:
         """Prepare.
 
         Args:
-            factory: the source of robots.
+            factory: creates the robots.
             fleet: the served robots.
             now: returns the time, in seconds.
-            renew: switches to another version of a robot; raises `UrcError`.
+            renew: switches to another version of a robot; may raise `UrcError`.
         """
         self.factory = factory
         self.fleet = fleet
@@ -55,13 +55,15 @@ class Manager:
         self.catalogue = PackageCatalog(factory.robot_options.data / "packages", now)
         self.jobs = Jobs(factory.store, self._sources, self._used)
         self._parked: dict[str, Lock] = {}
-        """Robots that are on the menu because they are installed: name → served version."""
+        """Robots that are on the menu because their packages are installed: maps the name to the
+        served version."""
         self._offered: dict[str, str] = {}
-        """Interfaces that robots offer because they are installed: name → digest."""
+        """Interfaces that robots offer because the interfaces are installed: maps the name to the
+        digest."""
         self._seen: object = None
-        """Fingerprint of the store's state at the last look."""
+        """Fingerprint of the package store's state at the last update of the menu."""
         self._is_behind = False
-        """Whether a change is deferred until a robot is no longer driven."""
+        """Whether a change waits until a robot is no longer driven."""
         self._changing = asyncio.Lock()
 
     def _sources(self, complain: Callable[[str], None]) -> list[Source]:
@@ -76,7 +78,7 @@ class Manager:
     # The menu
 
     async def park(self) -> None:
-        """Serve the installed robots if the menu shows them, and no others."""
+        """Update the robots of installed packages, if the menu shows installed robots."""
         if not self.factory.robot_options.shows_installed:
             return
         parked = await asyncio.to_thread(self.factory.parked)
@@ -111,7 +113,7 @@ class Manager:
             self._parked.setdefault(name, locks[-1])
 
     def _waits(self, name: str) -> bool:
-        """Return whether a robot is driven; a change of its package is then deferred."""
+        """Return whether a robot is driven, which defers a change of its package."""
         is_driven = name in self.fleet.robots and bool(self.fleet.driven_by(name))
         self._is_behind = self._is_behind or is_driven
         return is_driven
@@ -136,7 +138,7 @@ class Manager:
                 log.warning("%s: %s", name, error)
 
     async def apply_settings(self, name: str, robot: Robot, version: str) -> None:
-        """Switch to a robot with new settings; raise `UrcError` when widgets clash."""
+        """Switch to a robot with new settings; raise `UrcError` when widgets conflict."""
         if name in self.fleet.robots:
             self._renew(name, robot)
         else:
@@ -147,24 +149,24 @@ class Manager:
                 self._parked[name] = self.factory.chosen(locks, version)
 
     def document_of(self, name: str, robot: Robot) -> Profile:
-        """Return a robot's profile as its document says, without added interfaces."""
+        """Return a robot's profile as its document defines it, without added interfaces."""
         lock = self._parked.get(name)
         if lock is not None:
             return self.factory.profile(lock)
         return self.factory.reread(robot.profile)
 
     def drivers(self) -> dict[str, str]:
-        """Return name → installed package, as ``drivers/puppet 1.0.0``."""
+        """Return the installed package of each robot, such as ``drivers/puppet 1.0.0``, by name."""
         return {name: str(lock) for name, lock in self._parked.items()}
 
     def lock_of(self, name: str) -> Lock | None:
-        """Return the installed package of a robot; None for a robot that was given at the start."""
+        """Return the installed package of a robot; None for a robot given at the start."""
         return self._parked.get(name)
 
     # Changes
 
     async def refresh(self) -> None:
-        """Update the menu if another program has installed or removed a package."""
+        """Update the menu if any program has installed or removed a package."""
         if await asyncio.to_thread(self.factory.stamp) != self._seen:
             await self.changed()
 
@@ -182,7 +184,7 @@ class Manager:
                 log.warning("the installed packages cannot be read: %s", error)
 
     async def connect(self, url: str) -> None:
-        """Add a repository that responds; raise `PackageError`."""
+        """Add a repository, which must respond; raise `PackageError` if it does not."""
         known = self.catalogue.repositories(log.info)
         await in_daemon(lambda: known.add(url), "connect")
         self.catalogue.refresh(force=True)
@@ -194,14 +196,14 @@ class Manager:
         self.catalogue.refresh(force=True)
 
     def gone(self, required: PackageRequirement) -> list[str]:
-        """Return all packages that a removal would remove, as ``drivers/puppet 1.0.0``; raise."""
+        """Return all packages that a removal would remove; raise `PackageError`."""
         before = self.factory.store.installed()
         meant = self._meant(required)
         after = [lock for lock in before if lock not in meant]
         return sorted(_all(before) - _all(after))
 
     def _meant(self, required: PackageRequirement) -> list[Lock]:
-        """Return the installed packages that a wish names; raise `PackageError` for none."""
+        """Return the installed packages that match a requirement; raise `PackageError` for none."""
         meant = [
             lock
             for lock in self.factory.store.installed()
@@ -213,18 +215,19 @@ class Manager:
         return meant
 
     def forgettable(self, required: PackageRequirement) -> list[str]:
-        """Return the robots whose settings a removal could delete; raise."""
+        """Return the robots whose settings a removal could delete; raise `PackageError`."""
         meant = self._meant(required)
         left = [lock for lock in self.factory.store.installed() if lock not in meant]
         return names_kept(self._kept_folder, meant, left)
 
     async def remove(self, text: str, *, forgets: bool = True) -> list[str]:
-        """Remove a package and its unneeded dependencies; return their names.
+        """Remove a package and the dependencies that become unused; return the names of all.
 
-        `forgets` deletes the settings of its robot, too.
+        `forgets` also deletes the settings of its robot.
 
         Raises:
-            PackageError: it is not installed, or its robot is being driven.
+            PackageError: the package is not installed.
+            Busy: an operator drives the robot of the package.
         """
         required = parse_requirement(text)
         for lock in await asyncio.to_thread(self._meant, required):
@@ -244,7 +247,7 @@ class Manager:
     async def agree(self, number: int, *, takes_risks: bool = False) -> Job:
         """Install the planned package; raise `Busy` while its robot is being driven.
 
-        The version in use stays in use, except after an update.
+        The version in use stays in use, unless the job is an update.
         """
         key, used = await asyncio.to_thread(self.jobs.touched, number)
         if key is not None:
@@ -263,7 +266,7 @@ class Manager:
         return lock
 
     async def back(self, text: str) -> Lock:
-        """Restore and return the version before an update. Raise `PackageError`."""
+        """Restore and return the version before the last update. Raise `PackageError`."""
         lock = await asyncio.to_thread(self.installed, text)
         self._check_idle_of(lock.key)
 
@@ -281,7 +284,7 @@ class Manager:
                 self.check_idle(name)
 
     def _used(self, key: PackageId) -> Lock | None:
-        """Return the version of a package in use; for a driven robot, any package of its name."""
+        """Return the version of a package in use; a robot's package is looked up by its name."""
         installed = self.factory.store.installed()
         if key.kind in DRIVEN:
             return in_use(self._kept_folder, key.name, installed)
@@ -293,7 +296,7 @@ class Manager:
         return self.factory.robot_options.data / "robots"
 
     def check_idle(self, name: str) -> None:
-        """Raise `Busy` while a robot is driven."""
+        """Raise `Busy` while an operator drives the robot."""
         driver = self.fleet.driven_by(name)
         if driver:
             raise Busy(f"{name} is being driven ({driver}): wait until the controls are free")
@@ -301,12 +304,12 @@ class Manager:
     # Data for pages
 
     def cache(self, words: str, kinds: tuple[str, ...], *, may_manage: bool) -> PackageList:
-        """Return the lists of a page; in a thread, since it reads files.
+        """Return the package lists for a page; call this in a thread, because it reads files.
 
         Args:
-            words: search words for the packages of repositories.
-            kinds: kinds of packages.
-            may_manage: whether the visitor may change anything.
+            words: search words for packages of repositories.
+            kinds: kinds of the listed packages.
+            may_manage: whether the visitor may change packages and settings.
         """
         catalogue = self.catalogue
         # Read first: replies that arrive during the search then cause one more request.
@@ -375,7 +378,7 @@ class Manager:
         )
 
     def _fits(self, interface: str) -> tuple[str, ...]:
-        """Return the titles of the robots that offer an added interface."""
+        """Return the titles of the robots that offer an installed interface."""
         return tuple(
             robot.profile.title or name
             for name, robot in self.fleet.robots.items()

@@ -1,7 +1,7 @@
 """Requests that read or change the playback of a recording.
 
-Layer 5. The pages of a playback are those of a robot that is only watched. Any visitor may change
-the playback, because no real robot is connected.
+Layer 5. The pages of a playback are those of a robot without controls. Any visitor may control the
+playback, because no real robot is connected.
 """
 
 import math
@@ -17,7 +17,7 @@ __all__ = ["move_playback", "playback_state"]
 
 
 def playback_state(playback: Playback | None) -> Response:
-    """Return the state of the playback as a response; 404 for None."""
+    """Return the state of the playback as a response; status 404 without a playback."""
     if playback is None:
         return told(404, "this robot is no recording")
     return answer(
@@ -32,7 +32,7 @@ def playback_state(playback: Playback | None) -> Response:
 
 
 async def move_playback(request: Request, playback: Playback | None) -> Response:
-    """Run, pause or move the playback, and return its state as a response."""
+    """Play, pause or seek the playback, and return its state as a response."""
     if playback is None:
         return told(404, "this robot is no recording")
     try:

@@ -1,7 +1,8 @@
-"""Routes of the managers: their pages, and their requests under ``/api/v1``.
+"""Routes of the manager pages, and of their requests under ``/api/v1``.
 
-Layer 5. Each change is a POST with a JSON body from this server's own pages; `urc.web.serve.policy`
-checks that. Each request needs the start key or the token of --manage.
+Layer 5. Each change is a POST request with a JSON body from this server's own pages;
+`urc.web.serve.policy` checks the origin. Each change requires the start key or the token of
+--manage.
 """
 
 import asyncio
@@ -44,26 +45,26 @@ KINDS = {
     "interfaces": ("interface",),
     "widgets": ("widget",),
 }
-"""Page → kinds of packages."""
+"""Maps a page to the kinds of packages that it shows."""
 
 
 @dataclass(frozen=True, slots=True)
 class ManagePage:
-    """``manage.html.j2``: repositories, installed packages and available packages."""
+    """Context of ``manage.html.j2``: repositories, installed packages and available packages."""
 
     head: PageHead
     nav: Nav
     title: str
     about: str
-    """One sentence about these packages."""
+    """One sentence about the packages of the page."""
     kinds: str
     """Kinds of packages, separated by commas."""
     may_manage: bool
-    """Whether this visitor may change anything."""
+    """Whether the visitor may change packages and settings."""
     may_name_paths: bool
-    """Whether the visitor may name paths of this machine: only with the start key."""
+    """Whether the visitor may enter paths of this machine, which requires the start key."""
     is_shown: bool
-    """Whether the menu shows installed robots."""
+    """Whether the menu shows the installed robots."""
 
 
 def manage_page(
@@ -75,7 +76,7 @@ def manage_page(
     may_name_paths: bool,
     is_shown: bool,
 ) -> str:
-    """Return a manager's page; `which` is one of `KINDS`."""
+    """Return a manager page; `which` is a key of `KINDS`."""
     title, about = {
         "drivers": (
             t("Drivers"),
@@ -112,7 +113,7 @@ ONLY_HERE: Final = "this needs the key in the address that URC printed, or the t
 
 
 class ApiError(Exception):
-    """An error response: status and one line."""
+    """An error response: a status and one line of text."""
 
     def __init__(self, status: int, line: str) -> None:
         super().__init__(line)
@@ -126,22 +127,22 @@ def answer(value: object, status: int = 200) -> Response:
 
 
 async def body_of(request: Request, kind: type[_T]) -> _T:
-    """Return the JSON body of a request as a `kind`; raise `ApiError`."""
+    """Return the JSON body of a request, decoded as `kind`; raise `ApiError`."""
     if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
         raise ApiError(415, "expected a body of type application/json")
     try:
         return msgspec.json.decode(await request.body(), type=kind)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise ApiError(400, f"the request does not fit: {error}") from None
+        raise ApiError(400, f"the request body does not match the schema: {error}") from None
 
 
 def told(status: int, line: str) -> Response:
-    """Return an error response with one line."""
+    """Return an error response with one line of text."""
     return answer(Failure(line), status)
 
 
 def _api(handler: _Handler) -> _Handler:
-    """Turn each `UrcError` of a handler into a response with one line."""
+    """Turn each `UrcError` of a handler into a response with one line of text."""
 
     @wraps(handler)
     async def handle(self: "ManageRoutes", request: Request) -> Response:
@@ -160,7 +161,7 @@ def _api(handler: _Handler) -> _Handler:
 
 
 class ManageRoutes:
-    """The routes of the managers of one dashboard."""
+    """The routes of a dashboard's manager pages."""
 
     def __init__(
         self,
@@ -175,7 +176,7 @@ class ManageRoutes:
             manager: the operations.
             ways: the pages of this server, for links.
             is_here: returns whether a request has the start key.
-            may_manage: returns whether a request may change anything.
+            may_manage: returns whether a request may change packages and settings.
         """
         self._manager = manager
         self._ways = ways
@@ -183,7 +184,7 @@ class ManageRoutes:
         self.may_manage = may_manage
 
     def routes(self) -> list[Route]:
-        """Return the routes of the pages and of their requests."""
+        """Return the routes of the pages and of their API requests."""
         posts = {
             "repositories": self.connect,
             "repositories/ask": self.refresh,
@@ -206,7 +207,7 @@ class ManageRoutes:
         ]
 
     def check(self, connection: HTTPConnection) -> None:
-        """Raise `ApiError` if the visitor may not change anything."""
+        """Raise `ApiError` if the visitor may not change packages and settings."""
         if not self.may_manage(connection):
             raise ApiError(403, ONLY_HERE)
 
@@ -225,7 +226,7 @@ class ManageRoutes:
 
     @_api
     async def cache(self, request: Request) -> Response:
-        """Return the packages; ``kinds`` and ``words`` filter. No repository is contacted."""
+        """Return the packages that match ``kinds`` and ``words``, without any new request."""
         query = request.query_params
         kinds = tuple(one for one in query.get("kinds", "").split(",") if one in _KINDS) or _KINDS
         cache = await asyncio.to_thread(
@@ -238,9 +239,9 @@ class ManageRoutes:
 
     @_api
     async def refresh(self, request: Request) -> Response:
-        """Start a refresh from the repositories; ``force`` ignores the age of the last one.
+        """Start a refresh from the repositories; ``force`` ignores the age of the lists.
 
-        Any visitor may start a refresh, but only now and then.
+        Any visitor may start a refresh, at most once per `FRESH_S` seconds.
         """
         said = await body_of(request, RefreshRequest)
         self._manager.catalogue.refresh(force=said.force and self.may_manage(request))
@@ -259,7 +260,7 @@ class ManageRoutes:
 
     @_api
     async def disconnect(self, request: Request) -> Response:
-        """Remove a repository; its installed packages stay."""
+        """Remove a repository; the packages installed from it stay."""
         self.check(request)
         said = await body_of(request, Url)
         await self._manager.disconnect(said.url)
@@ -267,21 +268,21 @@ class ManageRoutes:
 
     @_api
     async def install(self, request: Request) -> Response:
-        """Start the install of a package: download it, and list its permissions."""
+        """Start a job for a package by name: download it, and list its permissions."""
         self.check(request)
         said = await body_of(request, InstallRequest)
         return self._begun(parse_requirement(said.package))
 
     @_api
     async def add(self, request: Request) -> Response:
-        """Start the install of a package by its path in a repository, or on this machine."""
+        """Start a job for a package by its path in a repository, or on this machine."""
         self.check(request)
         said = await body_of(request, Add)
         return self._begun(self._meant(said.path.strip(), request))
 
     @_api
     async def upload(self, request: Request) -> Response:
-        """Start the install of an uploaded package, bundle or interface: the request body."""
+        """Start a job for the uploaded package, bundle or interface in the request body."""
         self.check(request)
         if request.headers.get("content-type") != "application/octet-stream":
             raise ApiError(415, "expected a body of type application/octet-stream")
@@ -309,7 +310,7 @@ class ManageRoutes:
 
     @_api
     async def remove(self, request: Request) -> Response:
-        """Remove a package; without ``yes`` only list the packages that would go."""
+        """Remove a package; without ``yes``, only list the packages that would be removed."""
         self.check(request)
         said = await body_of(request, InstallRequest)
         if not said.yes:
@@ -343,7 +344,7 @@ class ManageRoutes:
         return answer(news, 202)
 
     def _meant(self, path: str, request: Request) -> PackageRequirement | Path:
-        """Resolve a path: ``/interfaces/wide/`` in a repository, or a path of this machine."""
+        """Resolve a path: ``/interfaces/wide/`` in a repository, or a path on this machine."""
         inside = path.strip("/")
         if inside.partition("/")[0] in FOLDERS:
             try:

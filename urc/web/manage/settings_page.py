@@ -1,6 +1,7 @@
-"""Data of a robot's settings page: one form field for each setting, by the type of its value.
+"""Data of a robot's settings page: one form field per setting, chosen by the setting's type.
 
-Layer 5. Pure: this module fills the fields, `urc.web.manage.settings_routes` reads them.
+Layer 5. A pure module: it fills the fields, and `urc.web.manage.settings_routes` reads their
+values.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -26,13 +27,13 @@ _INPUTS: Final = {
     "number": ("text", "decimal"),
     "path": ("text", ""),
 }
-"""Type of a setting → type of its field and its on-screen keyboard. Numbers are text fields:
-a field of type number drops input that it cannot parse."""
+"""Maps the type of a setting to the type of its field and of the on-screen keyboard. Numbers are
+entered in text fields, because a number field drops invalid input."""
 
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """One choice of several."""
+    """One option of a choice field."""
 
     value: str
     title: str
@@ -46,27 +47,27 @@ class Field:
     name: str
     title: str
     about: str
-    """Description with range and default."""
+    """Description of the setting, with its range and default."""
     kind: str
-    """``text``, ``password``, ``choice`` or ``switch``."""
+    """Type of the field: ``text``, ``password``, ``choice`` or ``switch``."""
     keys: str
-    """``inputmode``; "" for the default."""
+    """HTML ``inputmode`` of the field; "" for the default keyboard."""
     value: str
-    """Entered value; never that of a secret."""
+    """Entered value; always "" for a secret."""
     placeholder: str
-    """Effective value while the field is empty."""
+    """Value in effect while the field is empty."""
     options: tuple[Option, ...]
     is_given: bool
-    """Whether the value was given at the start, and so is fixed here."""
+    """Whether the value was given at the start of the server, and cannot be changed here."""
     is_set: bool
-    """Whether a secret has a value."""
+    """Whether the secret has a value."""
     is_withheld: bool
-    """Whether a stored secret is unused because it was entered for another destination."""
+    """Whether the stored secret is unused because it was entered for another destination."""
 
 
 @dataclass(frozen=True, slots=True)
 class SettingsPage:
-    """``settings.html.j2``: driver, interface, and the driver's own settings."""
+    """Context of ``settings.html.j2``: the driver, the interface, and the driver's settings."""
 
     head: PageHead
     nav: Nav
@@ -81,11 +82,11 @@ class SettingsPage:
     interfaces: tuple[Option, ...]
     fields: tuple[Field, ...]
     transports: tuple[str, ...]
-    """Names of the transports of the test."""
+    """Names of the transports in the connection test."""
     may_manage: bool
     is_simulated: bool
     fault: str
-    """Why the robot cannot be used, or ""."""
+    """Reason why the robot cannot be used; "" if it can."""
 
 
 def settings_page(
@@ -105,17 +106,18 @@ def settings_page(
     """Return the page.
 
     Args:
-        nonce: nonce of this response.
-        name: name of the robot in its URL.
-        profile: the profile with all its interfaces.
-        kept: the stored settings.
-        given: settings from the start of the server.
-        withheld: secrets that are unused because they were entered for another destination.
+        nonce: nonce of the response's content security policy.
+        name: name of the robot in URLs.
+        profile: the robot's profile with all its interfaces.
+        kept: the stored settings of the robot.
+        given: settings given at the start of the server.
+        withheld: names of secrets that are unused because they were entered for another
+            destination.
         ways: the pages of this server, for links.
-        driver: the driver in use.
-        versions: its installed versions, newest first.
+        driver: the name of the package or file in use.
+        versions: installed versions of the driver, newest first.
         may_manage: whether the visitor may change anything.
-        fault: why the robot cannot be used, or "".
+        fault: reason why the robot cannot be used; "" if it can.
     """
     title = profile.title or name
     place = quote(name, safe="")
@@ -217,5 +219,5 @@ def _about(setting: Setting) -> str:
 
 
 def _text(value: Value) -> str:
-    """Return a value as a user would type it."""
+    """Return a value in the form in which a user enters it."""
     return str(value).lower() if isinstance(value, bool) else str(value)

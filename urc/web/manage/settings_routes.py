@@ -1,6 +1,7 @@
-"""Routes of a robot's settings: they are entered, tested, stored and used at once.
+"""Routes of a robot's settings, which are entered, tested, stored and then used immediately.
 
-Layer 5. Settings whose test fails are not stored, unless the user insists: a robot may be off.
+Layer 5. Settings that fail the test are stored only if the user insists, because a robot may be
+off.
 """
 
 import asyncio
@@ -39,14 +40,14 @@ _END_S: Final = 5.0
 
 
 class SettingsRoutes:
-    """The settings pages of all robots."""
+    """The routes of the settings pages of all robots."""
 
     def __init__(self, manager: Manager, manage: ManageRoutes, ways: NavigationLinks) -> None:
         """Prepare.
 
         Args:
-            manager: the packages and robots.
-            manage: the check of permission.
+            manager: the operations on packages and robots.
+            manage: the routes of the managers, which check permissions.
             ways: the pages of this server, for links.
         """
         self._manager = manager
@@ -55,14 +56,14 @@ class SettingsRoutes:
         self._trying: set[str] = set()
 
     def routes(self) -> list[Route]:
-        """Return the routes of the page and of its form."""
+        """Return the routes of the settings page and of its form."""
         return [
             Route("/robots/{name}/settings", self.page),
             Route("/api/v1/robots/{name}/settings", self.save, methods=["POST"]),
         ]
 
     async def page(self, request: Request) -> Response:
-        """Show the settings of a robot."""
+        """Show the settings page of a robot."""
         name = request.path_params["name"]
         html = await asyncio.to_thread(self._page, request, name)
         return HTMLResponse(html, headers=_NO_STORE)
@@ -102,7 +103,7 @@ class SettingsRoutes:
         return robot.profile if robot is not None else None
 
     async def save(self, request: Request) -> Response:
-        """Test the entered settings, and store them."""
+        """Test and store the entered settings."""
         name = request.path_params["name"]
         try:
             self._manage.check(request)
@@ -155,7 +156,7 @@ class SettingsRoutes:
             return StoredSettings()  # damaged: the new values replace it
 
     def _document(self, name: str, version: str) -> Profile:
-        """Return the profile of the chosen version, as written in its document."""
+        """Return the profile of the chosen version, as its document defines it."""
         manager, factory = self._manager, self._manager.factory
         lock = manager.lock_of(name)
         if lock is not None:
@@ -168,7 +169,7 @@ class SettingsRoutes:
     def _filled_in(
         self, profile: Profile, before: StoredSettings, said: SettingsAsked
     ) -> tuple[StoredSettings, dict[str, str]]:
-        """Return the settings to store, and the mistakes by field."""
+        """Return the settings to store, and the errors by field."""
         texts, faults = _typed(profile, said)
         factory = self._manager.factory
         package = factory.package_of(profile)
@@ -193,7 +194,7 @@ class SettingsRoutes:
     async def _tried(
         self, name: str, profile: Profile, values: Mapping[str, Value]
     ) -> tuple[ProbedTransport, ...]:
-        """Test every transport while the robot is disconnected; a STOP ends the test at once."""
+        """Test all transports while the robot is disconnected; a STOP ends the test immediately."""
         robot_options = self._manager.factory.robot_options
         service = self._manager.fleet.stations.get(name)
         held_off = service.held_off() if service is not None else nullcontext()
@@ -215,7 +216,7 @@ class SettingsRoutes:
 
 
 def _epoch(service: RobotService | None) -> int:
-    """Return a number that changes with every STOP and every new operator."""
+    """Return a number that changes with every STOP and every change of the operator."""
     return service.controls.controller.lease.state.epoch if service is not None else 0
 
 
@@ -231,7 +232,7 @@ def _line(tried: ProbeResult) -> ProbedTransport:
 
 
 def _typed(profile: Profile, said: SettingsAsked) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the valid inputs, and the mistakes in the others by field."""
+    """Return the valid inputs, and the errors of the invalid inputs, by field."""
     texts: dict[str, str] = {}
     faults: dict[str, str] = {}
     for name, setting in profile.settings.items():

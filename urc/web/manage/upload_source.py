@@ -1,6 +1,6 @@
-"""Sources of uploaded packages: a bundle, an archive, or a bare interface document.
+"""Sources of uploaded packages: a bundle, an archive, or an interface document without a package.
 
-Layer 5. A bare document becomes a package, so it is stored, listed and removed like all others.
+Layer 5. A document is wrapped in a package, so it is stored, listed and removed like all packages.
 """
 
 from collections.abc import Sequence
@@ -23,19 +23,19 @@ __all__ = ["given_source", "source_at"]
 
 _DOCUMENTS: Final = (".yaml", ".yml")
 _BYTES: Final = 262_144
-"""Largest bare document, in bytes."""
+"""Maximum size of a document without a package, in bytes."""
 
 
 def given_source(name: str, data: bytes, installed: Sequence[Lock]) -> FileSource:
-    """Return the source of an uploaded file.
+    """Return the package source of an uploaded file.
 
     Args:
-        name: name of the file from the browser; only its suffix counts.
+        name: file name from the browser; only the suffix matters.
         data: its content.
-        installed: installed packages; a bare document gets an unused version.
+        installed: installed packages; a document gets a version that none of them uses.
 
     Raises:
-        PackageError: it is neither a package nor an interface.
+        PackageError: the file is neither a package nor an interface.
     """
     name = PurePath(name).name or "the upload"
     suffix = PurePath(name).suffix.lower()
@@ -53,9 +53,10 @@ def given_source(name: str, data: bytes, installed: Sequence[Lock]) -> FileSourc
 
 
 def source_at(path: Path, installed: Sequence[Lock]) -> FileSource:
-    """Return the source at a path of this machine; raise `PackageError`.
+    """Return the package source at a path on this machine; raise `PackageError`.
 
-    The path is a package's folder, a bundle, an archive, an interface document, or its folder.
+    The path leads to a package folder, a bundle, an archive, an interface document, or the folder
+    of one.
     """
     bare = path / "interface.yaml" if path.is_dir() else path
     if bare.suffix.lower() not in _DOCUMENTS or (path / MANIFEST).is_file():
@@ -82,7 +83,7 @@ def _wrapped(name: str, data: bytes, installed: Sequence[Lock]) -> FileSource:
         )
     called = document.get("name")
     if not isinstance(called, str) or not NAME.fullmatch(called):
-        raise PackageError(f"{name}: expected 'name' with small letters, digits and '-'")
+        raise PackageError(f"{name}: expected 'name' in lower-case letters, digits and '-'")
     key = PackageId("interface", called)
     before = [lock.number for lock in installed if lock.key == key]
     manifest = {

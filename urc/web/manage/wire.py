@@ -1,6 +1,7 @@
-"""Messages between the managers' pages and the server: JSON, in camel case.
+"""JSON messages between the manager pages and the server, in camel case.
 
-Layer 5. Pure. Requests are decoded into these types; a mismatch is refused with one line.
+Layer 5. Pure. Requests are decoded into these types; the server refuses an invalid request with one
+line of text.
 """
 
 from typing import Annotated, Any, Final, Literal
@@ -36,7 +37,7 @@ __all__ = [
 ]
 
 MOST_HITS: Final = 100
-"""Most packages in the result of a search."""
+"""Maximum number of packages in a search result."""
 
 _Short = Annotated[str, msgspec.Meta(max_length=300)]
 _Long = Annotated[str, msgspec.Meta(max_length=4096)]
@@ -44,7 +45,7 @@ _Settings = Annotated[dict[_Short, _Long | None], msgspec.Meta(max_length=200)]
 
 
 class ManageMessage(msgspec.Struct, frozen=True, rename="camel", forbid_unknown_fields=True):
-    """Base of all messages of this module."""
+    """The base class of all messages in this module."""
 
 
 class Url(ManageMessage, frozen=True):
@@ -54,30 +55,30 @@ class Url(ManageMessage, frozen=True):
 
 
 class RefreshRequest(ManageMessage, frozen=True):
-    """Request to refresh the package lists from the repositories."""
+    """Request to refresh the package lists."""
 
     force: bool = False
-    """Whether to ignore the age of the last refresh."""
+    """Whether to ignore the age of the lists."""
 
 
 class InstallRequest(ManageMessage, frozen=True):
-    """Request about a package: ``drivers/puppet`` or ``drivers/puppet@1.0.0``."""
+    """Request about a package, such as ``drivers/puppet`` or ``drivers/puppet@1.0.0``."""
 
     package: _Short
     yes: bool = False
-    """Whether to perform a removal; else it is only listed."""
+    """Whether to perform the removal; if not, it is only listed."""
     forget: bool = True
-    """Whether a removal also deletes the settings of the robot, with its secrets."""
+    """Whether a removal also deletes the robot's settings and secrets."""
 
 
 class Add(ManageMessage, frozen=True):
-    """Request to add a package by its path: in a repository, or on this machine."""
+    """Request to add a package by its path, in a repository or on this machine."""
 
     path: _Long
 
 
 class JobDecision(ManageMessage, frozen=True):
-    """Approval or cancellation of a job, after its permissions were shown."""
+    """Approval or cancellation of a job, after the user has seen the permissions."""
 
     number: int
     takes_risks: bool = False
@@ -94,26 +95,26 @@ class JobNews(ManageMessage, frozen=True):
     title: str
     state: JobState
     line: str
-    """Current activity or result, in one line."""
+    """Current activity or result of the job, in one line."""
     done: int
     of: int
-    """Number of steps; 0 while unknown."""
+    """Number of steps; 0 while the number is unknown."""
     is_update: bool = False
     packages: tuple[str, ...] = ()
-    """Origin and signer of each package; for an update, the change of each."""
+    """Origin and signer of each package; for an update, the changes of both."""
     may: tuple[str, ...] = ()
-    """Permissions of the package, one a line."""
+    """Permissions of the package, one per line."""
     risks: tuple[str, ...] = ()
-    """Access of the package itself to this machine; for an update, only new access."""
+    """The package's own access to this machine; for an update, only additional access."""
     gained: tuple[str, ...] = ()
-    """Permissions that an update adds."""
+    """Permissions that the update adds."""
     lost: tuple[str, ...] = ()
     wire: tuple[str, ...] = ()
-    """Changes in the frames to the robot, for an update."""
+    """Changes that the update makes to the frames sent to the robot."""
     stays: str = ""
-    """Version that stays in use until the user chooses another one, or ""."""
+    """Version that stays in use until the user chooses another version; "" if none does."""
     notes: tuple[str, ...] = ()
-    """Further notes, for example about a repository that did not respond."""
+    """Further notes, for example about a repository that does not respond."""
 
 
 class RepositoryInfo(ManageMessage, frozen=True):
@@ -122,19 +123,19 @@ class RepositoryInfo(ManageMessage, frozen=True):
     url: str
     name: str
     count: int
-    """Number of package versions in it."""
+    """Number of package versions in the repository."""
     fault: str
-    """Why the last request failed, or ""."""
+    """Reason why the last request failed; "" if it succeeded."""
     is_kept: bool
-    """Whether its cached list is in use."""
+    """Whether the cached list of the repository is in use."""
     is_plain: bool
-    """Whether it is reached without encryption."""
+    """Whether the repository is reached without encryption."""
     keeper: str = ""
-    """Signer of its index, with the fingerprint of the key; "" if it is unsigned."""
+    """Signer of the repository's index, with the key's fingerprint; "" for an unsigned index."""
 
 
 class Installed(ManageMessage, frozen=True):
-    """A package that a user installed, and no mere dependency."""
+    """A package that a user has installed directly, not only as a dependency."""
 
     package: str
     name: str
@@ -144,48 +145,48 @@ class Installed(ManageMessage, frozen=True):
     licence: str
     authors: tuple[str, ...]
     brings: tuple[str, ...]
-    """Dependencies of the package, as ``widgets/dial 1.0.0``."""
+    """Dependencies of the package, such as ``widgets/dial 1.0.0``."""
     newer: str
-    """Newer version in a repository, or ""."""
+    """Newer version in a repository; "" if this version is the newest."""
     before: str
-    """Version before the update, or "" if none can be restored."""
+    """Version before the update; "" if no earlier version can be restored."""
     url: str
-    """URL of its page, or ""."""
+    """URL of the package's page; "" if it has none."""
     settings_url: str
     fits: tuple[str, ...]
-    """Titles of the robots that offer this interface."""
+    """Titles of the robots that offer the interface."""
     fault: str
-    """Why it cannot be used, or ""."""
+    """Reason why the package cannot be used; "" if it can."""
     withdrawn: tuple[str, ...] = ()
-    """Withdrawn packages among it and its dependencies, with the reason; one a line."""
+    """Withdrawn packages among the package and its dependencies with the reasons, one per line."""
 
 
 class Available(ManageMessage, frozen=True):
-    """A package of a repository."""
+    """A package that a repository offers."""
 
     package: str
     name: str
     kind: str
     version: str
     versions: tuple[str, ...]
-    """All versions, newest first."""
+    """All offered versions, newest first."""
     summary: str
     licence: str
     authors: tuple[str, ...]
     origin: str
     size: int
     has: str
-    """Installed version, or ""."""
+    """Installed version; "" if none is installed."""
 
 
 class PackageList(ManageMessage, frozen=True):
-    """All lists of a manager's page."""
+    """All lists of a manager page."""
 
     repositories: tuple[RepositoryInfo, ...]
     installed: tuple[Installed, ...]
     available: tuple[Available, ...]
     total: int
-    """Packages that were found; the lists have at most `MOST_HITS`."""
+    """Number of packages found; the lists contain at most `MOST_HITS`."""
     is_asking: bool
     """Whether a refresh is running."""
     may_manage: bool
@@ -193,26 +194,26 @@ class PackageList(ManageMessage, frozen=True):
 
 
 class ResultLine(ManageMessage, frozen=True):
-    """Result of an action, in one line."""
+    """Result of an action, as one line of text."""
 
     line: str
 
 
 class RemovedPackages(ManageMessage, frozen=True):
-    """Packages that a removal removes."""
+    """Packages that a removal affects."""
 
     gone: tuple[str, ...]
-    """Names as ``drivers/puppet 1.0.0``."""
+    """Names and versions, such as ``drivers/puppet 1.0.0``."""
     line: str
     has_settings: bool = False
-    """Whether it has settings, which the removal may delete."""
+    """Whether the robot has settings, which the removal may delete."""
 
 
 class Failure(ManageMessage, frozen=True):
-    """Error response: why a request failed."""
+    """Error response with the reason for a failed request."""
 
     error: str
-    """The reason, in one line."""
+    """The reason, as one line of text."""
 
 
 class HealthStatus(ManageMessage, frozen=True):
@@ -223,27 +224,27 @@ class HealthStatus(ManageMessage, frozen=True):
 
 
 class StopResult(ManageMessage, frozen=True):
-    """Result of a STOP."""
+    """Result of a STOP request."""
 
     latched: str
     """Name of the operator who pressed STOP."""
     confirmed: bool
-    """Whether the robot's transports have taken the stop."""
+    """Whether all transports of the robot have accepted the stop."""
 
 
 class ControlState(ManageMessage, frozen=True):
-    """The holder of the lease, and the state of STOP."""
+    """Holder of the lease, and state of STOP."""
 
     holder: str
-    """Name of the page that drives, or ""."""
+    """Name of the page that drives; "" if no page drives."""
     latched: str
-    """Name of the operator who pressed STOP; "" while nothing is latched."""
+    """Name of the operator who pressed STOP; "" while STOP is not latched."""
     emulated: bool
-    """Whether the robot is emulated or a playback."""
+    """Whether the robot is emulated, or is a playback."""
 
 
 class PlaybackRequest(ManageMessage, frozen=True):
-    """Request to change the playback; fields that are left out stay as they are."""
+    """Request to change the playback; omitted fields stay unchanged."""
 
     position_s: float | None = None
     is_playing: bool | None = None
@@ -262,36 +263,36 @@ class PlaybackState(ManageMessage, frozen=True):
 
 
 class Timeline(ManageMessage, frozen=True):
-    """Audit log of a robot's motion."""
+    """The audit log of a robot's motion."""
 
     entries: list[dict[str, Any]]
     fault: str
-    """Why the log is no longer written, or ""."""
+    """Reason why the log is no longer written; "" while it is written."""
 
 
 class ReloadResult(ManageMessage, frozen=True):
-    """Result of a reload of a robot's documents."""
+    """Result of reloading the documents of a robot."""
 
     line: str
     url: str
-    """URL of its page."""
+    """URL of the robot's page."""
 
 
 class SettingsAsked(ManageMessage, frozen=True):
-    """The submitted settings of a robot."""
+    """Settings of a robot, as submitted by the page."""
 
     settings: _Settings = {}
-    """Setting → typed text; None leaves a secret as it is."""
+    """Maps a setting to the typed text; None leaves a secret unchanged."""
     version: _Short = ""
     interface: _Short = ""
     test: bool = True
     """Whether to test the connection."""
     anyway: bool = False
-    """Whether to save even if the test fails."""
+    """Whether to save even if the connection test fails."""
 
 
 class ProbedTransport(ManageMessage, frozen=True):
-    """Test result of one transport."""
+    """Result of the connection test of one transport."""
 
     transport: str
     type: str
@@ -302,12 +303,12 @@ class ProbedTransport(ManageMessage, frozen=True):
 
 
 class SettingsAnswer(ManageMessage, frozen=True):
-    """Result of a submission of settings."""
+    """Result of submitting settings."""
 
     is_saved: bool
     text: str
     faults: dict[str, str] = {}
-    """Setting → its mistake, in one line."""
+    """Maps a setting to its error, as one line of text."""
     missing: tuple[str, ...] = ()
-    """Titles of settings that have no value."""
+    """Titles of required settings without a value."""
     lines: tuple[ProbedTransport, ...] = ()

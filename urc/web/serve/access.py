@@ -1,8 +1,8 @@
-"""Identity of visitors: a secret of this start, never an address.
+"""Identity of visitors, proved by a secret that changes at each start, never by an address.
 
-Layer 5. Pure. The address that URC prints carries the start key. A browser hands it in once and
-gets a session in a cookie that scripts cannot read; a program sends the key with each request. Keys
-and sessions end with the server.
+Layer 5. Pure. The address printed by URC contains the start key. A browser hands in the key once,
+and gets a session in a cookie that scripts cannot read. A program sends the key with each request.
+Keys and sessions expire when the server stops.
 """
 
 import secrets
@@ -14,16 +14,18 @@ from urllib.parse import quote
 __all__ = ["PARAMETER", "UNKNOWN_VISITOR", "Access", "Standing", "Visitor"]
 
 PARAMETER = "key"
-"""Name of the start key in the query of a URL."""
+"""Name of the query parameter that carries the start key."""
 PREFIX = "urc-start-"
 SESSIONS = 1000
-"""Most known browsers; the oldest one is forgotten."""
+"""Maximum number of known browsers; above it, the oldest browser is forgotten."""
 CODES = 16
 OLD_COOKIES = 8
-"""Most cookies of earlier starts in one browser; one more, and all are deleted."""
+"""Maximum number of cookies from earlier starts in one browser; above it, all these cookies are
+deleted."""
 
 Standing = Literal["here", "manager", "stranger"]
-"""``here`` has the start key, ``manager`` the token of ``--manage``, ``stranger`` neither."""
+"""Rights of a visitor: ``here`` has the start key, ``manager`` the token of ``--manage``,
+``stranger`` neither."""
 _Headers = Iterable[tuple[bytes, bytes]]
 
 
@@ -32,16 +34,16 @@ class Visitor(NamedTuple):
 
     standing: Standing = "stranger"
     name: str = ""
-    """Identifier of the browser or program; "" for unknown visitors. No secret."""
+    """Identifier of the browser or program; "" for an unknown visitor. No secret."""
     is_program: bool = False
-    """Whether the request itself carries the key, which a third-party page cannot send."""
+    """Whether the request itself carries the key, which a page of another site cannot send."""
 
 
 UNKNOWN_VISITOR = Visitor()
 
 
 class Access:
-    """The keys of one start of the server, and the browsers admitted by a key."""
+    """The keys of one start of the server, and the browsers that these keys have admitted."""
 
     def __init__(
         self, *, is_open: bool = False, key: str = "", instance: str = "", token: str = ""
@@ -49,30 +51,30 @@ class Access:
         """Make the key.
 
         Args:
-            is_open: unknown visitors may watch and drive; otherwise they may only press STOP.
-            key: the start key; "" makes one.
-            instance: identifier in the cookie's name of this start; "" makes one.
-            token: the secret of managers; "" for none.
+            is_open: whether unknown visitors may watch and drive; if not, they may only press STOP.
+            key: the start key; "" generates one.
+            instance: identifier of this start in the cookie's name; "" generates one.
+            token: the secret of managers; "" for no managers.
         """
         self.is_open = is_open
         self.key = key or secrets.token_urlsafe(24)
         self.instance = instance or secrets.token_hex(4)
         self.cookie = PREFIX + self.instance
         self.frame_code = f"/frame-code/{secrets.token_urlsafe(16)}"
-        """Path below which frames load code: a frame has no origin, and so sends no cookies."""
+        """Path prefix of code for frames: a frame has no origin, and therefore sends no cookies."""
         self._token = token
         self._sessions: dict[str, Visitor] = {}
         self._codes: dict[str, None] = {}
         self._count = 0
 
     def address(self, url: str) -> str:
-        """Return `url`, which has no query, with the start key."""
+        """Return `url` with the start key; `url` must not have a query."""
         return f"{url}?{PARAMETER}={quote(self.key, safe='')}"
 
     def address_once(self, url: str) -> str:
-        """Return an address for the first browser only, without the start key.
+        """Return an address that admits only the first browser, and does not contain the start key.
 
-        This address may appear in public, for example in the command line of a browser.
+        The address may become visible to others, for example in the command line of a browser.
         """
         code = secrets.token_urlsafe(24)
         self._codes[code] = None
@@ -81,11 +83,11 @@ class Access:
         return f"{url}?{PARAMETER}={code}"
 
     def address_of_managers(self, url: str) -> str:
-        """Return the address for remote managers; "" without a token."""
+        """Return the address for remote managers; "" if there is no token."""
         return f"{url}?{PARAMETER}={quote(self._token, safe='')}" if self._token else ""
 
     def admit(self, word: str) -> str | None:
-        """Return the new session of a browser that hands in `word`; None if the key is invalid."""
+        """Return a new session for a browser that hands in the key `word`; None if invalid."""
         standing = self._standing(word)
         if standing is None and word in self._codes:
             del self._codes[word]
@@ -100,10 +102,10 @@ class Access:
         return session
 
     def cookies(self, session: str, headers: _Headers, *, is_secure: bool) -> list[str]:
-        """Return the ``Set-Cookie`` headers that keep a session.
+        """Return the ``Set-Cookie`` headers that store a session in the browser.
 
         Args:
-            session: the result of `admit`.
+            session: a result of `admit`.
             headers: headers of the request.
             is_secure: whether the request came over TLS.
         """
@@ -115,7 +117,7 @@ class Access:
         return kept
 
     def visitor(self, headers: _Headers) -> Visitor:
-        """Return the visitor of a request with these headers (names in lower case)."""
+        """Return the visitor of a request from its headers, with names in lower case."""
         pairs = list(headers)
         for name, value in pairs:
             scheme, _, word = value.decode("latin-1").partition(" ")
@@ -140,7 +142,7 @@ def _is_same(said: str, wanted: str) -> bool:
 
 
 def _cookies(headers: _Headers) -> Iterator[tuple[str, str]]:
-    """Yield name and value of each cookie; a name may repeat."""
+    """Yield the name and value of each cookie; names may repeat."""
     for name, value in headers:
         if name == b"cookie":
             for part in value.decode("latin-1").split(";"):

@@ -1,8 +1,8 @@
-"""One HTTP connection: requests have a time limit, and every refusal carries the policy headers.
+"""One HTTP connection, with a time limit for requests and with policy headers in every refusal.
 
-Layer 5. A thin layer over uvicorn's protocol; only `server` uses it. The library itself refuses
-bytes that are no HTTP, and connections above its limit. Without this layer those responses would
-lack the page policy.
+Layer 5. A thin layer over uvicorn's protocol, used only by `server`. uvicorn itself refuses invalid
+HTTP, and connections above its limit. Without this layer, these refusals would lack the page
+policy.
 """
 
 import asyncio
@@ -20,18 +20,18 @@ from urc.web.serve.policy import REFUSAL_HEADERS
 __all__ = ["CONNECTIONS", "REQUEST_S", "RESERVE", "HttpConnection", "refusal"]
 
 CONNECTIONS = 1024
-"""Most open connections, WebSockets included. A further one closes an idle one: the oldest of the
-address with the most idle connections."""
+"""Maximum number of open connections, including WebSockets. Another connection closes an idle
+connection: the oldest idle one of the address that has most of them."""
 RESERVE = 64
-"""Further connections while none is idle, for STOP only."""
+"""Additional connections for STOP only, when no connection is idle."""
 REQUEST_S = 5.0
-"""Time limit for a whole request with its body, in seconds. The time runs from the opening of the
-connection for the first request, and from the first byte for later ones.
+"""Time limit for the arrival of a complete request with its body, in seconds. The time starts at
+the opening of the connection for the first request, and at the first byte for later requests.
 """
 
 
 def refusal(status: HTTPStatus, text: str) -> bytes:
-    """Return a complete response with one line of plain text; the connection closes after it."""
+    """Return a complete response with one line of plain text, which closes the connection."""
     body = text.encode() + b"\n"
     headers = [
         (b"content-type", b"text/plain; charset=utf-8"),
@@ -45,18 +45,18 @@ def refusal(status: HTTPStatus, text: str) -> bytes:
 
 
 def _stops(data: bytes) -> bool:
-    """Return whether a request with this beginning is a STOP."""
+    """Return whether a request that begins with `data` is a STOP."""
     method, _, rest = data.partition(b"\r\n")[0].partition(b" ")
     return is_stop(method.decode("latin-1"), rest.partition(b" ")[0].decode("latin-1"))
 
 
 class HttpConnection(H11Protocol):
-    """uvicorn's HTTP/1.1 protocol with a time limit on the arrival of a request.
+    """uvicorn's HTTP/1.1 protocol, with a time limit for the arrival of a request.
 
-    WARNING: it depends on asyncio's protocol methods and on parts of the base class. The used parts
-    are the arguments of the constructor, `send_400_response`, and the attributes `conn`,
-    `connections`, `loop` and `transport`. The tests in tests/e2e/test_dashboard_server.py fail when
-    one of them changes.
+    WARNING: this class depends on asyncio's protocol methods and on parts of its base class. The
+        parts in use are the arguments of the constructor, `send_400_response`, and the attributes
+        `conn`, `connections`, `loop` and `transport`. The tests in
+        tests/e2e/test_dashboard_server.py fail when one of these parts changes.
     """
 
     def __init__(
@@ -76,10 +76,10 @@ class HttpConnection(H11Protocol):
         self._is_one_too_many = False
         self._has_spoken = False
         self.made_s = 0.0
-        """Time of its opening, by the clock of the loop."""
+        """Time when the connection opened, by the clock of the event loop."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take the transport, and expect a request."""
+        """Store the transport, and wait for a request."""
         super().connection_made(transport)
         self.made_s = self.loop.time()
         if len(self.connections) > self._most and not self._make_room():
@@ -90,7 +90,7 @@ class HttpConnection(H11Protocol):
         self._watch()
 
     def data_received(self, data: bytes) -> None:
-        """Take received bytes, and check whether the request is complete."""
+        """Process received bytes, and check whether the request is complete."""
         self._has_spoken = True
         if self._is_one_too_many and not _stops(data):
             # Not earlier: the client would lose a response sent before it has written its request.
@@ -100,16 +100,16 @@ class HttpConnection(H11Protocol):
         self._watch()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Cancel the time limit."""
+        """Cancel the time limit of the request."""
         self._unwatch()
         super().connection_lost(exc)
 
     def send_400_response(self, msg: str) -> None:
-        """Refuse bytes that are no HTTP; called by the base class."""
+        """Refuse invalid HTTP; the base class calls this method."""
         self._refuse(HTTPStatus.BAD_REQUEST, msg)
 
     def _make_room(self) -> bool:
-        """Close an idle connection; return whether one was found."""
+        """Close an idle connection; return whether there was one."""
         waiting: dict[str, list[HttpConnection]] = {}
         for one in self.connections:
             if isinstance(one, HttpConnection) and one is not self and one.only_waits:
@@ -123,12 +123,12 @@ class HttpConnection(H11Protocol):
 
     @property
     def only_waits(self) -> bool:
-        """Return whether the connection is idle: no complete request is under way."""
+        """Return whether the connection is idle, without a complete request in progress."""
         is_ours = self.transport.get_protocol() is self and not self.transport.is_closing()
         return is_ours and self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
 
     def _watch(self) -> None:
-        """Run the time limit while a request is incomplete."""
+        """Start the time limit while a request is incomplete, else cancel it."""
         is_ours = self.transport.get_protocol() is self  # else it is a WebSocket
         is_open = self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
         if not (is_ours and is_open) or self.transport.is_closing():

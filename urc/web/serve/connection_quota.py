@@ -1,7 +1,7 @@
-"""Limits on the concurrent requests of one visitor, so that others still get through.
+"""Limits on the concurrent requests of one visitor, so that other visitors can still connect.
 
-Layer 5. Pure. Visitors with a key are counted one by one, unknown visitors by their address. STOP
-is not counted: it is always accepted.
+Layer 5. Pure. Each visitor with a key has a separate count; unknown visitors are counted by
+address. STOP requests are not counted, because they are always accepted.
 """
 
 import re
@@ -14,10 +14,11 @@ from urc.web.serve.access import Visitor
 __all__ = ["KNOWN_PLACES", "PLACES", "ConnectionQuota", "is_stop"]
 
 PLACES = 32
-"""Most requests and sockets of one unknown address at a time. A page has up to two sockets and six
-requests: enough for several pages, and for a few people behind one address."""
+"""Maximum number of concurrent requests and sockets from one unknown address. A page uses up to two
+sockets and six requests, so the limit allows several pages, and a few people behind one address."""
 KNOWN_PLACES = 256
-"""The same limit for a known browser or program: it may watch many robots."""
+"""Maximum number of concurrent requests and sockets of a known browser or program, which may watch
+many robots."""
 
 _STOP = re.compile(r"/api/v1/robots/[^/ ]+/stop")
 
@@ -36,9 +37,9 @@ class ConnectionQuota:
 
     @contextmanager
     def taken(self, visitor: Visitor, address: str) -> Iterator[bool]:
-        """Take a place while the context lasts; yield whether one was free.
+        """Occupy a place while the context lasts; yield whether a place was free.
 
-        `address` counts for unknown visitors.
+        `address` identifies an unknown visitor.
         """
         is_known = visitor.standing != "stranger"
         who = f"{visitor.standing} {visitor.name}" if is_known else f"at {address}"

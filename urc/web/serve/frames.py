@@ -1,8 +1,8 @@
-"""Finds WebSocket frames that hold one whole text message: nearly every tick is one.
+"""Finds WebSocket frames that contain one whole text message; nearly every tick is such a frame.
 
-Layer 5, pure. It only reads. The WebSocket library handles everything else from the same bytes:
-fragments, control frames and protocol errors. This module only counts their bytes, to find the
-start of the next frame.
+Layer 5, pure. It only reads. The WebSocket library processes all other frames from the same bytes:
+fragments, control frames and protocol errors. This module only counts the bytes of other frames, to
+find the start of the next frame.
 """
 
 from typing import Final
@@ -16,25 +16,25 @@ _SHORT, _LONG = 126, 127
 _HEAD: Final = 2
 _MASK: Final = 4
 _PLAIN: Final = bytes(_MASK)
-"""A mask that changes nothing."""
+"""A masking key that leaves the payload unchanged."""
 _CONTROL: Final = 0x08
 
 
 class WebSocketFrames:
-    """The received bytes of one client, from the first byte after the handshake on."""
+    """Parser for the bytes received from one client after the handshake."""
 
     def __init__(self) -> None:
         self._is_between = True
-        """Whether the next byte begins a frame that begins a message."""
+        """Whether the next byte starts a new message."""
         self._left = 0
-        """Missing bytes of the current frame."""
+        """Number of missing bytes of the current frame."""
         self._head = b""
         """Bytes of an incomplete frame header."""
         self._is_inside = False
-        """Whether a fragmented message is incomplete."""
+        """Whether a fragmented message is still incomplete."""
         self.spans: list[tuple[int, int]] = []
         """Start and end of each whole text frame at the beginning of the last received bytes, for
-        `text_of`. The list is empty for a single text."""
+        use with `text_of`. The list is empty if the bytes were a single text frame."""
 
     def whole(self, data: bytes) -> bytes | None:
         """Return the text if `data` is exactly one whole text frame, else None."""
@@ -75,19 +75,19 @@ class WebSocketFrames:
 
 
 def text_of(frame: bytes) -> bytes:
-    """Return the text of a whole frame of `WebSocketFrames.spans`."""
+    """Return the text of a whole frame from `WebSocketFrames.spans`."""
     at = _HEAD + _MASK + (2 if frame[1] & 0x7F == _SHORT else 0)
     return _unmasked(frame[at - _MASK : at], frame[at:])
 
 
 def _is_text(data: bytes, at: int) -> bool:
-    """Return whether a whole text frame of usual length begins at `at`."""
+    """Return whether a whole text frame with a length of at most 16 bits begins at `at`."""
     size = data[at + 1]
     return data[at] == _TEXT and bool(size & _MASKED) and size & 0x7F != _LONG
 
 
 def _size(data: bytes, at: int) -> int | None:
-    """Return the size of the frame at `at` with its header, in bytes; None if still unknown."""
+    """Return the size of the frame at `at` with its header, in bytes; None if not yet known."""
     if len(data) < at + _HEAD:
         return None
     size, head = data[at + 1] & 0x7F, _HEAD

@@ -1,9 +1,9 @@
 """Access checks and page policy for every request, before any route is looked up.
 
-Layer 5. Pure ASGI middleware around the whole application, so that error responses pass through it
-too. The policy checks Host against foreign names that resolve to this machine. The policy checks
-Origin against foreign pages that open a WebSocket or post a form. The response headers stop
-injected markup. The module knows no route, robot or template.
+Layer 5. Pure ASGI middleware around the whole application, so that error responses also get its
+headers. The check of Host prevents foreign host names that resolve to this machine. The check of
+Origin prevents foreign pages from opening a WebSocket or posting a form. The response headers block
+injected markup. The module depends on no route, robot or template.
 """
 
 import ipaddress
@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 BODY_BYTES = 1 << 20
-"""Largest accepted request body, in bytes."""
+"""Maximum size of an accepted request body, in bytes."""
 
 _AUTHORITY = r"(?P<host>\[[0-9a-f:.]{2,45}\]|[a-z0-9_.-]{1,253})(?::(?P<port>[0-9]{1,5}))?"
 _HOST = re.compile(_AUTHORITY, re.ASCII | re.IGNORECASE)
@@ -95,20 +95,21 @@ REFUSAL_HEADERS = (
     (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'"),
     *_FIXED_HEADERS,
 )
-"""Headers of a plain-text refusal outside the application: nothing may run or load there."""
+"""Headers of a plain-text refusal from outside the application; they forbid all scripts and
+resources."""
 
 
 class Authority(NamedTuple):
-    """A host with its port, as in ``Host:`` or in an origin."""
+    """A host and its port, from a ``Host`` or ``Origin`` header."""
 
     host: str
-    """Host in lower case; an IPv6 address has its brackets."""
+    """Host in lower case; an IPv6 address keeps its brackets."""
     port: int | None
-    """None if the text has no port."""
+    """Port number; None if the header has no port."""
 
 
 def parse_host(text: str) -> Authority | None:
-    """Return the parts of a ``Host`` header, or None unless it is exactly one host and port."""
+    """Return the host and port of a ``Host`` header; None if the header is invalid."""
     match = _HOST.fullmatch(text)
     return _authority(match) if match else None
 
@@ -116,15 +117,17 @@ def parse_host(text: str) -> Authority | None:
 def is_host_allowed(
     authority: Authority, names: frozenset[str], *, is_loopback: bool = False
 ) -> bool:
-    """Return whether the server accepts that host.
+    """Return whether the server accepts requests for this host.
 
-    A foreign name server can rebind neither a literal address nor ``localhost``. Every other name
-    must be one of `names`: any device on the network may claim a name under ``.local``.
+    DNS rebinding from a foreign name server affects neither a literal address nor ``localhost``.
+    All other names must be among `names`, because any device on the network may claim a name under
+    ``.local``.
 
     Args:
         authority: the host.
-        names: allowed names, in lower case, with this machine's own.
-        is_loopback: whether the request came over loopback; then no other address is valid.
+        names: allowed names in lower case, including the names of this machine.
+        is_loopback: whether the request came over loopback; if so, only loopback addresses are
+            valid.
     """
     host = authority.host
     name = host.removesuffix(".")
@@ -147,12 +150,12 @@ def own_names() -> frozenset[str]:
 
 
 def is_origin_ours(origin: str, scheme: str, authority: Authority) -> bool:
-    """Return whether `origin` has exactly the scheme, host and port of this request.
+    """Return whether `origin` exactly matches the scheme, host and port of the request.
 
     Args:
-        origin: the header; ``null`` is never ours.
-        scheme: ``http``, ``https``, ``ws`` or ``wss`` of the request.
-        authority: the request's own host.
+        origin: the Origin header; ``null`` never matches.
+        scheme: scheme of the request: ``http``, ``https``, ``ws`` or ``wss``.
+        authority: host and port of the request.
     """
     match = _ORIGIN.fullmatch(origin)
     theirs = _authority(match) if match else None
@@ -167,16 +170,16 @@ def is_origin_ours(origin: str, scheme: str, authority: Authority) -> bool:
 
 
 def frame_policy(scope: Scope, widget: str, digest: str, place: str) -> str:
-    """Return the policy of a frame: code of URC and of one widget, and nothing else.
+    """Return the policy of a frame, which allows only the code of URC and of one widget.
 
-    The policy has no nonce, because a nonce would allow scripts and styles of any address. A
-    request to a foreign address can leak data. The digest allows the import map alone.
+    The policy has no nonce, because a nonce would allow scripts and styles from any address. Any
+    request to a foreign address can leak data. The digest allows only the import map.
 
     Args:
-        scope: of the request for the frame; its host is allowed already.
-        widget: its name in URLs.
-        digest: ``sha256-…`` of the import map.
-        place: path below which frames load code.
+        scope: scope of the request for the frame, whose host was already checked.
+        widget: name of the widget in URLs.
+        digest: digest ``sha256-…`` of the import map.
+        place: path prefix of code for frames.
     """
     authority = parse_host(_values(scope, b"host")[0])
     # The grammar of CSP sources has no IPv6 addresses.
@@ -190,7 +193,7 @@ def frame_policy(scope: Scope, widget: str, digest: str, place: str) -> str:
 
 
 class Policy:
-    """The middleware, which puts ``nonce`` and ``visitor`` into the state of the request."""
+    """Middleware that stores ``nonce`` and ``visitor`` in the state of each request."""
 
     def __init__(self, app: ASGIApp, access: Access, *, allowed_hosts: Iterable[str] = ()) -> None:
         self._app = app
@@ -200,7 +203,7 @@ class Policy:
         self._places = ConnectionQuota()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Refuse, or call the application and add the headers to its response."""
+        """Refuse the request, or call the application and add the policy headers."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -220,7 +223,7 @@ class Policy:
                 if has_place:
                     await self._app(scope, _limited(scope, receive), answer.send)
                 else:
-                    await answer.refuse(503, "Too many requests from this address are under way.")
+                    await answer.refuse(503, "Too many requests from this address are in progress.")
 
     def _refusal(self, scope: Scope) -> tuple[int, str] | None:
         hosts = _values(scope, b"host")
@@ -244,11 +247,11 @@ class Policy:
 
 
 class _Answer:
-    """Adds the headers of the page policy to the response.
+    """Adds the page policy's headers to a response.
 
-    A route may set three keys in the request's state. ``frame_policy`` is the policy of a frame
-    instead of a page's. ``is_code`` marks files that frames may load too. ``is_file`` marks
-    third-party content: opened by itself, it must not act as a page of URC.
+    A route may set three keys in the state of its request. ``frame_policy`` is the policy of a
+    frame in place of the page policy. ``is_code`` marks files that frames may load too. ``is_file``
+    marks third-party content, which must not act as a page of URC when it is opened directly.
     """
 
     def __init__(self, scope: Scope, send: Send, nonce: str) -> None:
@@ -303,7 +306,7 @@ class _Answer:
 
 
 def _limited(scope: Scope, receive: Receive) -> Receive:
-    """Return `receive` with a limit on the total length of the body."""
+    """Return `receive` with a limit on the total size of the body."""
     if scope["type"] == "websocket":
         return receive
     total = 0
@@ -327,7 +330,7 @@ def _authority(match: re.Match[str]) -> Authority | None:
 
 
 def _is_loopback(scope: Scope) -> bool:
-    """Return whether a request comes over loopback, from a program on this machine."""
+    """Return whether a request comes over loopback, so from a program on this machine."""
     client = scope.get("client")
     try:
         return client is not None and unmapped(ipaddress.ip_address(client[0])).is_loopback

@@ -1,7 +1,7 @@
-"""The HTTP server: uvicorn, run from a coroutine, with small send buffers.
+"""The HTTP server: uvicorn, run by a coroutine, with small send buffers.
 
-Layer 5. Only this module and `connection` know uvicorn. Kernel and process buffer as little unsent
-data per client as possible: buffered data grows old and cannot be taken back.
+Layer 5. Only this module and `connection` depend on uvicorn. Kernel and process buffer as little
+unsent data per client as possible, because buffered data becomes outdated and cannot be withdrawn.
 """
 
 import asyncio
@@ -47,16 +47,16 @@ async def serve(
     request_s: float = REQUEST_S,
     connections: int = CONNECTIONS,
 ) -> None:
-    """Serve `app` until SIGINT, SIGTERM or cancellation; then close within 3 seconds.
+    """Serve `app` until SIGINT, SIGTERM or cancellation, then close within 3 seconds.
 
     Args:
-        app: the result of `build_app`.
-        host: an address or name of this machine.
-        port: 0 lets the system choose one.
-        on_ready: called once with an address, as ``http://127.0.0.1:8080/``: the first of
-            `reachable_urls`.
-        request_s: time limit for a complete request, in seconds.
-        connections: most open connections; a further one gets status 503.
+        app: an application from `build_app`.
+        host: an address or host name of this machine.
+        port: TCP port; 0 lets the system choose one.
+        on_ready: called once with the first of `reachable_urls`, such as
+            ``http://127.0.0.1:8080/``.
+        request_s: time limit for the arrival of a complete request, in seconds.
+        connections: maximum number of open connections; above it, new connections get status 503.
 
     Raises:
         UrcError: the server cannot listen on the address.
@@ -94,7 +94,7 @@ async def serve(
 
 
 class _Server(uvicorn.Server):
-    """uvicorn's server with an event for its end, in place of polling ten times a second."""
+    """uvicorn's server with an event for its end, instead of polling ten times per second."""
 
     def __init__(self, config: uvicorn.Config) -> None:
         super().__init__(config)
@@ -106,7 +106,7 @@ class _Server(uvicorn.Server):
         self._ending.set()
 
     async def main_loop(self) -> None:
-        """Update the Date header every second, until the end."""
+        """Update the Date header every second until the server ends."""
         while not await self.on_tick(0):
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(DATE_S):
@@ -114,16 +114,16 @@ class _Server(uvicorn.Server):
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Leave signals to `_ending`: uvicorn's own handler raises them again at the end."""
+        """Leave signals to `_ending`: uvicorn's handler would raise them again at the end."""
         yield
 
 
 class _DashboardSocket(WebSocketsSansIOProtocol):
     """uvicorn's WebSocket without a send queue, and with a callback when the socket is writable.
 
-    WARNING: only asyncio's protocol methods and the arguments of the constructor are used here; the
-    rest of the base class is private to uvicorn. The application finds the `SocketFlow` in
-    ``scope["state"]["flow"]``.
+    WARNING: this class may use only asyncio's protocol methods and the arguments of the
+        constructor; the rest of the base class is private to uvicorn. The application finds the
+        socket's `SocketFlow` in ``scope["state"]["flow"]``.
     """
 
     def __init__(
@@ -135,11 +135,11 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
     ) -> None:
         self._urc_flow = SocketFlow()
         self._urc_frames: WebSocketFrames | None = None
-        """None during the handshake."""
+        """Parser of received frames; None during the handshake."""
         super().__init__(config, server_state, {**app_state, "flow": self._urc_flow}, _loop)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Take the transport, and ask to be paused as soon as the kernel's buffer is full."""
+        """Store the transport, and request a pause as soon as the kernel's buffer is full."""
         super().connection_made(transport)
         self._urc_flow.connected(cast("asyncio.Transport", transport))
 
@@ -149,7 +149,7 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
         self._urc_flow.lost()
 
     def data_received(self, data: bytes) -> None:
-        """Hand a whole text to the client at once; all else takes uvicorn's usual path."""
+        """Pass a whole text message directly to the client; leave all other data to uvicorn."""
         if self._urc_frames is None:
             self._urc_frames = WebSocketFrames()
             super().data_received(data)
@@ -166,7 +166,7 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
     def _urc_several(
         self, data: bytes, spans: Iterable[tuple[int, int]], sink: Callable[[bytes], bool]
     ) -> None:
-        """Hand over texts that arrived together, up to the first that the client does not take."""
+        """Pass on messages that arrived together, up to the first that the client refuses."""
         at = 0
         for begin, end in spans:
             if not sink(text_of(data[begin:end])):
@@ -218,12 +218,13 @@ def _listen(host: str, port: int) -> socket.socket:
 def reachable_urls(host: str, port: int) -> tuple[str, ...]:
     """Return the URLs of a dashboard that listens on `host`.
 
-    For ``0.0.0.0`` and ``::`` these are the addresses of this machine's interfaces, or loopback if
-    it has none; else it is `host`. Network addresses come first. No packet is sent.
+    For ``0.0.0.0`` and ``::``, these are the addresses of all network interfaces of this machine,
+    or else loopback. For any other host, the URL contains `host`. Network addresses precede
+    loopback. The function sends no packet.
 
     Args:
-        host: the address or name that the server listens on.
-        port: the real one, not 0.
+        host: the address or name on which the server listens.
+        port: the actual port, not 0.
     """
     try:
         address = ipaddress.ip_address(host.partition("%")[0])
@@ -246,7 +247,7 @@ async def _until_ready(server: uvicorn.Server, running: "asyncio.Future[None]") 
 
 
 async def _follow(server: _Server, running: "asyncio.Future[None]") -> None:
-    """Wait for the server's end; close it gracefully on cancellation."""
+    """Wait until the server ends; on cancellation, close it gracefully."""
     try:
         await asyncio.shield(running)
     except asyncio.CancelledError:
@@ -258,7 +259,7 @@ async def _follow(server: _Server, running: "asyncio.Future[None]") -> None:
 
 @contextlib.contextmanager
 def _ending(server: _Server) -> Iterator[None]:
-    """Let SIGINT and SIGTERM end the server while the context lasts, where possible."""
+    """Let SIGINT and SIGTERM end the server while the context lasts, if the platform allows."""
     loop = asyncio.get_running_loop()
     caught: list[signal.Signals] = []
 

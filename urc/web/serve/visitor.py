@@ -1,4 +1,4 @@
-"""Rights of a visitor: the start key gives more rights, and a page may choose to watch only.
+"""Rights of a visitor: the start key adds rights, and a page may choose to only watch.
 
 Layer 5. Pure.
 """
@@ -14,13 +14,13 @@ __all__ = ["guest_of", "is_here", "may_manage", "visitor_of"]
 
 
 def visitor_of(connection: HTTPConnection) -> Visitor:
-    """Return the visitor of a request, as the page policy identified it."""
+    """Return the visitor that the page policy has identified for a request."""
     found: Visitor = getattr(connection.state, "visitor", UNKNOWN_VISITOR)
     return found
 
 
 def guest_of(connection: HTTPConnection) -> SocketPeer:
-    """Return the visitor's identity for the robot's other pages."""
+    """Return the visitor's identity as other pages of the robot see it."""
     host = connection.client.host if connection.client else ""
     has_key = is_here(connection)
     place = "" if has_key and _is_loopback(host) else host
@@ -33,7 +33,7 @@ def guest_of(connection: HTTPConnection) -> SocketPeer:
 
 
 def is_here(connection: HTTPConnection) -> bool:
-    """Return whether the visitor has the start key; the address does not matter."""
+    """Return whether the visitor has the start key, regardless of its address."""
     return visitor_of(connection).standing == "here"
 
 
