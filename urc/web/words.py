@@ -1,10 +1,11 @@
-"""Texts of pages in the user's language; English is the key and the fallback.
+"""Texts of the pages in the user's language; the English text is the key and the fallback.
 
-Layer 5. The catalogues are those of gettext (``translations/*.po``, written and checked by
-``scripts.translations``). This module reads their compiled form, one flat table for each language.
-The page's modules import the same table as ``urc/words``, so server and page use the same texts.
+Layer 5. The catalogues are in gettext format (``translations/*.po``), written and checked by
+``scripts.translations``. This module reads their compiled form, with one flat table for each
+language. The modules of the pages import the same table as ``urc/words``, so server and pages use
+the same texts.
 
-Texts of a robot's own documents, such as titles of signals, are not translated.
+Texts from the documents of a robot, such as the titles of signals, are not translated.
 """
 
 import json
@@ -34,7 +35,7 @@ __all__ = [
 
 
 def spoken(line: str) -> str:
-    """Return a line in the current language; text that is no phrase stays as it is."""
+    """Return a line in the current language; return a text that is not a phrase unchanged."""
     if not isinstance(line, Phrase):
         return line
     if line.pieces:
@@ -50,14 +51,14 @@ LANGUAGES: Mapping[str, str] = {
     "fr": "Français",
     "it": "Italiano",
 }
-"""BCP 47 tag → the language's own name."""
+"""Maps a BCP 47 tag to the name of the language in that language."""
 MOST_WISHES = 20
-"""Most entries of an Accept-Language header that are read."""
+"""Maximum number of entries that are read from an Accept-Language header."""
 
 _HOLE = re.compile(r"\{([a-z_]+)\}")
 
 language: ContextVar[str] = ContextVar("urc_language", default="en")
-"""Language of the current request."""
+"""Language of the current request, as a BCP 47 tag."""
 
 
 def t(text: str, /, **names: object) -> str:
@@ -68,7 +69,7 @@ def t(text: str, /, **names: object) -> str:
 
 @lru_cache(maxsize=len(LANGUAGES))
 def table(tag: str) -> Mapping[str, str]:
-    """Return English → the language; empty for English and for a missing catalogue."""
+    """Return the translations of English texts; empty for English, and without a catalogue."""
     place = FOLDER / f"{tag}.json"
     if tag not in LANGUAGES or not place.is_file():
         return {}
@@ -77,19 +78,19 @@ def table(tag: str) -> Mapping[str, str]:
 
 
 def address(tag: str) -> str:
-    """Return the URL of a language's table."""
+    """Return the URL of the table of a language."""
     return "/static/core/english.js" if tag == "en" else f"/words/{tag}.js"
 
 
 def module(tag: str) -> str:
-    """Return the table as a JavaScript module, for `kit.js`."""
+    """Return the table of a language as a JavaScript module, for `kit.js`."""
     return f"export default {json.dumps(table(tag), ensure_ascii=False)};\n"
 
 
 def choose(chosen: str, accepted: str) -> str:
-    """Return the language for a user.
+    """Return the language for a user, as a BCP 47 tag.
 
-    `chosen` is the language picked on this device, or "". `accepted` is the Accept-Language header
+    `chosen` is the language picked on the device, or "". `accepted` is the Accept-Language header
     (RFC 9110, 12.5.4).
     """
     if chosen in LANGUAGES:

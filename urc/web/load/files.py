@@ -2,7 +2,7 @@
 
 Layer 5. A URL contains either a key into a table of the loaded profile, or the three numbers of a
 tile. Text from a browser never becomes part of a path. Third-party pages are looked up in the same
-way; ``framed.py`` builds the document around them.
+way; ``external_pages.py`` builds the document around them.
 """
 
 import hashlib

@@ -1,7 +1,7 @@
-"""The image on a robot's card: its camera, its pose in the world, or its main values.
+"""The image on a robot's card on the menu: its camera, its pose in the world, or its main values.
 
-Layer 5. A card never connects a robot. An emulated robot has a view from outside; a real one shows
-data only while a page is connected.
+Layer 5. A card never connects a robot. An emulated robot shows its simulated world; a real robot
+shows data only while a page is connected.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,13 +21,13 @@ from urc.web.words import t
 __all__ = ["VALUES", "Cards", "small_values"]
 
 VALUES = 4
-"""Most values on a card without image."""
+"""Maximum number of values on a card without an image."""
 _FRESH = {"cache-control": "no-store"}
 _UNSHOWN = ("image", "blob", "array")
 
 
 class Cards:
-    """Responds with the current content of cards.
+    """Serves the current content of the cards on the menu.
 
     Args:
         stations: the served robots, by the name in their URL.
@@ -37,11 +37,11 @@ class Cards:
         self._stations = stations
 
     def routes(self) -> list[Route]:
-        """Return the only route."""
+        """Return the only route, that of card contents."""
         return [Route("/robots/{name}/card", self.card)]
 
     async def card(self, request: Request) -> Response:
-        """Send an image, or values as JSON ``[[title, text], …]``; 204 without any data."""
+        """Return an image, or values as JSON ``[[title, text], …]``; status 204 without data."""
         service = self._stations().get(request.path_params["name"])
         if service is None:
             raise HTTPException(404, t("No robot of that name is served here."))
@@ -55,7 +55,7 @@ class Cards:
 
 
 def small_values(driver: Driver, readings: Mapping[str, Reading]) -> list[tuple[str, str]]:
-    """Return the first values of a robot that fit on a card, each with its title."""
+    """Return the first values of a robot that fit on a card, each with its title, as text."""
     found = [
         (one.title or spoken(name), _text(one, readings[name]))
         for name, one in driver.signals.items()

@@ -1,7 +1,7 @@
-"""One cell of a page: the widget's markup, and the configuration for its module.
+"""One cell of a page: the markup of its widget, and the configuration for the widget's module.
 
-Layer 5. Widget templates come from packages. These templates run in a sandbox, and a failure only
-affects their own cell.
+Layer 5. Widget templates come from packages. They run in a sandbox, and a failed template affects
+only its own cell.
 """
 
 import json
@@ -37,56 +37,59 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One slot of the grid with its widget's markup."""
+    """One slot of the grid, with the markup of its widget."""
 
     index: int
-    """Number of the cell in the page; the grid's rules use it."""
+    """Number of the cell on the page, which the rules of the grid refer to."""
     config: str
-    """JSON for the host: slot, widget, inputs, outputs (see ``output.js``), options, title."""
+    """JSON for the widget host: slot, widget, inputs, outputs (see ``output.js``), options,
+    title."""
     html: Markup
-    """The widget's own rendered template; "" when it failed."""
+    """Rendered template of the widget; "" if the template failed."""
     error: str
-    """Why the widget's template failed, or ""."""
+    """Reason why the widget's template failed; "" on success."""
     is_background: bool
     frame: str = ""
-    """URL of the widget's frame; "" for a widget in the page."""
+    """URL of the widget's frame; "" for a widget that runs in the page."""
 
 
 @dataclass(frozen=True, slots=True)
 class WidgetContext:
-    """``widgets/*/template.html.j2``, whose fields are its variables.
+    """Context of ``widgets/*/template.html.j2``; its fields are the variables of the template.
 
-    The markup is shown before the module has loaded, so it must make sense without any value.
+    The markup is shown before the widget's module has loaded, so the markup must be understandable
+    without any value.
     """
 
     title: str
-    """Title of the slot. Without one: the title of the first required signal, the first command,
-    the first signal or the widget, in this order."""
+    """Title of the slot. If the slot has no title: the title of the first required signal, the
+    first command, the first signal or the widget, in this order."""
     options: Mapping[str, object]
-    """Checked options. Every declared option has a key; None means no value."""
+    """Checked options. Every declared option has a key; None means that the option has no value."""
     inputs: Mapping[str, Signal | tuple[Signal, ...]]
-    """Input → its signal, or its signals for an input of many. Unbound inputs are missing."""
+    """Maps an input to its signal, or a multiple input to its signals. Unbound inputs are
+    omitted."""
     widget: str
     """The widget's name."""
     uid: str
-    """Unique in the page, for ``id`` and ``aria-labelledby``."""
+    """Identifier that is unique on the page, for ``id`` and ``aria-labelledby``."""
     outputs: Mapping[str, str] = field(default_factory=dict)
-    """Output → readable name of its command. Unbound outputs are missing, so that a widget can
-    leave their controls out."""
+    """Maps an output to the readable name of its command. Unbound outputs are omitted, so a widget
+    can leave out their controls."""
 
 
 def render_widget(widget: Widget, context: WidgetContext) -> Markup:
-    """Return the widget's markup; pass on any exception of its template."""
+    """Return the widget's markup; propagate any exception of its template."""
     source, variables = _source(widget), _variables(context)
     return Markup(widget_template(source).render(variables))  # noqa: S704  # autoescaped
 
 
 def render_foreign(uses: Iterable[tuple[WidgetUse, Profile]], trust: WidgetTrust) -> None:
-    """Render the markup of all third-party widgets of a page at once, which saves time.
+    """Render the markup of all third-party widgets of a page together, to save time.
 
     Args:
-        uses: the cells in their order, each with the profile of its robot.
-        trust: tells third-party widgets from trusted ones.
+        uses: the widget uses in the order of the cells, each with the profile of its robot.
+        trust: distinguishes third-party widgets from trusted widgets.
     """
     wanted = []
     for index, (use, profile) in enumerate(uses):
@@ -109,7 +112,7 @@ def _variables(context: WidgetContext) -> dict[str, object]:
 
 
 def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -> WidgetContext:
-    """Return the variables of the widget's template."""
+    """Return the variables of a widget's template."""
     signals = profile.driver.signals
     single = {name: signals[signal] for name, signal in use.inputs.items()}
     several = {name: tuple(signals[one] for one in many) for name, many in use.lists.items()}
@@ -122,9 +125,9 @@ def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -
 
 
 def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str, str]) -> str:
-    """Return the subject of the widget: its first required signal, else its command.
+    """Return the subject of a widget: its first required signal, else its command.
 
-    An additional output is not its subject: a camera with pan and tilt is a camera.
+    An optional output is not the subject: a camera with pan and tilt is still a camera.
     """
     needed = [name for name in inputs if widget.inputs[name].is_required]
     about = [inputs[name].title or spoken(inputs[name].name) for name in (*needed, *inputs)]
@@ -149,10 +152,10 @@ def widget_cell(
     *,
     is_background: bool = False,
 ) -> Cell:
-    """Return one slot with its widget; an exception of the template only affects this cell.
+    """Return one slot with its widget; an exception of the template affects only this cell.
 
-    Another process renders the template of a third-party widget. The call waits for it, unless
-    `render_foreign` has done so before.
+    A separate process renders the template of a third-party widget. The call waits for this
+    process, unless `render_foreign` has already rendered the template.
     """
     widget = profile.widgets[use.widget]
     context = widget_context(use, widget, profile, uid=f"cell-{index}")
@@ -183,6 +186,6 @@ def widget_cell(
 
 
 def spoken(name: str) -> str:
-    """Return an identifier in readable form: ``left_motor`` → ``Left motor``."""
+    """Return an identifier in readable form, for example ``Left motor`` for ``left_motor``."""
     words = name.replace("_", " ").replace("-", " ").strip()
     return words[:1].upper() + words[1:]

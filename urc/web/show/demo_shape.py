@@ -1,6 +1,6 @@
-"""The JSON Schema of a widget's ``demo.yaml``, made from the widget's manifest.
+"""The JSON Schema of a widget's ``demo.yaml``, generated from the widget's manifest.
 
-Layer 5. The gallery and `urc validate` share it, so their results agree.
+Layer 5. The gallery and `urc validate` use the same schema, so their results agree.
 """
 
 from collections.abc import Iterable, Mapping
@@ -28,7 +28,7 @@ _TYPES: Final = [*_ELEMENTS, "array", "object", "image", "blob"]
 
 
 def _mapping(title: str, properties: Mapping[str, Any], *required: str) -> dict[str, Any]:
-    """Return the schema of a mapping that has these keys and no others."""
+    """Return the schema of a mapping with exactly these allowed keys."""
     return {
         "title": title,
         "type": "object",
@@ -47,7 +47,7 @@ _VALUE: Final = {
     "items": {"enum": _ELEMENTS},
     "size": _COUNT,
 }
-"""Common keys of signals and arguments."""
+"""Properties that signals and arguments have in common."""
 _SIGNAL: Final = _mapping(
     "signal of a demo",
     {
@@ -96,9 +96,10 @@ _FOLLOW: Final = dict.fromkeys(
 
 
 def check_demo(widget: Widget, document: Document) -> list[Problem]:
-    """Return every problem of a demo.
+    """Return all problems of a demo.
 
-    The states refer to the bindings of the demo: they are checked once those are valid.
+    The states of a demo refer to its bindings, so the options of states are checked only after the
+    bindings are valid.
     """
     data = document.data
     problems = check_inline(document, (), data, _demo(widget, data))
@@ -145,7 +146,7 @@ def _part(data: Any, key: str) -> dict[str, Any]:
 def _state(
     bound: Mapping[str, Any], signals: Mapping[str, Any], outputs: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the schema of a state, for the signals of the demo and its own."""
+    """Return the schema of a state, for its own signals and those of the whole demo."""
     values = {name: _values(given) for name, given in signals.items()}
     past = {"type": "array", "items": {"type": "array", "minItems": 2, "maxItems": 2}}
     answered = {*outputs, *_commands(outputs.values())}
@@ -168,21 +169,21 @@ def _state(
 
 
 def _values(given: Any) -> dict[str, Any]:
-    """Return the schema of a value; an input of many signals has one for each."""
+    """Return the schema of a value; a multiple input requires one value for each signal."""
     if not isinstance(given, list):
         return {}
     return {"type": "array", "minItems": len(given), "maxItems": len(given)}
 
 
 def _ages(names: Iterable[str]) -> dict[str, Any]:
-    """Return the schema of ages: one for all signals, or one for each."""
+    """Return the schema of ages: one age for all signals, or one age for each signal."""
     age = {"if": {"type": "array"}, "then": {"items": _NUMBER}, "else": _NUMBER}
     named = _mapping("the signals of this demo", dict.fromkeys(names, age))
     return {"type": ["number", "object"], "if": {"type": "object"}, "then": named}
 
 
 def _single(signals: Mapping[str, Any]) -> list[str]:
-    """Return the names of single signals; a list of signals has one name for each."""
+    """Return the names of single signals; a list of signals yields one name per element."""
     names = []
     for name, given in signals.items():
         many = isinstance(given, list)

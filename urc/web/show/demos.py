@@ -1,6 +1,6 @@
-"""A widget's ``demo.yaml``: its states, each as a small robot with fixed values.
+"""A widget's ``demo.yaml``: its states, each represented by a small robot with fixed values.
 
-Layer 5. The gallery, the tests and the images of the manual use it.
+Layer 5. The gallery, the tests and the images of the manual use these states.
 """
 
 import base64
@@ -28,28 +28,28 @@ from urc.web.wire.messages import encode_hello
 __all__ = ["WidgetState", "demo_states", "colour_bars"]
 
 PICTURE_BYTES = 4 << 20
-"""Largest image in a demo, in bytes."""
+"""Maximum size of an image in a demo, in bytes."""
 _BARS = ((0xC0,) * 3, (0xC0, 0xC0, 0), (0, 0xC0, 0xC0), (0, 0xC0, 0), (0xC0, 0, 0xC0), (0xC0, 0, 0))
 
 
 class WidgetState(NamedTuple):
-    """One state of a widget, ready to be rendered."""
+    """One state of a widget, ready for rendering."""
 
     name: str
     use: WidgetUse
     profile: Profile
-    """A robot with only this widget and no connection."""
+    """Profile of a robot with only this widget and no connection."""
     news: str
-    """JSON for ``gallery.js``: the values of the robot."""
+    """Values of the robot, as JSON for ``gallery.js``."""
     shows: tuple[str, ...]
-    """Texts that the widget must show."""
+    """Texts that the widget must show in this state."""
 
 
 def demo_states(widget: Widget) -> list[WidgetState]:
-    """Return the states in the widget's ``demo.yaml``, in its order.
+    """Return the states in the widget's ``demo.yaml``, in the order of the file.
 
     Raises:
-        ProblemsError: the file is missing or invalid.
+        ProblemsError: the demo is missing or invalid.
     """
     document = read_document(str(widget.folder / "demo.yaml"))
     problems = check_demo(widget, document)
@@ -93,7 +93,7 @@ def _state(widget: Widget, document: Document, demo: Mapping[str, Any], name: st
 def _signals(
     declared: Mapping[str, Any],
 ) -> tuple[dict[str, Signal], dict[str, str], dict[str, tuple[str, ...]]]:
-    """Return the signals, and the bindings of single inputs and of inputs of many signals."""
+    """Return the signals, the bindings of single inputs, and the bindings of multiple inputs."""
     signals: dict[str, Signal] = {}
     inputs: dict[str, str] = {}
     lists: dict[str, tuple[str, ...]] = {}
@@ -163,7 +163,7 @@ def _readings(
     inputs: Mapping[str, str],
     lists: Mapping[str, tuple[str, ...]],
 ) -> Iterator[dict[str, Any]]:
-    """Yield one reading a signal: its value or image, its age in seconds, its alarm."""
+    """Yield one reading per signal: its value or image, its age in seconds, and its alarm."""
     ages, alarms = shown.get("age_s", 0.0), shown.get("alarms") or {}
     for name, value in (shown.get("values") or {}).items():
         many = name in lists
@@ -186,7 +186,7 @@ def _nth(given: Any, place: int) -> Any:
 def _images(
     widget: Widget, document: Document, state: str, shown: Mapping[str, Any]
 ) -> dict[str, dict[str, Any]]:
-    """Return the images among the values of a state, by signal."""
+    """Return the images among the values of a state, by signal name."""
     images = {}
     for name, value in (shown.get("values") or {}).items():
         try:
@@ -200,7 +200,7 @@ def _images(
 
 
 def _image(widget: Widget, value: Any) -> bytes | None:
-    """Return a generated, stored or inline image; None if the value is no image."""
+    """Return a generated, stored or inline image; None if the value is not an image."""
     match value:
         case {"picture": [int(width), int(height)], **more} if not more:
             return colour_bars(width, height)
@@ -221,7 +221,7 @@ def _decoded(text: str) -> bytes:
 
 
 def _file(folder: Path, name: str) -> bytes:
-    """Return a file of the widget's folder; refuse all other paths."""
+    """Return a file in the widget's folder; raise `UrcError` for any other path."""
     path = (folder / name).resolve()
     if not path.is_relative_to(folder.resolve()) or not path.is_file():
         raise UrcError(f"there is no file {name!r} in the widget's folder")
@@ -231,7 +231,7 @@ def _file(folder: Path, name: str) -> bytes:
 
 
 def colour_bars(width: int, height: int) -> bytes:
-    """Return a PNG with colour bars over a grey ramp; equal sizes give equal bytes."""
+    """Return a PNG with colour bars above a grey ramp; the size determines every byte."""
     if not (1 <= width <= 2048 and 1 <= height <= 2048):
         raise UrcError(f"a test picture has 1 to 2048 pixels a side, not {width} x {height}")
     bars = b"".join(bytes(_BARS[x * len(_BARS) // width]) for x in range(width))

@@ -1,8 +1,8 @@
-"""Routes of files and third-party pages that a robot's documents name for their widgets.
+"""Routes of the files and third-party pages that a robot's documents name for their widgets.
 
-Layer 5. A document without scripts and with one frame shows a third-party page. The policy of the
-dashboard allows only frames of its own origin. So this document frames the other page, and its
-policy allows the one origin in the widget's option.
+Layer 5. A document without scripts shows a third-party page in a frame. The policy of the dashboard
+allows only frames from the dashboard's own origin. The document around the third-party page has a
+separate policy, which allows only the origin in the widget's option.
 """
 
 import base64
@@ -40,16 +40,16 @@ _POLICY: Final = (
 
 @dataclass(frozen=True, slots=True)
 class FramedPage:
-    """``framed.html.j2``: the document around one third-party page."""
+    """Context of ``framed.html.j2``: the document around one third-party page."""
 
     title: str
-    """Host of the page."""
+    """Host name of the third-party page."""
     url: str
-    """URL of the page; "" if it is refused."""
+    """URL of the third-party page; "" if the page is refused."""
     fault: str
-    """Why it is refused, in one line."""
+    """Reason for the refusal, in one line; "" if the page is shown."""
     style: Markup = _STYLE
-    """Style, character by character: the policy contains its digest."""
+    """Exact text of the style, because the policy contains its digest."""
 
 
 class ExternalPages:
@@ -63,7 +63,7 @@ class ExternalPages:
         self._robots = robots
 
     def routes(self) -> list[Route]:
-        """Return the routes for the application."""
+        """Return the routes of files and third-party pages."""
         return [
             Route("/robots/{name}/files/{file:path}", self._file),
             Route("/robots/{name}/framed/{page}", self._page),
@@ -83,9 +83,9 @@ class ExternalPages:
 
 
 def framed_page(profile: Profile, key: str, request: Request) -> Response:
-    """Return the document around a page that an option names; raise 404 for any other.
+    """Return the document around a page that an option names; raise status 404 for any other page.
 
-    A page of this server itself is refused: in a frame it could reach the dashboard.
+    A page of this server is refused, because in a frame it could access the dashboard.
     """
     pages = (many for use in uses_of(profile) for many in use.pages.values())
     urls = {page_key(url): url for many in pages for url in many}

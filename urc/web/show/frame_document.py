@@ -1,8 +1,8 @@
-"""The document of a frame with a third-party widget: an empty cell and an import map.
+"""The document for a frame with a third-party widget: an empty cell and an import map.
 
-Layer 5. The document holds no data of a robot: the page passes markup and values in
-(``warden.js``). The policy of the document allows code from a few paths; it has no other access to
-the network.
+Layer 5. The document contains no data of a robot; the page passes in the markup and values
+(``frame_host.js``). The policy of the document allows code from a few paths, and blocks all other
+network access.
 """
 
 import base64
@@ -25,23 +25,23 @@ __all__ = ["FramePage", "FrameDocuments"]
 
 @dataclass(frozen=True, slots=True)
 class FramePage:
-    """``frame.html.j2``: the document around one third-party widget."""
+    """Context of ``frame.html.j2``: the document around one third-party widget."""
 
     title: str
     import_map: Markup
-    """JSON, character by character: the policy contains its digest."""
+    """Exact text of the JSON, because the policy contains its digest."""
     style: str
     """URL of the widget's style sheet."""
     place: str
-    """Path prefix of its files."""
+    """Path prefix of the files that the frame loads."""
 
 
 class FrameDocuments:
     """Makes the documents.
 
     Args:
-        modules: the import map.
-        has: returns whether a widget of that name exists.
+        modules: import map of the pages.
+        has: returns whether a widget with this name exists.
         place: path below which frames load code.
     """
 
@@ -53,7 +53,7 @@ class FrameDocuments:
         self._place = place
 
     async def frame(self, request: Request) -> Response:
-        """Return the document for one widget; raise 404 for an unknown name."""
+        """Return the document for one widget; raise status 404 for an unknown name."""
         name, place = request.path_params["widget"], self._place
         if not self._has(name):
             raise HTTPException(404)
@@ -64,6 +64,6 @@ class FrameDocuments:
         return HTMLResponse(render("frame.html.j2", page), headers={"cache-control": "no-store"})
 
     def _below(self, modules: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the import map with all its URLs below the frames' path."""
+        """Return the import map with the path prefix for frames before each URL."""
         imports = cast("Mapping[str, str]", modules["imports"])
         return {"imports": {name: f"{self._place}{url}" for name, url in imports.items()}}

@@ -1,6 +1,7 @@
-"""The gallery: every widget in the states of its demo, without a robot.
+"""The gallery: every widget in all states of its demo, without a robot.
 
-Layer 5. The page itself plays the robot (``gallery.js``): it opens no socket and sends nothing.
+Layer 5. The page itself simulates the robot (``gallery.js``), without a socket and without sending
+anything.
 """
 
 import asyncio
@@ -40,17 +41,18 @@ class Found(NamedTuple):
 
     folder: Path
     widget: Widget | None
-    """Manifest of the widget, or None for a broken manifest."""
+    """The widget from its manifest; None for an invalid manifest."""
     problems: tuple[Problem, ...] = ()
-    """Problems of the manifest."""
+    """Problems in the manifest."""
 
 
 class WidgetLookup:
     """The existing widgets.
 
     Args:
-        profiles: returns the robots' profiles.
-        is_fresh: whether each look-up reads manifests again; else the robots' loaded widgets count.
+        profiles: returns the profiles of the served robots.
+        is_fresh: whether each look-up reads the manifest again; if not, the widgets loaded by
+            robots are used.
     """
 
     def __init__(self, profiles: Callable[[], Iterable[Profile]], *, is_fresh: bool) -> None:
@@ -58,13 +60,13 @@ class WidgetLookup:
         self._is_fresh = is_fresh
 
     def names(self) -> list[str]:
-        """Return the names of all widgets, with broken ones."""
+        """Return the names of all widgets, including invalid widgets."""
         profiles = list(self._profiles())
         names = {name for registry in self._registries(profiles) for name in registry.names()}
         return sorted(names.union(*(profile.widgets for profile in profiles)))
 
     def find(self, name: str) -> Found | None:
-        """Return a widget, or None for an unknown name."""
+        """Return a widget; None for an unknown name."""
         profiles = list(self._profiles())
         mine = next((one.widgets[name] for one in profiles if name in one.widgets), None)
         if mine is not None:
@@ -75,7 +77,7 @@ class WidgetLookup:
         return next((_on(registry, name) for registry in registries if registry.has(name)), None)
 
     def folder(self, name: str) -> Path | None:
-        """Return the folder of a widget without a look at its manifest, or None."""
+        """Return the folder of a widget without reading its manifest; None for an unknown name."""
         profiles = list(self._profiles())
         mine = [one.widgets[name].folder for one in profiles if name in one.widgets]
         registries = self._registries(profiles)
@@ -83,7 +85,7 @@ class WidgetLookup:
         return next(iter(mine), None) or next(in_folder, None)
 
     def _registries(self, profiles: Iterable[Profile]) -> list[WidgetFolder]:
-        """Return the folders of widgets; none of them can replace a widget of URC."""
+        """Return the folders of widgets; URC's folder is first and takes precedence."""
         files = dict.fromkeys(one.file for one in profiles)
         return [WidgetFolder(shipped("widgets")), *(widget_folder_of(file) for file in files)]
 
@@ -94,15 +96,15 @@ def _on(registry: WidgetFolder, name: str) -> Found:
 
 
 def mark(text: str) -> str:
-    """Return the text, marked for the catalogues; pages translate it with `t`."""
+    """Return `text`, marked for the catalogues; pages translate the text with `t`."""
     return text
 
 
 EXAMPLES = (mark("normal"), mark("stale"), mark("gone"), mark("none"), mark("hostile"))
-"""Names of states that most widgets have; an author may add others."""
+"""Names of states that most widgets have; a demo may add others."""
 SEPARATOR = "+"
 MOST_AT_ONCE = 16
-"""Most widgets on one page."""
+"""Maximum number of widgets on one page."""
 NO_WIDGET = mark("There is no widget of that name.")
 
 log = logging.getLogger(__name__)
@@ -110,19 +112,19 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class GalleryEntry:
-    """One widget in the list."""
+    """One widget in the list of the gallery."""
 
     name: str
     title: str
     summary: str
     url: str
     fault: str
-    """Why it cannot be shown, or ""."""
+    """Reason why the widget cannot be shown; "" if it can."""
 
 
 @dataclass(frozen=True, slots=True)
 class GalleryPage:
-    """``widgets.html.j2``: the list of widgets."""
+    """Context of ``widgets.html.j2``: the list of all widgets."""
 
     head: PageHead
     nav: Nav
@@ -131,7 +133,7 @@ class GalleryPage:
 
 @dataclass(frozen=True, slots=True)
 class DemoView:
-    """One state of one widget."""
+    """One state of one widget, as shown in the gallery."""
 
     widget: str
     state: str
@@ -143,13 +145,13 @@ class DemoView:
 
 
 class WidgetView(NamedTuple):
-    """One widget of a page."""
+    """One widget on a page of the gallery."""
 
     name: str
     widget: Widget | None
     states: list[WidgetState]
     problems: tuple[Problem, ...] = ()
-    """Why the widget has no states."""
+    """Problems that prevent the states of the widget from being shown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,22 +165,22 @@ class WidgetProblem:
 
 @dataclass(frozen=True, slots=True)
 class DemoPage:
-    """``widget.html.j2``: widgets in the states of their demos."""
+    """Context of ``widget.html.j2``: widgets in the states of their demos."""
 
     head: PageHead
     title: str
     summary: str
     exhibits: tuple[DemoView, ...]
     faults: tuple[WidgetProblem, ...]
-    """Problems of the widgets that cannot be shown."""
+    """Problems of widgets that cannot be shown."""
     stamp_url: str
-    """URL of the stamp, for reloads after an edit, or ""."""
+    """URL of the current stamp, for reloads after an edit; "" without reloads."""
     stamp: str
-    """The stamp before the files were read."""
+    """The stamp, computed before the files were read."""
 
 
 class Gallery:
-    """Pages and files of all widgets.
+    """Pages and files of all widgets in the gallery.
 
     Args:
         modules: the import map.
@@ -203,10 +205,10 @@ class Gallery:
         self._ways = ways
         self._trust = trust
         self.assets = Assets()
-        """Files of the shown widgets, which need not belong to any robot."""
+        """Files of the shown widgets, including widgets that no robot uses."""
 
     def routes(self) -> list[Route]:
-        """Return the routes; they go before the route of the widgets' files."""
+        """Return the routes of the gallery, for use before the route of the widget files."""
         return [
             Route("/widgets", self.index),
             Route("/widgets/", self.index),
@@ -224,7 +226,7 @@ class Gallery:
         )
 
     async def demo(self, request: Request) -> Response:
-        """Show one widget, or several with a plus between their names."""
+        """Show one widget, or several widgets whose names are joined by plus signs."""
         names = self._names(request)
         # Taken before the files are read, so that no change is missed.
         stamp = await asyncio.to_thread(self._stamp, names) if self._is_dev else ""
@@ -260,7 +262,7 @@ class Gallery:
         )
 
     async def stamp(self, request: Request) -> Response:
-        """Return a text that changes whenever a file of the widgets is saved."""
+        """Return a stamp that changes whenever a file of the widgets is saved."""
         if not self._is_dev:
             raise HTTPException(404)
         stamp = await asyncio.to_thread(self._stamp, self._names(request))
@@ -293,14 +295,14 @@ class Gallery:
         return entries
 
     def _names(self, request: Request) -> list[str]:
-        """Return the names in the URL; raise 404 for too many."""
+        """Return the widget names in the URL; raise status 404 for too many names."""
         wanted = list(dict.fromkeys(request.path_params["names"].split(SEPARATOR)))
         if len(wanted) > MOST_AT_ONCE:
             raise HTTPException(404, f"A page shows {MOST_AT_ONCE} widgets at most.")
         return wanted
 
     def _shown(self, name: str) -> WidgetView:
-        """Return a widget with its states or its problems; raise 404 for an unknown one."""
+        """Return a widget with its states or problems; raise status 404 for an unknown widget."""
         found = self._lookup.find(name)
         if found is None:
             raise HTTPException(404, t(NO_WIDGET))
@@ -322,7 +324,7 @@ def _exhibits(shown: Iterable[WidgetView], trust: WidgetTrust) -> Iterable[DemoV
 
 
 async def with_slash(request: Request) -> Response:
-    """Redirect to the same path with a slash at its end."""
+    """Redirect to the same path with a final slash."""
     return RedirectResponse(request.url.replace(path=f"{request.url.path}/").path, 308)
 
 

@@ -1,6 +1,6 @@
-"""Choice of a robot's interface and its pages.
+"""Selection of a robot's interface and its pages.
 
-Layer 5. Pure. Each robot has a generated debug interface in addition to its own interfaces.
+Layer 5. Pure. Each robot has a generated debug interface in addition to its designed interfaces.
 """
 
 import json
@@ -32,17 +32,17 @@ __all__ = [
 ]
 
 DEBUGGING: Final = Interface(DEBUG, "Debug")
-"""Stand-in for the debug interface: it has no grid."""
+"""Placeholder for the debug interface, which has no grid."""
 DEBUG_STYLES: Final = ("/static/dev/dev.css", "/static/dev/debug.css")
 KEPT: Final = "urc-interface"
-"""Cookie with the robot's last shown interface on this device. The cookie's path is the robot's
-page, and ``interfaces.js`` writes it.
+"""Name of the cookie with the robot's last shown interface on this device. The cookie's path is the
+page of the robot; ``interfaces.js`` writes the cookie.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class InterfaceChoice:
-    """An interface of the robot."""
+    """An interface that the operator can choose for a robot."""
 
     name: str
     title: str
@@ -62,25 +62,26 @@ class PageTab:
 
 @dataclass(frozen=True, slots=True)
 class DebugPart:
-    """``debug.html.j2``: every signal and every command of a robot."""
+    """Context of ``debug.html.j2``: all signals and commands of a robot."""
 
     signals: tuple[Signal, ...]
     commands: str
-    """JSON list for ``debug_commands.js``."""
+    """Commands as a JSON list for ``debug_commands.js``."""
     count: int
     """Number of commands."""
     wire: str
-    """Path of the developer page's socket, or ""."""
+    """Path of the developer page's socket; "" without a developer page."""
     dev_url: str
 
 
 def chosen(profile: Profile, wanted: str | None, kept: str = "") -> Interface | None:
-    """Return the interface to show, or None if the robot has none of the wanted name.
+    """Return the interface to show; None if the robot has no interface named `wanted`.
 
     Args:
         profile: profile of the robot.
-        wanted: name in the page's URL, or None.
-        kept: name of the last shown interface on the device; ignored if it no longer exists.
+        wanted: name of the interface in the URL; None if the URL has none.
+        kept: name of the interface last shown on the device; ignored if the interface no longer
+            exists.
     """
     known = {**profile.interfaces, DEBUG: DEBUGGING}
     if wanted is not None:
@@ -95,9 +96,9 @@ def choices(
 
     Args:
         profile: profile of the robot.
-        interface: the current one.
+        interface: the interface that is shown.
         url: path of the robot's page.
-        more: text to append to each URL.
+        more: text that is appended to each URL.
     """
     every = (*profile.interfaces.values(), DEBUGGING)
     return tuple(
@@ -112,7 +113,7 @@ def choices(
 
 
 def page_tabs(interface: Interface, wanted: str = "") -> tuple[PageTab, ...]:
-    """Return the pages of an interface with tabs; exactly one is current."""
+    """Return the pages of an interface as tabs; exactly one tab is current."""
     names = list(interface.tabs)
     current = wanted if wanted in interface.tabs else next(iter(names), "")
     return tuple(
@@ -122,12 +123,12 @@ def page_tabs(interface: Interface, wanted: str = "") -> tuple[PageTab, ...]:
 
 
 def is_turned(interface: Interface, slots: tuple[str, ...]) -> bool:
-    """Return whether a phone shows the designed layout only in landscape."""
+    """Return whether a phone shows the layout as designed only in landscape."""
     return any(needs_turning(page, slots) for page in interface.pages)
 
 
 def debug_part(profile: Profile, dev_url: str = "") -> DebugPart:
-    """Return the data of the debug interface."""
+    """Return the content of the debug interface."""
     driver = profile.driver
     commands = [_command(one, driver) for one in driver.commands.values()]
     signals = tuple(driver.signals.values())

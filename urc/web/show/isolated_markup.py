@@ -1,10 +1,10 @@
-"""Renders the templates of third-party widgets in a separate process, with little memory and time.
+"""Renders the templates of third-party widgets in a separate process with limited memory and time.
 
-``python -m urc.web.show.isolated_markup`` reads templates with their variables from its standard
-input, as JSON, and writes their markup. Layer 5.
+``python -m urc.web.show.isolated_markup`` reads templates and their variables as JSON from standard
+input, and writes the markup to standard output. Layer 5.
 
-The sandbox blocks access to Python objects, but not endless loops. The markup depends only on the
-variables and the language, so it is cached.
+The template sandbox blocks access to Python objects, but cannot stop endless loops. The markup is
+cached, because it depends only on the template, the variables and the language.
 """
 
 import json
@@ -24,9 +24,10 @@ from urc.web.show.sandbox import fault_line, widget_template
 __all__ = ["MOST_CHARACTERS", "RenderedMarkup", "markup_of"]
 
 MOST_CHARACTERS: Final = 65536
-"""Most characters in the markup of one cell."""
+"""Maximum number of characters in the markup of one cell."""
 TOTAL_S: Final = 20.0
-"""Time limit for several templates together, in seconds; generous, for small busy machines."""
+"""Time limit for rendering several templates together, in seconds; generous, for slow or busy
+machines."""
 PROCESSOR_S: Final = 4
 MEMORY_BYTES: Final = 512 << 20
 _COMMAND: Final = ("-P", "-m", "urc.web.show.isolated_markup")
@@ -34,14 +35,14 @@ _KEPT: Final = 256
 
 
 class RenderedMarkup(NamedTuple):
-    """The result of a template."""
+    """The result of rendering one template."""
 
     html: Markup
-    """The markup; "" after a failure."""
+    """The rendered markup; "" after a failure."""
     fault: str
-    """Why it failed, in one line, or ""."""
+    """Reason for the failure, in one line; "" on success."""
     line: int = 1
-    """Line of the template in which it failed, from 1."""
+    """Line of the template at which the rendering failed, counted from 1."""
 
 
 _made: dict[str, RenderedMarkup] = {}
@@ -49,9 +50,9 @@ _lock = Lock()
 
 
 def markup_of(wanted: Sequence[tuple[str, Mapping[str, object]]]) -> list[RenderedMarkup]:
-    """Return the markup of templates in the current language; blocks until it is rendered.
+    """Return the markup of templates in the current language; block until it is rendered.
 
-    `wanted` has the source and the variables of each template.
+    Each element of `wanted` has the source and the variables of one template.
     """
     language = words.language.get()
     jobs = [json.dumps([language, source, _plain(variables)]) for source, variables in wanted]
@@ -67,7 +68,7 @@ def markup_of(wanted: Sequence[tuple[str, Mapping[str, object]]]) -> list[Render
 
 
 def _rendered(jobs: list[str]) -> list[RenderedMarkup]:
-    """Return the markup of some templates; a template that kills the process only fails itself."""
+    """Return the markup of some templates; a template that ends the process fails alone."""
     said = _asked(jobs)
     if said is not None:
         return said
@@ -81,7 +82,7 @@ def _rendered(jobs: list[str]) -> list[RenderedMarkup]:
 
 
 def _asked(jobs: list[str]) -> list[RenderedMarkup] | None:
-    """Return the output of the process; None if it ended early."""
+    """Return the output of the process; None if the process ended early."""
     try:
         done = subprocess.run(  # noqa: S603 (our own program)
             [sys.executable, *_COMMAND],
@@ -98,7 +99,7 @@ def _asked(jobs: list[str]) -> list[RenderedMarkup] | None:
 
 
 def _plain(value: object) -> Any:
-    """Return a variable in the types of JSON; a record becomes a mapping of its fields."""
+    """Return a variable converted to JSON types; a named tuple becomes a mapping."""
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     if isinstance(value, Template):

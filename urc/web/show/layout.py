@@ -1,17 +1,19 @@
-"""The layout of an interface as CSS: the place of each cell, for each kind of screen.
+"""The layout of an interface as CSS: the position of each cell, for each kind of screen.
 
-Layer 5. Pure. The rules contain only numbers, so no text of a document can end the style element.
+Layer 5. Pure. The rules contain only numbers, so no text from a document can close the style
+element.
 
-A row or column without a slot is a margin: it keeps its place, with an eighth of the room of
-others. Phones have no margins. A phone in portrait shows the ``phone`` grid, else the ``tall`` one,
-else the ``wide`` one. The latter two are stacked in reading order if they are wider than two
-columns. A phone in landscape shows the ``low`` grid, else the ``wide`` one.
+A row or column without a slot is a margin: it keeps its position, with an eighth of the normal
+size. Phones show no margins. A phone in portrait shows the grid ``phone_portrait``, else
+``portrait``, else ``landscape``. Of these grids, the last two are stacked in reading order if they
+have more than two columns. A phone in landscape shows the grid ``phone_landscape``, else
+``landscape``.
 
-Over a background, an empty cell is a window with its full size on every screen. Only on a screen of
-low height, empty rows shrink in favour of rows with widgets.
+Over a background, an empty cell keeps its full size on every screen, so that the background is
+visible. On screens of low height, empty rows shrink in favour of rows with widgets.
 
-The pages of an interface share its cells. The attribute ``data-page`` of the grid selects the page,
-and a cell in two pages keeps its state.
+All pages of an interface share the cells. The grid attribute ``data-page`` selects the page; a cell
+on two pages keeps its state.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -26,16 +28,16 @@ SHORT = "(max-height: 479.98px)"
 TALL = "(orientation: portrait)"
 PHONE_COLUMNS = 2
 LEFT_HAND = ':root[data-hand="left"]'
-"""Selector for left-handed operators; ``hand.js`` sets the attribute."""
+"""Selector for left-handed operators; ``handedness.js`` sets the attribute."""
 _USED_COLUMN, _USED_ROW, _MARGIN = "minmax(0,1fr)", "minmax(8rem,1fr)", "minmax(0,.12fr)"
 _LOW_ROW = "minmax(6.5rem,1fr)"
-"""Height of a row on a phone in landscape: two rows fit."""
+"""Height of a row on a phone in landscape, chosen so that two rows fit."""
 _WINDOW = ("minmax(5rem,1fr)", "minmax(0,1fr)")
-"""Sizes of rows and columns in which the background is visible."""
+"""Sizes of rows and columns through which the background is visible."""
 
 
 def grid_css(interface: Interface, slots: Sequence[str]) -> str:
-    """Return the rules for the cells, numbered in the order of `slots`."""
+    """Return the CSS rules for the cells, which are numbered in the order of `slots`."""
     css = ""
     canvas = _Canvas(slots, interface.background if interface.background in slots else "")
     turned = [needs_turning(page, slots) for page in interface.pages]
@@ -52,11 +54,12 @@ def grid_css(interface: Interface, slots: Sequence[str]) -> str:
 
 
 class _Canvas(NamedTuple):
-    """The slots of a page, and its background."""
+    """The slots of a page, and its background slot."""
 
     slots: Sequence[str]
     background: str
-    """Slot behind all others; it shows through empty cells, which keep their full size."""
+    """Slot behind all other slots. Empty cells keep their full size, so that this slot is
+    visible."""
 
 
 def _left_hand(page: Tab, right: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
@@ -72,7 +75,7 @@ def _left_hand(page: Tab, right: Mapping[str, Layout], canvas: _Canvas) -> dict[
 
 
 def mirrored(grid: Layout) -> Layout:
-    """Return the grid with its columns in reverse order."""
+    """Return the grid with the order of its columns reversed."""
     slots = tuple(
         slot._replace(column=grid.columns - slot.column - slot.column_span) for slot in grid.slots
     )
@@ -80,14 +83,14 @@ def mirrored(grid: Layout) -> Layout:
 
 
 def needs_turning(page: Tab, slots: Sequence[str]) -> bool:
-    """Return whether a phone in portrait shows another layout than the designed one."""
+    """Return whether a phone in portrait shows a different layout than the designed one."""
     base = _placed(page.layouts, _Canvas(slots, "")).get("base")
     is_drawn = "phone_portrait" in page.layouts or "portrait" in page.layouts
     return base is not None and not is_drawn and _cropped(base).columns > PHONE_COLUMNS
 
 
 def _placed(grids: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
-    """Return the grid for each kind of screen, without empty slots."""
+    """Return the grid for each kind of screen, without unfilled slots."""
     if not grids:
         return {}
     crop = Layout._replace if canvas.background else _cropped
@@ -117,7 +120,7 @@ def _screens(place: str, grids: Mapping[str, Layout], canvas: _Canvas) -> str:
 
 
 def _filled(grid: Layout, names: Sequence[str]) -> Layout:
-    """Return the grid without empty slots."""
+    """Return the grid without unfilled slots."""
     return Layout(grid.rows, grid.columns, tuple(slot for slot in grid.slots if slot.name in names))
 
 
@@ -154,7 +157,7 @@ def _used(spans: Iterable[tuple[int, int]]) -> set[int]:
 
 
 def _cropped(grid: Layout) -> Layout:
-    """Return the grid without the rows and columns in which no slot stands."""
+    """Return the grid without empty rows and columns."""
     rows = sorted(_used((slot.row, slot.row_span) for slot in grid.slots))
     columns = sorted(_used((slot.column, slot.column_span) for slot in grid.slots))
     row_of = {old: new for new, old in enumerate(rows)}
@@ -167,7 +170,7 @@ def _cropped(grid: Layout) -> Layout:
 
 
 def _stacked(grid: Layout, first: int) -> Layout:
-    """Return the slots in one column, in reading order, from the row `first`."""
+    """Return the slots in one column in reading order, starting at row `first`."""
     ordered = sorted(grid.slots, key=lambda slot: (slot.row, slot.column))
     slots = tuple(Slot(slot.name, row, 0) for row, slot in enumerate(ordered, first))
     return Layout(len(slots) + first, 1, slots)

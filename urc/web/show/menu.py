@@ -1,6 +1,7 @@
-"""The menu: every served robot with its settings, and the navigation between pages.
+"""The menu of all served robots and their settings, and the navigation between pages.
 
-Layer 5. Pure. `menu.html.j2` sees `MenuPage`; all pages around the dashboard have `Nav`.
+Layer 5. Pure. The template `menu.html.j2` gets a `MenuPage`; all pages around the dashboard have a
+`Nav`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,7 +23,7 @@ __all__ = ["Card", "MenuPage", "Nav", "SettingRow", "NavigationLinks", "menu_pag
 
 @dataclass(frozen=True, slots=True)
 class NavigationLinks:
-    """Navigation links of this server."""
+    """The navigation links that this server offers."""
 
     has_managers: bool = False
     """Whether the pages for drivers, interfaces, widgets and settings exist."""
@@ -31,28 +32,29 @@ class NavigationLinks:
 
 @dataclass(frozen=True, slots=True)
 class Nav:
-    """``nav.html.j2``: the navigation bar of the pages around the dashboard."""
+    """Context of ``nav.html.j2``: the navigation bar of the pages around the dashboard."""
 
     current: str
-    """``menu``, ``drivers``, ``interfaces``, ``widgets``, ``dev``, or "" for none of them."""
+    """Current page: ``menu``, ``drivers``, ``interfaces``, ``widgets``, ``dev``, or "" for any
+    other page."""
     ways: NavigationLinks
 
 
 @dataclass(frozen=True, slots=True)
 class SettingRow:
-    """One line of a robot's settings."""
+    """One row in the list of a robot's settings."""
 
     title: str
     name: str
     value: str
-    """Value as shown; "" without a value."""
+    """Value of the setting for display; "" without a value."""
     description: str
     is_missing: bool
 
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """One robot on the menu."""
+    """One robot, as shown on the menu."""
 
     name: str
     """Name of the robot in URLs."""
@@ -60,29 +62,29 @@ class Card:
     summary: str
     url: str
     driver: str
-    """The driver: an installed package, or a file."""
+    """Name of the driver's package, or path of its file."""
     interface: str
-    """Title of the first interface."""
+    """Title of the robot's first interface."""
     rows: tuple[SettingRow, ...]
     missing: tuple[str, ...]
-    """Titles of the settings that keep Connect disabled."""
+    """Titles of missing settings, which disable Connect."""
     missing_names: tuple[str, ...]
-    """Names of the missing settings, for a command line."""
+    """Names of the missing settings, for use on a command line."""
     settings_url: str = ""
-    """URL of its settings; "" where they are fixed."""
+    """URL of the robot's settings; "" if the settings are fixed."""
     dev_url: str = ""
-    """URL of its developer page, or ""."""
+    """URL of the robot's developer page; "" if the robot has none."""
     is_looked_at: bool = False
-    """Whether a live image exists without a connection."""
+    """Whether a live image is available without a connection."""
     fault: str = ""
     """Why it cannot be used, or ""."""
     recorded: str = ""
-    """Time of the recording; "" for a robot."""
+    """Start time of the recording; "" for a robot."""
 
 
 @dataclass(frozen=True, slots=True)
 class MenuPage:
-    """``menu.html.j2``: the served robots and their settings."""
+    """Context of ``menu.html.j2``: the served robots and their settings."""
 
     head: PageHead
     nav: Nav
@@ -100,11 +102,11 @@ def menu_page(
     """Return the menu.
 
     Args:
-        head: head of the page.
+        head: data for the head of the page.
         robots: the robots, by the name in their URL.
         ways: navigation links of this server.
-        drivers: name of a robot → its installed package with version.
-        broken: robots that cannot be used.
+        drivers: maps a robot's name to its installed package with version.
+        broken: robots that cannot be used, by name.
     """
     cards = [
         _card(name, robot, ways, (drivers or {}).get(name, "")) for name, robot in robots.items()
@@ -116,7 +118,7 @@ def menu_page(
 
 
 def setting_row(setting: Setting, value: Value) -> SettingRow:
-    """Return a setting in readable form; a secret is hidden."""
+    """Return a setting in readable form; the value of a secret is hidden."""
     if value is None or value == "":
         shown = ""
     elif setting.is_secret:

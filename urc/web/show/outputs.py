@@ -21,7 +21,7 @@ _NOTHING_GIVEN = OutputBinding()
 
 
 def inputs_config(use: WidgetUse, widget: Widget, driver: Driver) -> dict[str, object]:
-    """Return the signals of the inputs, and the conversions to the units of the widget."""
+    """Return the signals of the inputs, and their conversions to the widget's units."""
     bound: dict[str, str | list[str]] = {**use.inputs}
     bound |= {name: list(many) for name, many in use.lists.items()}
     found: dict[str, list[dict[str, object] | None]] = {}
@@ -40,7 +40,7 @@ def _scale(have: str, want: str) -> dict[str, object] | None:
 
 
 def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -> dict[str, object]:
-    """Return the binding of one output."""
+    """Return the configuration of one output."""
     name = use.outputs[output]
     command = driver.commands.get(name)
     port = widget.outputs.get(output, _NO_PORT)
@@ -68,9 +68,9 @@ def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -
 
 
 def _moves(command: Command, given: OutputBinding) -> bool:
-    """Return whether the command always starts autonomous motion with these fixed arguments.
+    """Return whether the command with these fixed arguments always starts autonomous motion.
 
-    Where that depends on a chosen value, the server checks the choice.
+    If that depends on a value chosen by the operator, the server checks the value.
     """
     condition = command.moves_if
     is_told = condition is None or condition.names <= given.fixed.keys()
@@ -78,7 +78,7 @@ def _moves(command: Command, given: OutputBinding) -> bool:
 
 
 def _arguments(command: Command | None, given: OutputBinding) -> dict[str, dict[str, object]]:
-    """Return the arguments that are not fixed, by their names in the command."""
+    """Return the arguments that are not fixed, by name."""
     found: dict[str, dict[str, object]] = {}
     for name, one in (command.arguments if command is not None else {}).items():
         if name not in given.fixed:
@@ -98,7 +98,7 @@ def _arguments(command: Command | None, given: OutputBinding) -> dict[str, dict[
 
 
 def asked_before(command: Command | None) -> list[dict[str, object]]:
-    """Return the confirmations: of the command, or of one value of an argument."""
+    """Return the confirmations of a command, and of single values of its arguments."""
     if command is None:
         return []
     asked = [] if command.confirm is None else [("", "", command.confirm)]
@@ -117,14 +117,14 @@ def asked_before(command: Command | None) -> list[dict[str, object]]:
 
 
 def motion_lines(driver: Driver) -> list[str]:
-    """Return the transports over which STOP reaches the robot, each once."""
+    """Return the transports over which STOP reaches the robot, without duplicates."""
     stopping = [one for one in driver.commands.values() if one.hold is not None or one.stops]
     lines = [one.transport for one in stopping]
     return list(dict.fromkeys(lines))
 
 
 def _line(command: Command | None, driver: Driver) -> str:
-    """Return the transport that a command needs."""
+    """Return the transport whose loss disables the command; "" if no loss does."""
     line = command.transport if command else ""
     spec = driver.transports.get(line)
     # A transport that opens on demand is only opened again by the next command. A lost one must
@@ -140,7 +140,7 @@ def _line(command: Command | None, driver: Driver) -> str:
 def _ranges(
     command: Command | None, port: WidgetPort, given: OutputBinding
 ) -> dict[str, dict[str, object]]:
-    """Return the meaning of -1 to 1 for each argument that has a range of its own."""
+    """Return the values that -1 to 1 stand for, for each argument with a range."""
     if command is None:
         return {}
     found: dict[str, dict[str, object]] = {}
@@ -165,7 +165,7 @@ def _rest(command: Command, argument: Argument, least: float) -> float:
 
 
 def _neutral(command: Command | None, port: WidgetPort, given: OutputBinding) -> dict[str, Reading]:
-    """Return the values that stop the motion of this output, if the command has them."""
+    """Return the argument values with which the command stops the motion of this output."""
     if command is None:
         return {}
     release = _release_of(command)
@@ -177,12 +177,12 @@ def _release_of(command: Command) -> Mapping[str, Reading]:
 
 
 def mark(text: str) -> str:
-    """Return `text`. The mark adds it to the catalogues; the page translates it."""
+    """Return `text`. The call adds the text to the catalogues; the page translates the text."""
     return text
 
 
 def _step_words(step: sequence.Step) -> dict[str, str]:
-    """Return the name of a step as a key of the catalogues, and the value of its ``{what}``."""
+    """Return the name of a step as a catalogue key, and the value for its ``{what}``."""
     match step:
         case sequence.RunStep(command):
             return {"text": mark("run {what}"), "what": command}

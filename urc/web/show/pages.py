@@ -1,7 +1,8 @@
-"""Jinja → HTML. Each template has one documented context: the dataclass that it is rendered with.
+"""The pages of the dashboard: each Jinja template has one context, a dataclass.
 
-Layer 5. Templates see the dataclass as ``page`` and nothing else. Logic beyond ``for`` and ``if``
-belongs here; `urc.web.show.cells` makes the cells of a page.
+Layer 5. Templates receive this dataclass as ``page``, and nothing else. Templates contain only
+``for`` and ``if``; all other logic is in this module, and `urc.web.show.cells` builds the cells of
+a page.
 """
 
 import json
@@ -50,50 +51,50 @@ class PageHead:
     """Data for the head of every page."""
 
     nonce: str
-    """Nonce of this response; every script and style element carries it."""
+    """Nonce of the response, which every script and style element must carry."""
     title: str
     import_map: Mapping[str, object] = field(default_factory=lambda: with_words({"imports": {}}))
     widget_styles: tuple[str, ...] = ()
-    """URLs of widget style sheets."""
+    """URLs of the widgets' style sheets."""
     grid_css: str = ""
-    """Rules that place the cells; made of numbers only."""
+    """CSS rules that place the cells; the rules contain only numbers."""
     version: str = __version__
 
 
 @dataclass(frozen=True, slots=True)
 class RobotPage:
-    """``robot.html.j2``: one interface of one robot, live."""
+    """Context of ``robot.html.j2``: one live interface of one robot."""
 
     head: PageHead
     title: str
     socket: str
-    """Path and query of the WebSocket."""
+    """Path and query of the page's WebSocket."""
     interfaces: tuple[InterfaceChoice, ...]
     """All interfaces of the robot."""
     tabs: tuple[PageTab, ...]
-    """Pages of this interface; empty if it has only one."""
+    """Pages of the interface; empty if the interface has only one page."""
     number: int
-    """Number of the open page."""
+    """Number of the open page, from 0."""
     is_turned: bool
-    """Whether a phone shows the designed layout only in landscape."""
+    """Whether a phone shows the layout as designed only in landscape."""
     is_part: bool
-    """Whether the request is from ``interfaces.js``, which extracts the grid and its style."""
+    """Whether ``interfaces.js`` sent the request; the script uses only the grid and its style."""
     debug: DebugPart | None
-    """Content in place of a grid, for the debug interface."""
+    """Content of the debug interface, in place of a grid; None for other interfaces."""
     cells: tuple[Cell, ...]
     stop_url: str
-    """URL of STOP while the socket is down."""
+    """URL for STOP requests while the socket is down."""
     lines: str
-    """JSON list of the transports over which STOP reaches the robot."""
+    """Transports over which STOP reaches the robot, as a JSON list."""
     can_move: bool
-    """Whether the controls and STOP are shown."""
+    """Whether the page shows the controls and STOP."""
     playback: str
-    """Path of the playback's state; "" for a robot."""
+    """Path of the playback's state; "" without a playback."""
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorPage:
-    """``error.html.j2``: one sentence, and a link back."""
+    """Context of ``error.html.j2``: one sentence, and a link back."""
 
     head: PageHead
     status: int
@@ -114,19 +115,19 @@ def robot_page(
     is_part: bool = False,
     trust: WidgetTrust = WidgetTrust(),  # noqa: B008  # frozen
 ) -> str:
-    """Return the page of one interface.
+    """Return the page of one interface of a robot.
 
     Args:
         nonce: nonce of this response.
         name: name of the robot in its URL.
         profile: profile of the robot.
-        interface: one of its interfaces.
+        interface: the interface to show.
         modules: the import map.
-        is_watching: whether the page never drives.
-        tab: name of the open page; "" or an unknown one selects the first.
-        wire: path of the developer page; "" if this visitor has none.
-        playback: path of the playback's state; "" for a robot.
-        is_part: whether an open page swaps its interface.
+        is_watching: whether the page may only watch.
+        tab: name of the open page; "" or an unknown name selects the first page.
+        wire: path of the developer page; "" if the visitor may not use it.
+        playback: path of the playback's state; "" without a playback.
+        is_part: whether an open page requests this page to replace its interface.
         trust: tells third-party widgets from trusted ones.
     """
     uses = _uses(profile, interface)
@@ -161,23 +162,23 @@ def robot_page(
 
 
 def with_words(modules: Mapping[str, object]) -> Mapping[str, object]:
-    """Return the import map with the catalogue of the user's language."""
+    """Return the import map with the catalogue of the user's language added."""
     imports = cast("Mapping[str, str]", modules["imports"])
     return {"imports": {**imports, "urc/words": words.address(words.language.get())}}
 
 
 def error_page(nonce: str, status: int, message: str) -> str:
-    """Return a page with an error message of one sentence."""
+    """Return an error page with a message of one sentence."""
     return render("error.html.j2", ErrorPage(PageHead(nonce, f"{status}"), status, message))
 
 
 def render(template: str, page: object) -> str:
-    """Return a page's HTML; `page` is the dataclass that the template documents."""
+    """Return the HTML of a page; `page` is the context of the template."""
     return _pages().get_template(template).render(page=page)
 
 
 def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
-    """Return slot → widget, in reading order, without empty slots."""
+    """Return the widget of each filled slot, in reading order."""
     found = {
         name: interface.widgets.get(name) or profile.slots.get(name) for name in interface.shown
     }

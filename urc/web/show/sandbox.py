@@ -1,7 +1,7 @@
-"""The sandboxed Jinja environment for the templates of widgets, with few globals.
+"""The sandboxed Jinja environment for widget templates, with few global names.
 
-Layer 5. The sandbox limits neither time nor memory; for third-party widgets
-`urc.web.show.isolated_markup` does.
+Layer 5. The sandbox limits neither time nor memory; `urc.web.show.isolated_markup` sets these
+limits for third-party widgets.
 """
 
 import traceback
@@ -23,11 +23,11 @@ __all__ = ["TEMPLATE", "fault_line", "markdown", "widget_environment", "widget_t
 
 
 FIRST_HEADING = 4
-"""Heading level of ``#``: page and cells use the levels above it."""
+"""HTML heading level for ``#`` in Markdown; the page and its cells use the levels above."""
 
 
 def markdown(text: str) -> Markup:
-    """Return the HTML of a text in CommonMark, with tables and strikethrough."""
+    """Return the HTML of a CommonMark text, with support for tables and strikethrough."""
     parser = _parser()
     tokens = parser.parse(text)
     _lower_headings(tokens)
@@ -42,7 +42,7 @@ def _lower_headings(tokens: Sequence["Token"]) -> None:
 
 
 def _open_links_elsewhere(tokens: Sequence["Token"]) -> None:
-    """Open links in a new tab: leaving the page would end the control."""
+    """Open links in a new tab, because leaving the page would end the control of the robot."""
     for token in tokens:
         for child in token.children or ():
             if child.type == "link_open":
@@ -60,12 +60,12 @@ def _parser() -> "MarkdownIt":
 
 TEMPLATE: Final = "template.html.j2"
 _CODE: Final = "<template>"
-"""Jinja's file name of a template from text."""
+"""File name that Jinja reports for a template given as text."""
 
 
 @lru_cache(maxsize=1)
 def widget_environment() -> Environment:
-    """Return the Jinja environment for the templates of widgets."""
+    """Return the Jinja environment for widget templates."""
     widgets = ImmutableSandboxedEnvironment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
@@ -76,12 +76,12 @@ def widget_environment() -> Environment:
 
 @lru_cache(maxsize=256)
 def widget_template(source: str) -> Template:
-    """Return a compiled template; pass on Jinja's exceptions."""
+    """Return a compiled template; propagate Jinja's exceptions."""
     return widget_environment().from_string(source)
 
 
 def fault_line(fault: Exception) -> int:
-    """Return the line of the template in which it failed, from 1."""
+    """Return the line of the template at which the rendering failed, counted from 1."""
     if isinstance(fault, TemplateSyntaxError):
         return fault.lineno
     frames = traceback.extract_tb(fault.__traceback__)

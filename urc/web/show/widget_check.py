@@ -1,7 +1,7 @@
 """The checks of a widget's template, module and demo, for `urc validate` and the pages.
 
-Layer 5. Each file is read as the dashboard reads it. The module is only searched as text, because
-nothing here runs JavaScript.
+Layer 5. Each file is checked exactly as the dashboard loads it. The module is only searched as
+text, because this check runs no JavaScript.
 """
 
 import re
@@ -25,7 +25,7 @@ __all__ = ["FILES", "check_widget"]
 
 MODULE: Final = "widget.js"
 FILES: Final = (TEMPLATE, MODULE, "demo.yaml")
-"""Files of a widget besides the manifest."""
+"""Files of a widget in addition to its manifest."""
 MOST_BYTES: Final = 1 << 20
 _EXPORT: Final = re.compile(
     r"(?:^|[;}])\s*export\s+(?:default\b|\{[^}]*\bdefault\b[^}]*\})", re.MULTILINE
@@ -34,10 +34,10 @@ _ANY: Final = re.compile(r"^export\b.*", re.MULTILINE)
 
 
 def check_widget(widget: Widget, *, with_demo: bool = True) -> list[Problem]:
-    """Return the problems in the files of a widget with a valid manifest.
+    """Return the problems in the files of a widget; its manifest must be valid.
 
     Args:
-        widget: a widget from any source.
+        widget: the widget, from any source.
         with_demo: whether to check the demo, which pages do not need.
     """
     problems: list[Problem] = []
@@ -71,7 +71,7 @@ def _text(widget: Widget, name: str) -> str:
 def _rendered(
     widget: Widget, states: list[WidgetState], template: "_TemplateCheck"
 ) -> list[Problem]:
-    """Return the first failure to render the template in a state, if any."""
+    """Return the first failure to render the template in any of the states."""
     for state in states:
         context = widget_context(state.use, widget, state.profile, uid="cell-0")
         try:
@@ -82,7 +82,7 @@ def _rendered(
 
 
 def _module(widget: Widget, text: str) -> list[Problem]:
-    """Return a problem if the module's text has no default export."""
+    """Return a problem if the text of the module has no default export."""
     if _EXPORT.search(text):
         return []
     nearest = _ANY.search(text)
@@ -99,7 +99,7 @@ def _module(widget: Widget, text: str) -> list[Problem]:
 
 
 class _TemplateCheck:
-    """The template of one widget."""
+    """The template of one widget, with its checks."""
 
     def __init__(self, widget: Widget, source: str) -> None:
         self._widget = widget
@@ -107,7 +107,7 @@ class _TemplateCheck:
         self._lines = source.splitlines()
 
     def problems(self) -> list[Problem]:
-        """Return the syntax error of the template, or its unknown names."""
+        """Return the syntax error of the template, or its undefined names."""
         environment = widget_environment()
         try:
             environment.from_string(self._source)
@@ -127,7 +127,7 @@ class _TemplateCheck:
         return sorted(dict.fromkeys(found), key=lambda one: (one.line, one.column))
 
     def fault(self, error: Exception, where: str) -> Problem:
-        """Return an exception of the rendering as a problem at its line."""
+        """Return an exception from rendering as a problem with its line."""
         text = str(error).partition("\n")[0] or type(error).__name__
         return self._problem("bad-template", f"{text}{where}", fault_line(error))
 
@@ -143,7 +143,7 @@ class _TemplateCheck:
     def _keys(
         self, tree: nodes.Template, asked: set[int], table: str, declared: Iterable[str]
     ) -> Iterator[Problem]:
-        """Yield a problem for each undeclared key, such as ``options.label``, of a mapping."""
+        """Yield a problem for each undeclared key of a mapping, such as ``options.label``."""
         known = frozenset(declared)
         if any(node.name == table and node.ctx != "load" for node in tree.find_all(nodes.Name)):
             return  # the template assigns the name itself
@@ -172,14 +172,14 @@ class _TemplateCheck:
 
 
 def _asked(tree: nodes.Template) -> set[int]:
-    """Return the nodes whose existence the template tests."""
+    """Return the nodes that the template tests for existence."""
     tests = [one.node for one in tree.find_all(nodes.Test) if one.name in ("defined", "undefined")]
     filters = [one.node for one in tree.find_all(nodes.Filter) if one.name in ("default", "d")]
     return {id(node) for node in (*tests, *filters)}
 
 
 def _key(node: nodes.Getattr | nodes.Getitem) -> str:
-    """Return the key of a look-up, or "" for a computed key."""
+    """Return the key of a look-up; "" for a computed key."""
     if isinstance(node, nodes.Getattr):
         return node.attr
     key = node.arg.value if isinstance(node.arg, nodes.Const) else ""

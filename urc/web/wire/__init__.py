@@ -1,1 +1,1 @@
-"""Message types of a dashboard's sockets, without behaviour."""
+"""Message types of the dashboard's sockets, without behaviour."""

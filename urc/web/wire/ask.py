@@ -1,6 +1,6 @@
-"""Message types about questions and sequences, without behaviour.
+"""Message types for questions and sequences, without behaviour.
 
-Layer 5. Part of `urc.web.wire.messages`, which lists the direction of each message.
+Layer 5. Part of `urc.web.wire.messages`, which documents the direction of each message.
 """
 
 from typing import Literal
@@ -27,13 +27,13 @@ class _Ask(Outbound, tag="ask", omit_defaults=False, frozen=True):
     n: int
     """Number of the question."""
     id: int
-    """Number of its command, on the page that asks; 0 on other pages."""
+    """Number of the command on the page that asks; 0 on other pages."""
     who: str
     command: str
     text: str
     level: str
     left: int
-    """Time until the question fails, in milliseconds."""
+    """Time until the question expires, in milliseconds."""
 
 
 class _Asked(Outbound, tag="asked", frozen=True):
@@ -58,7 +58,7 @@ class _AllProgress(Outbound, tag="progress", omit_defaults=False, frozen=True):
 
 
 class Approval(msgspec.Struct, tag_field="t", tag="agree", forbid_unknown_fields=True, frozen=True):
-    """The answer to question `n`; no from the asking page withdraws it."""
+    """The answer to question `n`; a no from the asking page withdraws the question."""
 
     n: int
     yes: bool
@@ -66,25 +66,25 @@ class Approval(msgspec.Struct, tag_field="t", tag="agree", forbid_unknown_fields
 
 _Scalar = bool | int | float | str
 Arguments = dict[str, bool | int | float | str | tuple[_Scalar, ...] | None]
-"""Arguments of a command, as a page sends them."""
+"""Arguments of a command, as the page sends them."""
 
 
 class ApprovalRequest(
     msgspec.Struct, tag_field="t", tag="prepare", forbid_unknown_fields=True, frozen=True
 ):
-    """The operator's confirmation of exactly this command; requests the `token` for it."""
+    """The operator's confirmation of one command with its arguments; requests a `token`."""
 
     id: int
     command: str
     arguments: Arguments = {}
     stops: int | None = None
-    """As in `CommandRequest`, whose value counts."""
+    """Number of STOPs that the page knew; only the number in `CommandRequest` is checked."""
 
 
 class SequenceAction(
     msgspec.Struct, tag_field="t", tag="steer", forbid_unknown_fields=True, frozen=True
 ):
-    """A request about a sequence: pause, step, resume or end."""
+    """A request to pause, step, resume or end a sequence."""
 
     command: str
     verb: Pull
@@ -99,22 +99,22 @@ def encode_ask(
     level: Literal["normal", "hazardous"],
     left_s: float,
 ) -> str:
-    """Return a question for the second person, which the first one also sees."""
+    """Return a question to the second person; the first person's page also gets it."""
     return encoded(_Ask(number, run, who, command, cut(text), level, milliseconds(left_s)))
 
 
 def encode_asked(number: int) -> str:
-    """Return the message that ends a question."""
+    """Return the message that closes a question."""
     return encoded(_Asked(number))
 
 
 def encode_token(run: int, token: str) -> str:
-    """Return the token that allows the command `run`, once and soon."""
+    """Return the message with the token that allows the command `run` once, for a short time."""
     return encoded(_Token(run, token))
 
 
 def encode_progress(all_progress: tuple[SequenceProgress, ...]) -> str:
-    """Return the state of the sequences."""
+    """Return the message with the state of all sequences."""
     return encoded(
         _AllProgress(
             [

@@ -1,4 +1,4 @@
-"""Message types about the controls, without behaviour.
+"""Message types for the controls, without behaviour.
 
 Layer 5. Part of `urc.web.wire.messages`, which lists the direction of each message.
 """
@@ -39,7 +39,7 @@ class _Person(msgspec.Struct, frozen=True):
 class _Lease(Outbound, tag="lease", omit_defaults=False, frozen=True):
     you: str
     name: str
-    """Name of this page, as other pages show it."""
+    """Name of the page, as other pages show it."""
     epoch: int
     holder: _Person | None
     asker: _Person | None
@@ -48,15 +48,15 @@ class _Lease(Outbound, tag="lease", omit_defaults=False, frozen=True):
     latched: str
     """Name of the operator who pressed STOP; "" while nothing is latched."""
     stops: int
-    """Number of STOPs so far."""
+    """Number of STOPs in this run of the server."""
     confirmed: bool
     """Whether the robot's transports have taken the stop."""
     drives: bool
-    """Whether this page may drive."""
+    """Whether the page may drive."""
     forces: bool
-    """Whether this page may take the controls from another page."""
+    """Whether the page may take the controls from another page."""
     spare: str
-    """Secret key for the redundant socket of this page; "" for watchers."""
+    """Secret key for the redundant socket of the page; "" for watchers."""
 
 
 class _Beat(Outbound, tag="beat", frozen=True):
@@ -78,14 +78,14 @@ Verb = Literal["take", "ask", "yes", "no", "force", "leave", "reset"]
 
 
 class Drive(msgspec.Struct, tag_field="t", tag="drive", forbid_unknown_fields=True, frozen=True):
-    """A request about the controls; `for_s` is the time that the holder has to answer."""
+    """A request about the controls; `for_s` is the holder's time to answer, in seconds."""
 
     verb: Verb
     for_s: float = REQUEST_S
 
 
 class Tick(msgspec.Struct, tag_field="t", tag="tick", forbid_unknown_fields=True, frozen=True):
-    """A sample of a held control. See `urc.motion.freshness.ControlInput`."""
+    """One sample of a held control. See `urc.motion.freshness.ControlInput`."""
 
     command: str
     epoch: int
@@ -97,40 +97,40 @@ class Tick(msgspec.Struct, tag_field="t", tag="tick", forbid_unknown_fields=True
 class Release(
     msgspec.Struct, tag_field="t", tag="release", forbid_unknown_fields=True, frozen=True
 ):
-    """The end of a held control. `number` counts with the ticks; 0 without redundant socket."""
+    """The release of a held control, numbered with the ticks; 0 without redundant socket."""
 
     command: str
     number: int = 0
 
 
 class Stop(msgspec.Struct, tag_field="t", tag="stop", forbid_unknown_fields=True, frozen=True):
-    """STOP; `number` as in `Release`."""
+    """A press of STOP; `number` as in `Release`."""
 
     number: int = 0
 
 
 Driving = Drive | Tick | Release | Stop
 decode_tick = msgspec.json.Decoder(Tick).decode
-"""Decodes a text that is probably a tick; raises the exceptions in `NO_TICK`."""
+"""Decodes a text that is probably a tick; raises an exception in `NO_TICK` for other texts."""
 NO_TICK = (msgspec.MsgspecError, UnicodeError, RecursionError)
 _TICK_OF = b'{"t":"tick","command":"'
 """First bytes of a page's tick; a tick in another spelling takes the slower path."""
 
 
 def command_of(data: bytes) -> str:
-    """Return the command of a tick from its first bytes; "" if they do not show it."""
+    """Return the command of a tick from its first bytes; "" if it is not in these bytes."""
     end = data.find(b'"', len(_TICK_OF)) if data.startswith(_TICK_OF) else -1
     return data[len(_TICK_OF) : end].decode("ascii", "replace") if end > 0 else ""
 
 
 Doubled = Tick | Release | Stop
-"""Messages that a page may also send on its redundant socket."""
+"""Messages that a page may also send over its redundant socket."""
 
 
 class JoinRedundant(
     msgspec.Struct, tag_field="t", tag="spare", forbid_unknown_fields=True, frozen=True
 ):
-    """First message of a redundant socket: the key from the page's lease."""
+    """First message of a redundant socket, with the key from the page's lease."""
 
     key: str
 
@@ -138,7 +138,7 @@ class JoinRedundant(
 def encode_lease(
     state: LeaseState, you: Operator, *, left_s: float, is_confirmed: bool, spare: str = ""
 ) -> str:
-    """Return the lease message for one page; `spare` is the key for its redundant socket."""
+    """Return the lease message for a page; `spare` is the key for its redundant socket."""
     return encoded(
         _Lease(
             you=you.id,
@@ -163,12 +163,12 @@ def encode_beat(number: int) -> str:
 
 
 def encode_stopped(command: str, reason: Reason) -> str:
-    """Return the report of a control that stopped before it was let go."""
+    """Return the message that a control stopped before its release."""
     return encoded(_Stopped(command, reason))
 
 
 def encode_refused(about: str, command: str, message: str) -> str:
-    """Return the reason why a tick, or a request about the controls, was refused."""
+    """Return the message that a tick, or a request about the controls, was refused."""
     return encoded(_Refused(about, cut(message), command))
 
 

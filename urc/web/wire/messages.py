@@ -1,7 +1,8 @@
 """Message types of a dashboard's WebSocket, without behaviour.
 
-Layer 5. JSON text both ways. Times are milliseconds on the server's monotonic clock; ages are
-milliseconds at the moment of encoding. Values travel as index arrays over the names of `Hello`.
+Layer 5. Messages are JSON text in both directions. Times are in milliseconds on the server's
+monotonic clock; ages are in milliseconds at the moment of encoding. Values are sent as arrays of
+indexes into the names in `Hello`.
 
 Server → page, by ``t``::
 
@@ -24,12 +25,13 @@ Server → page, by ``t``::
     token   the reply to ``prepare``: allows one command, once, within 5 s
     progress the state of the sequences
 
-Images go as binary messages, see `urc.web.wire.picture`.
+Images are sent as binary messages; see `urc.web.wire.picture`.
 
-Page → server: ``ping``, ``run``, ``show``, ``agree``, ``prepare``, ``steer``, and for the controls
-``drive``, ``tick``, ``release`` and ``stop``. The last three also go over a redundant socket, which
-begins with ``spare`` and receives heartbeats. The types below bound the nesting: the decoder
-refuses anything deeper than a map of plain arguments.
+Messages from the page to the server: ``ping``, ``run``, ``show``, ``agree``, ``prepare``,
+``steer``, and for the controls ``drive``, ``tick``, ``release`` and ``stop``. Ticks, releases and
+stops may also use a redundant socket, which begins with ``spare`` and receives heartbeats. The
+types below limit the nesting depth: the decoder refuses anything deeper than a map of plain
+arguments.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -73,7 +75,7 @@ __all__ = [
 
 VERSION = 1
 INBOUND_BYTES = 64 * 1024
-"""Longest accepted message of a page, in bytes."""
+"""Maximum length of a message from a page, in bytes."""
 _AS_THEY_ARE = frozenset((float, bool, type(None)))
 _EXACT = 2**53 - 1  # a browser's numbers skip integers beyond it
 
@@ -87,7 +89,7 @@ CLOSE_FULL = 4503
 
 
 class BadMessage(Exception):
-    """The error for an invalid message of a page; its text has the expected form."""
+    """The error for an invalid message from a page; its text names the expected form."""
 
 
 class _Signal(msgspec.Struct, omit_defaults=True, frozen=True):
@@ -102,15 +104,16 @@ class _Signal(msgspec.Struct, omit_defaults=True, frozen=True):
     limits: dict[str, float] | None = None
     stale_after_s: float = 0.0
     sources: tuple[str, ...] = ()
-    """Transports with its readings: without a live one, the value is stale at once."""
+    """Transports that supply readings of the signal; if none of them is connected, the value is
+    stale immediately."""
     axes: str = ""
-    """Direction of its axes, or "" if unknown."""
+    """Direction of the signal's axes; "" if unknown."""
 
 
 class _Hello(Outbound, tag="hello", omit_defaults=False, frozen=True):
     version: int
     session: str
-    """Identifier of the session: a new one means that log numbers start again."""
+    """Identifier of the session; in a new session, the numbers of log lines restart."""
     robot: str
     title: str
     now: int
@@ -123,7 +126,7 @@ class _Values(Outbound, tag="v", frozen=True):
     i: msgspec.Raw
     v: Sequence[object]
     a: int | Sequence[int]
-    """Ages in milliseconds; one number if all are equal."""
+    """Ages in milliseconds; a single number if all ages are equal."""
     s: Sequence[str] | None = None
     e: Mapping[int, int] | None = None
 
@@ -151,7 +154,7 @@ class _Line(msgspec.Struct, frozen=True):
 
 class _Log(Outbound, tag="log", omit_defaults=False, frozen=True):
     first: int
-    """Number of the first line in this session, from 0."""
+    """Number of the first line within the session, from 0."""
     lines: list[_Line]
 
 
@@ -167,7 +170,7 @@ class _Pong(Outbound, tag="pong", frozen=True):
     c: float
     n: int
     u: int = 0
-    """Server time in milliseconds since 1970; left out if it is not known."""
+    """Server time in milliseconds since 1970; omitted if unknown."""
 
 
 class _Error(Outbound, tag="error", frozen=True):
@@ -176,7 +179,7 @@ class _Error(Outbound, tag="error", frozen=True):
 
 
 class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True, frozen=True):
-    """Requests a `pong` with the same `c`, the page's own clock in milliseconds."""
+    """A request for a `pong` with the same `c`, which is the page's clock in milliseconds."""
 
     c: float
 
@@ -184,13 +187,13 @@ class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True
 class CommandRequest(
     msgspec.Struct, tag_field="t", tag="run", forbid_unknown_fields=True, frozen=True
 ):
-    """One command. The page chooses `id`; exactly one reply carries it."""
+    """One command. The page chooses `id`; exactly one reply has this `id`."""
 
     id: int
     command: str
     arguments: Arguments = {}
     token: str = ""
-    """Token from `ApprovalRequest` if the driver requires a confirmation."""
+    """Token from `ApprovalRequest`, if the driver requires a confirmation."""
     stops: int | None = None
     """Number of STOPs that the page knew at the operator's click; None skips the check."""
 
@@ -212,10 +215,10 @@ _Message = TypeVar("_Message")
 
 
 def decoded(decoder: msgspec.json.Decoder[_Message], text: str | bytes) -> _Message:
-    """Return the message of a page.
+    """Return the decoded message of a page.
 
     Raises:
-        BadMessage: it is too long, or of no type of `decoder`.
+        BadMessage: the message is too long, or matches no type of `decoder`.
     """
     if len(text) > INBOUND_BYTES:
         raise BadMessage(f"longer than {INBOUND_BYTES} bytes")
@@ -234,7 +237,7 @@ def decode(text: str | bytes) -> Inbound:
 
 
 def encode_hello(profile: Profile, session: str, now_s: float) -> str:
-    """Return the first message: it gives later indexes their meaning."""
+    """Return the first message, which defines the meaning of all indexes."""
     sources = _sources(profile.driver)
     signals = profile.driver.signals
     return encoded(
@@ -251,7 +254,7 @@ def encode_hello(profile: Profile, session: str, now_s: float) -> str:
 
 
 class Indexes:
-    """Index numbers of names, with a cache of the last look-up."""
+    """Indexes of signal names, with a cache of the last look-up."""
 
     def __init__(self, index: Mapping[str, int]) -> None:
         self._index = index
@@ -259,11 +262,11 @@ class Indexes:
         self._found = msgspec.Raw(b"[]")
 
     def keyed(self, numbers: Mapping[str, int]) -> dict[int, int]:
-        """Return a mapping by signal with indexes in place of names."""
+        """Return the mapping with indexes in place of signal names."""
         return {self._index[name]: number for name, number in numbers.items()}
 
     def of(self, names: tuple[str, ...]) -> msgspec.Raw:
-        """Return the indexes of names, already encoded as JSON."""
+        """Return the indexes of names, encoded as JSON."""
         if names is not self._names and names != self._names:
             found = [*map(self._index.__getitem__, names)]
             self._names, self._found = names, msgspec.Raw(msgspec.json.encode(found))
@@ -273,7 +276,7 @@ class Indexes:
 def encode_values(
     samples: Iterable[Sample], indexes: Indexes, now_s: float, firsts: Mapping[str, int] = NOTHING
 ) -> bytes:
-    """Return one frame of readings; `firsts` are numbers of readings, by signal."""
+    """Return one frame of readings; `firsts` maps a signal to the number of its first reading."""
     values: Sequence[object]
     names, values, times, alarms = zip(*samples, strict=True)
     count, first_s = len(names), times[0]
@@ -292,7 +295,7 @@ def encode_values(
 
 
 def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
-    """Return the state of every transport."""
+    """Return the message with the state of every transport."""
     return encoded(
         _Links(
             [
@@ -312,7 +315,7 @@ def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
 
 
 def encode_log(notes: Iterable[LogEntry], first: int, now_s: float) -> str:
-    """Return lines of the log; `first` is the number of the first line in its session."""
+    """Return a message with log lines; `first` is the number of the first line in its session."""
     lines = [
         _Line(max(0, milliseconds(now_s - note.time_s)), note.level, note.source, cut(note.text))
         for note in notes
@@ -327,7 +330,7 @@ def encode_reply(
     code: str = "",
     message: str = "",
 ) -> str:
-    """Return the reply to a command: its values, or `code` and `message` of a failure."""
+    """Return the reply to a command: its values, or the `code` and `message` of its failure."""
     if code:
         return encoded(_Reply(run.id, ok=False, code=code, message=cut(message)))
     plain = {name: _plain(value) for name, value in (values or {}).items()}
@@ -335,17 +338,17 @@ def encode_reply(
 
 
 def encode_pong(ping: Ping, now_s: float, utc_s: float = 0.0) -> str:
-    """Return the reply to a ping; `utc_s` is the time of day, in seconds since 1970."""
+    """Return the reply to a ping; `utc_s` is the current time in seconds since 1970."""
     return encoded(_Pong(ping.c, milliseconds(now_s), milliseconds(utc_s)))
 
 
 def encode_error(code: str, message: str) -> str:
-    """Return the reason why a message was invalid, or why the socket closes."""
+    """Return the message with the reason why a message was invalid, or why the socket closes."""
     return encoded(_Error(code, cut(message)))
 
 
 def _plain(value: object) -> object:
-    """Return the value as a browser can hold it; of bytes, only their number."""
+    """Return the value in a form that browsers can represent; replace bytes by their number."""
     if isinstance(value, str):
         return cut(value)
     if type(value) is int and not -_EXACT <= value <= _EXACT:
@@ -384,7 +387,7 @@ def _signal(signal: Signal, sources: tuple[str, ...]) -> _Signal:
 
 
 def _sources(driver: Driver) -> dict[str, tuple[str, ...]]:
-    """Return the transports of each signal, from the fields of all messages."""
+    """Return the transports of each signal, taken from the fields of all messages."""
     asked: tuple[Poll | Command, ...] = (*driver.polls, *driver.commands.values())
     reads = [(message.transport, message.read) for message in driver.messages.values()]
     reads += [(each.transport, each.reply.read) for each in asked if each.reply]
@@ -398,7 +401,7 @@ def _sources(driver: Driver) -> dict[str, tuple[str, ...]]:
 
 
 def _add_sources(name: str, driver: Driver, found: dict[str, dict[str, None]]) -> dict[str, None]:
-    """Return the transports of a signal; a computed signal has those of its inputs."""
+    """Return the transports of a signal; a computed signal has the transports of its inputs."""
     signal = driver.signals.get(name)
     if signal is not None and signal.formula is not None and name not in found:
         found[name] = {}

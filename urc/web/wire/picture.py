@@ -1,13 +1,13 @@
-"""Images and other bytes of a signal, as binary messages over a dashboard's WebSocket.
+"""Images and other byte values of a signal, as binary messages over a dashboard's WebSocket.
 
-Layer 5. Pure. One message is one whole image; ``frames.js`` reads it::
+Layer 5. Pure. Each message contains one complete image; ``frames.js`` decodes it::
 
     0  u8   1: an image             4  u32  its age in milliseconds at the moment of encoding
     1  u8   length of the type      8  f64  the server's clock then, in milliseconds
     2  u16  index of the signal    16       media type in ASCII, then the bytes
 
-All clients get the same bytes, so the WebSocket frame is also built only once (RFC 6455, section
-5.2: a server does not mask).
+All clients get identical bytes, so the WebSocket frame is built only once (RFC 6455, section 5.2: a
+server does not mask).
 """
 
 import struct
@@ -24,13 +24,14 @@ _HEADER = struct.Struct(">BBHId")
 _OLDEST_MS = 2**32 - 1
 _FINAL_TEXT, _FINAL_BINARY = b"\x81", b"\x82"
 _SHORT, _MEDIUM = 126, 1 << 16
-"""The length of a frame takes one byte below the first, three below the second, else nine."""
+"""Frame lengths below the first limit take one byte, lengths below the second limit three bytes,
+and others nine bytes."""
 
 
 class ImageSelection(
     msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True
 ):
-    """Selects the images that the page shows; no others are sent."""
+    """Selects the images that the page shows; the server sends no other images."""
 
     signals: Annotated[
         tuple[Annotated[str, msgspec.Meta(max_length=256)], ...], msgspec.Meta(max_length=64)
@@ -38,13 +39,13 @@ class ImageSelection(
 
 
 def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
-    """Return the message of an image.
+    """Return the binary message with an image.
 
     Args:
         index: index of the signal in the names of `Hello`.
         data: the image from the robot.
-        age_ms: its age at `now_ms`.
-        now_ms: the server's clock.
+        age_ms: age of the image at `now_ms`, in milliseconds.
+        now_ms: time on the server's clock, in milliseconds.
     """
     kind = media_type(data).encode("ascii")
     age_ms = min(max(age_ms, 0), _OLDEST_MS)
@@ -52,7 +53,7 @@ def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
 
 
 def as_frame(message: bytes, *, is_text: bool = False) -> bytes:
-    """Return a message as one WebSocket frame, ready for any client."""
+    """Return a message as one WebSocket frame that any client can receive."""
     return (_FINAL_TEXT if is_text else _FINAL_BINARY) + _length(len(message)) + message
 
 

@@ -1,4 +1,4 @@
-"""Encoding of messages to a page: their base type, and the repair of texts.
+"""Encoding of messages to a page: their base type, and the repair of invalid texts.
 
 Layer 5.
 """
@@ -16,13 +16,13 @@ __all__ = [
 ]
 
 TEXT_CHARACTERS = 4096
-"""Longest text value for a page; a longer one is cut and ends in an ellipsis."""
+"""Maximum length of a text value in characters; a longer text is cut and ends in an ellipsis."""
 
 _encode = msgspec.json.Encoder().encode
 
 
 class Outbound(msgspec.Struct, tag_field="t", omit_defaults=True, frozen=True):
-    """A message to a page."""
+    """The base class of messages to a page."""
 
 
 def encoded(message: msgspec.Struct) -> str:
@@ -40,7 +40,7 @@ def encoded_bytes(message: msgspec.Struct) -> bytes:
 
 
 def repaired(tree: object) -> object:
-    """Return a tree of values with a question mark for each lone surrogate."""
+    """Return the tree of values with each lone surrogate replaced by a question mark."""
     if isinstance(tree, str):
         return tree.encode("utf-8", "replace").decode()
     if isinstance(tree, (list, tuple)):
@@ -51,10 +51,10 @@ def repaired(tree: object) -> object:
 
 
 def cut(text: str) -> str:
-    """Return a text, cut to the longest that a page gets."""
+    """Return a text, cut to `TEXT_CHARACTERS` characters."""
     return text if len(text) <= TEXT_CHARACTERS else text[: TEXT_CHARACTERS - 1] + "…"
 
 
 def milliseconds(seconds: float) -> int:
-    """Return the nearest whole number of milliseconds."""
+    """Return a time in milliseconds, rounded to a whole number."""
     return round(seconds * 1000)
