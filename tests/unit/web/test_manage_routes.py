@@ -99,7 +99,7 @@ def test_only_who_has_a_key_may_change_anything(
         assert plain.status_code == 415
         wrong = client.post(f"/api/v1/{path}", json={"no": "such key"})
         assert wrong.status_code == 400
-        assert "does not fit" in wrong.json()["error"]
+        assert "does not match the schema" in wrong.json()["error"]
         long = client.post(f"/api/v1/{path}", json={**body, "x": "x" * (1 << 20)})
         assert long.status_code == 413
     assert Store(tmp_path / "packages").installed() == before
