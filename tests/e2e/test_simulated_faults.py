@@ -73,7 +73,7 @@ async def test_faults_are_given_at_the_start_and_changed_by_typed_lines() -> Non
         assert took_s >= 0.35
         typed.write(b"fault nosie=2x\nmend\n")
         error = await complaints.readline()
-        assert error.startswith(b"there is no fault 'nosie'; there are delay=200ms, loss=5%")
+        assert error.startswith(b"unknown fault 'nosie'; known faults: delay=200ms, loss=5%")
         assert await said.readline() == b"faults: none\n"
         assert (await asked(port))[0].strip().isdigit()
         typed.write(b"fault silent\n")

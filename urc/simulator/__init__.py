@@ -1,1 +1,1 @@
-"""Emulated robots, from the same profile that drives the real one."""
+"""Emulated robots, defined by the same profiles as real robots."""

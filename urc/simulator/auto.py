@@ -1,8 +1,8 @@
-"""The emulated robot without rules: it replies to all requests that the driver declares.
+"""Automatic replies of an emulated robot to every request that the driver declares.
 
-Pure: no socket, no clock. A received frame is matched against all requests that the driver can send
-on that transport. The declaration that would decode the reply builds it from plausible values. If
-an argument of a command and a signal share a name, the signal takes the value of the argument.
+Pure: no sockets and no clock. Each received frame is matched against all requests that the driver
+can send on its transport. Each reply is encoded from plausible values, by the declaration that
+decodes the reply. A command argument with the name of a signal sets that signal.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -56,11 +56,11 @@ _FASTEST_S: Final = 0.1
 
 
 class Unanswered(Exception):
-    """The reason why a declared request has no reply, for people."""
+    """Raised if no reply can be built for a declared request; the text is for people."""
 
 
 class SimulatedReply(NamedTuple):
-    """One reply frame, or text without an end mark."""
+    """One reply: a frame, or a prompt without a terminator."""
 
     spec: ReadSpec
     reader: PayloadReader | None
@@ -68,10 +68,10 @@ class SimulatedReply(NamedTuple):
     prompt: Pattern | None = None
     match: Template | None = None
     needed: frozenset[str] = frozenset()
-    """The document's own fields that the receiver needs for its own reply."""
+    """Names of internal fields that the acknowledgement uses."""
 
     def fits(self, fields: Mapping[str, object]) -> bool:
-        """Return whether a frame with these fields exists."""
+        """Return whether a frame can be encoded from these fields."""
         try:
             return self.reader is not None and self.reader.write(fields) is not None
         except NotWritable:
@@ -79,15 +79,13 @@ class SimulatedReply(NamedTuple):
 
 
 class DefaultMessage(NamedTuple):
-    """An unsolicited message of the robot."""
+    """An unsolicited message that the robot repeats."""
 
     every_s: float
     answer: SimulatedReply
 
 
 class _Request(NamedTuple):
-    """A request that the driver can send."""
-
     label: str
     writer: PayloadWriter
     arguments: Mapping[str, Argument]
@@ -96,7 +94,7 @@ class _Request(NamedTuple):
 
 
 class ReceivedRequest(NamedTuple):
-    """A received request, with its arguments."""
+    """A received request and its decoded arguments."""
 
     request: _Request
     arguments: Mapping[str, object]
@@ -104,7 +102,7 @@ class ReceivedRequest(NamedTuple):
 
 
 class DefaultResponder:
-    """The shared values of all connections of one emulated robot."""
+    """Values and settings that all connections of an emulated robot share."""
 
     def __init__(self, driver: Driver, settings: Mapping[str, Value], values: Values) -> None:
         self.driver = driver
@@ -117,8 +115,8 @@ class DefaultResponder:
 
         Args:
             transport: its name.
-            framing: framing of the robot's side.
-            talks: whether it sends unsolicited messages.
+            framing: framing of data sent and received by the robot.
+            talks: whether the robot sends unsolicited messages.
         """
         return DefaultConnection(self, self.driver.transports[transport], framing, talks=talks)
 
@@ -128,7 +126,7 @@ class DefaultResponder:
         return self._raw[name](self.values.of(name, now_s))
 
     def fields(self, spec: ReadSpec, known: Mapping[str, object], now_s: float) -> Fields:
-        """Return raw fields for a frame: set values, else plausible ones."""
+        """Return raw fields for a frame: the set values, or plausible values."""
         numbers: dict[str, object] = {}
         others: dict[str, object] = {}
         for name in spec.fields:
@@ -163,7 +161,6 @@ class DefaultConnection:
     def __init__(
         self, robot: DefaultResponder, spec: TransportSpec, framing: Framing, *, talks: bool
     ) -> None:
-        """Prepare; `DefaultResponder.line` calls this."""
         self._robot = robot
         self._spec = spec
         self._framing = framing
@@ -183,7 +180,7 @@ class DefaultConnection:
         return [data for one in self.opening for data in self.render(one, now_s)]
 
     def answer(self, frame: Frame, now_s: float) -> list[Payload] | None:
-        """Return the reply to a frame, or None for a frame that the driver never sends.
+        """Return the reply to a frame, or None if the driver cannot have sent the frame.
 
         Raises:
             Unanswered: no reply can be built.
@@ -214,7 +211,7 @@ class DefaultConnection:
         return self._framing
 
     def message(self, name: str) -> SimulatedReply:
-        """Return a declared message, to be sent."""
+        """Return the encoder of a declared message."""
         message = self._robot.driver.messages[name]
         names = message.acknowledge.names if message.acknowledge is not None else frozenset()
         needed = frozenset(one for one in message.read.fields if one.startswith("_")) & names
@@ -246,11 +243,11 @@ class DefaultConnection:
         raise Unanswered(f"no reply can be built as {answer.spec.form}: {why}")
 
     def asked(self, frame: Frame, label: str = "") -> ReceivedRequest | None:
-        """Return the request in a frame with its arguments; an exact match goes first.
+        """Return the request and the arguments of a frame. Exact matches have priority.
 
         Args:
             frame: the received frame.
-            label: the preferred command or poll if several send the same frame; "" for any.
+            label: preferred command or poll if several send the same frame; "" for no preference.
         """
         near: ReceivedRequest | None = None
         best: ReceivedRequest | None = None
@@ -268,10 +265,10 @@ class DefaultConnection:
         return best if best is not None and label in ("", best.request.label) else None
 
     def asked_too(self, frame: Frame, label: str) -> ReceivedRequest | None:
-        """Return a frame as a request of the command `label` if its first match has no reply.
+        """Return the frame as a request of the command `label`, unless the first match has a reply.
 
-        Two declarations often send the same stop: the release of a held command, and a close
-        message or a command without reply.
+        Two declarations often send the same stop frame. Examples are the release of a held command,
+        a close message and a command without reply.
         """
         best = self.asked(frame)
         if best is None or best.request.names or best.request.answers:
@@ -282,13 +279,13 @@ class DefaultConnection:
         return None
 
     def labels(self, frame: Frame) -> set[str]:
-        """Return every command, poll and sequence that sends this exact frame, else the nearest."""
+        """Return the commands, polls and sequences with exactly this frame, or the nearest one."""
         found = list(self._readings(frame))
         exact = {one.request.label for one in found if self._gives(one)}
         return exact or {one.request.label for one in found[:1]}
 
     def _readings(self, frame: Frame) -> Iterator[ReceivedRequest]:
-        """Yield all requests that a frame may be, constant ones first."""
+        """Yield all possible requests of a frame, constant requests first."""
         for request in self._requests:
             found = request.writer.read(frame)
             arguments = None if found is None else typed_arguments(found, request.arguments)
@@ -301,7 +298,7 @@ class DefaultConnection:
             yield ReceivedRequest(request, arguments, frame)
 
     def _gives(self, asked: ReceivedRequest) -> bool:
-        """Return whether a request with its arguments encodes to this exact frame."""
+        """Return whether the request and its arguments encode to exactly the received frame."""
         request, arguments, frame = asked
         if not request.names:
             return True
@@ -316,7 +313,7 @@ class DefaultConnection:
             return False
 
     def _declared(self) -> Iterator[_Request]:
-        """Yield the requests of commands, polls and sequences; constant ones first."""
+        """Yield the requests of commands, polls and sequences. Constant requests are first."""
         driver, name = self._robot.driver, self._spec.name
         requests = []
         for command in driver.commands.values():
@@ -371,7 +368,7 @@ class DefaultConnection:
     def _script(
         self, label: str, steps: Iterable[Step]
     ) -> tuple[list[SimulatedReply], list[_Request]]:
-        """Return the frames expected before the first send, and those after each send."""
+        """Return the frames expected before the first send, and the requests with their replies."""
         opening: list[SimulatedReply] = []
         requests: list[tuple[WriteSpec, list[SimulatedReply]]] = []
         for step in _main_way(steps):
@@ -389,7 +386,7 @@ class DefaultConnection:
         return opening, [self._sent(label, send, tuple(after)) for send, after in requests]
 
     def _period_s(self, read: ReadSpec) -> float:
-        """Return the period of a message that keeps all its signals fresh."""
+        """Return a message period that keeps all signals of the message fresh."""
         signals = self._robot.driver.signals
         ages = [signals[name].stale_after_s for name in read.fields if name in signals]
         return min(_SLOWEST_S, max(_FASTEST_S, min(ages, default=_SLOWEST_S) / 3))
@@ -405,7 +402,7 @@ def _main_way(steps: Iterable[Step]) -> Iterator[Step]:
 
 
 def numbered(data: Payload, request: Frame) -> Payload:
-    """Return a reply with the number of its request, if the request has one."""
+    """Return the reply with the identifier of its request, if the request has an identifier."""
     asked = request.payload
     if not isinstance(asked, Envelope):
         return data

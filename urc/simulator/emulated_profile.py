@@ -1,6 +1,7 @@
-"""A profile that connects to its own emulated robot, on free ports.
+"""A profile that connects to an emulated robot on free ports.
 
-Layer 4. `urc demo` and `urc serve --simulate` use it; `urc simulate` keeps the real ports instead.
+Layer 4. `urc demo` and `urc serve --simulate` use free ports. `urc simulate` uses the profile's
+ports instead.
 """
 
 from collections.abc import AsyncIterator, Mapping
@@ -18,12 +19,12 @@ __all__ = ["stand_in"]
 async def stand_in(
     profile: Profile, settings: Mapping[str, Value], emulated_robot: EmulatedRobot | None = None
 ) -> AsyncIterator[Profile]:
-    """Emulate `profile` until the context ends; return the profile that connects to it.
+    """Emulate the robot of `profile` until the context ends; yield a profile that connects to it.
 
     Args:
-        profile: the profile of the robot.
-        settings: values for its templates.
-        emulated_robot: the emulated robot, for observers; made from the profile by default.
+        profile: profile of the robot.
+        settings: values of the profile's settings.
+        emulated_robot: emulated robot to use; None: create one from the profile.
 
     Raises:
         UrcError: a transport cannot be emulated.

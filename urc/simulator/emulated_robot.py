@@ -1,10 +1,10 @@
-"""The emulated robot: frames in, bytes out, by the simulator rules of a profile.
+"""An emulated robot that converts received frames to sent bytes, by the profile's simulator rules.
 
-The driver's own declarations reply to frames without a matching rule (`urc.simulator.auto`).
+If no rule matches a frame, the driver's declarations define the reply (`urc.simulator.auto`).
 
-Pure: no socket, no clock. The framing is the inverse of the driver's, so frames are split and built
-exactly as the real robot does it. Each client has a connection of its own; the robot's state is the
-same for all of them.
+Pure: no sockets and no clock. Frames are encoded and decoded with the reversed framing of the
+driver, as in the real robot. Each client has a separate connection, but all connections share the
+robot's state.
 """
 
 import logging
@@ -38,14 +38,20 @@ class _Line(Protocol):
 
 
 class TimedSetters:
-    """Rule → the connection that performs its changes, while that connection lives."""
+    """Assignments of timed rules to connections.
+
+    Only the assigned connection changes the robot's state.
+    """
 
     def __init__(self) -> None:
         """Begin without connections."""
         self._lines: dict[int, weakref.ref[_Line]] = {}
 
     def sets(self, rule: SimulatorRule, line: _Line) -> bool:
-        """Return whether `line` performs the changes of `rule`; the first caller does."""
+        """Return whether `line` may change state for `rule`.
+
+        An unassigned rule is assigned to `line`.
+        """
         known = self._lines.get(id(rule))
         before = known() if known is not None else None
         if before is None or before.is_over:
@@ -55,17 +61,16 @@ class TimedSetters:
 
 
 MOST_COURSES: Final = 256
-"""Most delayed replies of one connection."""
+"""Maximum number of delayed replies per connection."""
 
 log = logging.getLogger(__name__)
-"""Receives every fault, as ``(transport, text)``."""
+"""Logger of all faults, with the arguments ``(transport, text)``."""
 
 
 class EmulatedRobot:
-    """One emulated robot; `line` makes its side of a connection."""
+    """One emulated robot; `line` creates the robot's side of a connection."""
 
     def __init__(self, profile: Profile, settings: Mapping[str, Value]) -> None:
-        """Prepare the rules of `profile`, whose templates see `settings`."""
         self._transports = profile.driver.transports
         self._rules = profile.simulator
         self._values = Values(profile.driver, settings, profile.emulated, profile.world)
@@ -85,14 +90,14 @@ class EmulatedRobot:
         return EmulatedConnection(spec, framing, ruled, auto, self._setters, self._values)
 
     def picture(self, transport: str, topics: Iterable[str], now_s: float) -> bytes | None:
-        """Return the image of the robot's world for one of `topics`, or None.
+        """Return the world's current image for one of `topics`, or None without an image.
 
-        The image is b"" while the sensor has dropped out.
+        The image is b"" while the sensor has a dropout fault.
 
         Args:
-            transport: name of the transport of the subscription.
-            topics: names of the image's topic there.
-            now_s: seconds since the epoch.
+            transport: name of the transport with the subscription.
+            topics: alternative names of the image's topic.
+            now_s: current time, in seconds since the epoch.
         """
         body = self._values.body
         for topic in topics:
@@ -106,51 +111,51 @@ class EmulatedRobot:
 
     @property
     def body(self) -> SimulatedBody | None:
-        """The body in its world; None without a world."""
+        """The simulated body; None for a robot without a world."""
         return self._values.body
 
     def prepare(self) -> None:
-        """Load the modules for images, so that the first image is not late; may block."""
+        """Load the image modules in advance, so that the first image has no delay; may block."""
         if self._values.body is not None:
             self._values.body.prepare()
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """The injected faults, as they were written."""
+        """Active faults, in the syntax of `FAULTS`."""
         return tuple(one.text for one in self._values.faults.active.values())
 
     def inject(self, text: str, now_s: float) -> None:
         """Inject a fault in the syntax of `FAULTS`.
 
         Args:
-            text: such as ``loss=5%``.
-            now_s: seconds since the epoch.
+            text: fault to inject, such as ``loss=5%``.
+            now_s: current time, in seconds since the epoch.
 
         Raises:
-            UrcError: the fault is unknown, or impossible for this robot; one line.
+            UrcError: the fault is unknown, or impossible for this robot.
         """
         inject(parse_fault(text), self._values, now_s)
 
     def mend(self) -> None:
-        """Remove all faults; a low battery stays low."""
+        """Remove all faults. The battery remains low after a low-battery fault."""
         mend(self._values)
 
     def camera(self, now_s: float) -> bytes | None:
-        """Return the robot's camera image as JPEG; None without a camera in a world.
+        """Return the robot's camera image as JPEG; None for a world without a camera.
 
-        `now_s` is in seconds since the epoch.
+        `now_s` is the current time, in seconds since the epoch.
         """
         body = self._values.body
         name = next(iter(self._pictures.values()), None)
         return None if body is None or name is None else body.picture(name, now_s)
 
     def top_view(self, width: int, height: int, now_s: float) -> bytes | None:
-        """Return the robot in its world from above, as JPEG; None without a world.
+        """Return a top view of the world as JPEG; None for a robot without a world.
 
         Args:
-            width: pixels, 16 to 2000.
-            height: pixels, 16 to 2000.
-            now_s: seconds since the epoch.
+            width: width of the image in pixels, 16 to 2000.
+            height: height of the image in pixels, 16 to 2000.
+            now_s: current time, in seconds since the epoch.
         """
         body = self._values.body
         if body is None:
@@ -159,9 +164,9 @@ class EmulatedRobot:
         return body.world.top_view(width, height)
 
     def readings(self, now_s: float) -> Mapping[str, Reading]:
-        """Return the values of the robot's signals, for an observer without a connection.
+        """Return the values of the robot's signals, without a connection.
 
-        `now_s` is in seconds since the epoch.
+        `now_s` is the current time, in seconds since the epoch.
         """
         return {name: self._values.of(name, now_s) for name in self._values.driver.signals}
 
@@ -169,7 +174,7 @@ class EmulatedRobot:
 def _pictures(
     driver: Driver, settings: Mapping[str, Value], senses: Iterable[str]
 ) -> Mapping[tuple[str, str], str]:
-    """Return transport and topic → signal, for images from the world."""
+    """Return the signal of each camera image, by transport and topic."""
     return {
         (message.transport, topic_of(message.read, settings)): name
         for message in driver.messages.values()
@@ -181,7 +186,7 @@ def _pictures(
 
 
 def _speaks(rule: SimulatorRule) -> bool:
-    """Return whether a rule defines messages of its own, in place of the declared ones."""
+    """Return whether a rule sends messages instead of the declared messages."""
     if rule.request:
         return False
     says = any(one.send or one.message for one in rule.reactions)
@@ -193,7 +198,7 @@ class _Periodic:
     what: ReadyRule | DefaultMessage
     every_s: float
     left_s: float
-    """Time until it is due, in seconds."""
+    """Time until the next action, in seconds."""
 
 
 class EmulatedConnection:
@@ -208,7 +213,6 @@ class EmulatedConnection:
         setters: TimedSetters,
         values: Values,
     ) -> None:
-        """Prepare; `EmulatedRobot.line` calls this."""
         self._body = values.body
         self._flaws = values.faults
         self._late = DelayLine()
@@ -228,15 +232,15 @@ class EmulatedConnection:
         self._periodic += [_Periodic(one, one.every_s, one.every_s) for one in auto.messages]
         self._now_s = 0.0
         self.is_over = False
-        """Whether the robot ends the connection, after all its data was taken."""
+        """Whether the robot closes the connection after the client has received all data."""
         self.faults = 0
-        """Number of invalid frames, and of frames without a matching rule or a reply."""
+        """Number of invalid frames, unmatched frames and failed replies."""
         self.last_fault = ""
-        """Text of the newest fault, one line."""
+        """Text of the latest fault, in one line."""
 
     @property
     def due_in_s(self) -> float | None:
-        """Time until `step` has data to send, in seconds; None if it never has."""
+        """Time until `advance` has data to send, in seconds; None without pending data."""
         if not self._is_greeted:
             return 0.0
         left = [one.left_s for one in self._periodic]
@@ -249,17 +253,17 @@ class EmulatedConnection:
         return max(0.0, min(left)) if left else None
 
     def receive(self, data: Payload, now_s: float, limit: int | None = None) -> list[Payload]:
-        """Take data of the client and return the replies, each a whole frame.
+        """Process received data and return the replies. Each reply is a whole frame.
 
         Args:
-            data: any piece of the stream, or an envelope on a message transport.
-            now_s: seconds since the epoch, the templates' ``now``.
-            limit: most replies; requests beyond it are dropped. None: no limit.
+            data: bytes from any position of the stream, or an envelope on a message transport.
+            now_s: current time in seconds since the epoch, available to templates as ``now``.
+            limit: maximum number of replies; further requests are dropped. None: no limit.
         """
         return self._flawed(self._receive(data, now_s, limit, self._answer_or_lose), now_s)
 
     def request(self, data: Payload, now_s: float) -> list[Payload]:
-        """Return the replies at once, for servers that reply to each message separately."""
+        """Return the replies without injected faults. The server must delay and drop them."""
         return self._receive(data, now_s, None, self._answer)
 
     def _receive(
@@ -283,15 +287,15 @@ class EmulatedConnection:
         return answers
 
     def advance(self, dt_s: float, now_s: float) -> list[Payload]:
-        """Let `dt_s` seconds pass and return the robot's unsolicited frames.
+        """Advance the time by `dt_s` seconds and return the robot's unsolicited frames.
 
-        A rule that was due several times sends once: a pause causes no burst.
+        A periodic rule sends at most once per call, so a pause causes no burst.
         """
         said = self._flawed(self._due(dt_s, now_s), now_s)
         return self._late.pop_due(now_s) + said if self.has_late else said
 
     def _flawed(self, said: list[Payload], now_s: float) -> list[Payload]:
-        """Return the frames to send now; injected faults delay or lose the others."""
+        """Return the frames to send now. Injected faults delay or drop the other frames."""
         if not self._flaws.active:
             return said
         said = self._flaws.apply(said)
@@ -303,12 +307,12 @@ class EmulatedConnection:
 
     @property
     def has_late(self) -> bool:
-        """Whether a delayed frame is due."""
+        """Whether delayed frames are queued."""
         return self._late.due_s < math.inf
 
     @property
     def loses(self) -> bool:
-        """Whether the next reply is lost."""
+        """Whether an injected fault drops the next reply."""
         return self._flaws.is_silent or self._flaws.loses()
 
     @property
@@ -318,7 +322,7 @@ class EmulatedConnection:
 
     @property
     def is_incomplete(self) -> bool:
-        """Whether an injected fault has made a signal drop out."""
+        """Whether an injected dropout affects any signal."""
         return bool(self._flaws.dropped)
 
     def _due(self, dt_s: float, now_s: float) -> list[Payload]:
@@ -343,7 +347,7 @@ class EmulatedConnection:
         return said
 
     def _pass(self, now_s: float) -> None:
-        """Advance the world to the present, before its inputs change."""
+        """Advance the world to the current time before its inputs change."""
         self._now_s = now_s
         if self._body is not None:
             self._body.world.advance(now_s)
@@ -382,7 +386,7 @@ class EmulatedConnection:
         return said or []
 
     def _resume(self, running_rule: RunningRule, now_s: float) -> list[Payload]:
-        """Perform the due reactions, and keep the others for later."""
+        """Run the reactions that are due; schedule the remaining reactions."""
         said: list[Payload] = []
         while running_rule.ready_reactions and not self.is_over:
             reaction = running_rule.ready_reactions[0]
@@ -397,13 +401,13 @@ class EmulatedConnection:
 
     def _defer(self, running_rule: RunningRule, left_s: float) -> None:
         if len(self._running_rules) >= MOST_COURSES:
-            self._fault(f"{MOST_COURSES} delayed replies wait already; this one is dropped")
+            self._fault(f"{MOST_COURSES} delayed replies are already queued; dropped this reply")
             return
         running_rule.left_s, running_rule.has_waited = left_s, True
         self._running_rules.append(running_rule)
 
     def _try(self, make: Callable[[], list[Payload] | None]) -> list[Payload] | None:
-        """Return the result of `make`; count and log a frame without reply."""
+        """Return the result of `make`. If no reply can be built, count and log a fault."""
         try:
             return make()
         except Unanswered as problem:

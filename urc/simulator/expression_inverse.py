@@ -1,7 +1,8 @@
-"""Inversion of expressions: the field value for which an expression gives a wanted value.
+"""Inversion of expressions: find the field value for which an expression has the wanted value.
 
-Pure. An expression of one field with a chain of filters is inverted from its end. Pieces of the
-same bytes (``unpack`` at several offsets) are merged. An expression without inverse gives None.
+Pure. An expression of one field with a chain of filters is inverted from the last filter to the
+first. Parts of the same bytes (``unpack`` at several offsets) are merged. Expressions without an
+inverse return None.
 """
 
 import ast
@@ -21,11 +22,11 @@ _MOST_BYTES: Final = 4096
 
 
 def computed_fields(spec: ReadSpec, raw: Callable[[str], object]) -> dict[str, object]:
-    """Return the fields from which expressions of one field compute signals.
+    """Return the fields for signals that are computed from a single field.
 
     Args:
         spec: the frame.
-        raw: signal → its raw value; raises `BadValue` without one.
+        raw: returns the raw value of a signal; raises `BadValue` if there is no value.
     """
     wanted: dict[str, list[tuple[Template, object]]] = {}
     for name, template in spec.sets.items():
@@ -46,12 +47,12 @@ def computed_fields(spec: ReadSpec, raw: Callable[[str], object]) -> dict[str, o
 
 
 def _takes_apart(template: Template) -> bool:
-    """Return whether the expression takes its field apart, so that it cannot be a plain value."""
+    """Return whether the expression splits its field, so the field cannot be a plain value."""
     return any(f"_filter_{name}(" in template.python for name in ("split", *CUT_FILTERS, *_TEXTS))
 
 
 def field_of(wanted: Iterable[tuple[Template, object]]) -> object | None:
-    """Return the value of the one field for which all expressions give their wanted values."""
+    """Return a field value for which all expressions have their wanted values."""
     whole: bytearray | None = None
     last: Callable[[bytes], object] | None = None
     found: object | None = None
@@ -77,7 +78,7 @@ Step = tuple[str, tuple[Any, ...]]
 
 
 def _chain(python: str) -> list[Step]:
-    """Return the filters after the field, the last one first; [] for any other expression."""
+    """Return the filters of the expression, last filter first; [] for any other expression."""
     node, steps = ast.parse(python, mode="eval").body, list[Step]()
     while isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args:
         subject, *rest = node.args
@@ -90,7 +91,7 @@ def _chain(python: str) -> list[Step]:
 
 
 def _undone(chain: list[Step], value: Any) -> tuple[object, int]:
-    """Return the field, or bytes of it with their offset."""
+    """Return the field's value, or some of its bytes with their offset."""
     at = 0
     for name, arguments in chain:
         if name in _TEXTS:
@@ -117,7 +118,7 @@ def _undone(chain: list[Step], value: Any) -> tuple[object, int]:
 
 
 def _packed(type_name: str, value: Any) -> bytes:
-    """Return a value as bytes, clamped to the range of the type."""
+    """Return the value as bytes, clamped to the range of the type."""
     number = number_of(type_name)
     if number is None:
         raise ValueError(type_name)
@@ -142,4 +143,4 @@ _TEXTS: Final[dict[str, Callable[[bytes], object]]] = {
     "b64decode": _base64,
     "hexbytes": lambda data: data.hex().upper(),
 }
-"""Filters from bytes to text → their inverse."""
+"""Inverse functions of the filters that decode text to bytes, by filter."""

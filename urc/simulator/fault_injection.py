@@ -1,4 +1,4 @@
-"""Injects faults into an emulated robot, and removes them.
+"""Fault injection for an emulated robot: inject and remove faults.
 
 Pure.
 """
@@ -16,14 +16,14 @@ __all__ = ["inject", "mend"]
 
 
 def inject(fault: Fault, values: Values, now_s: float) -> None:
-    """Inject `fault` into the robot of `values`.
+    """Inject `fault` into the robot with these values.
 
     Raises:
-        UrcError: this robot cannot have the fault.
+        UrcError: the fault is impossible for this robot.
     """
     body, faults = values.body, values.faults
     if fault.name in ("noise", "low-battery") and body is None:
-        raise UrcError(f"fault {fault.name}: this robot has no world, which this fault needs")
+        raise UrcError(f"fault {fault.name}: this robot has no world")
     if fault.name == "dropout":
         faults.dropped |= {*_dropped(fault.signal, values)}
     elif fault.name == "stuck":
@@ -53,7 +53,7 @@ def _check_signal(fault: Fault, values: Values) -> None:
 
 
 def _dropped(name: str, values: Values) -> Iterator[str]:
-    """Yield the signals that lose their value with a signal or a sensor."""
+    """Yield the signals that lose their value when the signal or sensor `name` fails."""
     body = values.body
     if body is not None and name not in values.driver.signals and name in READINGS:
         body.world.dropped.add(name)

@@ -1,6 +1,6 @@
 """Fault injection for an emulated robot: delay, loss, noise and failed sensors.
 
-Pure. The same faults lose the same frames of the same traffic.
+Pure. For the same traffic, the same faults drop the same frames.
 """
 
 import math
@@ -18,7 +18,7 @@ from urc.simulator.world.chance import uniform
 __all__ = ["FAULTS", "Fault", "Faults", "DelayLine", "parse_fault"]
 
 MOST_LATE: Final = 1024
-"""Most delayed frames of one connection; beyond them the newest are lost."""
+"""Maximum number of delayed frames per connection; further frames are dropped."""
 _LONGEST_S: Final = 60.0
 _LOUDEST: Final = 1000.0
 
@@ -31,7 +31,7 @@ FAULTS: Final[Mapping[str, str]] = {
     "stuck": "stuck=SIGNAL",
     "low-battery": "low-battery",
 }
-"""Fault → its syntax."""
+"""Syntax of each fault, by name."""
 
 
 class Fault(NamedTuple):
@@ -39,22 +39,22 @@ class Fault(NamedTuple):
 
     name: str
     amount: float = 0.0
-    """Delay in seconds, share of lost frames, or factor on the noise."""
+    """Delay in seconds, share of lost frames (0 to 1), or noise factor."""
     signal: str = ""
-    """Name of the signal that drops out or is stuck."""
+    """Name of the affected signal, for dropout and stuck."""
     text: str = ""
-    """The text that was parsed."""
+    """Text of the fault, in the syntax of `FAULTS`."""
 
 
 def parse_fault(text: str) -> Fault:
     """Parse a fault in the syntax of `FAULTS`.
 
     Raises:
-        UrcError: the text is no fault; the message lists the faults.
+        UrcError: the text is not a fault; the message lists all faults.
     """
     name, _, value = text.strip().partition("=")
     if name not in FAULTS:
-        raise UrcError(f"there is no fault {name!r}; there are {', '.join(FAULTS.values())}")
+        raise UrcError(f"unknown fault {name!r}; known faults: {', '.join(FAULTS.values())}")
     wanted = UrcError(f"fault {name}: expected {FAULTS[name]}, found {text.strip()!r}")
     if ("=" in FAULTS[name]) != bool(value):
         raise wanted
@@ -96,11 +96,11 @@ class Faults:
     def __init__(self) -> None:
         """Begin without faults."""
         self.active: dict[str, Fault] = {}
-        """Faults by name, and by signal for faults of a signal."""
+        """Faults by name; for faults of a signal, by name and signal."""
         self.dropped: frozenset[str] = frozenset()
-        """Signals whose sensors have failed."""
+        """Signals with failed sensors."""
         self.stuck: dict[str, Reading] = {}
-        """Stuck signals, with their last value."""
+        """Last values of the stuck signals, by name."""
         self._frames = 0
 
     @property
@@ -115,7 +115,7 @@ class Faults:
         return "silent" in self.active
 
     def add(self, fault: Fault) -> None:
-        """Add a fault; it replaces one of the same kind."""
+        """Add a fault; it replaces a fault of the same name and signal."""
         key = f"{fault.name} {fault.signal}".strip()
         self.active[key] = fault
 
@@ -134,11 +134,11 @@ class Faults:
         return uniform(1, self._frames, "loss") < fault.amount
 
     def apply(self, frames: Iterable[Payload]) -> list[Payload]:
-        """Return the frames to a client that are not lost."""
+        """Return the frames that reach the client."""
         return [] if self.is_silent else [one for one in frames if not self.loses()]
 
     def drops(self, names: Iterable[str]) -> bool:
-        """Return whether one of several signals has dropped out."""
+        """Return whether any of the signals has dropped out."""
         return bool(self.dropped) and not self.dropped.isdisjoint(names)
 
 
@@ -149,15 +149,15 @@ class DelayLine:
         """Begin without frames."""
         self._waiting: deque[tuple[float, Payload]] = deque()
         self.lost = 0
-        """Frames beyond the limit, which are lost."""
+        """Number of frames dropped because the queue was full."""
 
     @property
     def due_s(self) -> float:
-        """Due time of the first frame, by the clock of `put`; ``inf`` without frames."""
+        """Due time of the first frame, on the clock of `push`; ``inf`` if the queue is empty."""
         return self._waiting[0][0] if self._waiting else math.inf
 
     def push(self, frames: Sequence[Payload], due_s: float) -> None:
-        """Keep frames until `due_s`."""
+        """Queue frames until `due_s`."""
         for one in frames:
             if len(self._waiting) >= MOST_LATE:
                 self.lost += 1

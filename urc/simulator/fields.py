@@ -1,4 +1,4 @@
-"""Raw fields for a frame of the emulated robot, and the subsets that a frame can carry.
+"""Raw fields for a frame of the emulated robot, and subsets of fields that fit into one frame.
 
 Pure.
 """
@@ -15,12 +15,13 @@ class Fields(NamedTuple):
     numbers: dict[str, object]
     others: dict[str, object]
     own: dict[str, object]
-    """The document's own fields: constants of ``when``, and echoes of the request."""
+    """Internal fields of the document: constants of ``when``, and values repeated from the
+    request."""
     unknown: tuple[str, ...] = ()
-    """The document's own fields without any known value."""
+    """Internal fields of the document without a known value."""
 
     def attempts(self, fits: Callable[[dict[str, object]], bool]) -> Iterator[dict[str, object]]:
-        """Yield fields to encode, from all to the fewest; the encoder decides."""
+        """Yield sets of fields to encode, from the largest to the smallest."""
         whole = {name: _rounded(raw) for name, raw in self.numbers.items()}
         yield self.numbers | self.others | self.own
         yield whole | self.others | self.own

@@ -1,4 +1,4 @@
-"""Multiline replies of an emulated robot, with their end mark.
+"""Multiline replies of an emulated robot, including their last line.
 
 Pure.
 """
@@ -12,11 +12,11 @@ __all__ = ["in_lines"]
 def in_lines(
     payload: bytes, lines: int | Pattern | None, reader: PayloadReader | None, encoding: str
 ) -> list[bytes]:
-    """Return the frames of a reply.
+    """Return the frames of a multiline reply.
 
     Args:
-        payload: the whole reply.
-        lines: number of lines, or the pattern of the last line; None for a single frame.
+        payload: payload of the whole reply.
+        lines: number of lines, or the pattern of the last line; None for a reply of one frame.
         reader: decoder of the whole reply.
         encoding: encoding of the transport.
     """
@@ -38,7 +38,7 @@ def in_lines(
 
 
 def _says(pieces: list[bytes], reader: PayloadReader, encoding: str) -> dict[str, object] | None:
-    """Return the decoded fields of lines, without the fields of the document itself."""
+    """Return the decoded fields of the lines, without internal fields."""
     try:
         found = reader.read(Frame(b"\n".join(pieces), encoding))
     except BadText:

@@ -1,7 +1,6 @@
-"""Fields of a reply that repeat the request, and fields that identify a frame.
+"""Reply fields that repeat values of the request, and fields that identify a frame.
 
-Pure. The module inverts equalities and lists of constants in ``when`` and ``match``, and no other
-part of an expression.
+Pure. The module inverts only equalities and lists of constants in ``when`` and ``match``.
 """
 
 import re
@@ -25,21 +24,21 @@ _ONE_OF = re.compile(
     ('[^'\\]*'|"[^"\\]*"|0x[0-9A-Fa-f]+|-?\d+(?:\.\d+)?)\s*[,\])]""",
     re.VERBOSE | re.ASCII,
 )
-"""A name, and the first of its possible constants."""
+"""A name and its first possible constant."""
 
 
 _MATCH = re.compile(
     r"(?<![\w.])(_?[A-Za-z]\w*)\s+is\s+(?:match|search)\(\s*'([^']*)'\s*\)", re.ASCII
 )
-"""A name, and the pattern of its value."""
+"""A name and the pattern of its value."""
 
 
 _HEMISPHERE = re.compile(r"\|\s*ddmm\(\s*(_?[A-Za-z]\w*)\s*\)", re.ASCII)
-"""The name with the hemisphere of a number of degrees and minutes."""
+"""Name of the hemisphere field of a value in degrees and minutes."""
 
 
 def rule_for(driver: Driver, transport: str, label: str) -> str:
-    """Return the hint for a request without automatic reply: a rule with its key, for people."""
+    """Return a suggested simulator rule for a request without an automatic reply."""
     if label in driver.commands and not driver.commands[label].steps:
         trigger = f"command: {label}"
     elif any(label == poll.name != f"polls.{at}" for at, poll in enumerate(driver.polls)):
@@ -50,7 +49,7 @@ def rule_for(driver: Driver, transport: str, label: str) -> str:
 
 
 def own_fields(spec: ReadSpec, known: Mapping[str, object]) -> dict[str, object]:
-    """Return the document's own fields: constants, and echoes of the request."""
+    """Return the document's internal fields: constants, and values repeated from the request."""
     own: dict[str, object] = {}
     if spec.when is not None:
         for left, right in _equalities(spec.when):
@@ -73,7 +72,7 @@ def own_fields(spec: ReadSpec, known: Mapping[str, object]) -> dict[str, object]
 
 
 class _Name(str):
-    """A name in an equality, in contrast to a text."""
+    """A name in an equality, as opposed to a text constant."""
 
     __slots__ = ()
 
@@ -100,7 +99,7 @@ def _constant(text: str) -> object:
 
 
 def correlated(match: Template, known: Mapping[str, object]) -> dict[str, object]:
-    """Return the reply's fields that are constants, or repeat a field of the request."""
+    """Return the reply's fields that are constants or repeat a field of the request."""
     return {
         left: known[right] if isinstance(right, _Name) else right
         for left, right in _equalities(match)
@@ -111,7 +110,7 @@ def correlated(match: Template, known: Mapping[str, object]) -> dict[str, object
 def typed_arguments(
     found: Mapping[str, object], arguments: Mapping[str, Argument]
 ) -> dict[str, object] | None:
-    """Return the arguments in a frame with their types, or None if they do not fit."""
+    """Return the typed arguments of a frame, or None if a value does not fit its type."""
     typed: dict[str, object] = {}
     for name, raw in found.items():
         argument = arguments.get(name)
@@ -125,9 +124,9 @@ def typed_arguments(
 def guesses(
     arguments: Mapping[str, Argument], found: Mapping[str, object]
 ) -> Iterator[dict[str, object]]:
-    """Yield arguments with each value of a missing one, for example where true is sent as ``on``.
+    """Yield the arguments with each possible value of a missing argument, such as true and false.
 
-    Only one argument may be missing, and it may have only a few values.
+    Arguments are guessed only if a single argument is missing and its values are few.
     """
     left = [one for name, one in arguments.items() if name not in found]
     if len(left) == 1:
@@ -137,7 +136,7 @@ def guesses(
 
 
 def is_alike(made: Payload, came: Payload) -> bool:
-    """Return whether a frame equals the built one; an envelope may have more attributes."""
+    """Return whether a frame equals the built frame. An envelope may have additional attributes."""
     if not isinstance(made, Envelope) or not isinstance(came, Envelope):
         return made == came
     said = came.attributes
@@ -172,6 +171,6 @@ def _as(kind: str, raw: object) -> object:
 
 
 def _is_whole(raw: str) -> bool:
-    """Return whether text is an integer as an expression writes it."""
+    """Return whether the text is an integer in the notation of expressions."""
     digits = raw.removeprefix("-")
     return digits.isdecimal() and digits.isascii() and str(int(raw)) == raw

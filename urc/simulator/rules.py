@@ -1,6 +1,6 @@
 """The simulator rules of a document, compiled for one transport.
 
-Pure: no socket, no clock.
+Pure: no sockets and no clock.
 """
 
 from collections.abc import Mapping
@@ -73,24 +73,24 @@ class RunningRule:
         self.names = names
         """Names and values from the frame."""
         self.asked = asked
-        """The declared request that triggered the rule, if any."""
+        """The declared request that triggered the rule; None for other frames."""
         self.frame = frame
-        """The received frame; None for a timed rule."""
+        """The received frame; None for a periodic rule."""
         self.sets = sets
-        """Whether this connection performs the changes to the robot."""
+        """Whether this connection changes the robot's state."""
         self.left_s = 0.0
-        """Time until the first of `ready_reactions` is due, in seconds."""
+        """Time until the first reaction in `ready_reactions` is due, in seconds."""
         self.has_waited = False
 
 
 class RuleSet:
-    """The rules of one transport, in the order of the document.
+    """The rules of one transport, in document order.
 
     Args:
         rules: the rules.
         spec: the transport.
-        framing: framing of the robot's side.
-        auto: replies to declared requests.
+        framing: framing of data sent and received by the robot.
+        auto: source of automatic replies to declared requests.
         values: values of the robot.
     """
 
@@ -109,7 +109,7 @@ class RuleSet:
         self._counters = Counters()
         ready = [self._ready(rule) for rule in rules]
         self.asked = tuple(rule for rule in ready if rule.what.every_s is None)
-        """Rules that frames trigger."""
+        """Rules that received frames trigger."""
         self.periodic = tuple(rule for rule in ready if rule.what.every_s is not None)
 
     def _ready(self, rule: SimulatorRule) -> ReadyRule:
@@ -131,10 +131,10 @@ class RuleSet:
         )
 
     def match(self, frame: Frame, now_s: float) -> RunningRule | None:
-        """Return the reactions of the first rule that matches a frame, or None.
+        """Return the reactions of the first rule that matches the frame; None without a match.
 
         Raises:
-            Unanswered: the condition of a rule has no value, or a field has none.
+            Unanswered: a condition or field of a rule has no value.
         """
         for rule in self.asked:
             asked: ReceivedRequest | None = None
@@ -164,7 +164,7 @@ class RuleSet:
         frame: Frame,
         now_s: float,
     ) -> RunningRule | None:
-        """Return the reactions of a rule to a frame with `names`; None if its condition fails."""
+        """Return the reactions to a frame with `names`; None if the rule's condition is false."""
         for name, value in (names or NOTHING).items():
             if isinstance(value, Unusable):
                 raise Unanswered(f"{name}: {value.why}")
@@ -177,7 +177,7 @@ class RuleSet:
     def holds(
         self, condition: Template | None, now_s: float, names: Mapping[str, object] = NOTHING
     ) -> bool:
-        """Return whether the condition of a rule is true; raise `Unanswered` if it has no value."""
+        """Return whether the rule's condition is true; raise `Unanswered` if evaluation fails."""
         if condition is None:
             return True
         try:
@@ -186,7 +186,7 @@ class RuleSet:
             raise Unanswered(str(error)) from None
 
     def do(self, reaction: ReadyReaction, running_rule: RunningRule, now_s: float) -> list[Payload]:
-        """Perform one reaction and return its frames; raise `Unanswered` if that is impossible."""
+        """Perform one reaction and return its frames; raise `Unanswered` on failure."""
         what = reaction.what
         said: list[Payload] = []
         try:
@@ -197,7 +197,9 @@ class RuleSet:
                 if asked is None and running_rule.frame is not None:
                     asked = self._auto.asked(running_rule.frame)
                 if asked is None:
-                    raise Unanswered("the driver never sends this, so it declares no reply")
+                    raise Unanswered(
+                        "the driver never sends this frame and declares no reply"
+                    )
                 said += self._auto.answers(asked, now_s)
             if reaction.message is not None:
                 said += self._auto.render(reaction.message, now_s)
@@ -210,11 +212,11 @@ class RuleSet:
         return said
 
     def _is_dropped(self, what: Reaction) -> bool:
-        """Return whether a reply contains a signal that has dropped out."""
+        """Return whether the reply contains a signal that has dropped out."""
         return what.send is not None and self._values.faults.drops(what.send.names)
 
     def _wants_dropped(self, what: Reaction) -> bool:
-        """Return whether a reaction may have failed because of a failed sensor."""
+        """Return whether a failed sensor may explain the failure of a reaction."""
         body = self._values.body
         names = {
             name for one in what.sets.values() if isinstance(one, Template) for name in one.names
@@ -250,7 +252,7 @@ class RuleSet:
 
 
 def _names_in(rule: ReadyRule, came: Frame) -> Mapping[str, object] | None:
-    """Return the names in a frame by a rule's own pattern or form; None without a match."""
+    """Return the names in a frame, read by the rule's pattern or form; None without a match."""
     frame = came if isinstance(came.payload, bytes) else frame_of(came.payload, came.encoding)
     try:
         if rule.reader is not None:
@@ -262,12 +264,12 @@ def _names_in(rule: ReadyRule, came: Frame) -> Mapping[str, object] | None:
 
 
 def not_taken(frame: Frame) -> str:
-    """Return the fault text for an unexpected frame, for people."""
+    """Return the fault message for an unexpected frame."""
     if not isinstance(frame.payload, bytes):
         shown = traffic_of(frame.payload).decode("utf-8", "replace")[:60]
         return f"no rule matches {shown!r}, and the driver never sends it"
     try:
         shown = repr(frame.text[:60])
     except BadText:
-        return f"a frame is not {frame.encoding} text"
+        return f"received a frame that is not valid {frame.encoding} text"
     return f"no rule matches {shown}, and the driver never sends it"

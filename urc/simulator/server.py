@@ -1,6 +1,6 @@
-"""Serves an emulated robot over real connections, for people, tests and ``urc demo``.
+"""Serves an emulated robot over real connections, for operators, tests and ``urc demo``.
 
-`urc.simulator.servers` has one server for each kind of transport.
+The package `urc.simulator.servers` has one server for each type of transport.
 """
 
 import asyncio
@@ -30,7 +30,7 @@ __all__ = ["serve"]
 
 _LOOPBACK = "127.0.0.1"
 _PORTS = {"ssh": 22, "telnet": 23, "ros": 9090}
-"""Default ports of transports whose option `port` may be left out."""
+"""Default ports of transports for which the option `port` may be omitted."""
 
 
 @asynccontextmanager
@@ -46,15 +46,14 @@ async def serve(
     """Emulate the robot of `profile` until the context ends.
 
     Args:
-        profile: the profile with its `simulator` rules.
-        settings: values for ports and templates; a port of 0 lets the system choose.
-        host: address to listen on; the default is reachable from this machine only.
-        now: returns seconds since the epoch, the templates' ``now``.
-        is_anywhere: whether to listen on free ports, and ignore the profile's ports and paths.
-        emulated_robot: the emulated robot; made from the profile by default.
+        profile: profile with `simulator` rules.
+        settings: values for ports and templates; for a port of 0, the system chooses a port.
+        host: local address to listen on; the default accepts only local clients.
+        now: returns the current time in seconds since the epoch, available to templates as ``now``.
+        is_anywhere: whether to listen on free ports instead of the profile's ports and paths.
+        emulated_robot: emulated robot to serve; None: create one from the profile.
 
-    Returns:
-        Transport → its endpoint.
+    Returns: Endpoint of each transport, by name.
 
     Raises:
         UrcError: a transport cannot be emulated, or an address is not available.
@@ -99,14 +98,14 @@ def _server(context: ServerContext) -> SimulatedServer:
     row = SERVERS.get(context.spec.type)
     if row is None:
         known = ", ".join(sorted(SERVERS))
-        message = f"{context.spec.type} cannot be emulated; these can: {known}"
+        message = f"{context.spec.type} cannot be emulated; expected one of {known}"
         raise UrcError(f"transports.{context.name}: {message}")
     server: SimulatedServer = row.load()(context)
     return server
 
 
 def _depth(transports: Mapping[str, TransportSpec], name: str) -> int:
-    """Return the number of transports in front of this one."""
+    """Return the number of tunnels in front of this transport."""
     tunnel = transports[name].tunnel
     return 1 + _depth(transports, tunnel) if tunnel else 0
 
@@ -114,7 +113,7 @@ def _depth(transports: Mapping[str, TransportSpec], name: str) -> int:
 def _put_inside(
     inside: dict[tuple[str, int], Endpoint], context: ServerContext, found: Endpoint
 ) -> Endpoint:
-    """Make a transport reachable through another one; return the endpoint for its clients."""
+    """Make a transport reachable through its tunnel; return the endpoint for clients."""
     host, port, url = _known_as(context)
     if not isinstance(host, str) or not isinstance(port, int):
         message = f"{context.spec.type} cannot be emulated behind another transport"
@@ -126,7 +125,7 @@ def _put_inside(
 
 
 def _known_as(context: ServerContext) -> tuple[object, object, str]:
-    """Return the driver's host and port of a transport, and its URL without TLS, if any."""
+    """Return the host and port of a transport in the driver, and its URL if it has no TLS."""
     url = context.options.get("url")
     if not isinstance(url, str):
         host, port = context.options.get("host"), context.options.get("port")

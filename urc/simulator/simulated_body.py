@@ -1,7 +1,7 @@
-"""The body of an emulated robot: its state drives the body, and the body gives its signals.
+"""The body of an emulated robot. The robot's state drives the body, and the body provides signals.
 
-Pure: no socket, no clock. The robot's fail-safe behaviour runs here, with or without a connection:
-the one of the document (`failsafe`), else the one of its held commands (`watchdog`).
+Pure: no sockets and no clock. The fail-safe works with and without a connection. It is declared in
+the document (`failsafe`) or derived from held commands (`watchdog`).
 """
 
 import logging
@@ -19,21 +19,21 @@ __all__ = ["SimulatedBody", "failsafe_of"]
 
 log = logging.getLogger("urc.simulator.emulated_robot")
 _KEPT = ("flies", "cut")
-"""Inputs that are no motion: a robot without commands stays in the air."""
+"""Inputs that are no motion: a drone without commands stays in the air."""
 
 _LOOKS = re.compile(r"_item\(ns\['world'\], '(laser|picture|panorama)'\)")
 """Sensors that need numpy."""
 
 Evaluate = Callable[[Template, float], object]
-"""A template and the time → its value over the robot's signals and state."""
+"""Evaluates a template over the robot's signals and state, at the given time."""
 
 
 class SimulatedBody:
     """The body of one emulated robot.
 
     Args:
-        spec: the declaration of its world.
-        driver: the driver of the robot.
+        spec: declaration of the world.
+        driver: driver of the robot.
         evaluate: returns the value of a template.
         put: sets a value in the robot's state.
     """
@@ -51,18 +51,18 @@ class SimulatedBody:
         self._evaluate = evaluate
         self._put = put
         self._heard_s = -math.inf
-        """Time of the last command that keeps the robot moving."""
+        """Time of the last command that prevents the fail-safe."""
         self._is_safe = True
-        """Whether the fail-safe has acted since."""
+        """Whether the fail-safe has acted since the last command."""
         self._last_fault = ""
 
     def note_commands(self, labels: Iterable[str], now_s: float) -> None:
-        """Record the commands in a frame."""
+        """Record the commands of a received frame."""
         if self.failsafe is not None and not {*labels}.isdisjoint(self.failsafe.without):
             self._heard_s, self._is_safe = now_s, False
 
     def prepare(self) -> None:
-        """Load the modules for lasers and cameras if a signal needs them; may block."""
+        """Load the laser and camera modules if a signal needs them; may block."""
         if any(_LOOKS.search(one.python) for one in self.spec.senses.values()):
             import urc.simulator.world.laser
             import urc.simulator.world.picture  # noqa: F401  # loaded is all that is wanted
@@ -72,12 +72,12 @@ class SimulatedBody:
         return self.world.view(now_s)
 
     def sense(self, name: str, now_s: float) -> object:
-        """Return the value of a signal from the world; raise `ExpressionError` without one."""
+        """Return the world's value of a signal; raise `ExpressionError` if there is no value."""
         self.world.advance(now_s)
         return self._evaluate(self.spec.senses[name], now_s)
 
     def picture(self, name: str, now_s: float) -> bytes | None:
-        """Return the image that is the value of a signal, or None."""
+        """Return the image value of a signal; None for other values."""
         value = self.sense(name, now_s)
         return value if isinstance(value, bytes) else None
 
@@ -121,7 +121,7 @@ class SimulatedBody:
 
 
 def failsafe_of(driver: Driver) -> Failsafe | None:
-    """Return the fail-safe of the held commands, from `watchdog` or `step`; None without one."""
+    """Return the fail-safe derived from `watchdog` or `step` of held commands; None without one."""
     held = {name: one.hold for name, one in driver.commands.items() if one.hold is not None}
     times = [hold.step_s or hold.watchdog_s for hold in held.values()]
     if not times or any(one is None or not math.isfinite(one) for one in times):

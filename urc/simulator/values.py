@@ -1,6 +1,6 @@
-"""The state of an emulated robot: values of its signals, and names of its own.
+"""The state of an emulated robot: signal values and internal variables.
 
-Pure. All connections of one robot share it.
+Pure. All connections of one robot share the same state.
 """
 
 import math
@@ -23,18 +23,18 @@ __all__ = ["Names", "Unsettable", "Values"]
 
 
 _PERIOD_S: Final = 60.0
-"""Period of the variation, in seconds."""
+"""Period of the signal's slow wave, in seconds."""
 _WIDTH: Final = (0.0, 100.0)
-"""Range of a number without a declared one."""
+"""Default range of a number."""
 _ELEMENTS: Final = 4
 _PIXEL: Final = a2b_base64(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNkYAAAAAYAAjCB0C8AAAAASUVORK5CYII="
 )
-"""An image of one grey pixel, as PNG."""
+"""A PNG image of one grey pixel."""
 
 
 def plausible(signal: Signal, now_s: float) -> Reading:
-    """Return a value of `signal` at `now_s` that violates no limit."""
+    """Return a value of `signal` at `now_s` within all limits."""
     if signal.type in ("image", "blob"):
         return _PIXEL if signal.size is None or signal.size >= len(_PIXEL) else b""
     if signal.type == "object":
@@ -64,7 +64,7 @@ def _single(signal: Signal, kind: ElementType | SignalType, place: int, now_s: f
 
 
 def _range(signal: Signal) -> tuple[float, float]:
-    """Return the range of values without any alarm."""
+    """Return the range of values without alarms."""
     limits: AlarmLimits = signal.limits
     lowest, highest = signal.min, signal.max
     floors = [one for one in (signal.min, limits.lolo, limits.low) if one is not None]
@@ -86,9 +86,9 @@ def _quaternion(now_s: float) -> dict[str, Value]:
 
 
 _DIGITS: Final = 7
-"""Decimals of the world's values: a centimetre on the earth."""
+"""Decimal places of world values: a centimetre in degrees of latitude."""
 _DEEPEST: Final = 16
-"""Deepest chain of computed signals."""
+"""Maximum depth of chained computed signals."""
 
 
 class Unsettable(UrcError):
@@ -105,17 +105,17 @@ class Values:
         initial: Mapping[str, Reading] = NOTHING,
         world: WorldSpec | None = None,
     ) -> None:
-        """Begin with `initial` values of signals and state, optionally in a world."""
+        """Start with `initial` values of signals and state variables, optionally with a world."""
         self.driver = driver
         self.settings: Mapping[str, Value] = dict(settings)
         self.state: dict[str, Reading] = {}
-        """Values that are no signals."""
+        """State variables that are not signals, by name."""
         self.chosen: dict[str, Reading] = {}
-        """Signals with a set value."""
+        """Explicitly set signal values, by name."""
         self.body: SimulatedBody | None = None
-        """The body with its sensors; None without a world."""
+        """The simulated body with its sensors; None without a world."""
         self.senses: Mapping[str, object] = NOTHING
-        """Signals that the world gives."""
+        """Signals that the world provides."""
         self.faults = Faults()
         """Injected faults of the robot."""
         for name, value in initial.items():
@@ -127,7 +127,7 @@ class Values:
             )
 
     def remember(self, arguments: Mapping[str, object]) -> None:
-        """Store the arguments of a command whose names are signals."""
+        """Store all command arguments with the name of a signal."""
         for name, value in arguments.items():
             signal = self.driver.signals.get(name)
             if signal is None or name in self.senses:
@@ -139,7 +139,7 @@ class Values:
                     continue  # the command uses the name with another meaning
 
     def set(self, name: str, value: object) -> None:
-        """Set a signal, within its range, or a value of the robot's own state.
+        """Set a signal, clamped to its range, or a state variable.
 
         Raises:
             Unsettable: the value is invalid for the signal.
@@ -154,7 +154,7 @@ class Values:
             raise Unsettable(f"{name}: {error}") from None
 
     def of(self, name: str, now_s: float, depth: int = 0) -> Reading:
-        """Return the value of a signal: as set, as computed, else a plausible one."""
+        """Return the value of a signal: explicitly set, computed or plausible."""
         if name in self.faults.stuck:
             return self.faults.stuck[name]
         signal = self.driver.signals[name]
@@ -177,7 +177,7 @@ class Values:
 
 
 class Names(Mapping[str, object]):
-    """A namespace: given names, ``now`` and ``settings``, the robot's state, its signals."""
+    """A namespace of given names, ``now``, ``settings``, state variables and signals."""
 
     __slots__ = ("_depth", "_given", "_now_s", "_values")
 
@@ -219,7 +219,7 @@ class Names(Mapping[str, object]):
 
 
 def _sensed(body: SimulatedBody, signal: Signal, now_s: float) -> Reading:
-    """Return the world's value of a signal; None if it is invalid."""
+    """Return the world's value of a signal; None if the value is invalid."""
     try:
         value = body.sense(signal.name, now_s)
         if isinstance(value, bytes):
@@ -232,7 +232,7 @@ def _sensed(body: SimulatedBody, signal: Signal, now_s: float) -> Reading:
 
 
 def _kept(signal: Signal, value: object) -> Reading:
-    """Return the value of `signal` after it was set to `value`; raise `BadValue`."""
+    """Return the stored form of `value` for `signal`; raise `BadValue`."""
     words = dict(signal.states)
     if words and value is not None:
         word = str(value)
@@ -240,7 +240,7 @@ def _kept(signal: Signal, value: object) -> Reading:
             return word
         if word in words:
             return words[word]
-        raise BadValue(f"{value!r} is not among the states {', '.join(words.values())}")
+        raise BadValue(f"{value!r} is not one of the states {', '.join(words.values())}")
     plain = signal._replace(conversion=signal.conversion._replace(polynomial=(), points=(), base=0))
     return build_converter(plain)(value)
 

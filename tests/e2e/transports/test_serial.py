@@ -354,7 +354,7 @@ async def test_server_that_sets_ports_up_is_not_emulated(tmp_path: Path) -> None
     taken = tmp_path / "no" / "such" / "folder"
     for port, told in (
         ("rfc2217://127.0.0.1:2217", "a path and socket://HOST:PORT can"),
-        (str(taken), f"cannot make {taken} (no such file or directory)"),
+        (str(taken), f"cannot create {taken} (no such file or directory)"),
     ):
         async with nothing_left():
             with pytest.raises(UrcError) as problem:

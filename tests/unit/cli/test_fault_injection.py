@@ -53,7 +53,7 @@ def test_a_robot_that_is_emulated_anew_keeps_its_faults() -> None:
     ("text", "told"),
     [
         ("pupet:silent", "no robot 'pupet' is emulated here; did you mean 'puppet'?"),
-        ("puppet:nosie=2x", "there is no fault 'nosie'; there are delay=200ms, loss=5%"),
+        ("puppet:nosie=2x", "unknown fault 'nosie'; known faults: delay=200ms, loss=5%"),
         ("noise=2x", "fault noise: this robot has no world"),
         ("puppet:stuck=batery", "fault stuck: there is no signal 'batery'; did you mean"),
     ],

@@ -63,7 +63,7 @@ def test_frames_are_answered_by_the_rules(
 
 FAULTS = [
     (b"hello\n", (), "no rule matches 'hello', and the driver never sends it"),
-    (b"\xff\n", (), "a frame is not utf-8 text"),
+    (b"\xff\n", (), "received a frame that is not valid utf-8 text"),
     (b"a\n", (rule("^a", "{{ nothing }}"),), "'nothing' has no value here"),
     (b"x" * 70_000, (), "a frame has more than 65536 bytes without b'\\n'; dropped"),
 ]

@@ -177,7 +177,7 @@ def test_a_low_battery_is_low_at_once(rover: EmulatedRobot) -> None:
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("lag=2s", "there is no fault 'lag'; there are delay=200ms, loss=5%, silent, noise=2x"),
+        ("lag=2s", "unknown fault 'lag'; known faults: delay=200ms, loss=5%, silent, noise=2x"),
         ("delay", "fault delay: expected delay=200ms, found 'delay'"),
         ("delay=2h", "fault delay: expected delay=200ms, found 'delay=2h'"),
         ("loss=120%", "fault loss: expected loss=5%, found 'loss=120%'"),

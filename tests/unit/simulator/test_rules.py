@@ -197,14 +197,14 @@ def test_rules_do_what_they_say(name: str, tmp_path: Path) -> None:
 
 FAULTS = [
     ("{ match: '^X$', set: { speed: '{{ word }}' } }", "speed: 'fast' is not a number"),
-    ("{ match: '^X$', set: { mode: '{{ word }}' } }", "mode: 'fast' is not among the states idle"),
+    ("{ match: '^X$', set: { mode: '{{ word }}' } }", "mode: 'fast' is not one of the states idle"),
     ("{ match: '^X$', when: 1 / 0 > 1, send: y }", "in '1 / 0 > 1': division by zero"),
     ("{ match: '^X$', send: { hex: '{{ 300 | u8 }}' } }", "300"),
     (
         "{ match: { regex: '^(?P<n>.)$', fields: { n: { scale: 2 } } }, send: '{{ n }}' }",
         "n: 'X' is not a number",
     ),
-    ("{ match: '^X$', answer: auto }", "the driver never sends this, so it declares no reply"),
+    ("{ match: '^X$', answer: auto }", "the driver never sends this frame and declares no reply"),
     ("{ match: '^X$', send: \"a\\nb\" }", "contains the delimiter"),
 ]  # fmt: skip
 
@@ -251,7 +251,7 @@ def test_answers_that_wait_are_bounded(tmp_path: Path) -> None:
     line = emulated_robot(tmp_path, "  wire: [{ match: '^W$', after: 1s, send: w }]\n").line("wire")
     line.receive(b"W\n" * (MOST_COURSES + 3), 0.0)
     assert line.faults == 3
-    assert "delayed replies wait already" in line.last_fault
+    assert "delayed replies are already queued" in line.last_fault
     assert line.due_in_s == 1.0
     assert line.advance(1.0, 1.0) == [b"w\n"] * MOST_COURSES
 

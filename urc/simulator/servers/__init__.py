@@ -1,1 +1,1 @@
-"""Simulated servers: one for each kind of transport, through which clients reach the robot."""
+"""Simulated servers that connect clients to an emulated robot, one for each type of transport."""

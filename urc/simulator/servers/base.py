@@ -1,4 +1,4 @@
-"""A simulated server: its protocol, its context, and the table of its kinds."""
+"""The protocol, the context and the registry of simulated servers."""
 
 import os
 import socket
@@ -26,70 +26,72 @@ __all__ = [
 
 
 class Endpoint(NamedTuple):
-    """The address of an open server."""
+    """The address of a listening server."""
 
     host: str
-    """Address, or "" without one."""
+    """Network address; "" for a server without an address."""
     port: int
-    """0 without a port."""
+    """TCP or UDP port; 0 for a server without a port."""
     text: str
-    """For people and ``urc simulate``: ``tcp 127.0.0.1:6789``, ``serial /dev/pts/3``."""
+    """Text for people, such as ``tcp 127.0.0.1:6789`` or ``serial /dev/pts/3``."""
     options: Mapping[str, object] = NOTHING
-    """Options that the driver's transport needs to connect here. These options override those of
-    the driver.
+    """Options for connecting the driver's transport to this server. These options override the
+    options in the driver.
     """
     path: str = ""
-    """Path of the device file, for serial ports."""
+    """Path of the device file of a serial port."""
 
 
 class LastPeer:
-    """The host that last sent something to the robot, through any of its servers."""
+    """The host that last sent data to the robot, through any server."""
 
     def __init__(self) -> None:
         self.host = ""
-        """Address of the client, or "" before its first message."""
+        """Address of the client; "" before the first data."""
 
 
 class ServerContext(NamedTuple):
-    """The context of a server: its transport, its address, and the robot behind it."""
+    """Context of a server: its transport, its address and the emulated robot."""
 
     name: str
     """Name of the transport in the driver."""
     spec: TransportSpec
     options: Mapping[str, object]
-    """Options of the transport, evaluated over the settings."""
+    """Transport options with evaluated settings."""
     host: str
-    """Address to listen on, for kinds of transport that listen."""
+    """Local address to listen on."""
     line: Callable[[], EmulatedConnection]
-    """Makes the robot's side of a new connection."""
+    """Creates the robot's side of a new connection."""
     now: Callable[[], float]
-    """Seconds since the epoch, the templates' ``now``."""
+    """Returns the current time in seconds since the epoch, available to templates as ``now``."""
     topics: Mapping[str, Mapping[str, Value]] = NOTHING
-    """Subscriptions of the driver, on a message transport: topic → options."""
+    """Options of the driver's subscriptions by topic, on a message transport."""
     is_anywhere: bool = False
-    """Whether to listen on any free port, in place of the port of the options."""
+    """Whether to listen on any free port instead of the configured port."""
     picture: Callable[[Sequence[str]], bytes | None] = lambda _: None
-    """Names of a topic → the current image of the robot's world, None without one."""
+    """Returns the current world image for the given topic names; None without an image."""
     last_peer: LastPeer | None = None
-    """Shared by all servers of the robot; None: not tracked."""
+    """Last peer, shared by all servers of the robot; None: not recorded."""
     carried: Mapping[tuple[str, int], Endpoint] = MappingProxyType({})
-    """Targets that clients can reach through this server: host and port in the driver → endpoint
-    of the emulated robot."""
+    """Targets that clients can reach through this server. The keys are hosts and ports in the
+    driver, and the values are endpoints of the emulated robot."""
 
 
 class SimulatedServer(Protocol):
     """One transport of the emulated robot."""
 
     async def open(self) -> Endpoint:
-        """Accept clients from now on.
+        """Start to accept clients.
 
         Raises:
-            UrcError: the address is not available, in one line that starts with
-                ``transports.NAME``.
+            UrcError: the address is not available. The message starts with ``transports.NAME``.
         """
 
     async def close(self) -> None:
-        """Accept no more clients and disconnect all; leave no task, socket or file behind."""
+        """Stop accepting clients and disconnect all clients.
+
+        Release all tasks, sockets and files.
+        """
 
 
 SERVERS = Table(
@@ -106,19 +108,20 @@ SERVERS = Table(
         "mqtt": "urc.simulator.servers.mqtt:MqttRobot",
     },
 )
-"""Kind of transport → class of a `SimulatedServer`, which is made from a `ServerContext`."""
+"""Server classes by transport type. Each class implements `SimulatedServer` and takes a
+`ServerContext`."""
 
 
 def option_port(context: ServerContext, key: str = "port", default: int | None = None) -> int:
-    """Return the port to listen on, 0..65535; 0 lets the system choose.
+    """Return the port to listen on, 0 to 65535. For port 0, the system chooses a port.
 
     Args:
         context: context of the server.
         key: name of the option.
-        default: the usual port of this kind of transport.
+        default: default port of the transport type.
 
     Raises:
-        UrcError: the option is not a port.
+        UrcError: the option is not a valid port.
     """
     if context.is_anywhere:
         return 0
@@ -134,13 +137,13 @@ def host_and_port(host: str, port: int) -> str:
 
 
 def cannot_listen(context: ServerContext, port: int, fault: OSError, kind: str = "") -> UrcError:
-    """Return the error for an address that is not available."""
+    """Return the error for an unavailable address."""
     where = f"{kind}{host_and_port(context.host, port)}"
     return UrcError(f"transports.{context.name}: cannot listen on {where} ({reason(fault)})")
 
 
 def reason(fault: OSError) -> str:
-    """Return the system's error text without the address, which asyncio repeats."""
+    """Return the system's error text without the address that asyncio repeats."""
     if isinstance(fault, socket.gaierror) or not fault.errno:
         return str(fault.strerror or fault).lower()
     return os.strerror(fault.errno).lower()

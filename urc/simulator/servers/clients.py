@@ -1,8 +1,8 @@
-"""The clients of a simulated server, and the dialogue with each.
+"""The clients of a simulated server, and their conversations with the robot.
 
-Each client talks to a `EmulatedConnection` of its own. The number of clients, the bytes read ahead
-and the time for accepting replies are bounded. When all places are taken, the client that was
-silent for longest is disconnected, so half-open connections cannot block the server.
+Each client has a separate `EmulatedConnection`. The number of clients, the size of input buffers
+and the write timeout are limited. A new client above the limit replaces the client with the longest
+silence, so half-open connections cannot block the server.
 """
 
 import asyncio
@@ -18,10 +18,10 @@ from urc.simulator.servers.base import ServerContext
 __all__ = ["MAX_CLIENTS", "READ_BYTES", "TAKEN_WITHIN_S", "ClientConnection", "Clients", "converse"]
 
 MAX_CLIENTS = 64
-"""Most connections on one transport."""
+"""Maximum number of connections per transport."""
 READ_BYTES = 4096
 TAKEN_WITHIN_S = 5.0
-"""A client that accepts no reply for this long is disconnected."""
+"""Write timeout in seconds. A client that does not read its data in this time is disconnected."""
 
 log = logging.getLogger(__name__)
 
@@ -32,16 +32,15 @@ class ClientConnection:
     def __init__(self, line: EmulatedConnection, abort: Callable[[], None]) -> None:
         self.line = line
         self.abort = abort
-        """Disconnects the client at once; a second call does nothing."""
+        """Disconnects the client immediately; further calls do nothing."""
         self.active_s = asyncio.get_running_loop().time()
-        """Time of its last data, by the loop's clock."""
+        """Time of the client's last data, on the event loop's clock."""
 
 
 class Clients:
-    """The clients of one server, and the tasks that talk to them."""
+    """The clients of one server, with one task per client."""
 
     def __init__(self, context: ServerContext, limit: int = MAX_CLIENTS) -> None:
-        """Hold at most `limit` clients."""
         self._context = context
         self._limit = limit
         self._talks: dict[ClientConnection, asyncio.Task[None]] = {}
@@ -56,7 +55,7 @@ class Clients:
         talk: Callable[[ClientConnection], Coroutine[Any, Any, None]],
         abort: Callable[[], None],
     ) -> None:
-        """Run `talk` with a new client; `abort` disconnects it, and is also called at the end.
+        """Run `talk` for a new client. Call `abort` to disconnect the client, and at the end.
 
         `talk` may raise OSError or TimeoutError for a lost client.
         """
@@ -100,17 +99,19 @@ async def converse(
     take: Callable[[], Awaitable[Payload | None]],
     put: Callable[[Sequence[Payload]], Awaitable[None]],
 ) -> None:
-    """Talk to one client until it closes, or the robot does (``connection: per_request``).
+    """Exchange data with one client until the client or the robot closes the connection.
+
+    With ``connection: per_request``, the robot closes the connection after one reply.
 
     Args:
         context: context of the server.
-        client: its line replies.
-        take: returns the next payload of the client; None or b"" at its end. The call may be
-            cancelled and repeated without loss.
-        put: sends the robot's payloads, and waits while the client's buffer is full.
+        client: client with the robot's side of its connection.
+        take: returns the client's next payload; None or b"" at the end of input. Calls of `take`
+            may be cancelled and repeated without data loss.
+        put: sends payloads of the robot; waits while the client's buffer is full.
 
     Raises:
-        TimeoutError: the client accepts no data.
+        TimeoutError: the client does not read its data.
     """
     clock = asyncio.get_running_loop().time
     line, before_s = client.line, clock()

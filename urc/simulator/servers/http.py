@@ -1,8 +1,8 @@
-"""The emulated robot behind a web server: requests, and streams of pictures, events and lines.
+"""An emulated robot behind a web server: requests, and streams of pictures, events and lines.
 
-Requests go to the robot's rules as envelopes. Each subscription of the driver is a stream under its
-path: the robot's messages on that topic or, for a camera, images of its world. Without a world,
-images have one changing colour.
+Requests are passed to the robot's rules as envelopes. Each subscription of the driver is a stream
+at the topic's path. Streams contain the robot's messages or, for a camera, images of its world.
+Without a world, each image is filled with one slowly changing colour.
 """
 
 import asyncio
@@ -26,13 +26,13 @@ __all__ = ["HttpServer"]
 
 
 _BLOCKS: Final = (20, 15)
-"""Columns and rows of blocks of 8 by 8 pixels: 160 by 120 pixels."""
+"""Columns and rows of 8 by 8 pixel blocks: 160 by 120 pixels."""
 _PERIOD_S: Final = 12.0
 """Period of the colour cycle, in seconds."""
 
 
 def picture(now_s: float) -> bytes:
-    """Return the image at the time `now_s`, in seconds."""
+    """Return a JPEG image for the time `now_s`, in seconds."""
     red, green, blue = colorsys.hsv_to_rgb(now_s / _PERIOD_S % 1.0, 0.6, 0.9)
     luma = 0.299 * red + 0.587 * green + 0.114 * blue
     means = (luma - 0.5, 0.564 * (blue - luma), 0.713 * (red - luma))
@@ -44,7 +44,7 @@ def picture(now_s: float) -> bytes:
 
 
 def _mean(difference: int) -> str:
-    """Return a difference from the mean before: four bits of length, and the number."""
+    """Return the code of a difference from the previous mean: length (four bits) and number."""
     if difference == 0:
         return "0000"
     length = abs(difference).bit_length()
@@ -89,13 +89,13 @@ class HttpRequest(NamedTuple):
     target: str
     """The request target as received."""
     path: str
-    """Decoded path below the path of the driver's URL, without the query."""
+    """Decoded path relative to the driver's URL, without the query."""
     headers: Mapping[str, str]
     body: bytes
 
     @property
     def ways(self) -> list[Envelope]:
-        """The request in both notations of a driver: with a query, or with all in the path."""
+        """The request in two notations: with a separate query, and with the query in the path."""
         query = urlsplit(self.target).query
         attributes: dict[str, object] = {"method": self.method, "path": self.path}
         attributes["headers"] = self.headers
@@ -112,7 +112,6 @@ class HttpServer(UrlServer, StreamServer):
     SCHEME = "http"
 
     def __init__(self, context: ServerContext) -> None:
-        """Prepare the server; `open` listens."""
         super().__init__(context)
         self._auth = HttpAuth(context.options.get("auth"))
 
@@ -127,7 +126,7 @@ class HttpServer(UrlServer, StreamServer):
 
 
 class _Talk:
-    """One connection: requests one after the other, the last of which may be a stream."""
+    """Serve one connection: sequential requests. The last request may be a stream."""
 
     def __init__(
         self,
@@ -158,7 +157,7 @@ class _Talk:
             await self._writer.wait_closed()
 
     async def _next(self, client: ClientConnection) -> HttpRequest | None:
-        """Return the next request, None at the end of the connection."""
+        """Return the next request; None at the end of the connection."""
         head: h11.Request | None = None
         body = bytearray()
         while True:
@@ -205,7 +204,7 @@ class _Talk:
             await self._answer(*_written(self._asks(client.line, asked)), asked)
 
     async def _suffer(self, line: EmulatedConnection) -> None:
-        """Delay or lose the reply, as the injected faults demand."""
+        """Delay or drop the reply according to the injected faults."""
         if line.loses:
             raise ConnectionResetError("lost on demand")
         if line.delay_s:
@@ -226,7 +225,7 @@ class _Talk:
         return Envelope("response", {"ok": False, "status": 404, "reason": reason})
 
     def _kind(self, asked: HttpRequest) -> str:
-        """Return the stream kind of the driver's subscription to that path, "" without one."""
+        """Return the stream type of the subscription to this path; "" without a subscription."""
         if asked.method != "GET":
             return ""
         ways = self._context.topics.items()
@@ -236,7 +235,7 @@ class _Talk:
         return str(kinds[0]) if kinds else ""
 
     def _picture(self, asked: HttpRequest) -> bytes:
-        """Return the camera image of the robot's world, or one of a changing colour."""
+        """Return the camera image of the robot's world, or an image of one changing colour."""
         context, target = self._context, asked.target.removeprefix(self._base)
         seen = context.picture((asked.path, target))
         return picture(context.now()) if seen is None else seen
@@ -259,7 +258,7 @@ class _Talk:
         await self._send(h11.EndOfMessage())
 
     async def _stream(self, client: ClientConnection, asked: HttpRequest, kind: str) -> None:
-        """Stream the robot's messages on a topic, until the client leaves."""
+        """Stream the robot's messages on a topic until the client disconnects."""
         headers = [("Content-Type", _TYPES[kind]), ("Cache-Control", "no-store")]
         await self._send(h11.Response(status_code=200, headers=headers))
         if kind == "mjpeg":
@@ -291,7 +290,7 @@ class _Talk:
             gone.cancel()
 
     async def _gone(self) -> None:
-        """Wait until the client closes; discard its data."""
+        """Wait until the client closes the connection; discard its data."""
         while await self._reader.read(READ_BYTES):
             pass
 
@@ -303,7 +302,7 @@ class _Talk:
                 await self._writer.drain()
 
     async def _refuse(self, fault: h11.RemoteProtocolError) -> None:
-        """Reply to a malformed request, if a reply is still possible."""
+        """Reply to a malformed request if the connection still permits a reply."""
         if self._http.our_state in (h11.IDLE, h11.SEND_RESPONSE):
             headers = [("Content-Length", "0"), ("Connection", "close")]
             await self._send(h11.Response(status_code=fault.error_status_hint, headers=headers))
@@ -333,7 +332,7 @@ def _bytes(body: object) -> bytes:
 
 
 def _piece(kind: str, event: str, body: bytes) -> bytes:
-    """Return a message as an event of a stream, or as a line."""
+    """Return a message as a server-sent event or as a line."""
     if kind == "lines":
         return body.replace(b"\n", b" ") + b"\n"
     name = [b"event: " + event.encode()] if event else []

@@ -1,4 +1,4 @@
-"""Authentication of clients of a simulated web server: Basic, Bearer or Digest (RFC 7616)."""
+"""Client authentication of a simulated web server: Basic, Bearer or Digest (RFC 7616)."""
 
 import hashlib
 import hmac
@@ -14,20 +14,20 @@ _FIELD = re.compile(r'(\w+)=(?:"([^"]*)"|([^\s,]*))')
 
 
 class HttpAuth:
-    """Checks requests against the option `auth` of the driver."""
+    """Checks requests against the driver's option `auth`."""
 
     def __init__(self, auth: object) -> None:
-        """Read the option; None accepts every request."""
+        """Read the option `auth`. Without the option, every request is accepted."""
         self._auth: Mapping[str, object] = auth if isinstance(auth, Mapping) else {}
         self._nonce = secrets.token_hex(16)
 
     def challenge(self, method: str, target: str, given: str) -> str | None:
-        """Return the challenge for a request without valid credentials, None for a valid one.
+        """Return the challenge for a request with invalid credentials; None for valid credentials.
 
         Args:
             method: method of the request.
             target: target of the request, as received.
-            given: its header Authorization.
+            given: value of the Authorization header.
         """
         kind = self._auth.get("type")
         user, password = self._text("user"), self._text("password")

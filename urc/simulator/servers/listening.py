@@ -1,4 +1,4 @@
-"""Simulated servers that listen on a TCP port: open, refuse, close."""
+"""Base classes of simulated servers that listen on a TCP port."""
 
 import asyncio
 import socket
@@ -22,29 +22,28 @@ __all__ = ["Listener", "ListeningServer", "StreamServer", "UrlServer", "keep_ali
 
 
 class Listener(NamedTuple):
-    """A listening socket of asyncio or of a library."""
+    """A listening socket of asyncio or another library."""
 
     address: tuple[Any, ...]
-    """Host and port, and further values of the system."""
+    """Host and port, followed by system-specific values."""
     close: Callable[[], None]
     """Stops accepting connections."""
     wait_closed: Callable[[], Awaitable[None]]
 
 
 class ListeningServer(ABC):
-    """One listening port and its clients."""
+    """A listening port and its clients."""
 
     DEFAULT_PORT: ClassVar[int | None] = None
-    """Default port of this kind of transport."""
+    """Default port of the transport type."""
 
     def __init__(self, context: ServerContext) -> None:
-        """Prepare the server; `open` listens."""
         self._context = context
         self._clients = Clients(context)
         self._listener: Listener | None = None
 
     async def open(self) -> Endpoint:
-        """Listen on the port of the options, or on any free port."""
+        """Listen on the port in the options, or on any free port."""
         port = self._port()
         try:
             self._listener = await self._listen(self._context.host, port)
@@ -53,7 +52,7 @@ class ListeningServer(ABC):
         return self._endpoint(*self._listener.address[:2])
 
     async def close(self) -> None:
-        """Stop listening and cut every connection."""
+        """Stop listening and disconnect every client."""
         if self._listener is not None:
             self._listener.close()
         await self._clients.close()
@@ -65,7 +64,7 @@ class ListeningServer(ABC):
 
     @abstractmethod
     async def _listen(self, host: str, port: int) -> Listener:
-        """Open the socket; may raise OSError."""
+        """Open the socket; raise OSError if the address is not available."""
 
     def _endpoint(self, host: str, port: int) -> Endpoint:
         text = f"{self._context.spec.type} {host_and_port(host, port)}"
@@ -73,14 +72,14 @@ class ListeningServer(ABC):
 
 
 class UrlServer(ListeningServer):
-    """A server that the driver addresses by the option `url`."""
+    """A server with the address in the driver's option `url`."""
 
     SCHEME: ClassVar[str]
     """URL scheme without TLS."""
     _path = "/"
 
     def _port(self) -> int:
-        """Return the port of the URL; 0 lets the system choose."""
+        """Return the port of the URL; for 0, the system chooses a port."""
         context = self._context
         url = str(context.options.get("url"))
         try:
@@ -93,7 +92,7 @@ class UrlServer(ListeningServer):
         if context.is_anywhere:
             return 0
         if parts.scheme != self.SCHEME:
-            message = f"{self.SCHEME} can be emulated, not {parts.scheme!r}"
+            message = f"expected the scheme {self.SCHEME}, found {parts.scheme!r}"
             raise UrcError(f"transports.{context.name}.url: {message}")
         return port
 
@@ -104,7 +103,7 @@ class UrlServer(ListeningServer):
 
 
 class StreamServer(ListeningServer):
-    """A server whose clients are plain byte streams."""
+    """A server for clients with plain byte streams."""
 
     async def _listen(self, host: str, port: int) -> Listener:
         server = await asyncio.start_server(self._accept, host, port, limit=READ_BYTES)
@@ -124,10 +123,10 @@ class StreamServer(ListeningServer):
         reader: asyncio.StreamReader,
         writer: asyncio.StreamWriter,
     ) -> Coroutine[Any, Any, None]:
-        """Talk to one client until its end."""
+        """Exchange data with one client until the connection ends."""
 
 
 def keep_alive(connection: socket.socket) -> None:
-    """Let the system detect a client that vanished silently."""
+    """Enable TCP keepalive, so that the system detects clients that vanish silently."""
     with suppress(OSError):  # the connection is closed already
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)

@@ -1,7 +1,7 @@
 """The emulated robot as a client of a real MQTT broker.
 
-A broker must run at the address of the settings, as for the real robot. The robot receives every
-message of the broker, except on topics to which the driver subscribes: the robot publishes those.
+A broker must run at the configured address, as for the real robot. The emulated robot publishes the
+driver's subscribed topics. It receives the messages of all other topics.
 """
 
 import asyncio
@@ -21,9 +21,10 @@ __all__ = ["MqttRobot"]
 
 OPEN_S = 5.0
 AGAIN_S = 1.0
-"""Delay before a new attempt after the loss of the broker, in seconds."""
+"""Delay before reconnecting to the broker, in seconds."""
 _NOT_OURS = ("client_id", "will")
-"""Options of the driver alone: two clients of one name would disconnect each other."""
+"""Options that are valid only for the driver. A shared client identifier would make each client
+disconnect the other."""
 
 log = logging.getLogger(__name__)
 
@@ -32,14 +33,13 @@ class MqttRobot:
     """One client of the broker."""
 
     def __init__(self, context: ServerContext) -> None:
-        """Prepare the client; `open` connects."""
         self._context = context
         self._clients = Clients(context)
         self._own = [matches(topic) for topic in context.topics]
         self._transport: Transport | None = None
 
     async def open(self) -> Endpoint:
-        """Connect to the broker that the options name."""
+        """Connect to the broker in the options."""
         context = self._context
         options = {name: value for name, value in context.options.items() if name not in _NOT_OURS}
         try:
@@ -62,10 +62,10 @@ class MqttRobot:
             await self._transport.close()
 
     async def _stay(self, client: ClientConnection, transport: Transport) -> None:
-        """Talk through the broker, and connect again after each loss."""
+        """Exchange messages through the broker, and reconnect after each loss."""
         while True:
             await self._talk(client, transport)
-            log.info("%s: the broker has gone", self._context.name)
+            log.info("%s: lost the connection to the broker", self._context.name)
             while True:
                 await asyncio.sleep(AGAIN_S)
                 with suppress(TransportError):

@@ -1,4 +1,4 @@
-"""The emulated robot behind a rosbridge server: version 2 of the protocol, over WebSocket."""
+"""An emulated robot behind a rosbridge server: protocol version 2 over WebSocket."""
 
 import asyncio
 import base64
@@ -21,9 +21,9 @@ __all__ = ["RosbridgeServer"]
 
 
 MAX_TOPICS = 512
-"""Most topics, services and subscriptions of one client."""
+"""Maximum number of topics, services and subscriptions per client."""
 _ENDS = {True: 4, False: 6}
-"""Result of an action → status code: succeeded or aborted."""
+"""Status codes of action results: succeeded or aborted."""
 
 _decode = msgspec.json.Decoder().decode
 _encode = msgspec.json.Encoder().encode
@@ -41,13 +41,13 @@ class Bridge:
     """The state that all clients of one bridge share."""
 
     def __init__(self, declared: Mapping[str, str]) -> None:
-        """Start with the robot's own topics: name → type, or "" for an unknown type."""
+        """Start with the types of the robot's topics, by name; "" for an unknown type."""
         self.types = dict(declared)
         self.clients: list[BridgeClient] = []
         self.servers: dict[str, BridgeClient] = {}
-        """Service → the client that offers it."""
+        """Client that offers each service, by service name."""
         self.asked: dict[str, tuple[BridgeClient, object]] = {}
-        """Id of a forwarded call → the caller and its id."""
+        """Caller and original identifier of each forwarded call, by new identifier."""
         self._count = 0
 
     def passed_on(self, service: str, client: "BridgeClient", number: object, args: object) -> None:
@@ -71,21 +71,21 @@ class BridgeClient:
     """One client of the bridge."""
 
     def __init__(self, bridge: Bridge, send: Callable[[str | bytes], None]) -> None:
-        """Join `bridge`; `send` takes one frame, text or binary."""
+        """Join `bridge`; `send` transmits one text or binary frame."""
         self._bridge = bridge
         self._send = send
         self.wanted: dict[str, _Wanted] = {}
-        """Topics that it subscribes to."""
+        """Subscriptions of the client, by topic."""
         self._shown_s: dict[str, float] = {}
         self._calls: dict[object, str] = {}
-        """Id of an unanswered call → its service."""
+        """Services of the unanswered calls, by identifier."""
         self._goals: dict[object, str] = {}
-        """Id of a running goal → its action."""
+        """Actions of the running goals, by identifier."""
         self._fragments = 0
         bridge.clients.append(self)
 
     def leave(self) -> None:
-        """Remove the client and the services that it offered."""
+        """Remove the client and all services that it offered."""
         bridge = self._bridge
         bridge.clients.remove(self)
         bridge.servers = {
@@ -94,7 +94,7 @@ class BridgeClient:
         bridge.asked = {key: who for key, who in bridge.asked.items() if who[0] is not self}
 
     def hears(self, text: str | bytes, now_s: float) -> Envelope | None:
-        """Handle one frame of the client; return the message for the emulated robot, if any."""
+        """Handle a frame of the client; return the message for the emulated robot, or None."""
         try:
             operation = _decode(text)
         except (msgspec.DecodeError, UnicodeDecodeError):
@@ -123,7 +123,7 @@ class BridgeClient:
                 self._finish(self._goals.pop(number), number, payload)
 
     def refuses(self, asked: Envelope) -> None:
-        """Report that the emulated robot has no such service or action."""
+        """Report to the client that the emulated robot lacks the service or action."""
         number = asked.attributes.get("id")
         if number in self._calls:
             service = self._calls.pop(number)
@@ -135,7 +135,7 @@ class BridgeClient:
             )
 
     def show(self, topic: str, message: object, now_s: float) -> None:
-        """Send a message to the client if it subscribed, at most at its throttle rate."""
+        """Send a message to a subscribed client, limited by its throttle rate."""
         wanted = self.wanted.get(topic)
         if wanted is None:
             return
@@ -155,7 +155,7 @@ class BridgeClient:
             self.write(operation)
 
     def write(self, operation: Mapping[str, object]) -> None:
-        """Send one operation as text."""
+        """Send one operation as JSON text."""
         self._send(_encode(operation).decode())
 
     def _write_pieces(self, text: str, size: int) -> None:
@@ -175,7 +175,7 @@ class BridgeClient:
     # -- replies of the robot
 
     def answer(self, service: str, number: object, values: object, is_ok: bool) -> None:
-        """Answer a call of this client."""
+        """Reply to a call of this client."""
         operation = {"op": "service_response", "service": service, "values": values}
         if number is not None:
             operation["id"] = number
@@ -206,7 +206,10 @@ class BridgeClient:
     # -- the client's operations
 
     def subscribe(self, operation: Mapping[str, Any], now_s: float) -> None:
-        """Subscribe; a second subscription to a topic replaces the first, throttle included."""
+        """Subscribe to a topic.
+
+        A repeated subscription replaces the previous subscription and its throttle rate.
+        """
         topic = _text(operation, "topic")
         if not topic or len(self.wanted) >= MAX_TOPICS:
             return
@@ -227,7 +230,7 @@ class BridgeClient:
         self._learn(_text(operation, "topic"), operation)
 
     def publish(self, operation: Mapping[str, Any], now_s: float) -> Envelope | None:
-        """Send a message to all subscribers and to the robot; drop it if its type is unknown."""
+        """Send a message to all subscribers and to the robot; drop messages of unknown type."""
         topic, message = _text(operation, "topic"), operation.get("msg")
         if topic not in self._bridge.types or not isinstance(message, dict):
             return None
@@ -237,7 +240,10 @@ class BridgeClient:
         return Envelope("publish", attributes, message)
 
     def call(self, operation: Mapping[str, Any], now_s: float) -> Envelope | None:
-        """Answer a call of rosapi, or forward it to the client or robot that offers the service."""
+        """Reply to a call of rosapi.
+
+        Forward other calls to the client or robot that offers the service.
+        """
         service, number = _text(operation, "service"), operation.get("id")
         args = operation.get("args")
         args = {} if args is None else args
@@ -302,7 +308,7 @@ class BridgeClient:
         table[number] = name
 
     def _rosapi(self, service: str, args: object) -> dict[str, object] | None:
-        """Return the reply of the node rosapi, or None for another service."""
+        """Return the reply of the node rosapi; None for other services."""
         folder, _, question = service.rpartition("/")
         if folder not in ("/rosapi", "rosapi"):
             return None
@@ -348,7 +354,7 @@ def _text(operation: Mapping[str, Any], name: str) -> str:
 
 
 def _fields(body: object) -> object:
-    """Return a body as an object: the emulated robot may have it as JSON text."""
+    """Return a body as an object; parse JSON text if necessary."""
     if not isinstance(body, bytes):
         return body
     try:
@@ -358,7 +364,7 @@ def _fields(body: object) -> object:
 
 
 def _png(data: bytes) -> str:
-    """Return `data` as the pixels of a square 8-bit RGB image, padded with newlines, in base64."""
+    """Return `data` as base64 pixels of a square 8-bit RGB image, padded with newlines."""
     side = max(1, round((len(data) / 3) ** 0.5))
     height = -(-len(data) // (side * 3))
     padded = data.ljust(side * height * 3, b"\n")
@@ -377,18 +383,17 @@ def _png(data: bytes) -> str:
 
 
 MAX_BYTES = 10_000_000
-"""Largest frame; the default of the real server."""
+"""Maximum frame size in bytes, equal to the default of the real server."""
 MAX_UNSENT_BYTES = 4_194_304
-"""A client with more unsent bytes than this misses messages."""
+"""Maximum number of unsent bytes per client. Clients above the limit miss messages."""
 
 
 class RosbridgeServer(MessageServer):
-    """A rosbridge port, and the bridge that its clients share."""
+    """A rosbridge port and its shared bridge."""
 
     DEFAULT_PORT = 9090
 
     def __init__(self, context: ServerContext) -> None:
-        """Prepare the server; `open` listens."""
         super().__init__(context)
         # A bridge names types in the style of its ROS version. The default is ROS 2.
         ros = {1: 1, 2: 2, "auto": 2}.get(context.options.get("version"))

@@ -1,7 +1,8 @@
-"""The emulated robot behind a pseudo-terminal, which programs open as any serial port.
+"""An emulated robot behind a pseudo-terminal, which programs can open like a serial port.
 
-The system chooses its name. If the profile names a missing file outside ``/dev``, a link of that
-name is made, so the profile works unchanged. For ``socket://HOST:PORT`` it is a TCP port.
+The system chooses the name of the pseudo-terminal. If the profile's port is a missing path outside
+``/dev``, the server creates a symbolic link at this path. The profile then works unchanged. For
+``socket://HOST:PORT``, the server listens on a TCP port.
 """
 
 import asyncio
@@ -21,14 +22,14 @@ from urc.simulator.servers.tcp import TcpServer
 __all__ = ["SerialServer"]
 
 _LOOK_S = 0.02
-"""Interval for polling a closed pseudo-terminal: the system does not report its opening."""
+"""Polling interval for a closed pseudo-terminal, in seconds. The system does not report its
+opening."""
 
 
 class SerialServer:
-    """One serial port, with at most one client."""
+    """One serial port with at most one client."""
 
     def __init__(self, context: ServerContext) -> None:
-        """Prepare the server; `open` makes the port."""
         port = str(context.options.get("port") or "")
         is_address = "://" in port and not (context.is_anywhere and port.startswith("rfc2217:"))
         self._server: SimulatedServer = (
@@ -70,7 +71,7 @@ class _PtyServer:
             try:
                 self._link.symlink_to(path)
             except OSError as fault:
-                message = f"cannot make {self._port} ({reason(fault)})"
+                message = f"cannot create {self._port} ({reason(fault)})"
                 await self.close()
                 raise UrcError(f"transports.{self._context.name}: {message}") from fault
             text += f", as {self._port}"
@@ -111,7 +112,7 @@ class _PtyServer:
             await gone.wait()
 
     def _read(self) -> bytes | None:
-        """Return the received bytes, None while no program has the port open."""
+        """Return the received bytes; None while no program has opened the port."""
         try:
             return os.read(self._wire, READ_BYTES)
         except BlockingIOError:
@@ -124,14 +125,14 @@ class _PtyServer:
 
 
 class _Wire:
-    """The robot's end while a client has the other."""
+    """The robot's end of a pseudo-terminal while a client is connected."""
 
     def __init__(self, number: int, first: bytes) -> None:
         self._number = number
         self._first = first
 
     async def read(self) -> bytes | None:
-        """Return the next bytes, None when the client has closed its end."""
+        """Return the next bytes; None after the client has closed the port."""
         if self._first:
             data, self._first = self._first, b""
             return data
@@ -171,7 +172,7 @@ class _Wire:
 
 
 class _SocketServer(TcpServer):
-    """A port behind ``socket://HOST:PORT``."""
+    """A serial port behind ``socket://HOST:PORT``."""
 
     def __init__(self, context: ServerContext, port: str) -> None:
         scheme, _, rest = port.partition("://")

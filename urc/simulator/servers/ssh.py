@@ -1,7 +1,7 @@
-"""The emulated robot behind an SSH server.
+"""An emulated robot behind an SSH server.
 
-A shell, or the command of the driver, talks to the robot. Forwarded connections only lead to the
-other transports of the same robot.
+The shell, or the driver's command, is connected to the robot. Forwarded connections can reach only
+the other transports of the same robot.
 """
 
 import asyncio
@@ -33,7 +33,7 @@ __all__ = ["SshServer"]
 LOGIN_WITHIN_S = 10.0
 _WINDOW = 65536
 _NOT_FOUND = 127
-"""Exit status of a shell for an unknown command."""
+"""Exit status of a shell after an unknown command."""
 
 
 class SshServer(ListeningServer):
@@ -42,7 +42,6 @@ class SshServer(ListeningServer):
     DEFAULT_PORT = 22
 
     def __init__(self, context: ServerContext) -> None:
-        """Prepare the server; `open` listens."""
         super().__init__(context)
         self._connections: dict[asyncssh.SSHServerConnection, None] = {}
         self._lock = _Lock(context)
@@ -175,7 +174,7 @@ class _Server(asyncssh.SSHServer):
         inside = self._context.carried.get((dest_host, dest_port))
         if inside is None:
             raise asyncssh.ChannelOpenError(
-                asyncssh.OPEN_CONNECT_FAILED, "the emulated robot has no server there"
+                asyncssh.OPEN_CONNECT_FAILED, "the emulated robot has no server at this address"
             )
         return self._connection.forward_connection(inside.host, inside.port)  # type: ignore[return-value]
 
@@ -221,7 +220,10 @@ class _Talk:
 
 
 def _own_key() -> asyncssh.SSHKey:
-    """Return this user's host key for emulated robots; it is kept, so that it is trusted once."""
+    """Return the current user's host key for emulated robots.
+
+    The key is stored, so clients need to trust it only once.
+    """
     file = data_folder() / "simulator_host_key"
     try:
         return asyncssh.read_private_key(file)
@@ -242,7 +244,7 @@ def _write(file: Path, content: bytes) -> None:
 def _private_key(
     context: ServerContext, key: str, passphrase: str | None
 ) -> asyncssh.SSHKey | None:
-    """Return the key in the options; None if this machine lacks it."""
+    """Return the key in the options; None if the key file is missing."""
     try:
         if "-----BEGIN" in key:
             return asyncssh.import_private_key(key.strip() + "\n", passphrase)

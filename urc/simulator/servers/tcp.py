@@ -1,4 +1,4 @@
-"""The emulated robot behind a TCP port, or as a client of the driver (``mode: listen``)."""
+"""An emulated robot behind a TCP port, or as a TCP client of the driver (``mode: listen``)."""
 
 import asyncio
 import socket
@@ -13,19 +13,18 @@ from urc.simulator.servers.listening import StreamServer
 __all__ = ["TcpServer"]
 
 CALLS_EVERY_S = 0.5
-"""Pause between two attempts to connect to the driver, in seconds."""
+"""Delay between attempts to connect to the driver, in seconds."""
 
 
 class TcpServer(StreamServer):
     """A plain TCP port."""
 
     def __init__(self, context: ServerContext) -> None:
-        """Prepare the server; `open` listens."""
         super().__init__(context)
         self._calls: asyncio.Task[None] | None = None
 
     async def open(self) -> Endpoint:
-        """Listen on the port of the options, or on any port; or connect to a listening driver."""
+        """Listen on the configured port or on any free port, or connect to a listening driver."""
         if self._context.options.get("mode") == "listen":
             return self._call(self._port())
         return await super().open()
@@ -62,7 +61,7 @@ class TcpServer(StreamServer):
         return Endpoint(host, port, text, {"bind": host, "port": port, "host": host})
 
     async def _keep_calling(self, host: str, port: int) -> None:
-        """Connect to the driver repeatedly, one connection at a time, as robots do."""
+        """Connect to the driver repeatedly, one connection at a time, like a real robot."""
         while True:
             with suppress(OSError, TimeoutError):
                 async with asyncio.timeout(TAKEN_WITHIN_S):

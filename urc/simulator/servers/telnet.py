@@ -1,4 +1,4 @@
-"""The emulated robot behind a Telnet server, which negotiates and echoes as real ones do."""
+"""An emulated robot behind a Telnet server, with negotiation and echo."""
 
 import asyncio
 from collections.abc import Sequence

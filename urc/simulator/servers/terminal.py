@@ -1,6 +1,6 @@
-"""The terminal of a simulated shell: it accepts any line end, and echoes input.
+"""The terminal of a simulated shell, with input echo and normalization of line ends.
 
-A terminal program sends CR where a driver may send LF; a real robot's terminal accepts both.
+A terminal program sends CR, while a driver may send LF. Real terminals accept both.
 """
 
 from typing import Final
@@ -13,10 +13,10 @@ _LINE_ENDS: Final = (b"\r", b"\n", b"\r\n")
 
 
 class TerminalInput:
-    """Input of one client, with the line ends that the driver declares."""
+    """Input of one client, converted to the line ends of the driver."""
 
     def __init__(self, spec: TransportSpec) -> None:
-        """Read for the framing of `spec`; if that has no line ends, bytes stay unchanged."""
+        """Use the line ends in the framing of `spec`. For other framings, bytes stay unchanged."""
         framing = spec.framing.sent or spec.framing
         end = framing.options.get("tx") if framing.type == "delimiter" else None
         self._end = end if isinstance(end, bytes) and end in _LINE_ENDS else b""

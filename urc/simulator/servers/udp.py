@@ -1,8 +1,8 @@
-"""The emulated robot behind a UDP port.
+"""An emulated robot behind a UDP port.
 
-A client is the source address of a datagram. If the driver listens on a port (``listen``), the
-robot sends there from the start. The robot sends to this machine until one of its UDP ports
-receives a datagram from another host.
+Clients are identified by the source address of their datagrams. If the driver listens on a port
+(``listen``), the robot sends to this port from the start. Unsolicited datagrams go to the local
+machine until another host sends a datagram to the robot.
 """
 
 import asyncio
@@ -23,9 +23,9 @@ from urc.simulator.servers.clients import ClientConnection, Clients, converse
 __all__ = ["UdpServer"]
 
 FORGOTTEN_S = 300.0
-"""A client that sends nothing for this long is dropped; the driver's own port never is."""
+"""Timeout in seconds for silent clients. The timeout does not apply to the driver's port."""
 _WAITING = 256
-"""Datagrams of one client that wait for the robot; more are lost."""
+"""Maximum number of queued datagrams per client; further datagrams are dropped."""
 
 _Address = tuple[str, int]
 
@@ -34,7 +34,6 @@ class UdpServer(asyncio.DatagramProtocol):
     """One UDP port and its clients."""
 
     def __init__(self, context: ServerContext) -> None:
-        """Prepare the server; `open` binds the port."""
         self._context = context
         self._clients = Clients(context)
         self._line: asyncio.DatagramTransport | None = None
@@ -43,7 +42,7 @@ class UdpServer(asyncio.DatagramProtocol):
         """Address on which the driver listens."""
 
     async def open(self) -> Endpoint:
-        """Bind the port of the options, or any free port."""
+        """Bind the configured port, or any free port."""
         context = self._context
         port = option_port(context) if context.options.get("port") is not None else 0
         options: dict[str, str | int] = {"host": context.host}
@@ -75,7 +74,7 @@ class UdpServer(asyncio.DatagramProtocol):
         await asyncio.sleep(0)  # the loop closes the socket in its next turn
 
     def datagram_received(self, data: bytes, addr: tuple[str | int, ...]) -> None:
-        """Queue the datagram of a client, and note its address."""
+        """Queue the client's datagram and record the client's address."""
         address = str(addr[0]), int(addr[1])
         if not data:
             return
@@ -111,7 +110,7 @@ class UdpServer(asyncio.DatagramProtocol):
         await converse(self._context, client, receiver.get, put)
 
     def _now_at(self, address: _Address) -> _Address:
-        """Return the address for unsolicited datagrams: the robot sends to its last peer."""
+        """Return the address for unsolicited datagrams: the host of the last peer."""
         last_peer = self._context.last_peer
         if address != self._told or last_peer is None or not last_peer.host:
             return address
@@ -119,7 +118,7 @@ class UdpServer(asyncio.DatagramProtocol):
 
 
 def _reachable(host: str) -> str:
-    """Return the loopback address where a server listens on all addresses."""
+    """Return the loopback address for a server that listens on all addresses."""
     if host in ("0.0.0.0", ""):  # noqa: S104 - compared, not bound
         return "127.0.0.1"
     return "::1" if host == "::" else host

@@ -1,4 +1,4 @@
-"""The emulated robot behind a WebSocket: each message is one payload."""
+"""An emulated robot behind a WebSocket; each message is one payload."""
 
 from abc import abstractmethod
 from collections.abc import Coroutine, Sequence
@@ -23,7 +23,7 @@ MAX_MESSAGE_BYTES = 1_048_576
 
 
 class MessageServer(ListeningServer):
-    """A server whose clients are WebSockets."""
+    """A server for WebSocket clients."""
 
     async def _listen(self, host: str, port: int) -> Listener:
         server = await self._serve(host, port)
@@ -38,13 +38,13 @@ class MessageServer(ListeningServer):
 
     @abstractmethod
     async def _serve(self, host: str, port: int) -> Server:
-        """Listen with the limits of this kind of server."""
+        """Listen with the limits of the server class."""
 
     @abstractmethod
     def _talk(
         self, client: ClientConnection, socket: ServerConnection
     ) -> Coroutine[Any, Any, None]:
-        """Talk to one client until its end."""
+        """Exchange messages with one client until the connection ends."""
 
 
 class WebSocketServer(UrlServer, MessageServer):
@@ -53,7 +53,6 @@ class WebSocketServer(UrlServer, MessageServer):
     SCHEME = "ws"
 
     def __init__(self, context: ServerContext) -> None:
-        """Prepare the server; `open` listens."""
         super().__init__(context)
         self._auth = HttpAuth(context.options.get("auth"))
         self._is_text = context.options.get("send_as", "text") == "text"
@@ -74,7 +73,7 @@ class WebSocketServer(UrlServer, MessageServer):
         )
 
     def _check(self, socket: ServerConnection, request: Request) -> Response | None:
-        """Refuse an unknown path, or a client without valid credentials."""
+        """Reject requests with an unknown path or invalid credentials."""
         given = request.headers.get("Authorization", "")
         challenge = self._auth.challenge("GET", request.path, given)
         if challenge is not None:
@@ -82,7 +81,9 @@ class WebSocketServer(UrlServer, MessageServer):
             refusal.headers["WWW-Authenticate"] = challenge
             return refusal
         if request.path.partition("?")[0] != self._path:
-            return socket.respond(HTTPStatus.NOT_FOUND, f"the robot is at {self._path}\n")
+            return socket.respond(
+                HTTPStatus.NOT_FOUND, f"unknown path; the robot's WebSocket is at {self._path}\n"
+            )
         return None
 
     async def _talk(self, client: ClientConnection, socket: ServerConnection) -> None:

@@ -1,1 +1,1 @@
-"""The small world in which emulated robots move and sense: pure, stepped by dt, seeded."""
+"""The simulated world of an emulated robot: pure, with fixed time steps and seeded noise."""

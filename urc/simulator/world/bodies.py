@@ -1,7 +1,7 @@
-"""Motion of bodies: one step of each kind, from its inputs.
+"""Motion models: one simulation step for each kind of body.
 
-Pure. Metres, seconds, radians; x ahead, y to the left, z up, as in REP 103. Wheels follow the exact
-arc of the step, so the length of a step does not matter while the inputs are constant.
+Pure. Units are metres, seconds and radians. The axes are x forward, y left and z up (REP 103).
+Wheeled bodies follow exact arcs, so constant inputs give the same path for every step length.
 """
 
 import math
@@ -17,7 +17,7 @@ GRAVITY: Final = 9.80665
 _LANDS_AT: Final = 0.4
 """Descent speed of a landing quadrotor, in m/s."""
 _LEAN: Final = 0.02
-"""Lean of a body on springs, in radians for each m/s²."""
+"""Lean of a sprung body, in radians per m/s²."""
 
 Inputs = Mapping[str, float]
 
@@ -31,38 +31,40 @@ class Motion:
     z: float = 0.0
     yaw: float = 0.0
     roll: float = 0.0
-    """Right side down is positive."""
+    """Roll in radians; right side down is positive."""
     pitch: float = 0.0
-    """Nose down is positive."""
+    """Pitch in radians; nose down is positive."""
     forward: float = 0.0
-    """Speed along its own x axis; `sideways` and `climb` are those along y and z."""
+    """Speed along the body's x axis, in m/s. `sideways` and `climb` are the speeds along y and
+    z."""
     sideways: float = 0.0
     climb: float = 0.0
     turn: float = 0.0
     """Turn rate to the left, in rad/s."""
     steer: float = 0.0
-    """Steering angle of the front wheels."""
+    """Steering angle of the front wheels, in radians."""
     phase: float = 0.0
-    """Phase of the wave along a body, in turns."""
+    """Phase of the body's wave, in turns."""
     drive: float = 0.0
-    """Strength of the wave, 0 to 1."""
+    """Amplitude of the body's wave, 0 to 1."""
     bend: float = 0.0
-    """Bend, -1 to 1, to the left."""
+    """Bend to the left, -1 to 1."""
     is_up: bool = False
-    """Whether it flies and has reached its height once."""
+    """Whether a flying body has reached its hover height."""
     accelerations: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    """Accelerations along its own axes, without gravity."""
+    """Accelerations along the body's axes without gravity, in m/s²."""
     rates: list[float] = field(default_factory=lambda: [0.0, 0.0])
-    """Rates of roll and pitch."""
+    """Roll rate and pitch rate, in rad/s."""
     told_forward: float = 0.0
-    """Speed of its wheels or tracks, also against an obstacle; likewise `told_turn`."""
+    """Speed of the wheels or tracks in m/s, even against an obstacle. `told_turn` is their turn
+    rate in rad/s."""
     told_turn: float = 0.0
     effort: float = 0.0
-    """Used share of its power, 0 to 1."""
+    """Used share of the maximum power, 0 to 1."""
 
 
 def move(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> None:
-    """Move for `dt_s` seconds with `inputs`; the world handles collisions."""
+    """Advance the motion by `dt_s` seconds with `inputs`, without collisions."""
     before = motion.forward, motion.sideways, motion.climb, motion.roll, motion.pitch
     _MOVES[body.type](body, motion, inputs, dt_s)
     turn = motion.turn
@@ -76,7 +78,7 @@ def move(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> None:
 
 
 def joints_of(body: BodySpec, motion: Motion) -> tuple[float, ...]:
-    """Return the angle of each joint from the head on: a travelling wave around a bend."""
+    """Return the joint angles from head to tail: a travelling wave added to a bend."""
     return tuple(
         motion.drive * body.amplitude * math.sin(2 * math.pi * (motion.phase - place / body.joints))
         + motion.bend * body.amplitude / 3
@@ -85,13 +87,13 @@ def joints_of(body: BodySpec, motion: Motion) -> tuple[float, ...]:
 
 
 def legs_of(body: BodySpec, motion: Motion) -> tuple[float, ...]:
-    """Return the angle of each leg, -pi to pi: neighbours are half a turn apart, as in a trot."""
+    """Return the leg angles from -pi to pi. Adjacent legs have opposite phases, as in a trot."""
     turns = (motion.phase + (place % 3 != 0) / 2 for place in range(body.legs))
     return tuple(2 * math.pi * ((one + 0.5) % 1.0 - 0.5) for one in turns)
 
 
 def _lean(body: BodySpec, motion: Motion) -> None:
-    """Lean against accelerations, and rock with the ground."""
+    """Lean against accelerations, and rock on rough ground."""
     along, across, _ = motion.accelerations
     motion.pitch += (-_LEAN * along - motion.pitch) * 0.2
     motion.roll += (_LEAN * across - motion.roll) * 0.2
@@ -111,7 +113,7 @@ def _within(value: float, most: float) -> float:
 
 
 def _arc(motion: Motion, dt_s: float) -> None:
-    """Follow the arc of the present speeds."""
+    """Move along an arc at the current speeds."""
     angle = motion.turn * dt_s
     if abs(angle) < 1e-9:
         sine, cosine = dt_s, angle * dt_s / 2
@@ -126,7 +128,7 @@ def _arc(motion: Motion, dt_s: float) -> None:
 
 
 def _ramped(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> tuple[float, float]:
-    """Return the wheels' new speed and turn."""
+    """Return the new speed and turn rate of the wheels."""
     forward = _within(inputs.get("forward", 0.0), body.speed)
     turn = _within(inputs.get("turn", 0.0), body.turn)
     motion.told_forward = _toward(motion.told_forward, forward, body.acceleration * dt_s)
@@ -212,7 +214,7 @@ def _quadrotor(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> N
 def _climb(
     body: BodySpec, motion: Motion, inputs: Inputs, flies: bool, cut: bool, dt_s: float
 ) -> float:
-    """Return the new vertical speed: it climbs to its height by itself, lands, or falls."""
+    """Return the new vertical speed for climbing to hover height, landing or falling."""
     if cut:
         return motion.climb - GRAVITY * dt_s
     if not flies:

@@ -1,6 +1,6 @@
-"""Reproducible noise: a number for a seed, a time step and a name.
+"""Reproducible noise: a random number for a seed, a time step and a name.
 
-Pure. There is no generator state, so the order of sensor readings does not matter.
+Pure. The generator has no state, so the order of sensor readings does not matter.
 """
 
 import math
@@ -21,19 +21,22 @@ def _mixed(seed: int, tick: int, name: str) -> int:
 
 
 def uniform(seed: int, tick: int, name: str) -> float:
-    """Return a number in [0, 1)."""
+    """Return a uniform random number in [0, 1)."""
     return (_mixed(seed, tick, name) >> 11) / 9007199254740992.0
 
 
 def gauss(seed: int, tick: int, name: str) -> float:
-    """Return a number of the standard normal distribution (Box and Muller)."""
+    """Return a random number of the standard normal distribution (Box and Muller)."""
     bits = _mixed(seed, tick, name)
     first, second = ((bits >> 32) + 1) / 4294967297.0, (bits & 0xFFFFFFFF) / 4294967296.0
     return math.sqrt(-2 * math.log(first)) * math.cos(2 * math.pi * second)
 
 
 def wander(seed: int, time_s: float, name: str) -> float:
-    """Return a slowly varying number between -1 and 1: the sum of four waves of 20 to 190 s."""
+    """Return a slowly varying number between -1 and 1.
+
+    The number is a sum of four waves with periods of 20 to 190 s.
+    """
     total = 0.0
     for place, period_s in enumerate((23.0, 47.0, 91.0, 187.0)):
         total += math.sin(2 * math.pi * (time_s / period_s + uniform(seed, place, name)))

@@ -1,6 +1,6 @@
-"""A laser scanner: rays from the middle of the robot, with noise.
+"""A laser scanner: rays from the centre of the robot, with noise.
 
-Pure. The module loads on first use, because it imports numpy.
+Pure. The module imports numpy, so it is loaded on first use.
 """
 
 import math
@@ -14,11 +14,11 @@ from urc.simulator.world.sensors import SensorInput
 __all__ = ["sweep"]
 
 _HEIGHT_M = 0.15
-"""Height of the scanner above the robot's foot, in metres."""
+"""Height of the scanner above the ground, in metres."""
 
 
 def sweep(faces: EdgeArrays, moment: SensorInput) -> Mapping[str, object]:
-    """Return ``world.laser``; a ray without echo within range has None."""
+    """Return ``world.laser``. Rays without an echo have the range None."""
     spec, motion = moment.spec.laser, moment.motion
     step = (spec.last - spec.first) / spec.rays
     angles = motion.yaw + spec.first + step * np.arange(spec.rays, dtype=np.float64)

@@ -1,7 +1,7 @@
-"""The camera image of the emulated robot, as JPEG: walls, ground and sky, drawn by rays.
+"""The camera image of the emulated robot as JPEG, rendered by ray casting: walls, ground and sky.
 
-Pure. The module loads on first use, because it imports numpy and Pillow. Each column of the image
-is one direction on the ground; its obstacles are drawn from the farthest to the nearest.
+Pure. The module imports numpy and Pillow, so it is loaded on first use. Each image column is one
+direction on the ground. Its obstacles are drawn from the farthest to the nearest.
 """
 
 import io
@@ -22,43 +22,43 @@ Array = NDArray[np.float32]
 _BINS: Final = 1440
 """Number of directions around the camera."""
 _LAYERS: Final = 4
-"""Most edges in one direction that are drawn: a low box hides only the foot of the wall."""
+"""Maximum number of edges drawn per direction. A low box hides only the foot of a wall."""
 _SKY: Final = ((150, 184, 222), (226, 233, 240))
-"""Colour of the sky at the top, and at the horizon."""
+"""Colours of the sky, at the top and at the horizon."""
 _GROUNDS: Final = {
     "floor": ((150, 146, 138), (128, 124, 118)),
     "grass": ((104, 138, 84), (92, 126, 74)),
     "water": ((70, 122, 150), (62, 112, 142)),
 }
 _FAR_M: Final = 25.0
-"""Distance at which a colour is half that of the horizon, in metres."""
+"""Distance in metres at which colours are blended halfway with the horizon."""
 _QUALITY: Final = 80
 
 
 class CameraPose(NamedTuple):
-    """Pose of the camera; metres and radians."""
+    """Pose of the camera, in metres and radians."""
 
     x: float
     y: float
     z: float
     yaw: float
     pitch: float = 0.0
-    """Nose down is positive."""
+    """Pitch in radians; nose down is positive."""
     roll: float = 0.0
-    """Right side down is positive."""
+    """Roll in radians; right side down is positive."""
 
 
 def camera_picture(
     plan: WorldMap, faces: EdgeArrays, pose: CameraPose, size: tuple[int, int], view: float
 ) -> NDArray[np.uint8]:
-    """Return the image ahead, as rows by columns by red, green and blue.
+    """Return the forward image as an array: rows by columns by RGB.
 
     Args:
         plan: the obstacles.
-        faces: edges of the plan.
+        faces: edges of the world map.
         pose: pose of the camera.
-        size: columns and rows.
-        view: horizontal field of view, below pi.
+        size: columns and rows of the image.
+        view: horizontal field of view in radians, below pi.
     """
     ahead = _straight(*size, view)
     rotated = ahead @ _rotation(pose.pitch, pose.roll).T
@@ -70,7 +70,7 @@ def camera_picture(
 def panorama_picture(
     plan: WorldMap, faces: EdgeArrays, pose: CameraPose, size: tuple[int, int]
 ) -> NDArray[np.uint8]:
-    """Return the panorama: a column for each direction, a row for each height."""
+    """Return the panorama. Columns are directions, and rows are heights."""
     columns, rows = size
     azimuth = np.linspace(math.pi, -math.pi, columns, endpoint=False, dtype=np.float32)
     height = np.linspace(math.pi / 2 - 0.01, -math.pi / 2 + 0.01, rows, dtype=np.float32)
@@ -100,7 +100,7 @@ def jpeg(picture: NDArray[np.uint8], *, flip: bool = False, mirror: bool = False
 
 @lru_cache(maxsize=8)
 def _straight(columns: int, rows: int, view: float) -> Array:
-    """Return the direction of each pixel for a level camera: ahead, left, up."""
+    """Return the direction of each pixel for a level camera, as forward, left and up components."""
     focus = columns / 2 / math.tan(view / 2)
     left = (columns / 2 - 0.5 - np.arange(columns, dtype=np.float32)) / focus
     up = (rows / 2 - 0.5 - np.arange(rows, dtype=np.float32)) / focus
@@ -119,7 +119,10 @@ def _rotation(pitch: float, roll: float) -> Array:
 def _seen(
     plan: WorldMap, faces: EdgeArrays, pose: CameraPose, azimuth: Array, slope: Array
 ) -> NDArray[np.uint8]:
-    """Return the colours in given directions: `azimuth` from ahead to the left, `slope` upwards."""
+    """Return the colours in the given directions.
+
+    `azimuth` is relative to ahead, positive to the left. `slope` is positive upwards.
+    """
     direction = azimuth + np.float32(pose.yaw)
     picture = _open_country(plan, pose, direction, slope)
     if len(faces.height):
@@ -129,7 +132,7 @@ def _seen(
 
 
 def _open_country(plan: WorldMap, pose: CameraPose, direction: Array, slope: Array) -> Array:
-    """Return sky and ground."""
+    """Return the colours of sky and ground."""
     above, horizon = (np.array(one, dtype=np.float32) for one in _SKY)
     share = np.clip(slope * 1.5, 0, 1)[..., None]
     picture: Array = horizon + (above - horizon) * share

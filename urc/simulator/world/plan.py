@@ -1,4 +1,4 @@
-"""The map of the world: obstacles as edges, and holes.
+"""The map of the world: obstacle edges and holes.
 
 Pure. Lengths in metres.
 """
@@ -14,7 +14,7 @@ __all__ = ["ROOM", "Edge", "WorldMap", "Contact"]
 
 
 class Edge(NamedTuple):
-    """A vertical face from the ground up."""
+    """A vertical face that starts at the ground."""
 
     x1: float
     y1: float
@@ -54,8 +54,8 @@ ROOM: Final = PlanSpec(
     ),
     holes=(Box(5.2, -0.6, 1.0, 1.0),),
 )
-"""The default room, 10 by 7 m: two halves with a door between them, boxes, four coloured posts, and
-stairs down."""
+"""The default room, 10 by 7 m. It has two halves with a door between them, boxes, four coloured
+posts and stairs down."""
 
 
 class WorldMap:
@@ -71,7 +71,10 @@ class WorldMap:
 
     @cached_property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Least x and y, greatest x and y of all obstacles; a square of 10 m without obstacles."""
+        """Minimum x and y, and maximum x and y of all obstacles, in metres.
+
+        Without obstacles, the bounds are a square of 10 m.
+        """
         if not self.edges:
             return -5.0, -5.0, 5.0, 5.0
         xs = [value for edge in self.edges for value in (edge.x1, edge.x2)]
@@ -79,7 +82,7 @@ class WorldMap:
         return min(xs), min(ys), max(xs), max(ys)
 
     def touch(self, x: float, y: float, z: float, radius: float) -> Contact | None:
-        """Return the deepest overlap of a circle at a height with an edge; None if it is free."""
+        """Return the deepest overlap of an edge with a circle at height `z`, or None."""
         deepest: Contact | None = None
         for edge in self.edges:
             if z >= edge.height:
@@ -91,7 +94,7 @@ class WorldMap:
         return deepest
 
     def is_hole(self, x: float, y: float) -> bool:
-        """Return whether the ground is missing at a point."""
+        """Return whether a point lies over a hole."""
         return any(
             abs(x - hole.x) <= hole.width / 2 and abs(y - hole.y) <= hole.depth / 2
             for hole in self.spec.holes
@@ -109,7 +112,7 @@ def _faces(box: Box) -> list[Edge]:
 
 
 def _nearest(edge: Edge, x: float, y: float) -> tuple[float, float]:
-    """Return the point of an edge that is nearest to a point."""
+    """Return the nearest point on an edge."""
     dx, dy = edge.x2 - edge.x1, edge.y2 - edge.y1
     length = dx * dx + dy * dy
     share = ((x - edge.x1) * dx + (y - edge.y1) * dy) / length if length else 0.0

@@ -1,6 +1,6 @@
-"""Rays against the edges of a plan, all at once.
+"""Vectorized intersection of rays with the edges of a world map.
 
-Pure. The module loads on first use, because it imports numpy.
+Pure. The module imports numpy, so it is loaded on first use.
 """
 
 from typing import Final
@@ -17,7 +17,7 @@ _NEAREST: Final = 1e-6
 
 
 class EdgeArrays:
-    """The edges of a plan as arrays."""
+    """The edges of a world map as arrays."""
 
     def __init__(self, plan: WorldMap) -> None:
         """Convert the edges of `plan`."""
@@ -31,16 +31,16 @@ class EdgeArrays:
 
 
 def cast(faces: EdgeArrays, x: float, y: float, angles: Numbers) -> tuple[Numbers, Numbers]:
-    """Return distance and position along the edge, for each ray and each edge.
+    """Return the distance and the position along the edge, for each pair of ray and edge.
 
     Args:
         faces: the edges.
-        x: origin of the rays.
-        y: origin of the rays.
-        angles: directions of the rays, in radians from the x axis to the left.
+        x: x coordinate of the rays' origin, in metres.
+        y: y coordinate of the rays' origin, in metres.
+        angles: directions of the rays in radians, counter-clockwise from the x axis.
 
-    Returns:
-        Two arrays of rays by edges: metres, ``inf`` without intersection; and 0 to 1.
+    Returns: Two arrays of shape (rays, edges): distances in metres (``inf`` without intersection),
+        and positions from 0 to 1.
     """
     cosine, sine = np.cos(angles)[:, None], np.sin(angles)[:, None]
     ax, ay = faces.start[:, 0] - x, faces.start[:, 1] - y
@@ -54,7 +54,7 @@ def cast(faces: EdgeArrays, x: float, y: float, angles: Numbers) -> tuple[Number
 
 
 def first_hits(faces: EdgeArrays, x: float, y: float, z: float, angles: Numbers) -> Numbers:
-    """Return the range of each ray at the height `z`, ``inf`` without an edge."""
+    """Return the range of each ray at height `z` in metres, or ``inf`` without an intersection."""
     if not len(faces.height):
         return np.full(len(angles), np.inf)
     distance, _ = cast(faces, x, y, angles)

@@ -1,6 +1,6 @@
 """The sensors of an emulated robot in its world.
 
-Pure. Readings are in metres, radians, seconds and volts; only bearings, latitudes and longitudes
+Pure. Readings are in metres, radians, seconds and volts. Only bearings, latitudes and longitudes
 are in degrees.
 """
 
@@ -18,13 +18,14 @@ __all__ = ["Battery", "SensorInput", "Odometry", "contact", "gps", "imu", "odome
 
 _EQUATOR_M: Final = 6378137.0
 _SQUARE_OF_ECCENTRICITY: Final = 0.00669437999014
-"""Squared eccentricity of the ellipsoid WGS 84."""
+"""Squared eccentricity of the WGS 84 ellipsoid."""
 _EMPTY: Final = 5.0
 """Battery level at which the simulation replaces the battery, in per cent."""
 _CHANGED_AFTER_S: Final = 30.0
-"""Standstill before the replacement, in seconds: a demo must not end with an empty battery."""
+"""Standstill time before the battery is replaced, in seconds. A demo must not end with an empty
+battery."""
 _REACH_M: Final = 0.06
-"""Distance of cliff sensors beyond the robot's edge, in metres."""
+"""Distance from the robot's edge to the cliff sensors, in metres."""
 
 
 class SensorInput(NamedTuple):
@@ -41,12 +42,12 @@ class SensorInput(NamedTuple):
     """Factor on the declared noise."""
 
     def gauss(self, name: str) -> float:
-        """Return this moment's error with a standard deviation of 1."""
+        """Return a random error with a standard deviation of 1 for the current time step."""
         return self.noise * gauss(self.spec.seed, self.tick, name)
 
 
 def quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
-    """Return x, y, z, w of three rotations, about z, then y, then x."""
+    """Return the quaternion x, y, z, w of rotations about z, then y, then x."""
     sr, cr = math.sin(roll / 2), math.cos(roll / 2)
     sp, cp = math.sin(pitch / 2), math.cos(pitch / 2)
     sy, cy = math.sin(yaw / 2), math.cos(yaw / 2)
@@ -59,7 +60,7 @@ def quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, flo
 
 
 class Odometry:
-    """Pose from the wheels, with a constant systematic error."""
+    """Wheel odometry: a pose with a constant systematic error."""
 
     def __init__(self, spec: WorldSpec) -> None:
         """Begin at the start pose of the world."""
@@ -70,7 +71,7 @@ class Odometry:
         track = spec.body.track
         self._half_track = spec.body.radius * 0.8 if track is None else track / 2
         self.left = 0.0
-        """Distance of the left wheel, in metres; backwards counts down."""
+        """Distance travelled by the left wheel, in metres; negative when driving backwards."""
         self.right = 0.0
 
     def advance(self, motion: Motion, dt_s: float, noise: float) -> None:
@@ -138,7 +139,10 @@ def imu(moment: SensorInput) -> Mapping[str, object]:
 
 
 def place_on_earth(spec: WorldSpec, x: float, y: float) -> tuple[float, float]:
-    """Return latitude and longitude of a point, in metres east (x) and north (y) of the datum."""
+    """Return the latitude and longitude of a point.
+
+    The point is in metres east (x) and north (y) of the datum.
+    """
     latitude, longitude, _ = spec.datum
     sine = math.sin(math.radians(latitude))
     root = 1 - _SQUARE_OF_ECCENTRICITY * sine * sine
@@ -148,7 +152,7 @@ def place_on_earth(spec: WorldSpec, x: float, y: float) -> tuple[float, float]:
 
 
 def gps(moment: SensorInput) -> Mapping[str, object]:
-    """Return ``world.gps``: x is east, y is north."""
+    """Return ``world.gps``. The x axis points east, and the y axis points north."""
     spec, motion, noise = moment.spec, moment.motion, moment.noise
     wide = 1.2 * noise
     x = motion.x + wide * wander(spec.seed, moment.time_s, "east") + 0.05 * moment.gauss("east")
@@ -186,7 +190,7 @@ def _ddmm(degrees: float, width: int) -> str:
 
 
 def contact(moment: SensorInput) -> Mapping[str, object]:
-    """Return ``world.contact``: bumpers, and cliffs."""
+    """Return ``world.contact``: the states of bumpers and cliff sensors."""
     motion, body = moment.motion, moment.spec.body
     left = right = False
     if moment.touch is not None:
@@ -217,7 +221,7 @@ def _is_cliff(moment: SensorInput, body: BodySpec, angle: float) -> bool:
 
 
 class Battery:
-    """The battery; never below empty, and replaced once the robot stands still without charge."""
+    """The battery. Its level is at least 0. An empty battery is replaced after a standstill."""
 
     def __init__(self, spec: WorldSpec) -> None:
         """Begin with the declared level."""
@@ -235,7 +239,7 @@ class Battery:
         return 100 * self.charge / self._spec.capacity
 
     def advance(self, effort: float, dt_s: float) -> None:
-        """Draw the current of a body at an effort of 0 to 1, for `dt_s` seconds."""
+        """Discharge the battery for `dt_s` seconds at an effort of 0 to 1."""
         self.current = self._spec.idle + self._spec.drive * effort
         self.charge = max(0.0, self.charge - self.current * dt_s / 3600)
         is_waiting = effort == 0 and self.level <= _EMPTY
@@ -248,7 +252,7 @@ class Battery:
         self.charge = min(self.charge, self._spec.capacity * level / 100)
 
     def readings(self) -> Mapping[str, object]:
-        """Return ``world.battery``; a discharging current is positive."""
+        """Return ``world.battery``; the discharge current is positive."""
         spec, share = self._spec, self.level / 100
         sag = 0.02 * (spec.full - spec.empty) * self.current / max(spec.idle + spec.drive, 1e-6)
         voltage = spec.empty + (spec.full - spec.empty) * share - sag

@@ -1,6 +1,6 @@
-"""The world from above, as JPEG, for cards and pages of an emulated robot.
+"""Top views of the world as JPEG, for cards and pages of an emulated robot.
 
-Pure. The module loads on first use, because it imports Pillow.
+Pure. The module imports Pillow, so it is loaded on first use.
 """
 
 import io
@@ -47,14 +47,14 @@ class _Map:
 def top_picture(
     plan: WorldMap, body: BodySpec, motion: Motion, trail: Iterable[Point], size: tuple[int, int]
 ) -> bytes:
-    """Return the image, north (y) up.
+    """Return the top view, with north (y) up.
 
     Args:
         plan: the obstacles.
-        body: shape of the robot.
+        body: declaration of the robot's body.
         motion: pose of the robot.
-        trail: its past positions, oldest first.
-        size: columns and rows, at least 16 each.
+        trail: past positions of the robot, oldest first.
+        size: columns and rows of the image, at least 16 each.
     """
     place = _Map(plan, motion, size)
     picture = Image.new("RGB", size, _GROUNDS[plan.spec.ground])
@@ -85,7 +85,7 @@ def top_picture(
 
 
 def _draw_grid(draw: ImageDraw.ImageDraw, place: _Map, motion: Motion) -> None:
-    """Draw lines a metre apart, so that motion is visible in open space."""
+    """Draw grid lines every metre, so that motion is visible in open space."""
     reach = math.ceil(max(place.size) / place.scale)
     for step in range(-reach, reach + 1):
         x, y = math.floor(motion.x) + step, math.floor(motion.y) + step
@@ -120,7 +120,7 @@ def _dot(draw: ImageDraw.ImageDraw, at: Point, radius: float, colour: str) -> No
 
 
 def _spine(body: BodySpec, motion: Motion) -> list[Point]:
-    """Return the points of a jointed body, from the head to the tail."""
+    """Return the points of a jointed body, from head to tail."""
     length = 3 * body.radius / max(1, body.joints) * 2
     x, y = motion.x, motion.y
     angle = motion.yaw + math.pi

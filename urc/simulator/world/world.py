@@ -1,7 +1,7 @@
-"""The world of one emulated robot: a body with inputs, and sensors.
+"""The world of an emulated robot: a body with inputs, and sensors.
 
-Pure: no clock, no socket. The time is an argument, and the world advances in steps of `STEP_S`. The
-same commands at the same times therefore give the same world, however often it is observed.
+Pure: no clock and no sockets. Time is an argument, and the world advances in steps of `STEP_S`.
+Identical commands at identical times produce the same world, regardless of observations.
 """
 
 import math
@@ -30,20 +30,21 @@ if TYPE_CHECKING:
 __all__ = ["FARTHEST_S", "STEP_S", "SensorView", "World"]
 
 STEP_S: Final = 0.02
-"""Length of a step, in seconds."""
+"""Length of a simulation step, in seconds."""
 FARTHEST_S: Final = 60.0
-"""Longest simulated gap between two observations, in seconds; the rest of the gap is skipped."""
+"""Maximum simulated time between two observations, in seconds. The rest of a longer gap is
+skipped."""
 _ASKED_EVERY_S: Final = 0.1
-"""Interval for reading time-dependent inputs while a long gap is simulated, in seconds."""
+"""Interval for reading time-dependent inputs during a long gap, in seconds."""
 _TRAIL_EVERY_M: Final = 0.05
 _TRAIL_MOST: Final = 400
 _LOW: Final = 12.0
-"""Battery level of the fault of that name, in per cent."""
+"""Battery level after the fault low-battery, in per cent."""
 _PANORAMA: Final = (512, 256)
 """Columns and rows of a panorama image."""
 
 Inputs = Callable[[float], Mapping[str, float]]
-"""Time → inputs of the body."""
+"""Returns the inputs of the body at a given time."""
 
 
 class World:
@@ -51,9 +52,9 @@ class World:
 
     Args:
         spec: the declaration.
-        inputs: returns the inputs of the body for a time; it may observe the world, which then
-            shows the present step.
-        holds: evaluates a condition about the camera, if a document has a template for it.
+        inputs: returns the inputs of the body at a given time. The function may observe the world
+            at the current step.
+        holds: evaluates a condition of the camera, if a document has a template for the condition.
     """
 
     def __init__(
@@ -70,22 +71,22 @@ class World:
         self.battery = Battery(spec)
         self.touch: Contact | None = None
         self.tick = 0
-        """Steps since the beginning."""
+        """Number of completed steps."""
         self.time_s: float | None = None
         """End of the last step, in seconds since the epoch; None before the first observation."""
         self.noise = 1.0
         self.dropped: set[str] = set()
-        """Names of failed `READINGS`, which have no value."""
+        """Names of failed `READINGS`. Failed readings have no value."""
         self._inputs = inputs
         self._holds = holds
         self._is_busy = False
         self._trail: deque[tuple[float, float]] = deque([(x, y)], _TRAIL_MOST)
         self._kept: dict[object, tuple[float, bytes]] = {}
-        """Kind of image → its time, and its bytes."""
+        """Time and bytes of the last image, by kind of image."""
         self._faces: EdgeArrays | None = None
 
     def advance(self, now_s: float) -> None:
-        """Advance to `now_s` in whole steps; the remainder waits for the next call."""
+        """Advance to `now_s` in whole steps; leave the remainder for the next call."""
         if self.time_s is None or now_s < self.time_s - FARTHEST_S:
             self.time_s = now_s  # the first observation, or the clock was set back
         if self._is_busy:
@@ -110,9 +111,9 @@ class World:
         return SensorView(self)
 
     def top_view(self, width: int, height: int) -> bytes:
-        """Return the world from above as JPEG, at most five new ones a second.
+        """Return a top view of the world as JPEG, at most five new images per second.
 
-        `width` and `height` are in pixels, 16 to 2000.
+        `width` and `height` are in pixels, from 16 to 2000.
         """
         size = min(2000, max(16, width)), min(2000, max(16, height))
 
@@ -125,7 +126,7 @@ class World:
         return self._once(("top", size), 0.2, draw)
 
     def picture(self) -> bytes:
-        """Return the robot's camera image as JPEG, at most ten new ones a second."""
+        """Return the robot's camera image as JPEG, at most ten new images per second."""
         flip, mirror = self._holds(self.spec.camera.flip), self._holds(self.spec.camera.mirror)
 
         def draw() -> bytes:
@@ -140,7 +141,10 @@ class World:
         return self._once(("camera", flip, mirror), 0.1, draw)
 
     def panorama(self) -> bytes:
-        """Return a panorama as JPEG: ahead in the middle, a row for each height."""
+        """Return a panorama as JPEG, with the forward direction in the middle.
+
+        Image rows are heights.
+        """
 
         def draw() -> bytes:
             from urc.simulator.world.picture import jpeg, panorama_picture
@@ -150,7 +154,7 @@ class World:
         return self._once("panorama", 0.5, draw)
 
     def faces(self) -> "EdgeArrays":
-        """Return the edges of the plan, for rays."""
+        """Return the edges of the map for ray casting."""
         if self._faces is None:
             from urc.simulator.world.rays import EdgeArrays
 
@@ -196,7 +200,7 @@ class World:
             self._trail.append((motion.x, motion.y))
 
     def _collide(self) -> None:
-        """Move a body that overlaps an obstacle back to its edge."""
+        """Move an overlapping body back to the edge of the obstacle."""
         motion, self.touch = self.motion, None
         for _ in range(3):  # a corner has two edges
             touch = self.plan.touch(motion.x, motion.y, motion.z, self.spec.body.radius)
@@ -212,12 +216,12 @@ class World:
 
 
 class SensorView(Mapping[str, object]):
-    """The sensor view of a world: the names of `READINGS`, computed on access."""
+    """The sensor view of a world; each value in `READINGS` is computed on access."""
 
     __slots__ = ("_world",)
 
     def __init__(self, world: World) -> None:
-        """Observe `world`, which must not advance meanwhile."""
+        """View `world`. The world must not advance while the view is in use."""
         self._world = world
 
     def __getitem__(self, name: str) -> object:
