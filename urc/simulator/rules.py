@@ -197,9 +197,7 @@ class RuleSet:
                 if asked is None and running_rule.frame is not None:
                     asked = self._auto.asked(running_rule.frame)
                 if asked is None:
-                    raise Unanswered(
-                        "the driver never sends this frame and declares no reply"
-                    )
+                    raise Unanswered("the driver never sends this frame and declares no reply")
                 said += self._auto.answers(asked, now_s)
             if reaction.message is not None:
                 said += self._auto.render(reaction.message, now_s)
