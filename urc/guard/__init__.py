@@ -1,10 +1,10 @@
-"""The guard: a small process that owns the lines of a moving robot, and stops the robot.
+"""The guard: a small process that owns a robot's connections and stops it if the server fails.
 
-The guard uses the transports and `urc.motion`; sessions use the guard. The guard runs nothing of a
-document: no template, no pattern, no parser. The guard gets rendered frames, and the stop frame
-    before any motion.
+The guard imports the transports and `urc.motion`; sessions import the guard. The guard evaluates no
+part of a document: no template, no pattern, no parser. The guard receives rendered frames only, and
+receives the stop frame before any motion.
 
-`guard_client` is the engine's side: `GuardClient` talks to a guard over a `Channel`, by the
-messages of `messages`. A `PipeChannel` leads to a process with a `GuardServer`, a `LocalChannel`
-to a `GuardServer` in this process.
+`GuardClient` in `guard_client` is the engine's side and exchanges the `messages` with the guard
+over a `Channel`. A `PipeChannel` connects to a `GuardServer` in a separate process; a
+`LocalChannel` connects to one in this process.
 """

@@ -1,4 +1,4 @@
-"""The guard's process: ``python -m urc.guard PIPE DOOR…``, started by `PipeChannel` alone."""
+"""The guard process, ``python -m urc.guard PIPE DOOR…``, which only `PipeChannel` starts."""
 
 import asyncio
 import gc
@@ -28,7 +28,7 @@ _ENTER_S: Final = 5.0
 
 
 class _Clock:
-    """This machine's monotonic clock, shared with the engine's process."""
+    """The monotonic clock of this machine, shared with the engine's process."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
@@ -83,7 +83,7 @@ async def _guard(line: socket.socket, priority: RealTimePriority) -> None:
 
 
 def _line(place: str) -> socket.socket:
-    """Return this end of the pipe: inherited, or a connection to the server's door."""
+    """Return this end of the pipe: an inherited socket, or a connection to the server's port."""
     if not place.startswith(DOOR):
         return socket.socket(fileno=int(place))
     line = socket.create_connection(("127.0.0.1", int(place.removeprefix(DOOR))), timeout=_ENTER_S)
@@ -93,7 +93,7 @@ def _line(place: str) -> socket.socket:
 
 
 def main() -> None:
-    """Guard the lines of one robot until the pipe ends, or SIGTERM."""
+    """Guard the connections of one robot until the pipe closes or SIGTERM arrives."""
     # Ctrl-C reaches every process of the terminal; the server decides how to react.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     logging.basicConfig(format="%(levelname)s: guard: %(message)s", level=logging.WARNING)

@@ -1,7 +1,8 @@
-"""The channel between the guard's client and the guard: its two sides, as protocols.
+"""Protocols for the two sides of the channel between the guard client and the guard.
 
-`urc.guard.pipe_channel.PipeChannel` leads to a process, `urc.guard.local_channel.LocalChannel` to a
-guard in this process. Neither channel knows the armed controls: the client has that table.
+`urc.guard.pipe_channel.PipeChannel` connects to a guard process, and
+`urc.guard.local_channel.LocalChannel` to a guard in this process. Only the client keeps the table
+of armed controls; channels have no access to the table.
 """
 
 from collections.abc import Iterable
@@ -14,11 +15,12 @@ __all__ = ["Channel", "ChannelListener", "GuardedLineSpec"]
 
 
 class GuardedLineSpec(NamedTuple):
-    """One line of the robot."""
+    """One transport of a robot, described for the guard."""
 
     make: messages.MakeTransport
     transport: Transport
-    """The transport of `make` in this process. Only a guard in this process opens it."""
+    """The transport object in this process that corresponds to `make`. Only a guard in the same
+    process opens this transport object."""
 
 
 class ChannelListener(Protocol):
@@ -29,36 +31,38 @@ class ChannelListener(Protocol):
         """Whether a control may be moving."""
 
     def briefing(self) -> Iterable[messages.ToGuard]:
-        """Return the messages that initialise a new guard, in their order.
+        """Return the messages that initialise a new guard, in sending order.
 
-        Called once for each new guard: a pending stop counts as sent from then on.
+        Called once for each new guard; the call marks pending stops as sent.
         """
 
     def handle(self, message: messages.FromGuard, size: int) -> None:
-        """Handle a message of the guard; `size` is its size in bytes for flow control."""
+        """Handle a message from the guard; `size` is its size in bytes for flow control."""
 
     def lost(self, reason: str) -> None:
-        """Handle the end of the guard, which closes every line."""
+        """Handle the end of the guard process, which closes every connection."""
 
 
 class Channel(Protocol):
     """The connection to a guard, and the guard's life cycle. Posting never waits."""
 
     def start(self) -> None:
-        """Start the guard; needs a running loop."""
+        """Start the guard; requires a running event loop."""
 
     async def finish(self) -> None:
-        """Let the guard stop all controls and close every line, then end the guard."""
+        """Stop all controls and close every connection, then end the guard."""
 
     def post(self, message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
         """Send a message to the guard.
 
-        Without a guard, the message is dropped, because the next guard is initialised anyway.
+        Without a running guard, drop the message: the next guard is initialised from the client's
+        table.
 
         Args:
             message: the message.
-            slot: this message replaces an unsent message of the same slot; "" for no slot.
-            is_urgent: whether the message is sent before all unsent messages.
+            slot: key of a replaceable message: a newer message replaces an unsent one with the same
+                key; "" for none.
+            is_urgent: whether to send the message before all unsent messages.
 
         Raises:
             UNFIT: the message cannot be encoded (`urc.guard.pipe.UNFIT`).

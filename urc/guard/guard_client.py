@@ -1,13 +1,14 @@
-"""The client of the guard: the robot's lines behind it, and one table of its held commands.
+"""The client of the guard: the robot's guarded transports, and the table of held commands.
 
-Theory of operation. The state of a guard is lost when its process dies. So the client keeps a table
-of the held commands that were armed or stopped: their terms, and whether they may be moving. A new
-guard is initialised from this table. The new guard gets the lines, the pending stop of each command
-that may be moving, and the terms of the other armed commands. The guard opens the lines with
-pending stops and writes these stops first. No motion continues by itself.
+Theory of operation. The guard's state is lost when the guard process dies. The client therefore
+keeps a table of all held commands that were armed or stopped. Each entry stores the terms of the
+command, and whether the command may be moving. A new guard is initialised from this table. The new
+guard receives the connections, a pending stop for each possibly moving command, and the terms of
+the other armed commands. For each pending stop, the guard opens the connection and writes the stop
+first. Motion never resumes automatically.
 
-A control *may be moving* from its first tick, or from a stop, until the guard reports the stop of
-its newest tick as written. So a stop survives the death of the guard that should have written it.
+A control *may be moving* from its first tick or stop request until the guard reports that the stop
+after the newest tick was written. A pending stop thus survives the death of the guard process.
 """
 
 import asyncio
@@ -27,7 +28,7 @@ __all__ = ["GuardClient", "HeldSpec"]
 
 _MOST_STOPS: Final = 256
 _TELLING_S: Final = 0.5
-"""Longest delay of a message on its way to the guard."""
+"""Maximum delay of a message to the guard, in seconds."""
 _UNCOUNTED: Final = Count({}, {})
 
 
@@ -36,7 +37,7 @@ class HeldSpec(NamedTuple):
 
     line: str
     terms: HoldTerms
-    """Terms without a stop frame, for a stop before the first arming."""
+    """Default terms without a stop frame, for a stop before the first arming."""
 
 
 @dataclass(slots=True)
@@ -47,18 +48,18 @@ class _Control:
     terms: HoldTerms
     is_armed: bool = False
     number: int = 0
-    """Number of the newest tick, as the present guard counts them."""
+    """Number of the newest tick, counted since the present guard started."""
     at_s: float = 0.0
     """Time of the newest tick."""
     counted: CountedFrame | None = None
-    """Frame of the newest tick while it is held, when it carries counters."""
+    """Frame of the newest tick of a held control, if the frame carries counters; otherwise None."""
     may_move: bool = False
     stopped_s: float = float("-inf")
-    """Time of the last reported stop."""
+    """Time of the last stop that the guard reported as written."""
 
 
 class GuardClient:
-    """The lines of one robot behind a guard, and its held commands.
+    """The guarded transports of one robot, and its held commands.
 
     The client implements `urc.runtime.motion_controller.MotionBackend` and `ChannelListener`.
     """
@@ -69,10 +70,10 @@ class GuardClient:
         held: Mapping[str, HeldSpec],
         channel_to: Callable[[ChannelListener], Channel],
     ) -> None:
-        """Prepare; nothing runs before `start`.
+        """Create the client; `start` starts the guard.
 
         Args:
-            lines: the lines; a tunnel precedes the lines inside it.
+            lines: the guarded transports; a tunnel precedes the transports inside the tunnel.
             held: the held commands by name.
             channel_to: creates the channel for this client.
         """
@@ -88,13 +89,14 @@ class GuardClient:
             )
             for spec in lines
         }
-        """The lines, for the links of the session."""
+        """Guarded transports by name, for the links of the session."""
         self.on_stand: Stands = _unheard
-        """Receives the counters of a line, and whether all counted frames of the engine were sent.
+        """Callback with the counters of a transport, and whether all counted frames of the engine
+        were sent.
         """
         self._held = dict(held)
         self._controls: dict[str, _Control] = {}
-        """The table of armed and possibly moving commands."""
+        """Table of armed and possibly moving commands."""
         self._stops: deque[tuple[str, Reason]] = deque(maxlen=_MOST_STOPS)
         self._stopped = asyncio.Event()
 
@@ -103,7 +105,7 @@ class GuardClient:
         self.channel.start()
 
     async def finish(self) -> None:
-        """Stop all commands that may be moving, close every line, and end the guard."""
+        """Stop all commands that may be moving, close every connection, and end the guard."""
         await self.channel.finish()
 
     # -- held commands: `urc.runtime.motion_controller.MotionBackend`
@@ -112,7 +114,7 @@ class GuardClient:
         """Accept ticks of `command` from now on.
 
         Raises:
-            UrcError: under these terms, nothing would ever stop the motion.
+            UrcError: the terms contain no way to stop the motion.
         """
         try:
             HoldToRun(terms)
@@ -124,7 +126,7 @@ class GuardClient:
         self.channel.post(messages.ArmControl(control.line, command, terms))
 
     def tick(self, command: str, data: Payload | CountedFrame) -> None:
-        """Renew the lease of `command`; `data` is its newest frame. Never waits."""
+        """Renew the lease of `command`, with `data` as its newest frame. Never waits."""
         control = self._controls.get(command)
         if control is None:
             return
@@ -149,12 +151,12 @@ class GuardClient:
             self.channel.post(renewal, slot=f"{command} stop")
 
     def release(self, command: str) -> None:
-        """Stop `command` after its release."""
+        """Stop `command` because its control was released."""
         self._discard_tick(command)
         self.channel.post(messages.ReleaseControl(command))
 
     def stop(self, stops: Mapping[str, Payload | FrameVariants]) -> None:
-        """Stop these commands at once, moving or not; the values are their stop frames."""
+        """Stop commands immediately, even if idle. `stops` maps each command to its stop frame."""
         told: list[tuple[str, str, HoldTerms]] = []
         for command, frame in stops.items():
             control = self._control(command)
@@ -170,8 +172,8 @@ class GuardClient:
         """Stop all commands that may be moving.
 
         Args:
-            stop_frame: renders the stop frame of a command as it is now. If it raises `UrcError`,
-                the last stop frame of the command is used.
+            stop_frame: returns the current stop frame of a command. If `stop_frame` raises
+                `UrcError`, the last known stop frame is used.
         """
         stops: dict[str, Payload | FrameVariants] = {}
         for command, control in self._controls.items():
@@ -192,11 +194,14 @@ class GuardClient:
         return control.may_move or since_s < STOP_FOR_S + _TELLING_S
 
     def is_open(self, command: str) -> bool:
-        """Return whether the line of `command` is connected, as last reported by the guard."""
+        """Return whether the guard last reported the connection of `command` as open."""
         return self.transports[self._held[command].line].is_open
 
     async def stops(self) -> Sequence[tuple[str, Reason]]:
-        """Wait for the next written stops: command, and the reason. Cancelling loses none."""
+        """Wait for written stops; return the command and the reason of each stop.
+
+        Cancelling loses none.
+        """
         while not self._stops:
             self._stopped.clear()
             await self._stopped.wait()
@@ -211,7 +216,7 @@ class GuardClient:
         return control
 
     def _discard_tick(self, command: str) -> None:
-        """Discard an unsent tick for good, because it would start a motion."""
+        """Discard an unsent tick permanently, because the tick would start a motion."""
         self.channel.drop(command)
         control = self._controls.get(command)
         if control is not None:
@@ -246,7 +251,7 @@ class GuardClient:
                 self._tick_again(message)
 
     def lost(self, reason: str) -> None:
-        """Handle the end of the guard, and of every line with it."""
+        """Handle the end of the guard, which also ends every connection."""
         for transport in self.transports.values():
             transport.lost(reason)
 
@@ -254,7 +259,10 @@ class GuardClient:
         self.on_stand(line, stand, is_settled)
 
     def _tick_again(self, counted: messages.CountersAdvanced) -> None:
-        """Render ticks again after other frames used their numbers. The ticks keep their age."""
+        """Render pending ticks again after other frames used their counter values.
+
+        Each tick keeps its original time.
+        """
         for command, number in counted.stale:
             control = self._controls.get(command)
             if control is None or control.counted is None or control.number != number:

@@ -1,10 +1,10 @@
-"""A line of the robot inside the guard.
+"""A connection to the robot inside the guard.
 
-Theory of operation. One task at a time opens the transport, reads to its end, and closes it. The
-engine requests opening and closing, and receives data within its credit. If the line is cut while
-the robot may be moving, the guard does not wait for the engine, which may be frozen or dead. The
-guard itself opens the line again (a *rescue*) and writes the stop first. The open line is then kept
-for the engine's next attempt.
+Theory of operation. One task at a time opens the transport, reads until the connection ends, and
+closes the transport. The engine requests opening and closing, and receives data within its
+flow-control credit. If the connection is lost while the robot may be moving, the guard does not
+wait for the engine, which may be frozen or dead. The guard itself reopens the connection (a
+*rescue*) and writes the stop first. The open connection is then kept for the engine's next attempt.
 """
 
 import asyncio
@@ -34,45 +34,48 @@ from urc.transports.connect_race import HURRY, ConnectRace
 __all__ = ["WINDOW_BYTES", "GuardedConnection"]
 
 WINDOW_BYTES: Final = 65536
-"""Limit of bytes sent to the engine before an acknowledgement."""
+"""Maximum number of bytes sent to the engine before an acknowledgement."""
 _GRACE_S: Final = 1.0
-"""Time allowed to a transport beyond its own timeout."""
+"""Extra time for a transport after its own timeout, in seconds."""
 _CLOSE_S: Final = 1.0
 _RESCUE_S: Final = 90.0
-"""Time limit of a rescue; after that, only the engine tries to connect."""
+"""Time limit of a rescue, in seconds; afterwards, only the engine tries to connect."""
 _KEPT_S: Final = 6.0
-"""Time for which a rescued line is kept for the engine."""
+"""Time for which a rescued connection is kept for the engine, in seconds."""
 _EVERY_S: Final = 0.05
-"""Shortest time between two attempts; five times as long for a line that is slow to open."""
+"""Minimum interval between two attempts, in seconds; five times as long for transports that are
+slow to open."""
 _SHORTEST_S: Final = 0.07
 _LONGEST_S: Final = 2.0
-"""Bounds of the timeout of an attempt, a multiple of the time of successful attempts. An attempt
-from the time without a robot is lost, and delays the next attempt.
+"""Bounds of the timeout of one attempt, in seconds. The timeout is a multiple of the usual duration
+of successful attempts. An attempt that begins before the robot is reachable fails, and delays the
+next attempt.
 """
 _REMEMBERED: Final = 5
 _TIMES: Final = 4.0
 _LOG_IN_S: Final = 6.0
 _GROWTH: Final = 1.25
 _LONG_S: Final = 0.5
-"""Limit of the timeout of attempts that cannot overlap; the timeout grows with each attempt."""
+"""Maximum timeout of attempts that cannot overlap, in seconds; the timeout grows with each attempt.
+"""
 _USUAL_S: Final = 0.25
 _WITHIN_S: Final = 0.7
-"""Time for the repeats of a stop, and for the last repeat on a slow line."""
+"""Time allowed for repeating a stop, and for the last repeat on a slow connection, in seconds."""
 _PAUSE_S: Final = 0.01
 
 Emit = Callable[[messages.FromGuard], int]
-"""Passes a message on; returns its approximate size in bytes."""
+"""Function that passes a message on, and returns the approximate size in bytes."""
 
 log = logging.getLogger(__name__)
 
 
 class GuardedConnection:
-    """A transport, its hold-to-run controls, and its connection."""
+    """A guarded transport with its connection and its hold-to-run controls."""
 
     def __init__(
         self, make: messages.MakeTransport, transport: Transport, emit: Emit, clock: LaneClock
     ) -> None:
-        """Prepare; `open` opens the line."""
+        """Store the transport; `open` opens the connection."""
         self.name = make.line
         self.transport = transport
         self._emit = emit
@@ -109,7 +112,7 @@ class GuardedConnection:
         self._turn = 0
         self._is_open = False
         self._is_handed = False
-        """Whether the engine has the open connection."""
+        """Whether the engine uses the open connection."""
         self._handed = asyncio.Event()
         self._is_rescuing = False
         self._waiting: TimerHandle | None = None
@@ -117,8 +120,8 @@ class GuardedConnection:
         self._fault = ""
         self._patience_s = _USUAL_S
         self._took_s: deque[float] = deque(maxlen=_REMEMBERED)
-        """Durations of the last successful attempts; the shortest has the least delay of this
-        machine.
+        """Durations of the last successful attempts, in seconds; the shortest one contains the
+        least local delay.
         """
         self._hurry = ConnectRace(_SHORTEST_S)
         self._credit = 0
@@ -126,14 +129,14 @@ class GuardedConnection:
         self._is_reading = False
         self._acked = 0
         self._counted = 0
-        """Number of the newest frame with counters from the engine that was sent."""
+        """Number of the newest counted frame of the engine that was sent."""
         self._round = 0
-        """Number of times that frames of the engine were refused because of used numbers."""
+        """Number of refusals of engine frames because their counter values were already used."""
 
     # -- requests of the engine
 
     def open(self, turn: int, timeout_s: float) -> None:
-        """Open the line; the result is reported by `LineOpened` or `OpenFailed`."""
+        """Open the connection; report the result as `LineOpened` or `OpenFailed`."""
         self._turn = turn
         if not self._is_rescuing:
             self._switch(self._live(timeout_s))
@@ -144,7 +147,7 @@ class GuardedConnection:
             self._waiting = self._clock.call_at(self._clock.now() + timeout_s, self._in_vain)
 
     def close(self, turn: int) -> None:
-        """Stop moving controls and close the line; the result is reported by `LineClosed`."""
+        """Stop moving controls, close the connection, and report `LineClosed`."""
         if turn != self._turn or self._is_rescuing:
             self._forget_waiting()
             self._emit(messages.LineClosed(self.name, turn))
@@ -155,7 +158,7 @@ class GuardedConnection:
             self._switch(self._shut(turn))
 
     def send(self, said: messages.SendBytes) -> None:
-        """Send a frame without motion; reported by `SendDone`, `SendRefused` or `SendStale`."""
+        """Send a frame without motion; report `SendDone`, `SendRefused` or `SendStale`."""
         if said.turn != self._turn or not self._is_handed or said.round != self._round:
             return  # from an earlier connection, or rendered again meanwhile
         data, number = said.data, said.number
@@ -172,7 +175,7 @@ class GuardedConnection:
                 self._acked = number
 
     def _leave(self, said: messages.SendBytes) -> Payload | None:
-        """Return the data to send at the frame's turn; None if it must not be sent any more."""
+        """Return the data to send when the frame is next in the queue; None if outdated."""
         if said.round != self._round:
             return None
         if not self._sent_counters.fits(said.count):
@@ -189,18 +192,18 @@ class GuardedConnection:
             self._counted = said.number
 
     def _refuse(self, number: int) -> None:
-        """Discard the rest of this round, because other frames have used its numbers."""
+        """Discard the rest of this round, because other frames have used its counter values."""
         self._round += 1
         self._emit(messages.SendStale(self.name, self._turn, number, self._sent_counters.stand))
 
     def credit(self, turn: int, amount: int) -> None:
-        """Add the engine's acknowledgement to its credit."""
+        """Add `amount` bytes to the flow-control credit, as acknowledged by the engine."""
         if turn == self._turn:
             self._credit += amount
             self._credited.set()
 
     def settle(self) -> None:
-        """Act on the messages received together."""
+        """Process the effects of a batch of messages."""
         if self._acked:
             number, self._acked = self._acked, 0
             self._emit(messages.SendDone(self.name, self._turn, number))
@@ -208,12 +211,12 @@ class GuardedConnection:
         self._liveness.start()
 
     def rescue(self) -> None:
-        """Open the line without the engine, because a stop is pending."""
+        """Reopen the connection without the engine, because a stop is pending."""
         if not self._is_open and not self._is_rescuing and self._task is None:
             self._switch(self._rescue())
 
     async def finish(self, within_s: float) -> None:
-        """Stop moving controls, wait for their stops within `within_s`, and close the line."""
+        """Stop moving controls, wait up to `within_s` for their stops, and close the connection."""
         self.scheduler.stop_all()
         self.scheduler.write_due()
         until_s = self._clock.now() + within_s
@@ -325,7 +328,7 @@ class GuardedConnection:
             await asyncio.sleep(0)  # a busy line must not delay the stops
 
     def _arrived(self, data: bytes) -> bool:
-        """Pass received data on at once, if no earlier data is waiting."""
+        """Pass on received data immediately, unless earlier data is still waiting."""
         if not self._is_reading or self._credit <= 0 or not self._is_handed:
             return False
         self._pass_on(data)
@@ -339,7 +342,7 @@ class GuardedConnection:
             raise PeerClosed(f"what the robot sent cannot be passed on ({fault})") from fault
 
     async def _recover(self, reason: str, *, is_abort: bool = False) -> None:
-        """Close a broken line, inform the engine, and stop the robot if a stop is pending."""
+        """Close a broken connection, inform the engine, and reconnect if a stop is pending."""
         # Without an abort, the kernel would send its buffered bytes later.
         is_abort = is_abort or self.scheduler.is_in_doubt
         self._cut(reason)
@@ -381,7 +384,7 @@ class GuardedConnection:
     # -- rescue
 
     def _stall(self, reason: str) -> None:
-        """Reset the line, so that data buffered in the kernel never arrives."""
+        """Reset the connection, so that data in the kernel's send buffer is never delivered."""
         if self._is_open:
             self._is_open = False
             self._liveness.end()
@@ -414,7 +417,7 @@ class GuardedConnection:
             self._is_rescuing = False
 
     async def _serve_rescued(self) -> None:
-        """Wait for the engine to take over the line, then serve the engine."""
+        """Wait until the engine takes over the connection, then serve the engine."""
         alarm = self._clock.call_at(self._clock.now() + _KEPT_S, self._handed.set)
         try:
             await self._handed.wait()
@@ -423,10 +426,10 @@ class GuardedConnection:
         if self._is_handed:
             await self._serve()
         else:
-            self._switch(self._recover("the engine has not asked for the line"))
+            self._switch(self._recover("the engine has not requested the connection"))
 
     def _in_vain(self) -> None:
-        """Report the timeout to a waiting engine."""
+        """Report the timeout to an engine that waits for a rescue."""
         if self._waiting is not None:
             self._forget_waiting()
             fault = self._fault or f"no answer from {self.transport.address}"

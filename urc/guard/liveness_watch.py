@@ -1,4 +1,4 @@
-"""Watch for a frozen program at the other end of a line while the robot moves."""
+"""Detection of a frozen program at the other end of a connection during motion."""
 
 import asyncio
 from collections.abc import Callable
@@ -14,7 +14,7 @@ _LOOK_S: Final = ASKED_EVERY_S
 
 
 class LivenessWatch:
-    """The watch of one line, over all its connections."""
+    """The liveness watch of one transport, across all its connections."""
 
     def __init__(
         self,
@@ -28,11 +28,11 @@ class LivenessWatch:
         """Prepare.
 
         Args:
-            transport: probed if it is a `SupportsProbe`.
+            transport: the transport, which is probed if it is a `SupportsProbe`.
             clock: the time.
-            silent_s: longest silence of the robot without a probe; None for no limit.
-            is_moving: returns whether a control moves.
-            failed: receives the reason when the program is frozen.
+            silent_s: maximum silence of the robot without a probe, in seconds; None for no limit.
+            is_moving: returns whether a control is moving.
+            failed: callback with the reason when the program is frozen.
         """
         self._transport = transport if isinstance(transport, SupportsProbe) else None
         self._clock = clock
@@ -46,17 +46,17 @@ class LivenessWatch:
 
     @property
     def is_able(self) -> bool:
-        """Whether liveness can be judged at all."""
+        """Whether the transport offers a way to judge liveness."""
         return self._transport is not None or self._silent_s is not None
 
     def begin(self) -> None:
-        """Record that the line is open."""
+        """Record that the connection is open."""
         self._is_open = True
         self._liveness = Liveness(self._silent_s)
         self.note_arrival()
 
     def end(self) -> None:
-        """Record that the line is closed."""
+        """Record that the connection is closed."""
         self._is_open = False
         if self._alarm is not None:
             self._alarm.cancel()
@@ -66,11 +66,11 @@ class LivenessWatch:
             self._asking = None
 
     def note_arrival(self) -> None:
-        """Record received bytes, or a pause in reading on our side."""
+        """Record received bytes, or a local pause in reading."""
         self._liveness.note_arrival(self._clock.now())
 
     def start(self) -> None:
-        """Watch the line while a control moves."""
+        """Start the watch if a control is moving."""
         if self._alarm is None and self._is_open and self.is_able and self._is_moving():
             self._check()
 

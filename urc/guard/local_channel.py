@@ -1,4 +1,4 @@
-"""A guard in this process, for tests and for ``--no-guard``."""
+"""A guard in this process, for tests and for the option ``--no-guard``."""
 
 from collections.abc import Sequence
 
@@ -15,7 +15,7 @@ _OVERHEAD_BYTES = 32
 
 
 class LocalChannel:
-    """The channel to a guard in this process, which stops nothing when this process hangs."""
+    """The channel to a guard in this process; such a guard stops no robot if this process hangs."""
 
     def __init__(
         self, listener: ChannelListener, *, lines: Sequence[GuardedLineSpec], clock: LaneClock
@@ -24,7 +24,7 @@ class LocalChannel:
 
         Args:
             listener: the client.
-            lines: in the order in which they carry each other.
+            lines: the transports; a tunnel precedes the transports inside the tunnel.
             clock: the time.
         """
         self._listener = listener
@@ -33,21 +33,21 @@ class LocalChannel:
         self._host = GuardServer(self._emit, clock)
 
     def start(self) -> None:
-        """Give the guard its lines."""
+        """Start the guard and create its transports."""
         for spec in self._lines:
             self._host.add(spec.make, spec.transport)
 
     async def finish(self) -> None:
-        """Stop everything and close every line."""
+        """Stop all controls and close every connection."""
         await self._host.finish()
 
     def post(self, message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
-        """Send a message, which the guard handles at once."""
+        """Deliver a message, which the guard handles immediately."""
         self._host.handle(message)
         self._host.settle()
 
     def drop(self, slot: str) -> None:
-        """Do nothing: no message is ever unsent."""
+        """Do nothing, because messages are delivered immediately."""
 
     async def ready(self) -> None:
         """Return at once."""

@@ -1,8 +1,8 @@
-"""The messages between the engine's process and the guard.
+"""The messages between the engine's process and the guard process.
 
-A message is a MessagePack array whose first element is its type. `line` is the name of a transport,
-`control` that of a held command. `turn` is the number of times that the engine has opened the line.
-Messages of an earlier turn are dropped.
+Each message is a MessagePack array whose first element is the message type. `line` is the name of a
+transport, and `control` is the name of a held command. `turn` counts how often the engine has
+opened the connection. Messages with an earlier `turn` are dropped.
 """
 
 from collections.abc import Mapping
@@ -49,23 +49,26 @@ class MakeTransport(msgspec.Struct, array_like=True, frozen=True, tag=1):
 
     line: str
     factory: str
-    """``module:attribute``, as in the table of transports."""
+    """Factory of the transport as ``module:attribute``, the same text as in the table of
+    transports."""
     options: dict[str, Any]
     subscriptions: list[tuple[str, dict[str, Any]]]
     tunnel: str
-    """Line that carries this one, created before; "" without one."""
+    """Name of the tunnel that carries this transport, created before; "" without a tunnel."""
     stalled_s: float
-    """Age of unsent motion at which the line counts as stalled, in seconds. A stalled line is
-    reset.
+    """Age of unsent motion data at which a connection counts as stalled, in seconds. A stalled
+    connection is reset.
     """
     is_strict: bool
-    """Whether the line is slow to open: then nothing is written while any byte is unsent."""
+    """Whether the transport is slow to open; if so, a frame is written only when no byte is unsent.
+    """
     silent_s: float | None = None
-    """Silence of a moving robot after which the line is reset, in seconds; None: unlimited."""
+    """Maximum silence of a moving robot before the connection is reset, in seconds; None:
+    unlimited."""
 
 
 class OpenLine(msgspec.Struct, array_like=True, frozen=True, tag=2):
-    """Open a line; answered by `LineOpened` or `OpenFailed`."""
+    """Open a connection; the answer is `LineOpened` or `OpenFailed`."""
 
     line: str
     turn: int
@@ -73,7 +76,7 @@ class OpenLine(msgspec.Struct, array_like=True, frozen=True, tag=2):
 
 
 class SendBytes(msgspec.Struct, array_like=True, frozen=True, tag=3):
-    """Send a frame that is no motion; answered by `SendDone` or `SendRefused`."""
+    """Send a frame that is no motion; the answer is `SendDone` or `SendRefused`."""
 
     line: str
     turn: int
@@ -81,20 +84,22 @@ class SendBytes(msgspec.Struct, array_like=True, frozen=True, tag=3):
     """Number of the frame on this connection."""
     data: Payload
     count: Count | None = None
-    """Counter values of the frame, if any: it is sent only while these are the next ones."""
+    """Counter values of the frame, or None; the frame is sent only while these values are the next
+    ones."""
     round: int = 0
-    """Number of `SendStale` messages before it on this connection; otherwise it is not sent."""
+    """Expected number of `SendStale` messages on this connection; with any other number, the frame
+    is dropped."""
 
 
 class CloseLine(msgspec.Struct, array_like=True, frozen=True, tag=4):
-    """Close a line; moving controls are stopped before. Answered by `LineClosed`."""
+    """Stop moving controls and close the connection. Answered by `LineClosed`."""
 
     line: str
     turn: int
 
 
 class FlowCredit(msgspec.Struct, array_like=True, frozen=True, tag=5):
-    """The engine has processed this many bytes from a line."""
+    """The engine has processed this number of bytes from a connection."""
 
     line: str
     turn: int
@@ -110,16 +115,17 @@ class ArmControl(msgspec.Struct, array_like=True, frozen=True, tag=6):
 
 
 class RenewLease(msgspec.Struct, array_like=True, frozen=True, tag=7):
-    """A tick of sampled input: it renews the lease of a control."""
+    """A tick of sampled input, which renews the lease of a control."""
 
     control: str
     number: int
-    """Number of the tick of this control."""
+    """Sequence number of the tick of this control."""
     data: Payload
     at_s: float
-    """Time of the sample on this machine's monotonic clock. A delayed tick keeps its age."""
+    """Time of the sample, in seconds of this machine's monotonic clock. The time of a delayed tick
+    stays unchanged."""
     count: Count | None = None
-    """Counter values, as in `SendBytes`."""
+    """Counter values of the frame, as in `SendBytes`."""
 
 
 class ReleaseControl(msgspec.Struct, array_like=True, frozen=True, tag=8):
@@ -129,13 +135,13 @@ class ReleaseControl(msgspec.Struct, array_like=True, frozen=True, tag=8):
 
 
 class StopMotion(msgspec.Struct, array_like=True, frozen=True, tag=9):
-    """Stop these controls, moving or not: line, control and terms of each."""
+    """Stop the listed controls, moving or not; each entry has line, control and terms."""
 
     controls: list[tuple[str, str, HoldTerms]]
 
 
 class RecoverStop(msgspec.Struct, array_like=True, frozen=True, tag=10):
-    """A control was moving when the previous guard died: open its line, and stop it first."""
+    """Reopen a connection to stop a control that was moving when the previous guard died."""
 
     line: str
     control: str
@@ -143,7 +149,7 @@ class RecoverStop(msgspec.Struct, array_like=True, frozen=True, tag=10):
 
 
 class ReplaceStop(msgspec.Struct, array_like=True, frozen=True, tag=11):
-    """Replace the stop frame of a control: the counter value of the old one is used up."""
+    """Replace the stop frame of a control, because the old frame's counter value is used up."""
 
     control: str
     stop: Payload
@@ -151,18 +157,18 @@ class ReplaceStop(msgspec.Struct, array_like=True, frozen=True, tag=11):
 
 
 class LineOpened(msgspec.Struct, array_like=True, frozen=True, tag=21):
-    """A line is open."""
+    """A connection was opened."""
 
     line: str
     turn: int
     address: str
-    """Address for people; it may be more precise than before."""
+    """Address to display; may be more precise than the configured address."""
     stand: dict[str, int] = {}
-    """Counter values that stops have used already."""
+    """Counter values that stop frames have already used."""
 
 
 class OpenFailed(msgspec.Struct, array_like=True, frozen=True, tag=22):
-    """A line could not be opened."""
+    """A connection could not be opened."""
 
     line: str
     turn: int
@@ -170,7 +176,7 @@ class OpenFailed(msgspec.Struct, array_like=True, frozen=True, tag=22):
 
 
 class BytesReceived(msgspec.Struct, array_like=True, frozen=True, tag=23):
-    """Bytes or an envelope arrived."""
+    """Bytes or an envelope arrived on a connection."""
 
     line: str
     turn: int
@@ -178,7 +184,7 @@ class BytesReceived(msgspec.Struct, array_like=True, frozen=True, tag=23):
 
 
 class SendDone(msgspec.Struct, array_like=True, frozen=True, tag=24):
-    """All frames up to this number were handed over."""
+    """All frames up to this number were handed to the transport."""
 
     line: str
     turn: int
@@ -193,11 +199,11 @@ class SendRefused(msgspec.Struct, array_like=True, frozen=True, tag=25):
     number: int
     message: str
     is_closed: bool
-    """Whether the line is closed."""
+    """Whether the connection is closed."""
 
 
 class LineLost(msgspec.Struct, array_like=True, frozen=True, tag=26):
-    """A line is lost: nothing more will arrive."""
+    """A connection was lost; no more data will arrive."""
 
     line: str
     turn: int
@@ -205,23 +211,23 @@ class LineLost(msgspec.Struct, array_like=True, frozen=True, tag=26):
 
 
 class LineClosed(msgspec.Struct, array_like=True, frozen=True, tag=27):
-    """A line was closed on request."""
+    """A connection was closed on request."""
 
     line: str
     turn: int
 
 
 class StopWritten(msgspec.Struct, array_like=True, frozen=True, tag=28):
-    """The stop of a control was written."""
+    """The stop frame of a control was written."""
 
     control: str
     reason: Reason
     number: int
-    """Number of the newest tick at that time."""
+    """Number of the newest tick when the stop was written."""
 
 
 class Heartbeat(msgspec.Struct, array_like=True, frozen=True, tag=29):
-    """The guard is alive."""
+    """Periodic proof that the guard is alive."""
 
     late_s: float
     """Delay of the guard's own timer, in seconds."""
@@ -233,15 +239,16 @@ class CountersAdvanced(msgspec.Struct, array_like=True, frozen=True, tag=30):
     line: str
     turn: int
     sent: int
-    """Number of the newest `SendBytes` with counters that was sent."""
+    """Number of the newest counted `SendBytes` that was sent."""
     stand: dict[str, int]
-    """Counter → last value sent."""
+    """Counter name → last value sent."""
     stale: list[tuple[str, int]]
-    """Control and number of ticks that cannot be sent: other frames used their counter values."""
+    """Control and number of each tick that cannot be sent, because other frames used its counter
+    values."""
 
 
 class SendStale(msgspec.Struct, array_like=True, frozen=True, tag=31):
-    """A `SendBytes` and all later ones of its round were not sent: its counters are used up."""
+    """A `SendBytes` with used counter values, and all later frames of its round, were not sent."""
 
     line: str
     turn: int
@@ -285,19 +292,19 @@ def _plain(value: object) -> object:
 
 
 def encoder() -> msgspec.msgpack.Encoder:
-    """Return an encoder of either side's messages.
+    """Return a new encoder for messages of either side.
 
-    The encoder raises `TypeError`, `OverflowError` or `NotImplementedError` for a body that cannot
-    be encoded, never `msgspec.EncodeError`.
+    Encoding raises `TypeError`, `OverflowError` or `NotImplementedError` for a body that cannot be
+    encoded, never `msgspec.EncodeError`.
     """
     return msgspec.msgpack.Encoder(enc_hook=_plain)
 
 
 def decoder_of_guard() -> msgspec.msgpack.Decoder[ToGuard]:
-    """Return the decoder of the guard."""
+    """Return the guard's decoder, for messages from the engine."""
     return msgspec.msgpack.Decoder(ToGuard)
 
 
 def decoder_of_server() -> msgspec.msgpack.Decoder[FromGuard]:
-    """Return the decoder of the engine's side."""
+    """Return the engine's decoder, for messages from the guard."""
     return msgspec.msgpack.Decoder(FromGuard)

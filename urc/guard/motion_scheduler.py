@@ -1,12 +1,12 @@
-"""Scheduler of the held commands of one line: writes their frames, and checks for a stall.
+"""The scheduler of one connection's held commands: writes their frames and detects a stall.
 
-Theory of operation. `step` writes the due frames of every control: stops first, regardless of
-unsent data, then motion if the line is clear. `step` runs after every message, and by a timer at
-the next due time. From a write until its acknowledgement by the other side, that is every few
-milliseconds, because the kernel does not report sent bytes.
+Theory of operation. `step` writes the due frames of every control. Stops are written first,
+regardless of unsent data; motion frames only if the connection is clear. `step` runs after every
+message, and by a timer at the next due time. Until the other side acknowledges a write, `step` also
+runs every few milliseconds, because the kernel does not report sent bytes.
 
-A control is *in doubt* while a written frame may not have arrived. If the line is then cut, a stop
-becomes pending.
+A control is *in doubt* while a written frame may not have arrived at the robot. If the connection
+is lost while a control is in doubt, a stop becomes pending.
 """
 
 import asyncio
@@ -30,13 +30,13 @@ from urc.transports.base import (
 __all__ = ["MotionScheduler"]
 
 _LOOK_S: Final = 0.005
-"""First interval of checks of a line that is not clear, and the shortest interval of all."""
+"""Minimum interval between checks of a connection with unsent data, in seconds."""
 _LONGEST_LOOK_S: Final = 0.02
-"""Longest interval of these checks, which doubles each time while no frame waits."""
+"""Maximum interval between these checks, in seconds; the interval doubles while no frame waits."""
 
 
 class MotionScheduler:
-    """The hold-to-run controls of one line."""
+    """The hold-to-run controls of one connection."""
 
     def __init__(
         self,
@@ -50,19 +50,20 @@ class MotionScheduler:
         sent_counters: SentCounters | None = None,
         counted: Callable[[list[tuple[str, int]]], None] | None = None,
     ) -> None:
-        """Prepare; nothing is written before `begin`.
+        """Create the scheduler, which writes nothing before `begin`.
 
         Args:
-            transport: the transport of the line; `SupportsUnsent`, `SupportsOffer` and
-                `SupportsForget` are used if supported.
+            transport: the transport; `SupportsUnsent`, `SupportsOffer` and `SupportsForget` are
+                used if implemented.
             clock: the time.
-            stalled_s: age of unsent bytes at which the line counts as stalled.
-            is_strict: whether motion waits until no byte is unsent.
-            told: receives each written stop: control, reason, number of the newest tick.
-            failed: receives the reason when the line stalls or refuses data.
-            sent_counters: the counters of the line.
-            counted: called after a change of the counters, with control and number of each tick
-                that cannot be written any more.
+            stalled_s: age of unsent bytes at which the connection counts as stalled, in seconds.
+            is_strict: whether motion waits until all earlier bytes are sent.
+            told: callback for each written stop, with the control, the reason and the number of the
+                newest tick.
+            failed: callback with the reason when the connection stalls or refuses data.
+            sent_counters: the sent counters of the connection.
+            counted: callback after a change of the counters, with the control and number of each
+                tick that became obsolete.
         """
         self._clock = clock
         self._unsent = transport.unsent if isinstance(transport, SupportsUnsent) else None
@@ -74,16 +75,16 @@ class MotionScheduler:
         self._sent_counters = sent_counters or SentCounters()
         self._counted = counted
         self._counts: dict[str, Count | None] = {}
-        """Control → effect of its newest tick on the counters."""
+        """Control → effect of the control's newest tick on the counters."""
         self._stale: list[tuple[str, int]] = []
         self._watch = StallWatch(stalled_s)
         self.queue: SendQueue[tuple[str, bool]] = SendQueue(transport, clock, self._sent)
-        """Frames that the transport does not accept at once."""
+        """Frames that the transport cannot accept immediately."""
         self._holds: dict[str, HoldToRun] = {}
         self._numbers: dict[str, int] = {}
         self._doubtful: set[str] = set()
         self._is_stop_under_way = False
-        """Whether a written stop may not have arrived."""
+        """Whether a written stop may not have arrived at the robot."""
         self._is_open = False
         self._alarm: TimerHandle | None = None
         self._alarm_s = 0.0
@@ -91,22 +92,22 @@ class MotionScheduler:
 
     @property
     def owes(self) -> bool:
-        """Whether a control must be stopped as soon as the line is open again."""
+        """Whether a control must be stopped as soon as the connection is open again."""
         return any(hold_to_run.owes_stop for hold_to_run in self._holds.values())
 
     @property
     def is_moving(self) -> bool:
-        """Whether a control is held."""
+        """Whether any control is moving."""
         return any(hold_to_run.state == "moving" for hold_to_run in self._holds.values())
 
     @property
     def is_settled(self) -> bool:
-        """Whether nothing moves, and every stop and its repeats were handed over."""
+        """Whether no control moves, and every stop and its repeats were handed to the transport."""
         return self.queue.is_idle and all(one.state == "idle" for one in self._holds.values())
 
     @property
     def is_in_doubt(self) -> bool:
-        """Whether a written frame may not have arrived."""
+        """Whether a written frame may not have arrived at the robot."""
         return bool(self._doubtful)
 
     # -- requests for a control
@@ -118,7 +119,7 @@ class MotionScheduler:
     def tick(
         self, control: str, number: int, data: Payload, at_s: float, count: Count | None = None
     ) -> None:
-        """Handle sampled input of the time `at_s`; empty `data` only renews the lease."""
+        """Handle input that was sampled at `at_s`; empty `data` only renews the lease."""
         hold_to_run = self._holds.get(control)
         if hold_to_run is None:
             return
@@ -138,24 +139,24 @@ class MotionScheduler:
             hold_to_run.renew(hold_to_run.terms._replace(stop=stop, stops=stops))
 
     def release(self, control: str) -> None:
-        """Stop a control that was released."""
+        """Stop `control`, because it was released."""
         hold_to_run = self._holds.get(control)
         if hold_to_run is not None:
             hold_to_run.stop("released", self._clock.now())
 
     def stop(self, control: str, terms: HoldTerms) -> None:
-        """Stop `control`, even if it does not move."""
+        """Stop `control`, whether it moves or not."""
         hold_to_run = self._hold_to_run(control, terms)
         hold_to_run.stop("stopped", self._clock.now())
         if not self._is_open:
             hold_to_run.cut()
 
     def owe(self, control: str, terms: HoldTerms) -> None:
-        """Record that `control` may be moving: stop it as soon as the line is open."""
+        """Record that `control` may be moving: stop it as soon as the connection is open."""
         self._hold_to_run(control, terms).cut(is_doubtful=True)
 
     def stop_all(self) -> None:
-        """Stop moving controls before the line is closed."""
+        """Stop moving controls before the connection is closed."""
         now = self._clock.now()
         for hold_to_run in self._holds.values():
             if hold_to_run.state == "moving":
@@ -171,7 +172,7 @@ class MotionScheduler:
         return hold_to_run
 
     def check_arrivals(self) -> None:
-        """Record the frames that have arrived by now; only for a working line."""
+        """Record the acknowledged frames; must be called only on a working connection."""
         if self._unsent is not None and self.queue.is_idle and not self._unsent():
             self._all_arrived()
 
@@ -182,7 +183,7 @@ class MotionScheduler:
     # -- the line
 
     def begin(self) -> None:
-        """Record that the line is open, and write pending stops first."""
+        """Record that the connection is open, and write pending stops first."""
         self._is_open = True
         self._sent_counters.reset()
         self._stale.clear()
@@ -193,7 +194,7 @@ class MotionScheduler:
         self.write_due()
 
     def cut(self) -> None:
-        """Record that the line is closed, and drop all unsent frames."""
+        """Record that the connection is closed, and drop all unsent frames."""
         self._is_open = False
         for control, is_stop in self.queue.end():
             if is_stop:
@@ -206,7 +207,7 @@ class MotionScheduler:
             self._alarm = None
 
     def write_due(self) -> None:
-        """Write the due frames."""
+        """Write all due frames."""
         if not self._is_open:
             return
         now = self._clock.now()
@@ -227,7 +228,7 @@ class MotionScheduler:
         self.tell_counted()
 
     def tell_counted(self) -> None:
-        """Report changed counters, and ticks that cannot be written any more."""
+        """Report changed counters, and obsolete ticks."""
         if self._sent_counters.is_changed:
             for control, hold_to_run in self._holds.items():
                 if hold_to_run.is_waiting and not self._sent_counters.fits(
@@ -285,21 +286,21 @@ class MotionScheduler:
             self._look_s = _LOOK_S
 
     def _turn(self, control: str, data: Payload, *, is_stop: bool) -> tuple[Payload, Count | None]:
-        """Return the frame to write now, and its effect on the counters."""
+        """Return the next frame to write, and its effect on the counters."""
         if not is_stop:
             return data, self._counts.get(control)
         stops = self._holds[control].terms.stops
         return self._sent_counters.choose(stops) if stops else (data, None)
 
     def _leave_stop(self, control: str, data: Payload) -> Payload:
-        """Return a stop at its turn in the queue."""
+        """Return a stop frame when it is next in the queue."""
         data, count = self._turn(control, data, is_stop=True)
         self._sent_counters.left(count)
         self._tell_soon()
         return data
 
     def _leave(self, control: str, data: Payload, count: Count | None) -> Payload | None:
-        """Return a frame of motion at its turn, or None if its numbers are already used."""
+        """Return a motion frame when next in the queue; None if its counter values are used up."""
         fits = self._sent_counters.fits(count)
         if fits:
             self._sent_counters.left(count)
@@ -309,7 +310,7 @@ class MotionScheduler:
         return data if fits else None
 
     def _tell_soon(self) -> None:
-        """Report the counters after handing over the frame: the engine may answer at once."""
+        """Report the counters after sending the frame, because the engine may reply immediately."""
         asyncio.get_running_loop().call_soon(self.tell_counted)
 
     def _sent(self, tag: tuple[str, bool], fault: TransportError | None) -> None:
@@ -378,14 +379,15 @@ class MotionScheduler:
 
     @property
     def _is_wanted(self) -> bool:
-        """Whether motion is unwritten."""
+        """Whether a motion frame is still unwritten."""
         return any(hold_to_run.is_waiting for hold_to_run in self._holds.values())
 
     @property
     def _is_watched(self) -> bool:
-        """Whether unsent bytes matter: they contain motion, or motion waits for them.
+        """Whether unsent bytes matter, because they contain motion or motion waits behind them.
 
-        Motion waits for them on a line that is slow to open. A ping sent during a cut would block
-        motion until the cut ends, and old motion would then continue.
+        Motion waits for unsent bytes only on a transport that is slow to open. A ping sent during
+        an interruption would block motion until the interruption ends, and old motion would then
+        continue.
         """
         return bool(self._doubtful) or (self._is_strict and self._is_wanted)

@@ -1,8 +1,8 @@
-"""One end of the pipe between the engine's process and the guard.
+"""One end of the pipe between the engine's process and the guard process.
 
-A message on the wire is its length in four bytes, then its body. Writing never waits: unsent
-messages are queued, urgent messages first, and a newer message replaces an older one of its slot.
-The senders bound the queue: replies by the credit of their lines, requests by the limit of pending
+Each message on the wire is a four-byte length followed by the body. Writing never waits: unsent
+messages are queued. Urgent messages go first, and a newer message replaces an older one of the same
+slot. The senders limit the queue: replies by flow-control credit, requests by the limit of pending
 requests.
 """
 
@@ -21,13 +21,13 @@ _HEAD = 4
 _put_head, _head_of = struct.Struct("<I").pack_into, struct.Struct("<I").unpack_from
 _READ_BYTES = 65536
 _AT_ONCE = 64
-"""Number of messages handled before other tasks of the loop run."""
+"""Number of messages handled before other tasks of the event loop run."""
 UNFIT = (TypeError, OverflowError, NotImplementedError, msgspec.MsgspecError)
-"""Exceptions of `post` for a message that cannot be encoded."""
+"""Exceptions that `post` raises for a message that cannot be encoded."""
 
 
 class Pipe:
-    """Reads and writes messages on a connected socket, which it owns."""
+    """A reader and writer of messages on a connected socket; the pipe owns the socket."""
 
     def __init__(
         self,
@@ -39,15 +39,15 @@ class Pipe:
         settle: Callable[[], None],
         gone: Callable[[], None],
     ) -> None:
-        """Begin to read; needs a running loop that watches sockets.
+        """Start reading; requires a running event loop that can watch sockets.
 
         Args:
             line: connected.
             encoder: encoder of posted messages.
             decoder: decoder of received messages.
-            take: receives each message.
-            settle: called after messages that arrived together.
-            gone: called once, when the other side has closed the pipe.
+            take: callback for each message.
+            settle: callback after each batch of messages.
+            gone: callback when the other side has closed the pipe; called once.
         """
         line.setblocking(False)
         self._line = line
@@ -62,7 +62,7 @@ class Pipe:
         self._space = memoryview(bytearray(_READ_BYTES))
         self._held = bytearray()
         self._is_behind = False
-        """Whether received messages wait for the next turn of the loop."""
+        """Whether received messages wait for the next iteration of the event loop."""
         self._rest = b""
         """Unsent bytes of a partly written message."""
         self._urgent: deque[bytes] = deque()
@@ -71,7 +71,8 @@ class Pipe:
         self._is_writing = False
         self.is_open = True
         self.taken_bytes = 0
-        """Size of the message in `take`, as returned by `post` on the other side."""
+        """Size in bytes of the message being handled, equal to the result of the sender's `post`.
+        """
         self._loop.add_reader(line, self._readable)
 
     @property
@@ -80,11 +81,12 @@ class Pipe:
         return self._is_writing
 
     def post(self, message: object, *, slot: str = "", is_urgent: bool = False) -> int:
-        """Write a message as soon as the pipe accepts it; return its size in bytes.
+        """Queue a message and write it as soon as possible; return its size in bytes.
 
         Args:
             message: a message for the encoder.
-            slot: this message replaces an unsent message of the same slot.
+            slot: key of a replaceable message: a newer message replaces an unsent one with the same
+                key.
             is_urgent: whether the message is sent before all unsent messages.
 
         Raises:
@@ -120,7 +122,7 @@ class Pipe:
         self._newest.pop(slot, None)
 
     def close(self) -> None:
-        """Close at once, without calling `gone`; a second call does nothing."""
+        """Close the pipe without calling `gone`; a second call does nothing."""
         if self.is_open:
             self.is_open = False
             self._loop.remove_reader(self._line)
@@ -128,7 +130,7 @@ class Pipe:
             self._line.close()
 
     def end(self) -> None:
-        """Signal the end of the messages to the other side."""
+        """Signal the end of messages to the other side."""
         if self.is_open:
             try:
                 self._line.shutdown(socket.SHUT_WR)
@@ -199,7 +201,7 @@ class Pipe:
         self._look_behind()
 
     def _look_behind(self) -> None:
-        """Let other tasks run before the remaining complete messages."""
+        """Let other tasks run before handling the remaining complete messages."""
         is_behind = _is_whole(self._held) and self.is_open
         if is_behind:
             self._loop.call_soon(self._resume)
@@ -215,7 +217,7 @@ class Pipe:
             self._read_held()
 
     def _handle(self, data: memoryview) -> int:
-        """Handle the complete messages in `data`; return their number of bytes."""
+        """Handle the complete messages in `data`; return the number of bytes handled."""
         at, size = 0, len(data)
         for _ in range(_AT_ONCE):
             if size - at < _HEAD or not self.is_open:

@@ -1,9 +1,9 @@
-"""The channel to a guard in a separate process, which is started, watched and restarted.
+"""The channel to a guard in a separate process: starts, watches and restarts the process.
 
-Theory of operation. The guard sends a beat ten times a second. A guard that has ended, or is silent
-for half a second, is killed and replaced at once. A guard that is ready to run but gets no
-processor time is not replaced, because a new guard would get none either. A new guard has no state:
-its client initialises it first.
+Theory of operation. The guard sends a heartbeat ten times a second. A guard that has ended, or has
+been silent for half a second, is killed and replaced immediately. A guard that is ready to run but
+gets no processor time is not replaced: a new guard would get none either. A new guard has no state,
+so the client initialises it first.
 """
 
 import asyncio
@@ -23,17 +23,20 @@ from urc.guard.process import CAN_INHERIT, GuardAcceptor, ProcessState, launch, 
 __all__ = ["CAN_GUARD", "PipeChannel"]
 
 CAN_GUARD: Final = CAN_INHERIT or os.name == "nt"
-"""Whether this system can run the guard in a separate process."""
+"""Whether this system can run the guard as a separate process."""
 _LOOK_S: Final = 0.1
 _SILENT_LOOKS: Final = 5
 _MOST_KEPT_LOOKS: Final = 15
-"""Limit of checks without a beat on a busy machine."""
+"""Maximum number of checks without a heartbeat on a busy machine."""
 _START_LOOKS: Final = 100
-"""Limit of checks before the first beat, because Python starts slowly on a busy machine."""
+"""Maximum number of checks before the first heartbeat, because Python starts slowly on a busy
+machine."""
 _STEADY_S: Final = 0.5
-"""Shortest life of a successfully started guard; opening a line also counts as success."""
+"""Minimum lifetime of a guard that counts as successfully started, in seconds; an opened connection
+also counts."""
 _AT_ONCE: Final = 3
-"""Number of short-lived guards that are replaced at once; later replacements wait `_AGAIN_S`."""
+"""Number of short-lived guards that are replaced immediately; each later replacement waits
+`_AGAIN_S`."""
 _AGAIN_S: Final = 1.0
 _FINISH_S: Final = 3.0
 _DIED: Final = "the guard of this line ended; another one is starting"
@@ -49,7 +52,8 @@ class PipeChannel:
 
         Args:
             listener: the client.
-            is_inherited: whether the process inherits its pipe; otherwise it connects to a port.
+            is_inherited: whether the guard process inherits its end of the pipe; otherwise, it
+                connects to a port.
         """
         self._listener = listener
         self._is_inherited = is_inherited
@@ -73,13 +77,13 @@ class PipeChannel:
 
     @property
     def pid(self) -> int:
-        """Id of the guard's process; 0 without a process."""
+        """Process ID of the guard; 0 without a process."""
         return 0 if self._process is None else self._process.pid
 
     # -- messages
 
     def post(self, message: messages.ToGuard, *, slot: str = "", is_urgent: bool = False) -> None:
-        """Send a message, or drop it without a guard. See `urc.guard.channel.Channel`."""
+        """Send a message; without a guard, drop the message. See `urc.guard.channel.Channel`."""
         if self._pipe is not None:
             self._pipe.post(message, slot=slot, is_urgent=is_urgent)
 
@@ -89,11 +93,11 @@ class PipeChannel:
             self._pipe.drop(slot)
 
     async def ready(self) -> None:
-        """Return once a guard is initialised."""
+        """Return after a guard has been initialised."""
         await self._is_up.wait()
 
     def now(self) -> float:
-        """Return this machine's monotonic time, which the guard's process shares."""
+        """Return this machine's monotonic time in seconds, shared with the guard process."""
         return time.monotonic()
 
     def _handle(self, message: messages.FromGuard) -> None:
@@ -105,7 +109,7 @@ class PipeChannel:
     # -- from start to end
 
     def start(self) -> None:
-        """Start the process, which needs a running loop, and initialise it once connected."""
+        """Start the guard process and initialise the guard; requires a running event loop."""
         loop = asyncio.get_running_loop()
         self._started_s = loop.time()
         try:
@@ -128,7 +132,7 @@ class PipeChannel:
         try:
             line = await door.admitted()
         except (OSError, TimeoutError) as fault:
-            log.error("the guard did not come to its door (%s)", fault)
+            log.error("the guard did not connect to the server (%s)", fault)
             self._died()
         else:
             self._begin(line)
@@ -150,7 +154,7 @@ class PipeChannel:
         self._look = loop.call_at(self._look_s, self._watch)
 
     async def finish(self) -> None:
-        """Let the guard stop all controls and end, within 3 s."""
+        """Stop all controls and end the guard within 3 s."""
         self._is_finishing = True
         if self._look is not None:
             self._look.cancel()
@@ -182,7 +186,7 @@ class PipeChannel:
     # -- the watch
 
     def _watch(self) -> None:
-        """Check that the guard is alive, every `_LOOK_S`."""
+        """Check the guard's heartbeat every `_LOOK_S`."""
         loop = asyncio.get_running_loop()
         # A late look counts for nothing: this process slept, and beats may be unread.
         if loop.time() - self._look_s < _LOOK_S and not self._is_kept():
@@ -197,7 +201,7 @@ class PipeChannel:
         self._look = loop.call_at(self._look_s, self._watch)
 
     def _is_kept(self) -> bool:
-        """Return whether a silent guard is ready to run, but gets no processor time."""
+        """Return whether a silent guard is ready to run but gets no processor time."""
         if not self._silent_looks or self._kept_looks >= _MOST_KEPT_LOOKS:
             return False
         before, self._standing = self._standing, standing(self.pid)
@@ -208,7 +212,7 @@ class PipeChannel:
         return is_kept
 
     def _died(self) -> None:
-        """Start a new guard, unless the end was requested."""
+        """Start a new guard, unless `finish` was called."""
         self._gone.set()
         self._pipe = None
         if self._look is not None:
@@ -229,7 +233,7 @@ class PipeChannel:
         self._listener.lost(_DIED)
 
     def _bury(self) -> None:
-        """Kill the process, so that a line never has two guards."""
+        """Kill the process, so that no connection is ever owned by two guards."""
         process, self._process = self._process, None
         if process is not None:
             with suppress(ProcessLookupError):
@@ -240,4 +244,4 @@ class PipeChannel:
 
 
 def _nothing() -> None:
-    """Do nothing after messages that came together."""
+    """Do nothing after a batch of messages."""

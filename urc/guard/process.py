@@ -1,4 +1,4 @@
-"""Start and end of the guard's process."""
+"""Start and end of the guard process."""
 
 import asyncio
 import hmac
@@ -15,9 +15,9 @@ from urc.transports.own_listeners import OWN_DOORS
 __all__ = ["CAN_INHERIT", "DOOR", "GuardAcceptor", "launch", "reap", "standing"]
 
 CAN_INHERIT: Final = os.name == "posix"
-"""Whether this system can hand an open pipe to another process."""
+"""Whether this system can pass an open socket to another process."""
 DOOR: Final = "door:"
-"""Prefix of the port, on systems where the guard connects to the server."""
+"""Prefix of the port argument, on systems where the guard connects to the server."""
 TOKEN_BYTES: Final = 64
 _LOOPBACK: Final = "127.0.0.1"
 _ADMIT_S: Final = 10.0
@@ -25,10 +25,10 @@ _SAY_S: Final = 1.0
 
 
 class GuardAcceptor:
-    """A port of this machine for the guard, on systems without inherited pipes.
+    """A local port to which the guard connects, on systems without inherited sockets.
 
-    Any program of this machine can connect. The guard alone gets the token, on its standard input.
-    A connection without the token is closed.
+    Any program on this machine can connect to the port. Only the guard receives the token, on its
+    standard input. Connections without the token are closed.
     """
 
     def __init__(self) -> None:
@@ -38,7 +38,7 @@ class GuardAcceptor:
 
     @property
     def port(self) -> int:
-        """Number of the port."""
+        """TCP port number of the acceptor."""
         return int(self._listener.getsockname()[1])
 
     async def admitted(self) -> socket.socket:
@@ -73,14 +73,14 @@ class GuardAcceptor:
         return hmac.compare_digest(said, self.token)
 
     def close(self) -> None:
-        """Close the port. May be called twice."""
+        """Close the port. A second call does nothing."""
         self._listener.close()
 
 
 def launch(
     *, is_inherited: bool = CAN_INHERIT
 ) -> tuple["subprocess.Popen[bytes]", socket.socket | GuardAcceptor]:
-    """Start the process; return it, and our end of the pipe or the port for its connection."""
+    """Start the guard process; return the process, and our end of the pipe or the acceptor."""
     return _heir() if is_inherited else _visitor()
 
 
@@ -125,15 +125,15 @@ class ProcessState(NamedTuple):
     """The state of a process, as the system reports it."""
 
     wants_to_run: bool = False
-    """Whether the process runs, or waits for a processor or a disk: it neither sleeps nor is
+    """Whether the process is running, or waits for a processor or a disk; false if asleep or
     stopped.
     """
     ran_s: float = 0.0
-    """Processor time of its first thread, in seconds."""
+    """Processor time of the first thread, in seconds."""
 
 
 def standing(process: int, proc: Path = Path("/proc")) -> ProcessState:
-    """Return the state of a process from files of Linux; a default on other systems."""
+    """Return the state of a process from Linux's ``/proc``; return a default on other systems."""
     try:
         # The name before the state may hold anything, brackets and spaces too.
         state = (proc / str(process) / "stat").read_text("latin-1").rpartition(")")[2].split()[0]
@@ -144,7 +144,7 @@ def standing(process: int, proc: Path = Path("/proc")) -> ProcessState:
 
 
 async def reap(process: "subprocess.Popen[bytes]") -> None:
-    """Wait 1 s for the end of a process, then kill it."""
+    """Wait up to 1 s for a process to end, then kill it."""
     for _ in range(100):
         if process.poll() is not None:
             return

@@ -1,6 +1,6 @@
-"""The engine's proxy of a transport in the guard: the five members, by messages.
+"""The engine's proxy of a transport in the guard, with the five members of a transport.
 
-Messages about an earlier connection are ignored: each connection has its turn.
+Each connection has a number, its turn; messages of an earlier turn are ignored.
 """
 
 import asyncio
@@ -23,7 +23,7 @@ _OPEN_GRACE_S: Final = 0.7
 _CLOSE_S: Final = 1.0
 _CREDIT_BYTES: Final = WINDOW_BYTES // 4
 _OFFERED_BYTES: Final = 65536
-"""Limit of pending bytes that no caller awaits."""
+"""Maximum number of pending bytes without a waiting caller."""
 _CLOGGED_BYTES: Final = 4096
 
 log = logging.getLogger(__name__)
@@ -34,20 +34,20 @@ Stands = Callable[[str, Mapping[str, int], bool], None]
 
 @dataclass(slots=True)
 class _Sent:
-    """Data that the guard has not reported as handed over."""
+    """Data that the guard has not yet reported as handed to the transport."""
 
     number: int
     size: int
     data: Payload
     taken: asyncio.Future[None] | None
-    """Future of the waiting caller."""
+    """Future of the caller that waits for this data, or None."""
     counted: CountedFrame | None
     left: Callable[[Payload], None] | None
-    """Receives the data that was handed over."""
+    """Callback for the data that was handed to the transport, or None."""
 
 
 class GuardedTransport:
-    """The proxy of one line, over all its connections. Also a `Prompt`."""
+    """The proxy of one transport, across all its connections. Also a `Prompt`."""
 
     def __init__(
         self,
@@ -60,11 +60,11 @@ class GuardedTransport:
         """Prepare.
 
         Args:
-            name: name of the line.
-            address: address of the robot, for people.
-            post: passes a message to the guard without waiting.
+            name: name of the transport.
+            address: address of the robot, for display.
+            post: sends a message to the guard without waiting.
             ready: returns once a guard is ready.
-            stands: receives the counters of the line, and whether no frame with a counter is
+            stands: callback with the counters of the transport, and whether no counted frame is
                 pending.
         """
         self._stands = stands
@@ -75,7 +75,7 @@ class GuardedTransport:
         self._turn = 0
         self._is_open = False
         self._is_known = False
-        """Whether the guard may have data of this turn."""
+        """Whether the guard may have data of the present connection."""
         self._opening: asyncio.Future[str] | None = None
         self._closing: asyncio.Future[None] | None = None
         self._ended = _CLOSED
@@ -83,25 +83,25 @@ class GuardedTransport:
         self._arrived = asyncio.Event()
         self._sink: Callable[[bytes], bool] | None = None
         self._taken_bytes = 0
-        """Received bytes that are not acknowledged to the guard yet."""
+        """Number of received bytes that are not yet acknowledged to the guard."""
         self._number = 0
         self._under_way: deque[_Sent] = deque()
         self._round = 0
-        """Number of times that the guard has refused pending frames."""
+        """Number of refusals of pending frames by the guard."""
         self._under_way_bytes = 0
 
     @property
     def address(self) -> str:
-        """Address of the robot, for people."""
+        """Address of the robot, for display."""
         return self._address
 
     @property
     def is_open(self) -> bool:
-        """Whether the line is connected, by the last report of the guard."""
+        """Whether the transport is connected, as last reported by the guard."""
         return self._is_open
 
     async def open(self, timeout_s: float) -> None:
-        """Connect, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Connect; raise `ConnectFailed` after a refusal, or after about `timeout_s` seconds."""
         await self.close()
         self._turn += 1
         self._opening = asyncio.get_running_loop().create_future()
@@ -123,7 +123,7 @@ class GuardedTransport:
             raise ConnectFailed(fault)
 
     async def receive(self) -> Payload:
-        """Return the next received data; raise `PeerClosed` at the end."""
+        """Return the next received data; raise `PeerClosed` after the end of the connection."""
         while not self._receiver:
             if not self._is_open:
                 raise PeerClosed(self._ended)
@@ -134,7 +134,7 @@ class GuardedTransport:
         return data
 
     async def send(self, data: Payload) -> None:
-        """Hand `data` over, after a wait for space; raise `TransportError` on a broken line."""
+        """Send `data` after a wait for space; raise `TransportError` on a broken connection."""
         if not self._is_open:
             raise PeerClosed(self._ended)
         taken: asyncio.Future[None] = asyncio.get_running_loop().create_future()
@@ -142,7 +142,7 @@ class GuardedTransport:
         await taken
 
     async def close(self) -> None:
-        """Close at once. The call never raises; a second call does nothing."""
+        """Close at once. Never raises; a second call does nothing."""
         self._end(_CLOSED)
         self._ended = _CLOSED
         self._receiver.clear()
@@ -156,14 +156,14 @@ class GuardedTransport:
     # -- a `Prompt`
 
     def offer(self, data: bytes) -> bool:
-        """Pass `data` on; return whether the proxy accepted it."""
+        """Pass `data` to the guard if the queue has space; return whether `data` was accepted."""
         if not self._is_open or self._under_way_bytes + len(data) > _OFFERED_BYTES:
             return False
         self._enqueue(data, None)
         return True
 
     def offer_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> bool:
-        """Pass on a frame with counters, and render it again until its numbers are the next ones.
+        """Pass on a counted frame; render it again until its counter values are the next ones.
 
         Returns:
             Whether the frame was accepted; `left` then receives the data that was handed over.
@@ -174,10 +174,10 @@ class GuardedTransport:
         return True
 
     async def send_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> None:
-        """Pass on a frame with counters, or wait while the line is full.
+        """Pass on a frame with counters; wait while the queue is full.
 
         Raises:
-            TransportError: the line broke.
+            TransportError: the connection broke.
         """
         if not self._is_open:
             raise PeerClosed(self._ended)
@@ -187,17 +187,17 @@ class GuardedTransport:
 
     @property
     def is_clogged(self) -> bool:
-        """Whether the pending data has reached its limit."""
+        """Whether the pending data has reached the limit."""
         return self._under_way_bytes > _CLOGGED_BYTES
 
     def divert(self, sink: Callable[[bytes], bool]) -> None:
-        """Pass received data to `sink` until the line is closed."""
+        """Pass received data to `sink` until the connection is closed."""
         self._sink = sink
 
     # -- messages of the guard
 
     def lost(self, reason: str) -> None:
-        """Record the end of the guard, which closes every line."""
+        """Record the end of the guard, which closes every connection."""
         self._end(reason)
         self._is_known = False
         if self._opening is not None and not self._opening.done():
@@ -205,7 +205,7 @@ class GuardedTransport:
         self._closed()
 
     def handle(self, said: messages.FromGuard, size: int) -> None:
-        """Handle a message about this line; it counts for `size` bytes on both sides."""
+        """Handle a message about this transport; both sides count the message as `size` bytes."""
         match said:
             case messages.BytesReceived(turn=turn, data=data) if (
                 turn == self._turn and self._is_open
@@ -258,7 +258,7 @@ class GuardedTransport:
         self._arrived.set()
 
     def _count(self, size: int) -> None:
-        """Acknowledge received bytes to the guard in larger steps."""
+        """Acknowledge received bytes to the guard in batches."""
         self._taken_bytes += size
         if self._taken_bytes >= _CREDIT_BYTES and self._is_open:
             amount, self._taken_bytes = self._taken_bytes, 0
@@ -296,7 +296,7 @@ class GuardedTransport:
         self._stands(self._name, said.stand, is_settled)
 
     def _send_again(self, said: messages.SendStale) -> None:
-        """Render the unsent frames again with the next numbers, and send them in the same order."""
+        """Render the unsent frames again with the next counter values; keep their order."""
         self._round = this_round = self._round + 1
         self._stands(self._name, said.stand, True)
         again: list[tuple[_Sent, Numbered | None]] = []
@@ -333,7 +333,7 @@ class GuardedTransport:
                 taken.set_result(None)
 
     def _end(self, reason: str) -> None:
-        """Fail all waiting calls; the first reason stays."""
+        """Fail all waiting calls; if called again, keep the first reason."""
         if not self._is_open:
             return
         self._is_open = False

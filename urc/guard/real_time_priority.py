@@ -1,11 +1,11 @@
-"""Real-time priority of the guard, where the system allows it.
+"""Real-time priority of the guard process, where the system permits it.
 
-The guard suits this priority: it runs no template, pattern or parser of a document, and the work of
-each turn is bounded. The guard has the lowest real-time priority (``SCHED_RR``, 1), so it precedes
-ordinary programs, but no other real-time program. Two limits prevent a faulty guard from starving
-the machine. After `LONGEST_S` without waiting, the guard has ordinary priority for `PAUSE_S`. After
-`FATAL_S`, the kernel ends the guard, which the server detects. Child threads and programs have
-ordinary priority.
+Real-time priority suits the guard: it evaluates no template, pattern or parser of a document, and
+does only bounded work in each turn. The guard uses the lowest real-time priority (``SCHED_RR``, 1):
+above ordinary programs, but above no other real-time program. Two limits prevent a faulty guard
+from blocking the machine. After `LONGEST_S` of uninterrupted work, the guard runs at ordinary
+priority for `PAUSE_S`. After `FATAL_S`, the kernel kills the guard, and the server starts a new
+one. Child threads and child processes run at ordinary priority.
 """
 
 import os
@@ -18,7 +18,7 @@ from typing import Final
 __all__ = ["FATAL_S", "LONGEST_S", "PAUSE_S", "SWITCH", "RealTimePriority", "why_not"]
 
 SWITCH: Final = "URC_REAL_TIME"
-"""Environment variable; ``no`` disables the priority."""
+"""Environment variable; the value ``no`` disables real-time priority."""
 LONGEST_S: Final = 0.1
 FATAL_S: Final = 2.0
 PAUSE_S: Final = 1.0
@@ -29,7 +29,7 @@ if sys.platform == "linux":
     import resource
 
     def _ask() -> str:
-        """Request the priority; return the reason of a refusal, or ""."""
+        """Request real-time priority; return the reason of a refusal, or ""."""
         policy = os.SCHED_RR | os.SCHED_RESET_ON_FORK
         try:
             os.sched_setscheduler(0, policy, os.sched_param(_PRIORITY))
@@ -60,9 +60,10 @@ class RealTimePriority:
     """The real-time priority of this process."""
 
     def __init__(self) -> None:
-        """Create the object without requesting the priority."""
+        """Create the object without requesting real-time priority."""
         self._again_s: float | None = None
-        """Time of the next request, after a run that was too long."""
+        """Time of the next request after an excessively long run, in seconds; None without a pause.
+        """
 
     def request(self) -> str:
         """Request the priority; return the reason of a refusal, or ""."""
@@ -75,7 +76,7 @@ class RealTimePriority:
         return refusal
 
     def retry(self) -> None:
-        """Request the priority again after the pause; called regularly."""
+        """Request the priority again after the pause; must be called regularly."""
         if self._again_s is not None and time.monotonic() >= self._again_s:
             self._again_s = None
             _ask()
@@ -86,7 +87,7 @@ class RealTimePriority:
 
 
 def why_not() -> str:
-    """Return the reason why a guard on this machine would lack the priority, or ""."""
+    """Return the reason why a guard on this machine cannot get the priority, or ""."""
     if os.environ.get(SWITCH, "").lower() == "no":
         return f"{SWITCH} is no"
     refusal = _ask()

@@ -1,4 +1,4 @@
-"""A queue before a transport whose `send` has to wait."""
+"""A send queue for a transport whose `send` may wait."""
 
 import asyncio
 import logging
@@ -20,11 +20,11 @@ class TimerHandle(Protocol):
     """A timer."""
 
     def cancel(self) -> None:
-        """Cancel the timer; harmless after it has fired."""
+        """Cancel the timer; does nothing after the timer has fired."""
 
 
 class LaneClock(Protocol):
-    """The source of time, like `urc.runtime.clock.Clock`."""
+    """A source of time, like `urc.runtime.clock.Clock`."""
 
     def now(self) -> float:
         """Return monotonic seconds."""
@@ -33,18 +33,18 @@ class LaneClock(Protocol):
         """Return after `seconds`."""
 
     def call_at(self, time_s: float, action: Callable[[], None]) -> TimerHandle:
-        """Run `action` at `time_s`, or at once if that is past."""
+        """Run `action` at `time_s`, or immediately if that time is past."""
 
 
 class Sender(Protocol):
-    """The part of a transport that the queue needs."""
+    """The part of a transport that the queue uses."""
 
     async def send(self, data: Payload) -> None:
         """Hand `data` over."""
 
 
 class SendQueue(Generic[_Tag]):
-    """A short queue before a transport, with one task from its first frame to its end."""
+    """A short send queue for one transport; one task sends its frames in order."""
 
     def __init__(
         self,
@@ -54,13 +54,14 @@ class SendQueue(Generic[_Tag]):
         *,
         after: "SendQueue[object] | None" = None,
     ) -> None:
-        """Prepare an empty queue.
+        """Create an empty queue.
 
         Args:
             sender: the transport.
             clock: the time.
-            done: called for each frame with its tag, and with the error, if any.
-            after: another queue, whose frames all go before those of this one.
+            done: callback for each frame with its tag, and with the error or None.
+            after: queue whose frames are all sent before the frames of this queue; None for no such
+                queue.
         """
         self._sender = sender
         self._clock = clock
@@ -72,23 +73,23 @@ class SendQueue(Generic[_Tag]):
         self._is_free.set()
         self._task: asyncio.Task[None] | None = None
         self.busy_since_s: float | None = None
-        """Time since which the first frame waits; None for an empty queue."""
+        """Time since which the first frame has been waiting; None for an empty queue."""
 
     @property
     def is_idle(self) -> bool:
-        """Whether all frames were handed over."""
+        """Whether all frames were handed to the transport."""
         return not self._waiting
 
     async def until_idle(self) -> None:
-        """Return after all frames were handed over."""
+        """Return after all frames were handed to the transport."""
         await self._is_free.wait()
 
     def push(self, make: Callable[[], Payload | None], tag: _Tag) -> None:
         """Add a frame to the queue.
 
         Args:
-            make: renders the frame at its turn; None drops it.
-            tag: argument of `done`, which is not called for a dropped frame.
+            make: renders the frame when it is next in the queue; a result of None drops the frame.
+            tag: argument for `done`, which is not called for a dropped frame.
         """
         if not self._waiting:
             self.busy_since_s = self._clock.now()
@@ -99,7 +100,7 @@ class SendQueue(Generic[_Tag]):
             self._task = asyncio.get_running_loop().create_task(self._run())
 
     def end(self) -> list[_Tag]:
-        """Stop sending; return the tags of frames that were not handed over."""
+        """Stop sending; return the tags of the unsent frames."""
         task, self._task = self._task, None
         if task is not None:
             task.cancel()
@@ -141,6 +142,6 @@ class SendQueue(Generic[_Tag]):
 
 
 def why_broken(bug: Exception) -> str:
-    """Log an unexpected error of a transport, and return a message for people."""
+    """Log an unexpected error of a transport; return an error message for people."""
     log.error("a transport failed in an unexpected way", exc_info=bug)
     return f"the transport failed in an unexpected way ({type(bug).__name__}: {bug})"

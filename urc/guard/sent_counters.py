@@ -1,8 +1,8 @@
 """The counter values that were sent on one connection.
 
-The guard has no templates. The guard gets rendered frames, each with its effect on the counters. A
-frame is sent only while its values are the next ones. So the values on the wire rise without gaps,
-in any order of arrival here, and regardless of frames that were rendered in advance.
+The guard evaluates no templates. Each rendered frame includes its effect on the counters. A frame
+is sent only while its counter values are the next ones. The values on the wire therefore rise
+without gaps, regardless of the order of arrival and of frames that were rendered in advance.
 """
 
 from collections.abc import Sequence
@@ -13,21 +13,21 @@ __all__ = ["SentCounters"]
 
 
 class SentCounters:
-    """The sent counters of one line; `begin` starts each connection."""
+    """The counter values sent on one transport; `reset` begins a new connection."""
 
     def __init__(self) -> None:
         self.stand: dict[str, int] = {}
-        """Counter → last value sent; missing before the first one."""
+        """Counter name → last value sent; missing before the first value."""
         self.is_changed = False
-        """Whether values were sent that the engine does not know yet."""
+        """Whether sent values were not yet reported to the engine."""
 
     def reset(self) -> None:
-        """Start a connection, on which no value was sent."""
+        """Begin a new connection, without sent values."""
         self.stand = {}
         self.is_changed = False
 
     def fits(self, count: Count | None) -> bool:
-        """Return whether a frame may be sent now; a frame without counters always may."""
+        """Return whether a frame may be sent now; always true for a frame without counters."""
         if count is None:
             return True
         stand, before = self.stand, count.before
@@ -40,5 +40,8 @@ class SentCounters:
             self.is_changed = True
 
     def choose(self, stops: Sequence[Numbered]) -> Numbered:
-        """Return the stop with the next values. A wrong value is better than no stop."""
+        """Return the stop frame with the next counter values, or the last one if none fits.
+
+        A wrong value is better than no stop.
+        """
         return next((one for one in stops if self.fits(one.takes)), stops[-1])

@@ -1,4 +1,4 @@
-"""The guard's server: the lines by name, and the handling of messages."""
+"""The guard's server: transports by name, and message handlers."""
 
 import asyncio
 from collections.abc import Callable
@@ -14,14 +14,17 @@ from urc.transports.base import TopicSubscription, Transport, TransportSetup
 __all__ = ["FINISH_S", "GuardServer"]
 
 FINISH_S: Final = 2.0
-"""Longest time for the last stops and the closing of lines, in seconds."""
+"""Maximum time for the last stops and for closing the connections, in seconds."""
 
 
 class GuardServer:
-    """All lines of one robot. All handlers run on one event loop, and no handler waits."""
+    """The guarded transports of one robot.
+
+    All handlers run on one event loop, and no handler waits.
+    """
 
     def __init__(self, emit: Emit, clock: LaneClock) -> None:
-        """Begin without lines; `emit` sends messages to the engine's side."""
+        """Create a server without transports; `emit` sends messages to the engine."""
         self._emit = emit
         self._clock = clock
         self._lines: dict[str, GuardedConnection] = {}
@@ -42,7 +45,7 @@ class GuardServer:
         }
 
     def handle(self, said: messages.ToGuard) -> None:
-        """Handle a message of the engine's side; `settle` follows."""
+        """Handle a message from the engine; call `settle` after each batch of messages."""
         if type(said) is messages.RenewLease and not self._is_finishing:
             line = self._controls.get(said.control)
             if line is not None:
@@ -52,14 +55,14 @@ class GuardServer:
             self._handlers[type(said)](said)
 
     def settle(self) -> None:
-        """Write due frames, after messages that arrived together."""
+        """Write due frames after a batch of messages."""
         while self._stirred:
             line = self._stirred.pop()
             line.scheduler.write_due()
             line.settle()
 
     async def finish(self) -> None:
-        """Stop all controls and close all lines, within little more than `FINISH_S`."""
+        """Stop all controls and close all connections, within little more than `FINISH_S`."""
         self._is_finishing = True
         ends = [line.finish(FINISH_S) for line in self._lines.values()]
         await asyncio.gather(*ends)
@@ -73,7 +76,7 @@ class GuardServer:
         self.add(said, transport)
 
     def add(self, said: messages.MakeTransport, transport: Transport) -> None:
-        """Add a line with its transport."""
+        """Add a guarded connection for a transport."""
         self._lines[said.line] = GuardedConnection(said, transport, self._emit, self._clock)
 
     def _send(self, said: messages.SendBytes) -> None:

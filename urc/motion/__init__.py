@@ -1,5 +1,5 @@
-"""The motion contract as pure state machines: the lease of the operator, hold-to-run, and stops.
+"""The motion rules as pure state machines: the operator's lease, hold-to-run controls, and stops.
 
-Floor 3, pure: no socket, no clock, no template; time is passed in, in seconds of one monotonic
-clock. The guard process and the session run the same machines.
+This package is on layer 3 and is pure: no socket, no clock, no template. Callers pass the time, in
+seconds of one monotonic clock. The guard process and the session use the same state machines.
 """

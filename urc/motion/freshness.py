@@ -1,8 +1,9 @@
-"""The freshness of control inputs, without trust in the clock of a page.
+"""Freshness checks for control inputs that do not rely on the clock of the browser.
 
-The server sends numbered beats to every page. An input carries the newest beat that its page has
-received, the epoch of its lease, and a number of its own. So the server refuses an input that was
-buffered, recorded and replayed, or sent under an earlier lease. No clocks are compared.
+The server sends numbered beats to every page. Each input carries the newest beat that its page has
+received, the epoch of its lease, and a sequence number. The server can therefore refuse inputs that
+were buffered, recorded and replayed, or sent under an earlier lease. Clocks of different machines
+are never compared.
 """
 
 from collections import deque
@@ -11,50 +12,50 @@ from typing import Final, NamedTuple
 __all__ = ["OLDEST_S", "DuplicateElimination", "Freshness", "ControlInput"]
 
 OLDEST_S: Final = 0.4
-"""Greatest age of the beat that an input echoes, in seconds."""
+"""Maximum age of the beat that an input echoes, in seconds."""
 _KEPT: Final = 64
 
 
 class ControlInput(NamedTuple):
-    """The numbers that a page sends with every tick of a held control."""
+    """The sequence numbers that a page sends with every tick of a held control."""
 
     epoch: int
-    """Epoch of the lease."""
+    """Epoch of the lease under which the input was sent."""
     number: int
-    """Number of the tick; it grows with every tick of this page."""
+    """Number of the tick, which grows with every tick of this page."""
     echo: int
-    """Newest beat of the server that the page has received."""
+    """Number of the newest server beat that the page has received."""
 
 
 class Freshness:
-    """The beats sent to one page, and its newest input for each control."""
+    """The beats sent to one page, and the page's newest input for each control."""
 
     def __init__(self, first: int = 1) -> None:
         """Begin without beats.
 
         Args:
-            first: number of the first beat. An unpredictable one refuses inputs that were recorded
-                before a restart.
+            first: number of the first beat. An unpredictable number invalidates inputs that were
+                recorded before a restart.
         """
         self._issued: deque[float] = deque(maxlen=_KEPT)
-        """Times at which the newest beats were sent. Their numbers are consecutive."""
+        """Send times of the newest beats, which have consecutive numbers."""
         self._number = first - 1
         self._newest: dict[str, int] = {}
 
     def issue(self, now: float) -> int:
-        """Return the number of a beat that is sent to the page now."""
+        """Return the number of a new beat, which the caller sends to the page now."""
         self._number += 1
         self._issued.append(now)
         return self._number
 
     def refusal(self, given: ControlInput, epoch: int, now: float, of: str = "") -> str:
-        """Return the reason to refuse an input; accept it and return "" if there is no reason.
+        """Return the reason to refuse an input; for a valid input, store its number and return "".
 
         Args:
-            given: the numbers that the page sent with the input.
+            given: the numbers sent with the input.
             epoch: epoch of the present lease.
             now: the time.
-            of: the control. Each control has an order of its own.
+            of: the control. Each control has an independent order of numbers.
         """
         if given.epoch != epoch:
             return f"it belongs to lease {given.epoch}, and this is {epoch}"
@@ -71,18 +72,19 @@ class Freshness:
 
 
 class DuplicateElimination:
-    """A filter for messages that a page sends twice, on two lines that lose packets independently.
+    """A filter for messages that a page sends twice, over two independent lossy connections.
 
-    The first copy counts. The numbers of a page only grow, and each line keeps their order. A
-    number that is not above the newest one arrived on the other line already, or a newer message
-    overtook it there. A delayed tick must not move a control that was released on the other line.
+    The first copy counts. A page's numbers only grow, and each connection keeps their order. A
+    number that is not above the newest one is a copy, or a newer message overtook the message on
+    the other connection. A delayed tick must not move a control that was released over the other
+    connection.
     """
 
     def __init__(self) -> None:
         self._newest: dict[str, int] = {}
 
     def accept(self, about: str, number: int) -> bool:
-        """Return whether `number` is the highest so far for `about`, and store it."""
+        """Return whether `number` is the highest number so far for `about`; if so, store it."""
         if number <= self._newest.get(about, 0):
             return False
         self._newest[about] = number

@@ -1,16 +1,18 @@
 """One hold-to-run control: its frames while it is held, and its stop.
 
-Theory of operation. A `HoldToRun` is idle, moving or stopping. It moves only while it gets *ticks
-of sampled input*. Each tick renews a short lease and replaces the value that was not yet written:
-only the newest value is sent, never a queue. When the lease expires, the control is released, or a
-stop is requested, the stop frame goes out before anything else. It was rendered at the arming. Then
-there is silence, because repeated zeros would fight other sources of motion.
+Theory of operation. A `HoldToRun` is idle, moving or stopping. The control moves the robot only
+while *ticks of sampled input* arrive. Each tick renews a short lease and replaces the unwritten
+value. Only the newest value is sent; values are never queued. The stop frame is sent first when the
+lease expires, the control is released, or a stop is requested. The stop frame was rendered when the
+control was armed. After the stop, nothing is sent, because repeated zeros would override other
+sources of motion.
 
-Motion never resumes by itself. Every stop but a release disarms the control, and further ticks are
-refused. The operator has to let go and make a new gesture, which arms the control again.
+Motion never resumes automatically. Every stop except a release disarms the control; further ticks
+are then refused. The operator must release the control and press again, which arms the control
+again.
 
-When a line is cut while the robot may be moving, the control owes a stop. It is the first frame on
-the restored line. All other unsent values are dropped.
+If the connection is lost while the robot may be moving, the control owes a stop. This stop is the
+first frame on the restored connection. Other unsent values are dropped.
 """
 
 from typing import Final, Literal, NamedTuple
@@ -24,30 +26,31 @@ SHORTEST_LEASE_S: Final = 0.1
 LEASE_S: Final = 0.25
 LONGEST_LEASE_S: Final = 1.0
 STOP_EVERY_S: Final = 0.05
-"""Period of a repeated stop on lossy lines, in seconds."""
+"""Period of a repeated stop on lossy connections, in seconds."""
 STOP_FOR_S: Final = 0.5
-"""Duration of the repeats, in seconds."""
+"""Time for which a stop is repeated, in seconds."""
 
 Reason = Literal["released", "expired", "stopped", "revoked"]
 
 
 class HoldTerms(NamedTuple):
-    """The terms of an armed control. Only the stop frame changes during the motion."""
+    """The terms of an armed control. Only the stop frame can change during motion."""
 
     stop: Payload
-    """Frame that stops the motion, framing included. It is empty for a robot that moves in steps:
-    each step ends by itself, so no stop is written."""
+    """Complete frame that stops the motion. Empty for a robot that moves in steps, because each
+    step ends without a stop frame."""
     period_s: float
-    """Shortest mean time between two writes, in seconds."""
+    """Minimum mean time between two writes, in seconds."""
     lease_s: float = LEASE_S
-    """Duration of the motion after the last tick, 0.1 to 1.0 seconds."""
+    """Time for which motion continues after the last tick, 0.1 to 1.0 seconds."""
     is_lossy: bool = False
-    """Whether the line may lose frames (datagrams, serial, topics): then the stop is repeated."""
+    """Whether the transport may lose frames, such as datagrams; if so, the stop is repeated."""
     stops: tuple[Numbered, ...] = ()
-    """The stop with each counter value that it may need when it leaves; empty: without counters."""
+    """Variants of the stop frame for different counter values; empty for a stop without counters.
+    """
 
     def stopped_by(self, stop: Payload | FrameVariants) -> "HoldTerms":
-        """Return the same terms with another stop."""
+        """Return a copy of the terms with a different stop frame."""
         if isinstance(stop, FrameVariants):
             return self._replace(stop=stop.frames[0].data, stops=stop.frames)
         return self._replace(stop=stop, stops=())
@@ -57,10 +60,10 @@ class HoldToRun:
     """The state machine of one hold-to-run control."""
 
     def __init__(self, terms: HoldTerms) -> None:
-        """Prepare for `terms`; nothing moves.
+        """Create an idle control with `terms`.
 
         Raises:
-            ValueError: a lease or period is out of range: the motion would never stop.
+            ValueError: the lease or the period is out of range, so the motion might never stop.
         """
         if not SHORTEST_LEASE_S <= terms.lease_s <= LONGEST_LEASE_S:
             raise ValueError(f"a lease lasts 0.1 to 1.0 s, not {terms.lease_s:g}")
@@ -71,9 +74,9 @@ class HoldToRun:
         self.reason: Reason | None = None
         """Reason of the last stop."""
         self.is_told = True
-        """Whether the last stop was reported; kept for the owner of the line."""
+        """Whether the last stop was reported; set by the owner of the connection."""
         self.owes_stop = False
-        """Whether the line was cut before the robot can have received the stop."""
+        """Whether the connection was lost before the robot can have received the stop."""
         self._rate_limiter = RateLimiter(terms.period_s, is_strict=terms.stop == b"")
         self._waiting: Payload | None = None
         self._expires_at = 0.0
@@ -82,16 +85,16 @@ class HoldToRun:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether a value was not yet written."""
+        """Whether a value has not been written yet."""
         return self._waiting is not None
 
     def must_stop(self, now: float) -> bool:
-        """Return whether it is being stopped, or its lease has expired."""
+        """Return whether the control is being stopped, or its lease has expired."""
         return self.state == "stopping" or (self.state == "moving" and now >= self._expires_at)
 
     @property
     def deadline(self) -> float | None:
-        """Latest time of the next call of `due`; None while idle."""
+        """Latest time for the next call of `due`; None while idle."""
         if self.state == "moving":
             if self._waiting is None:
                 return self._expires_at
@@ -99,7 +102,7 @@ class HoldToRun:
         return self._stop_at if self.state == "stopping" else None
 
     def renew(self, terms: HoldTerms) -> None:
-        """Replace the terms. An owed stop and the state of the rate limit stay.
+        """Replace the terms. A pending stop and the state of the rate limit stay unchanged.
 
         Raises:
             ValueError: as above.
@@ -110,16 +113,16 @@ class HoldToRun:
         self.terms = terms
 
     def arm(self) -> None:
-        """Accept ticks from now on; the first one begins the motion."""
+        """Accept ticks from now on; the first tick begins the motion."""
         self.is_armed = True
 
     def tick(self, data: Payload | None, now: float) -> bool:
-        """Accept a tick of sampled input: renew the lease, and keep `data` as the newest value.
+        """Accept a tick of sampled input: renew the lease, and store `data` as the newest value.
 
-        None renews the lease without a value: the present one cannot be sent.
+        None renews the lease without a new value, because the input's value cannot be sent.
 
         Returns:
-            Whether the tick was accepted. After False, the control has to be armed again.
+            Whether the tick was accepted. After False, the control must be armed again.
         """
         if self.state == "moving" and now >= self._expires_at:
             self.stop("expired", now)  # a tick after the lease belongs to no motion
@@ -131,11 +134,14 @@ class HoldToRun:
         return True
 
     def forget(self) -> None:
-        """Drop the unsent value; the lease goes on."""
+        """Drop the unsent value, but keep the lease."""
         self._waiting = None
 
     def stop(self, reason: Reason, now: float) -> None:
-        """Stop. A release stops only a moving control; STOP is never refused."""
+        """Stop.
+
+        A release has no effect on a control that is not moving; other stops always take effect.
+        """
         if reason == "released" and self.state != "moving":
             return  # nothing moves, and an idle control is silent
         self.is_armed = self.is_armed and reason == "released"
@@ -148,12 +154,12 @@ class HoldToRun:
         self._stop_until = now + STOP_FOR_S if is_repeated else now
 
     def due(self, now: float, *, is_clear: bool) -> Payload | None:
-        """Return the frame to write now, or None.
+        """Return the frame to write now, or None if no frame is due.
 
         Args:
             now: the time.
-            is_clear: whether the line has no unsent bytes. Motion waits for a clear line, and newer
-                values replace it meanwhile. A stop does not wait.
+            is_clear: whether the connection has no unsent bytes. Motion waits for a clear
+                connection; meanwhile, newer values replace the waiting value. A stop does not wait.
         """
         if self.state == "moving" and now >= self._expires_at:
             self.stop("expired", now)
@@ -174,10 +180,10 @@ class HoldToRun:
         return self.terms.stop
 
     def cut(self, *, is_doubtful: bool = False) -> None:
-        """Record the loss of the line: drop the unsent value, and owe a stop if it may be moving.
+        """Record the loss of the connection: drop the unsent value, and owe a stop if needed.
 
         Args:
-            is_doubtful: whether a written stop may have been lost with the line.
+            is_doubtful: whether a written stop may have been lost with the connection.
         """
         if self.state != "idle" or is_doubtful:
             self.owes_stop = True
@@ -186,7 +192,7 @@ class HoldToRun:
         self._waiting = None
 
     def restored(self, now: float) -> None:
-        """Record that the line is back: an owed stop goes first."""
+        """Record that the connection is restored; an owed stop is sent first."""
         if self.owes_stop:
             self.state = "idle"
             self.stop("revoked", now)

@@ -1,9 +1,10 @@
-"""The lease of one robot: the right of one operator to drive it.
+"""The lease of one robot: the exclusive right of one operator to drive the robot.
 
 Theory of operation. At most one operator holds the lease. Every change of the holder, and every
-stop, raises the epoch and begins with a stop on the wire. Inputs with an older epoch are refused,
-so that no motion continues by accident. A silent holder loses the lease. STOP needs no lease, and
-it latches: nothing moves until an operator resets it on purpose. A reset starts no motion.
+stop, raises the epoch of the lease and first sends a stop to the robot. Inputs with an older epoch
+are refused, so that no motion continues by mistake. A holder without input for `SILENT_S` loses the
+lease. STOP needs no lease and is latched: nothing moves until an operator resets the latch. A reset
+never starts motion.
 """
 
 from typing import Final, Literal, NamedTuple
@@ -23,27 +24,30 @@ LONGEST_REQUEST_S: Final = 60.0
 
 
 class Operator(NamedTuple):
-    """A person at a page."""
+    """A person at a dashboard page."""
 
     id: str
     """Unique while connected."""
     name: str = ""
-    """Name for other operators."""
+    """Name shown to other operators."""
     role: Role = "driver"
 
 
 class LeaseState(NamedTuple):
-    """The public state of a lease. It survives a restart."""
+    """The public state of a lease.
+
+    After a restart of the server, only the latch and the counters are restored.
+    """
 
     epoch: int = 0
     holder: Operator | None = None
     asked_by: Operator | None = None
-    """Operator who asks for the lease."""
+    """Operator who has requested the lease, or None."""
     asked_until: float = 0.0
     latched_by: str = ""
-    """Name of the operator who pressed STOP; "" without a latch."""
+    """Name of the operator who pressed STOP; "" if no stop is latched."""
     stops: int = 0
-    """Number of stops in this run of the server. A request from before the last stop is void, even
+    """Number of stops since the server started. A request from before the last stop is void, even
     after a reset."""
 
 
@@ -52,35 +56,35 @@ class LeaseChanged(NamedTuple):
 
     state: LeaseState
     must_stop: bool
-    """Whether a stop must go out before the new state takes effect."""
+    """Whether a stop must be sent before the new state takes effect."""
 
 
 class LeaseRefused(NamedTuple):
-    """The lease did not change."""
+    """A refusal to change the lease."""
 
     message: str
-    """Reason for people; it names the holder when the holder is the reason."""
+    """Reason for display; names the holder if the holder blocks the change."""
 
 
 class Lease:
     """The lease of one robot."""
 
     def __init__(self, state: LeaseState | None = None) -> None:
-        """Start from `state`, as stored before a restart: the latch stays, the holder does not."""
+        """Start from `state`, as stored before a restart: keep the latch, drop the holder."""
         kept = state or LeaseState()
         self.state = LeaseState(kept.epoch + 1, latched_by=kept.latched_by, stops=kept.stops)
         self._touched_at = 0.0
 
     @property
     def deadline(self) -> float | None:
-        """Time of the next change by `expire`; None without one."""
+        """Time of the next change by `expire`; None if no change is pending."""
         if self.state.holder is None:
             return None
         silent_at = self._touched_at + SILENT_S
         return min(silent_at, self.state.asked_until) if self.state.asked_by else silent_at
 
     def refusal(self, client: str, epoch: int) -> str:
-        """Return the reason to refuse motion of a client, or ""."""
+        """Return the reason to refuse motion of `client`, or ""."""
         state = self.state
         if state.latched_by:
             return self.latched
@@ -95,12 +99,12 @@ class Lease:
     def interlock(self, client: Operator, stops: int | None = None) -> str:
         """Return the reason to refuse autonomous motion, or "".
 
-        Autonomous motion needs no lease, because no control is held. A latched stop and the lease
-        of another operator prevent it.
+        Autonomous motion needs no lease, because no control is held. A latched stop or another
+        operator's lease prevents autonomous motion.
 
         Args:
             client: the operator who gives the command.
-            stops: number of stops at the time of the request; None: requested now.
+            stops: number of stops when the command was requested; None for a request made now.
         """
         state = self.state
         if _RANK[client.role] < _RANK["driver"]:
@@ -115,16 +119,16 @@ class Lease:
 
     @property
     def latched(self) -> str:
-        """Message about the latched stop, or ""."""
+        """Message about the latched stop, or "" without a latch."""
         by = self.state.latched_by
         return f"stopped by {by}: reset it first" if by else ""
 
     def touch(self, now: float) -> None:
-        """Record an input of the holder."""
+        """Record an input of the holder, which renews the lease."""
         self._touched_at = now
 
     def acquire(self, client: Operator, now: float) -> LeaseChanged | LeaseRefused:
-        """Give a free lease to `client`."""
+        """Grant the free lease to `client`."""
         state = self.state
         if _RANK[client.role] < _RANK["driver"]:
             return LeaseRefused("viewers cannot drive")
@@ -137,7 +141,7 @@ class Lease:
     def request(
         self, client: Operator, now: float, for_s: float = REQUEST_S
     ) -> LeaseChanged | LeaseRefused:
-        """Ask the holder for the lease; after a timeout, the lease is handed over."""
+        """Ask the holder for the lease; grant the lease after `for_s` seconds without an answer."""
         state = self.state
         if state.holder is None or state.holder.id == client.id:
             return self.acquire(client, now)
@@ -150,7 +154,7 @@ class Lease:
         return LeaseChanged(self.state, must_stop=False)
 
     def answer(self, client: str, now: float, *, is_granted: bool) -> LeaseChanged | LeaseRefused:
-        """Hand the lease over, or keep it, as the holder answers."""
+        """Hand over the lease or keep the lease, according to the holder's answer."""
         state = self.state
         if state.holder is None or state.holder.id != client or state.asked_by is None:
             return LeaseRefused("nobody asks you for the controls")
@@ -168,7 +172,7 @@ class Lease:
         return self._grant(client, now)
 
     def leave(self, client: str) -> LeaseChanged | None:
-        """Remove a client as the holder or asker; return None if it is neither."""
+        """Remove a client as holder or asker; return None if the client was neither."""
         state = self.state
         if state.holder is not None and state.holder.id == client:
             self.state = self._next(latched_by=state.latched_by)
@@ -179,14 +183,17 @@ class Lease:
         return None
 
     def stop(self, by: str) -> LeaseChanged:
-        """Stop and latch. This is never refused."""
+        """Stop and latch. A stop is never refused."""
         state = self.state
         by = state.latched_by or by
         self.state = self._next(latched_by=by)._replace(stops=state.stops + 1)
         return LeaseChanged(self.state, must_stop=True)
 
     def reset(self, client: Operator) -> LeaseChanged | LeaseRefused:
-        """Reset the latch: the next holder can drive the robot. Nothing starts to move."""
+        """Reset the latch, so that operators can drive the robot again.
+
+        A reset starts no motion.
+        """
         if _RANK[client.role] < _RANK["driver"]:
             return LeaseRefused("viewers can stop the robot, and cannot reset it")
         if not self.state.latched_by:
@@ -195,7 +202,7 @@ class Lease:
         return LeaseChanged(self.state, must_stop=False)
 
     def expire(self, now: float) -> LeaseChanged | None:
-        """Apply timeouts: hand the lease to the asker, or take it from a silent holder."""
+        """Apply timeouts: grant the lease to the asker, or withdraw a silent holder's lease."""
         state = self.state
         if state.holder is None:
             return None
@@ -211,7 +218,7 @@ class Lease:
         return LeaseChanged(self.state, must_stop=True)
 
     def _next(self, holder: Operator | None = None, latched_by: str = "") -> LeaseState:
-        """Return the state of the next epoch, without an asker."""
+        """Return a state with the next epoch and without an asker."""
         return LeaseState(
             self.state.epoch + 1, holder, latched_by=latched_by, stops=self.state.stops
         )

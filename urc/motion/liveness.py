@@ -1,7 +1,8 @@
-"""The liveness of the program at the other end of a line, judged by the bytes received from it.
+"""The liveness of the program at the other end of a connection, judged by received bytes.
 
-The kernel of a frozen program still acknowledges bytes, which then wait until the program goes on.
-So acknowledgements prove nothing. The guard sends probes, and times the replies.
+The kernel of a frozen program still acknowledges bytes, although the program does not read the
+bytes. Acknowledgements are therefore no proof of liveness. The guard instead sends probes, and
+measures the time until each reply.
 """
 
 from math import inf
@@ -12,9 +13,9 @@ __all__ = ["ASKED_EVERY_S", "SILENCE_S", "Liveness"]
 SILENCE_S: Final = 0.5
 """Silence after which a probed program counts as frozen, in seconds."""
 ASKED_EVERY_S: Final = 0.05
-"""Time between a reply and the next probe, in seconds."""
+"""Interval between a reply and the next probe, in seconds."""
 _ON_THE_WAY_S: Final = 0.03
-"""Time allowed for the delivery of a reply, and for the reset without one, in seconds."""
+"""Time reserved for the delivery of a reply, or for the reset after a missing reply, in seconds."""
 
 
 class Liveness:
@@ -23,29 +24,29 @@ class Liveness:
     __slots__ = ("_asked_s", "_heard_s", "_silent_s")
 
     def __init__(self, silent_s: float | None) -> None:
-        """Begin; `silent_s` is the longest silence without a probe, None: unlimited."""
+        """Begin; `silent_s` is the maximum silence without a probe, in seconds; None: unlimited."""
         self._silent_s = inf if silent_s is None else silent_s
         self._heard_s = -inf
         self._asked_s: float | None = None
 
     @property
     def is_asked(self) -> bool:
-        """Whether a probe has no reply yet."""
+        """Whether a probe is still unanswered."""
         return self._asked_s is not None
 
     @property
     def deadline(self) -> float:
-        """Time at which the program counts as frozen, unless bytes arrive before."""
+        """Time at which the program counts as frozen, unless bytes arrive earlier."""
         asked_s = inf if self._asked_s is None else self._asked_s
         answer_s = SILENCE_S - ASKED_EVERY_S - _ON_THE_WAY_S
         return min(self._heard_s + self._silent_s, asked_s + answer_s)
 
     def note_arrival(self, now: float) -> None:
-        """Record that bytes arrived."""
+        """Record the arrival of bytes."""
         self._heard_s = now
         self._asked_s = None
 
     def asked(self, now: float) -> None:
-        """Record a probe; the oldest one without a reply counts."""
+        """Record a probe; if several are unanswered, the oldest probe counts."""
         if self._asked_s is None:
             self._asked_s = now

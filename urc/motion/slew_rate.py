@@ -1,8 +1,8 @@
-"""The slew rate of held commands: a limit on speeding up, never on stopping.
+"""A slew rate limit for held commands: limits acceleration, never braking.
 
-A value is measured from rest, the value that stops the motion. A change towards rest is allowed at
-once. A change away from rest is limited. A change through rest reaches rest at once, and is limited
-from there.
+Distances are measured from rest, the value at which the robot stands still. A change towards rest
+is applied immediately. A change away from rest is limited. A change through rest reaches rest
+immediately, and is limited beyond rest.
 """
 
 import math
@@ -14,11 +14,11 @@ from urc.model.values import Reading
 __all__ = ["SlewRateLimiter"]
 
 _LONGEST_S: Final = 1.0
-"""Longest step in time that counts, in seconds: no lease is longer."""
+"""Maximum time step for the calculation, in seconds; no lease is longer."""
 
 
 class SlewRateLimiter:
-    """The limits of one held command, and its present distance from rest."""
+    """The slew rate limits of one held command, and its present distance from rest."""
 
     __slots__ = ("_first_s", "_last_s", "_per_s", "_reached", "_rest")
 
@@ -28,26 +28,26 @@ class SlewRateLimiter:
         """Begin at rest.
 
         Args:
-            per_s: argument → greatest growth per second, in the unit of the argument.
-            rest: argument → value at standstill; 0 if left out.
+            per_s: argument → maximum increase per second, in the unit of the argument.
+            rest: argument → value at standstill; 0 if omitted.
             first_s: time credited to the first value of a motion, in seconds.
         """
         self._per_s = per_s
         self._rest = {name: rest.get(name) for name in per_s}
         self._first_s = first_s
         self._reached: dict[str, tuple[float, ...]] = {}
-        """Argument → distance of each of its elements from rest."""
+        """Argument → present distance of each array element from rest."""
         self._last_s: float | None = None
 
     def reset(self) -> None:
-        """Reset to standstill: the next motion begins at rest."""
+        """Reset to standstill, so that the next motion begins at rest."""
         self._reached.clear()
         self._last_s = None
 
     def limit(self, values: Mapping[str, Reading], now: float) -> dict[str, Reading]:
-        """Return `values`, each limited to its greatest distance from rest at `now`.
+        """Return `values`, each limited to its maximum distance from rest at the time `now`.
 
-        Values that are not numbers stay unchanged: the check of arguments refuses them.
+        Values that are not numbers stay unchanged, because the argument check refuses them later.
         """
         last_s, self._last_s = self._last_s, now
         passed_s = self._first_s if last_s is None else min(max(0.0, now - last_s), _LONGEST_S)
@@ -82,13 +82,13 @@ class SlewRateLimiter:
 
 
 def _grown(wanted: float, was: float, room: float) -> float:
-    """Return the allowed distance from rest, after a distance of `was` and a growth of `room`."""
+    """Return the permitted distance from rest, at most `room` more than the distance `was`."""
     start = abs(was) if was * wanted > 0 else 0.0
     return math.copysign(min(abs(wanted), start + room), wanted)
 
 
 def _written(wanted: float, rest: float, far: float) -> float:
-    """Return the value at the distance `far` from rest; unchanged if it was not limited."""
+    """Return the value at the distance `far` from rest, or `wanted` if no limit applied."""
     if abs(wanted - rest) <= abs(far):
         return wanted
     return int(rest) + math.trunc(far) if isinstance(wanted, int) else rest + far

@@ -1,8 +1,9 @@
-"""Detection of stalled lines, by the age of the oldest unsent byte.
+"""Detection of stalled connections by the age of the oldest unsent byte.
 
-Only the number of unsent bytes is known. The number grows with each write, and shrinks with each
-acknowledgement, in the same order. So its course gives the time at which the oldest unsent byte was
-written. The number alone says nothing: a busy line may always have unsent bytes.
+The system reports only the number of unsent bytes. The number grows with each write and shrinks
+with each acknowledgement, in the same order. The history of this number therefore reveals the write
+time of the oldest unsent byte. The number alone proves no stall, because a busy connection may
+always have unsent bytes.
 """
 
 import sys
@@ -21,42 +22,42 @@ __all__ = [
 ]
 
 SHORTEST_CUT_S: Final = 0.2
-"""Shortest cut of the link that the promise of `STOP_WITHIN_S` covers, in seconds."""
+"""Shortest network interruption for which `STOP_WITHIN_S` is guaranteed, in seconds."""
 STOP_WITHIN_S: Final = 0.1
-"""Longest time from the end of such a cut to the stop, in seconds."""
+"""Maximum time from the end of a network interruption to the stop, in seconds."""
 TICK_S: Final = 0.05
-"""Period of the ticks of a held control, in seconds. The first write after the begin of a cut may
-be this late."""
+"""Period of the ticks of a held control, in seconds. The first write after the beginning of an
+interruption may come this late."""
 AFRESH_S: Final = 0.03
-"""Time to reset a nearby line, to open it, and to write the stop, in seconds."""
+"""Time to reset and reopen a nearby connection and write the stop, in seconds."""
 STALLED_S: Final = round(SHORTEST_CUT_S + STOP_WITHIN_S - TICK_S - AFRESH_S, 3)
-"""Age of unsent bytes at which a line counts as stalled, in seconds. A stalled line is reset and
-opened again: otherwise the kernel would deliver the old bytes later. A byte that was written one
-tick after the begin of the shortest cut reaches this age just in time."""
+"""Age of unsent bytes at which a connection counts as stalled, in seconds. A stalled connection is
+reset and reopened; otherwise, the kernel would deliver the old bytes later. A byte that was written
+one tick after the beginning of the shortest interruption reaches this age just in time."""
 WAITED_S: Final = 1.0
-"""The same age for lines that are slow to open, in seconds."""
+"""Age of unsent bytes at which a connection that is slow to open counts as stalled, in seconds."""
 IN_FLIGHT_S: Final = 0.15
-"""Age of unacknowledged bytes on a healthy line, in seconds. Systems delay acknowledgements: Linux
-by up to 40 ms, small stacks until a second segment arrives."""
+"""Maximum age of unacknowledged bytes on a healthy connection, in seconds. Operating systems delay
+acknowledgements: Linux by up to 40 ms, small TCP stacks until a second segment arrives."""
 _TOGETHER_S: Final = 0.005
 _MOST: Final = 256
 
 
 class StallWatch:
-    """The watch over one line."""
+    """The stall watch of one connection."""
 
     __slots__ = ("_marks", "_taken", "_written", "limit_s")
 
     def __init__(self, limit_s: float = STALLED_S) -> None:
         self.limit_s = limit_s
         self._marks: deque[tuple[float, int]] = deque()
-        """Times of writes, each with the number of bytes written by then."""
+        """Time of each write, with the total number of bytes written by then."""
         self._written = 0
         self._taken = 0
 
     @property
     def deadline(self) -> float | None:
-        """Time at which the line is stalled, unless the bytes leave before."""
+        """Time at which the connection is stalled, unless the oldest bytes are sent earlier."""
         return self._marks[0][0] + self.limit_s if self._marks else None
 
     def age_s(self, now: float) -> float:
@@ -64,9 +65,9 @@ class StallWatch:
         return now - self._marks[0][0] if self._marks else 0.0
 
     def saw(self, unsent: int, now: float) -> bool:
-        """Record the number of unsent bytes; return whether the line is stalled.
+        """Record the number of unsent bytes; return whether the connection is stalled.
 
-        Call it right before each write, and from time to time.
+        Call this method right before each write, and regularly between writes.
         """
         if not unsent:
             self.reset()
@@ -82,12 +83,12 @@ class StallWatch:
         return self.age_s(now) >= self.limit_s
 
     def wrote(self, size: int, now: float) -> None:
-        """Record a write of `size` bytes; the next `saw` corrects the estimate."""
+        """Record a write of `size` bytes; the next call of `saw` corrects the estimate."""
         self._written += size
         self._mark(now)
 
     def gave_up(self) -> None:
-        """Record that the unsent bytes never leave: later bytes inherit their age."""
+        """Record that the unsent bytes will never be sent; later bytes inherit their age."""
         if self._marks:
             began = self._marks[0][0]
             self._marks.clear()
@@ -95,7 +96,7 @@ class StallWatch:
         self._written = self._taken = 0
 
     def reset(self) -> None:
-        """Reset to a line without unsent bytes."""
+        """Reset the watch to a connection without unsent bytes."""
         self._marks.clear()
         self._written = self._taken = 0
 

@@ -36,5 +36,5 @@ def test_no_second_has_more_than_one_beyond_the_rate(rate: int, waits: list[floa
 
 
 def test_a_rate_is_needed() -> None:
-    with pytest.raises(ValueError, match="more than 0"):
+    with pytest.raises(ValueError, match="greater than 0"):
         RateLimiter(0.0)
