@@ -1,11 +1,12 @@
 """The audit log: the motion commands of each operator, with times and results, in an SQLite file.
 
 Theory of operation. `AuditLog.note` puts an entry into a short queue and returns. The call never
-waits for a disk, because motion and STOP call it. A separate thread writes the queue in batches,
-one transaction each. When the queue or the disk is full, entries are lost and counted; the next
-written entry has the count. When the file reaches its limit, the oldest entries are deleted.
+waits for a disk, because motion and STOP call `note`. A separate thread writes the queued entries
+in batches, with one transaction per batch. If the queue or the disk is full, entries are lost and
+counted; the next written entry records the count. When the file reaches its limit, the oldest
+entries are deleted.
 
-Each row has a hash over itself and the row before it, so `check` finds a changed, removed or
+Each row contains a hash of itself and the previous row, so `check` detects a changed, removed or
 inserted row. The hash does not protect against an attacker who rewrites the whole file.
 """
 
@@ -28,35 +29,37 @@ from urc.private_files import make_private
 __all__ = ["AuditLog", "AuditEntry", "check", "read", "shown"]
 
 MOST_BYTES: Final = 32 * 1024 * 1024
-"""Limit of the file, in bytes; the oldest entries are deleted first."""
+"""Maximum size of the file, in bytes; beyond this limit, the oldest entries are deleted."""
 MOST_WAITING: Final = 4096
-"""Limit of the queue, in entries."""
+"""Maximum number of queued entries."""
 _BATCH: Final = 512
 _GATHER_S: Final = 0.05
-"""Time to gather a batch, in seconds, so that one commit writes many entries."""
+"""Time for which entries are gathered into a batch, in seconds, so that one commit writes many
+entries."""
 _RETRY_S: Final = 5.0
-"""Time before the next attempt after a write error, in seconds."""
+"""Delay before the next attempt after a write error, in seconds."""
 _LOCKED_S: Final = 1.0
-"""Time to wait for other readers and writers of the file, in seconds."""
+"""Maximum wait for other readers and writers of the file, in seconds."""
 _CLOSE_S: Final = 2.0
 _LONGEST_TEXT: Final = 1000
 _SHARE: Final = 10
-"""One of so many rows is deleted when the file is full."""
+"""When the file is full, one in this many rows is deleted."""
 _PAGE: Final = 4096
 
 log = logging.getLogger(__name__)
 
 
 class AuditEntry(NamedTuple):
-    """One entry. The caller must leave secrets out."""
+    """One entry. The caller must remove secrets from all texts."""
 
     at: float
     """UTC time of this machine's clock, in seconds since 1970."""
     robot: str
     what: str
-    """``moved``, ``stopped``, ``refused``, ``lease``, ``STOP``, ``reset``, ``ran`` or ``lost``."""
+    """Kind of event: ``moved``, ``stopped``, ``refused``, ``lease``, ``STOP``, ``reset``, ``ran``
+    or ``lost``."""
     who: str = ""
-    """Name of the person or page."""
+    """Name of the person or page that caused the event."""
     role: str = ""
     client: str = ""
     """Id of the connection."""
@@ -66,11 +69,11 @@ class AuditEntry(NamedTuple):
     arguments: str = ""
     """Arguments as JSON."""
     data: str = ""
-    """Bytes in hex, or the hash of many bytes: see `shown`."""
+    """Sent bytes in hex, or the hash of a long payload; see `shown`."""
     outcome: str = ""
-    """Result, as text for people."""
+    """Result as text for display."""
     times: int = 1
-    """Number of equal events that this entry stands for."""
+    """Number of equal events that this entry represents."""
     lasted_s: float = 0.0
 
 
@@ -90,7 +93,7 @@ _SELECT: Final = f"SELECT id, {', '.join(_COLUMNS)}, chain FROM entries"  # noqa
 
 
 class AuditLog:
-    """A writer of one audit file. Use it as a context, or call `close`."""
+    """A writer of one audit file. Use the writer as a context manager, or call `close`."""
 
     def __init__(
         self,
@@ -105,12 +108,12 @@ class AuditLog:
         Args:
             file: path of the file.
             most_bytes: approximate limit of the file, in bytes.
-            most_waiting: limit of the queue, in entries.
+            most_waiting: maximum number of queued entries.
             now: source of UTC time, in seconds.
         """
         self.file = file
         self.fault = ""
-        """Reason why writing fails now, or ""."""
+        """Reason why entries currently cannot be written, or ""."""
         self._most_bytes = most_bytes
         self._most_waiting = most_waiting
         self._now = now
@@ -123,7 +126,7 @@ class AuditLog:
         self._thread.start()
 
     def add(self, entry: AuditEntry) -> None:
-        """Queue an entry and return at once. Safe to call from any thread; never raises."""
+        """Queue an entry and return immediately. This method is thread-safe and never raises."""
         with self._wakes:
             if len(self._waiting) >= self._most_waiting:
                 self._lost += 1
@@ -132,19 +135,19 @@ class AuditLog:
             self._wakes.notify()
 
     def settle(self, timeout_s: float = _CLOSE_S) -> bool:
-        """Wait until all queued entries are written; return whether they are."""
+        """Wait until all queued entries are written; return whether the wait succeeded."""
         with self._wakes:
             return self._wakes.wait_for(lambda: not self._waiting and not self._is_busy, timeout_s)
 
     def close(self) -> None:
-        """Write the queue for two seconds at most, and end the thread."""
+        """Write the queued entries for at most two seconds, and end the thread."""
         with self._wakes:
             self._is_closing = True
             self._wakes.notify_all()
         self._thread.join(_CLOSE_S)
 
     def __enter__(self) -> "AuditLog":
-        """Return self; the end of the block closes it."""
+        """Return `self`; the end of the `with` block closes the writer."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -173,7 +176,7 @@ class AuditLog:
                 base.close()
 
     def _next_batch(self) -> list[AuditEntry]:
-        """Return the queued entries after a short wait for more, or [] at the end."""
+        """Return the queued entries after a short wait for more; return [] at the end."""
         with self._wakes:
             self._is_busy = False
             self._wakes.notify_all()
@@ -287,10 +290,11 @@ def read(file: Path, *, robot: str = "", since: float = 0.0, last: int = 200) ->
     """Return the newest entries, oldest first, or [] without a file.
 
     Args:
-        file: file of an `AuditLog`, which may be writing it.
-        robot: only entries of this robot and of no robot; "" for all entries.
-        since: only entries from this time on, UTC in seconds.
-        last: limit of the number of entries.
+        file: path of the file of an `AuditLog`, which may still be writing.
+        robot: name of a robot, to select its entries and the entries without a robot; "" for all
+            entries.
+        since: start of the period, as UTC time in seconds since 1970.
+        last: maximum number of entries.
 
     Raises:
         OSError: the file cannot be read.
@@ -307,7 +311,7 @@ def read(file: Path, *, robot: str = "", since: float = 0.0, last: int = 200) ->
 
 
 def check(file: Path) -> str:
-    """Return the first broken place of the hash chain, or "" for an intact file.
+    """Return a message about the first broken link of the hash chain, or "" for an intact file.
 
     Raises:
         OSError: the file cannot be read.
@@ -333,7 +337,7 @@ def _link(before: str, entry: AuditEntry) -> str:
 
 
 def _cut(entry: AuditEntry) -> AuditEntry:
-    """Return an entry with shortened texts and without lone surrogates, which UTF-8 lacks."""
+    """Return an entry with shortened texts, and without lone surrogates, invalid in UTF-8."""
     return AuditEntry._make(_text(one) if isinstance(one, str) else one for one in entry)
 
 

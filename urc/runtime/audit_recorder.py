@@ -1,9 +1,9 @@
-"""The audit entries of one robot: two for each motion, not one for each tick.
+"""Audit entries of one robot: two entries per motion, instead of one per tick.
 
-Layer 4, synchronous; callers pass the time. Motion calls these functions, so they never wait or
-raise. Each motion has an entry for its start and one for its end, with its first and last values. A
-repeated refusal gets one entry per second, with its count. So the audit log shows the cause of each
-motion, and its size does not grow with every tick.
+This module is on layer 4 and synchronous; callers pass the time. These functions never wait or
+raise, because motion calls them. Each motion has a start entry and an end entry, with the first and
+last values of the motion. Repeated refusals are combined into one entry per second, with a count.
+The audit log therefore shows the cause of each motion, but does not grow with every tick.
 """
 
 import json
@@ -24,11 +24,11 @@ __all__ = ["AuditRecorder"]
 
 _NOBODY: Final = Operator("", "", "viewer")
 _AGAIN_S: Final = 1.0
-"""Shortest time between entries for the same refusal, in seconds."""
+"""Minimum interval between entries for the same refusal, in seconds."""
 _MOST_KEPT: Final = 64
-"""Limit of different refusals with a count."""
+"""Maximum number of different refusals that are counted separately."""
 _MOST_TOLD: Final = 16
-"""Limit of refusal entries per second, so that a hostile page cannot fill the file."""
+"""Maximum number of refusal entries per second, so that a hostile page cannot fill the file."""
 _MOST_SECRETS: Final = 256
 _LONGEST_NAME: Final = 100
 _LONGEST_TEXT: Final = 1000
@@ -40,7 +40,7 @@ _P = ParamSpec("_P")
 def _harmless(
     take: "Callable[Concatenate[AuditRecorder, _P], None]",
 ) -> "Callable[Concatenate[AuditRecorder, _P], None]":
-    """Catch every exception, so that a bug here cannot stop motion; log only the first one."""
+    """Catch every exception, because an audit bug must not stop motion; log only the first one."""
 
     @wraps(take)
     def taken(self: "AuditRecorder", /, *args: _P.args, **named: _P.kwargs) -> None:
@@ -85,13 +85,13 @@ class AuditRecorder:
 
         Args:
             robot: name of the robot.
-            note: receives the entries; must not block.
+            note: callback for each entry; must not block.
             utc: source of UTC time, in seconds since 1970.
             secrets: texts to redact, such as the values of secret settings.
         """
         self.robot = robot
         self.is_faulty = False
-        """Whether a bug in URC has prevented an entry."""
+        """Whether a bug in URC has prevented the recording of an entry."""
         self._note = note
         self._hub: Hub | None = None
         self._now: Callable[[], float] = _never
@@ -107,11 +107,11 @@ class AuditRecorder:
         """Number of refusal entries in the current second."""
 
     def attend(self, hub: Hub | None, now: Callable[[], float]) -> None:
-        """Also report to the taps of a session's hub, with its clock; None ends that."""
+        """Also report entries to the taps of a session's hub. None ends the reports."""
         self._hub, self._now = hub, now
 
     def hide(self, secrets: Iterable[str]) -> None:
-        """Redact these texts too, from now on."""
+        """Add texts to redact from now on."""
         known = dict.fromkeys((*(one for one in secrets if one), *self._secrets))
         self._secrets = tuple(known)[:_MOST_SECRETS]
         self._disguises = SecretForms(self._secrets)
@@ -126,7 +126,7 @@ class AuditRecorder:
         data: Payload,
         now: float,
     ) -> None:
-        """Note an accepted tick and its frame."""
+        """Record an accepted tick and its frame."""
         if self._hub is not None and self._hub.is_tapped:
             self._hub.publish_record(MotionRecord(now, command, arguments))
         motion = self._motions.get(command)
@@ -147,7 +147,7 @@ class AuditRecorder:
 
     @_harmless
     def stopped(self, command: str, reason: str, now: float) -> None:
-        """Note the stop of a control, and its reason."""
+        """Record the stop of a control, and the reason of the stop."""
         motion = self._motions.pop(command, None)
         if motion is None:
             return
@@ -165,7 +165,7 @@ class AuditRecorder:
 
     @_harmless
     def refused(self, client: Operator, about: str, message: str, now: float) -> None:
-        """Note the refusal of a tick or request; `about` is the control or the request."""
+        """Record the refusal of a tick or request; `about` names the control or the request."""
         about, message = about[:_LONGEST_NAME], message[:_LONGEST_TEXT]
         key = (client.id, about, message)
         known = self._refusals.get(key)
@@ -181,7 +181,7 @@ class AuditRecorder:
 
     @_harmless
     def leased(self, state: LeaseState, now: float) -> None:
-        """Note a change of the lease: the holder, or the latch of STOP."""
+        """Record a change of the lease: the holder, or the latch of STOP."""
         before, self._lease = self._lease, state
         if state.latched_by and not before.latched_by:
             self._record("STOP", _NOBODY, epoch=state.epoch, outcome=f"by {state.latched_by}")
@@ -206,7 +206,7 @@ class AuditRecorder:
         data: Payload = b"",
         answer: Mapping[str, Reading] = NOTHING,
     ) -> None:
-        """Note a command without hold, and its outcome: ``done`` or the reason of the failure."""
+        """Record a command without hold, and its outcome: ``done`` or the reason of the failure."""
         if answer:
             outcome = f"{outcome}: {_json(answer)}"
         self._record(

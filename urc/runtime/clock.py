@@ -1,4 +1,4 @@
-"""Time as an argument: the real clock here, a fake one in `urc.testing`."""
+"""Time as an injected dependency: the real clock; `urc.testing` has a fake clock."""
 
 import asyncio
 import time
@@ -10,10 +10,10 @@ __all__ = ["Timer", "Clock", "LoopClock", "PeriodicTimer", "within"]
 
 
 class Timer(Protocol):
-    """A call that is due later and can be cancelled."""
+    """A scheduled call that can be cancelled."""
 
     def cancel(self) -> None:
-        """Cancel the call; harmless after it was made."""
+        """Cancel the call; does nothing after the call was made."""
 
 
 class Clock(Protocol):
@@ -26,11 +26,11 @@ class Clock(Protocol):
         """Return after `seconds`."""
 
     def call_at(self, time_s: float, action: Callable[[], None]) -> Timer:
-        """Call `action` at `time_s` on this clock, or at once if that is past."""
+        """Call `action` at `time_s` on this clock, or immediately if `time_s` is past."""
 
 
 class LoopClock:
-    """The time of the running event loop."""
+    """A clock that reads the time of the running event loop."""
 
     now = staticmethod(time.monotonic)
     """Return monotonic seconds."""
@@ -40,13 +40,13 @@ class LoopClock:
         await asyncio.sleep(seconds)
 
     def call_at(self, time_s: float, action: Callable[[], None]) -> Timer:
-        """Call `action` at `time_s`, or at once if that is past."""
+        """Call `action` at `time_s`, or immediately if `time_s` is past."""
         # Relative to `now`, because an event loop's own clock may have another zero.
         return asyncio.get_running_loop().call_later(max(0.0, time_s - self.now()), action)
 
 
 class PeriodicTimer:
-    """A timer whose action returns the seconds to the next call, or None for the last one."""
+    """A timer whose action returns the delay until the next call in seconds, or None to end."""
 
     def __init__(self, clock: Clock, delay_s: float, action: Callable[[], float | None]) -> None:
         self._clock = clock
@@ -65,7 +65,7 @@ class PeriodicTimer:
 
 @asynccontextmanager
 async def within(clock: Clock, seconds: float) -> AsyncIterator[None]:
-    """Raise `TimeoutError` if the block takes longer than `seconds` on `clock`."""
+    """Raise `TimeoutError` if the block takes longer than `seconds`, measured by `clock`."""
     loop = asyncio.get_running_loop()
     async with asyncio.timeout(None) as scope:
         alarm = clock.call_at(clock.now() + seconds, lambda: scope.reschedule(loop.time()))

@@ -1,6 +1,7 @@
-"""The commands, polls and messages of a document that its tests use.
+"""Test coverage of a document: its commands, polls and messages that the tests use.
 
-Layer 4, pure. An untested command is not a problem; the author decides which tests are needed.
+Layer 4, pure. An untested command is not reported as a problem, because the author decides which
+tests are needed.
 """
 
 from collections.abc import Iterable
@@ -13,7 +14,7 @@ __all__ = ["Coverage", "Exercised", "measure", "summary"]
 
 _KINDS: Final[tuple[Kind, ...]] = ("command", "poll", "message")
 _NAMED_MOST: Final = 3
-"""Limit of names in the summary; beyond it, they are counted."""
+"""Maximum number of names in the summary; further names are only counted."""
 
 
 class Coverage(NamedTuple):
@@ -22,7 +23,7 @@ class Coverage(NamedTuple):
     file: str
     total: int
     untested: tuple[Exercised, ...]
-    """Untested commands, polls and messages, in this order and in the order of the document."""
+    """Untested commands, then polls, then messages, each in the order of the document."""
 
 
 def measure(file: str, driver: Driver, exercised: Iterable[Exercised]) -> Coverage:
@@ -37,7 +38,7 @@ def measure(file: str, driver: Driver, exercised: Iterable[Exercised]) -> Covera
 
 
 def summary(coverages: Iterable[Coverage]) -> str:
-    """Return a short text about the untested parts, or ""."""
+    """Return a short text about the untested parts, or "" for full coverage."""
     untested = [one for coverage in coverages for one in coverage.untested]
     if not untested:
         return ""

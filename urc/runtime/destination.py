@@ -1,7 +1,7 @@
-"""The destination of a robot's transports, as one short text; secrets are bound to it.
+"""The destination of a robot's transports as a short digest, to which secrets are bound.
 
-A secret goes to any host that the transports' options name. So each secret is stored together with
-the destination for which it was entered, and is never used for another one.
+A secret is sent to the host that the transports' options name. Each secret is therefore stored with
+the destination for which it was entered, and is never used for a different destination.
 """
 
 import json
@@ -27,19 +27,19 @@ _MANNERS: Final = frozenset(
         "replies",
     )
 )
-"""Options about the manner of the connection. All others count as a place, also those of a
-transport that does not ship with URC."""
+"""Transport options that do not affect the destination. Any other option counts as part of the
+destination, including options of third-party transports."""
 
 
 def destination_of(profile: Profile, package: str, values: Mapping[str, Value]) -> str:
-    """Return a digest of all places that a robot's settings can reach.
+    """Return a digest of all destinations that a robot's settings can reach.
 
-    Equal packages with equal transports and places have equal digests.
+    The digest is equal for equal packages with equal transports and destinations.
 
     Args:
         profile: profile with the transports.
-        package: ``drivers/puppet``; "" for a document given by path.
-        values: values of the settings.
+        package: package name, such as ``drivers/puppet``; "" for a document given by path.
+        values: setting → value.
     """
     empty = {name: one.empty for name, one in profile.settings.items() if not one.is_required}
     lines = [_line(spec, empty | dict(values)) for spec in profile.driver.transports.values()]

@@ -1,4 +1,4 @@
-"""The topics of a rosbridge robot, and their form in a document."""
+"""The topics of a rosbridge robot, listed and written in the form of a document."""
 
 import asyncio
 import re
@@ -32,11 +32,11 @@ _PLAIN = re.compile(r"std_msgs/(?:msg/)?(?:Bool|String|Float\d+|U?Int\d+)")
 
 
 class RosTopic(NamedTuple):
-    """One topic with a publisher or a subscriber."""
+    """A topic with at least one publisher or subscriber."""
 
     name: str
     type: str
-    """Type of the messages; "" if rosapi does not know it."""
+    """Message type; "" if rosapi does not know the type."""
 
 
 async def ros_topics(transport: Transport, timeout_s: float) -> list[RosTopic]:
@@ -69,7 +69,7 @@ async def ros_topics(transport: Transport, timeout_s: float) -> list[RosTopic]:
 
 
 def snippet(topics: Sequence[RosTopic], transport: str) -> str:
-    """Return signals and messages in YAML for the topics with known fields."""
+    """Return signals and messages in YAML for the topics whose fields are known."""
     signals: list[str] = []
     messages: list[str] = []
     for topic in topics:

@@ -1,7 +1,7 @@
-"""The only caller of a driver's engine.
+"""The dispatcher: the only caller of a driver's engine.
 
-All calls into the engine run on the event loop, one after the other and never nested. Performing an
-event only sets state in a `Link`, the hub or a future; the links' own tasks act on it later. A
+All calls to the engine run on the event loop, one after the other and never nested. Performing an
+event only changes the state of a `Link`, the hub or a future; the links' own tasks react later. A
 driver with several transports has one engine, one dispatcher, and one link for each transport.
 """
 
@@ -34,7 +34,7 @@ __all__ = ["MAX_WAITING", "Dispatcher", "EngineLike", "LinkPort"]
 
 
 MAX_WAITING = 256
-"""Limit of pending commands; one more is refused."""
+"""Maximum number of pending commands; further commands are refused."""
 
 Answer = Replied | Failed
 
@@ -43,11 +43,11 @@ class PendingCommands:
     """The futures of pending commands."""
 
     def __init__(self, clock: Clock, limit_s: Callable[[str], float]) -> None:
-        """Start without pending commands.
+        """Begin without pending commands.
 
         Args:
             clock: source of time.
-            limit_s: command → longest wait, in seconds.
+            limit_s: command → maximum wait, in seconds.
         """
         self._clock = clock
         self._limit_s = limit_s
@@ -59,11 +59,11 @@ class PendingCommands:
 
     @property
     def is_full(self) -> bool:
-        """Whether the limit of pending commands is reached."""
+        """Whether the maximum number of pending commands is reached."""
         return len(self._all) >= MAX_WAITING
 
     def add(self, request: Request, answer: asyncio.Future[Answer], now: float) -> None:
-        """Add the future of a request that is made at `now`."""
+        """Add and return the future of a request made at the time `now`."""
         name = request.command
         limit_s = self._limits_s.get(name)
         if limit_s is None:
@@ -74,7 +74,7 @@ class PendingCommands:
             self._arm(due_s)
 
     def settle(self, answer: Answer) -> None:
-        """Set the result of a pending command, if it still waits."""
+        """Set the result of a pending command, unless its caller no longer waits."""
         found = self._all.pop(answer.id, None)
         if found is not None and not found[0].done():
             found[0].set_result(answer)
@@ -98,7 +98,7 @@ class PendingCommands:
         self._alarm = self._clock.call_at(due_s, self._ring)
 
     def _ring(self) -> None:
-        """Fail the overdue commands, if any; the timer may be early."""
+        """Fail overdue commands; does nothing if the timer fires early."""
         self._alarm = None
         now = self._clock.now()
         for number, (_, due_s, name) in list(self._all.items()):
@@ -111,22 +111,23 @@ class PendingCommands:
 
 
 _SOONEST_S = 0.001
-"""Shortest time to the next tick after one with overdue work; an engine cannot block the loop."""
+"""Minimum delay before the next tick if work is overdue, in seconds, so that an engine cannot block
+the loop."""
 _AFTER_A_BUG_S = 1.0
 
 log = logging.getLogger(__name__)
 
 
 class EngineLike(Protocol):
-    """The methods that the dispatcher uses of `urc.protocol.engine.Engine`."""
+    """The methods of `urc.protocol.engine.Engine` that the dispatcher uses."""
 
     @property
     def deadline(self) -> float | None:
-        """Time of the next `tick`, or None."""
+        """Time of the next `tick`, or None without one."""
 
     @property
     def calm_s(self) -> float:
-        """Lower bound of new deadlines from `receive` and `command`, in seconds from now."""
+        """Minimum delay of deadlines that `receive` and `command` may create, in seconds."""
 
     def start(self, transport: str, now: float) -> Sequence[Event]:
         """Handle an opened transport."""
@@ -141,7 +142,7 @@ class EngineLike(Protocol):
         """Start a command."""
 
     def latch(self, reason: str, now: float) -> Sequence[Event]:
-        """End every sequence and refuse autonomous motion until called with ""."""
+        """End every sequence and refuse autonomous motion until the next call with ""."""
 
     def finish(self, now: float) -> list[Event]:
         """Start an orderly close of every connection."""
@@ -151,38 +152,38 @@ class EngineLike(Protocol):
 
 
 class LinkPort(Protocol):
-    """The dispatcher's interface to a `Link`.
+    """The interface of a `Link` that the dispatcher uses.
 
-    Methods of this interface must not call the dispatcher.
+    Implementations of these methods must not call the dispatcher.
     """
 
     @property
     def is_full(self) -> bool:
-        """Whether the output is too long for new commands."""
+        """Whether the output queue is too long for new commands."""
 
     def want_open(self) -> None:
-        """Connect, because a request waits."""
+        """Connect, because a request is waiting."""
 
     def want_close(self, reason: str) -> None:
-        """Write the queued output and close; close at once if a reason is given."""
+        """Write the queued output, then close; with a reason, close immediately."""
 
     def send(self, sent: Send) -> None:
-        """Write bytes or a message; secret ones are not shown as traffic."""
+        """Write bytes or a message; secret data is hidden from the traffic view."""
 
     def frame_received(self) -> None:
-        """Handle a good frame."""
+        """Handle a valid frame."""
 
     def ready(self) -> None:
-        """Handle the end of the connection's steps."""
+        """Handle the end of the connection's ``on_connect`` steps."""
 
     def count(self, fault: Violation) -> None:
         """Count a protocol violation."""
 
     def hang_up(self, reason: str) -> None:
-        """Close the connection; the link's own task reports the end to the engine."""
+        """Close the connection; the link's own task later reports the end to the engine."""
 
     def publish(self) -> None:
-        """Publish the state if it has changed."""
+        """Publish the link state if the state has changed."""
 
 
 class Dispatcher:
@@ -201,13 +202,14 @@ class Dispatcher:
         """Take over an engine.
 
         Args:
-            engine: the engine, which no other code may call from now on.
-            hub: receives readings and log entries.
+            engine: the engine, which other code must not call from now on.
+            hub: destination of readings and log entries.
             clock: source of time.
             commands: the driver's commands.
-            limit_s: command → seconds after which its wait ends, regardless of the engine.
-            sequence_control: sequence → its control.
-            motion: receives the events of held commands; None: drops them.
+            limit_s: command → time in seconds after which its wait ends, even if the engine is
+                still busy.
+            sequence_control: control of each sequence, by name.
+            motion: handler of held-command events; None ignores the events.
         """
         self._engine = engine
         self._hub = hub
@@ -225,7 +227,7 @@ class Dispatcher:
         self._is_stopped = False
 
     def attach(self, transport: str, port: LinkPort) -> None:
-        """Set the link of `transport`."""
+        """Set the link that serves `transport`."""
         self._ports[transport] = port
 
     def start(self, transport: str) -> None:
@@ -233,7 +235,7 @@ class Dispatcher:
         self._run(lambda now: self._engine.start(transport, now))
 
     def receive(self, transport: str, data: Payload, now: float) -> None:
-        """Pass received data to the engine; all its readings reach the hub together."""
+        """Pass received data to the engine; publish all resulting readings together."""
         if self._is_stopped:
             return
         try:
@@ -250,7 +252,10 @@ class Dispatcher:
         self._run(lambda now: self._engine.closed(transport, reason, now))
 
     def command(self, request: Request) -> asyncio.Future[Answer]:
-        """Start a command. The future gets exactly one result, unless `forget` comes first."""
+        """Start a command.
+
+        The future receives exactly one result, unless `forget` is called first.
+        """
         loop = self._loop = (
             self._loop or asyncio.get_running_loop()
         )  # cached: the call costs a system call
@@ -273,26 +278,26 @@ class Dispatcher:
         return answer
 
     def pull(self, sequence: str, what: Pull) -> None:
-        """Pause, continue or end a sequence; do nothing if it does not run."""
+        """Pause, continue or end a sequence; do nothing if the sequence is not running."""
         sequence_control = self._sequence_control.get(sequence)
         if sequence_control is not None:
             sequence_control.pull(what)
             self._run(self._engine.tick)
 
     def latch(self, reason: str) -> None:
-        """End every sequence and refuse autonomous motion; "" allows it again."""
+        """End every sequence and refuse autonomous motion; "" permits autonomous motion again."""
         self._run(lambda now: self._engine.latch(reason, now))
 
     def forget(self, request_id: int) -> None:
-        """Forget a request whose caller has gone."""
+        """Forget a request whose caller no longer waits."""
         self._waiting.forget(request_id)
 
     def wind_up(self) -> None:
-        """Start the timer with the engine's first deadline."""
+        """Start the timer for the engine's first deadline."""
         self._arm()
 
     def finish(self) -> None:
-        """Start an orderly close of every open connection; the engine then closes each."""
+        """Start an orderly close of every open connection; the engine finishes each close."""
         try:
             events = self._engine.finish(self._clock.now())
         except Exception as bug:  # supervisor, as in `command`
@@ -309,7 +314,7 @@ class Dispatcher:
         self._waiting.close(reason)
 
     def _refusal(self, request: Request) -> Failed:
-        """Return the reason to refuse a request without the engine, or None."""
+        """Return the reason to refuse a request before the engine is called, or None."""
         if self._is_stopped:
             return Failed(request.id, request.command, "disconnected", "the session is closed")
         if self._waiting.is_full:
@@ -363,7 +368,7 @@ class Dispatcher:
                 port.publish()
 
     def _change(self, event: Event) -> None:
-        """Pass an event to the link whose state it changes."""
+        """Pass an event to its link, which changes its state."""
         match event:
             case Violation(transport):
                 self._ports[transport].count(event)
@@ -375,7 +380,7 @@ class Dispatcher:
                 self._ports[transport].want_close(reason)
 
     def _arm_after(self, now: float) -> None:
-        """Call `_arm` unless the timer is already early enough."""
+        """Call `_arm` unless the timer already fires early enough."""
         # Without this check, a text poll costs 1.32 times a driver by hand, not 1.2 (decision 30).
         if self._alarm_s is None or self._alarm_s > now + self._calm_s:
             self._arm()
@@ -429,7 +434,7 @@ class Dispatcher:
         self._arm(_SOONEST_S)
 
     def _survive(self, bug: Exception) -> None:
-        """Report a bug of URC, reopen all connections, and keep the timer running."""
+        """Report a bug in URC, reopen all connections, and keep the timer running."""
         log.error("the engine failed", exc_info=bug)
         text = f"internal error ({type(bug).__name__}): please report it with the log"
         self._hub.log(LogEntry(self._clock.now(), "error", "engine", text))

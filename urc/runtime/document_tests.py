@@ -1,10 +1,11 @@
-"""The tests of a document, run on the engine that also drives the robot.
+"""The runner of a document's tests, which uses the same engine as a real robot.
 
-Layer 4, without I/O and asyncio: `urc validate` needs no robot, no network and no secret.
+This module is on layer 4, without I/O and asyncio: `urc validate` needs no robot, no network and no
+secret.
 
-A test runs in one instant, or step by step on a simulated clock. In one instant, the driver does
-nothing by itself. Step by step, the whole driver runs, except for polls that the test does not
-name.
+A test runs either in one instant or step by step on a simulated clock. In a test of one instant,
+the driver sends nothing automatically. In a test with steps, the whole driver runs, except for
+polls that the test does not name.
 """
 
 from collections.abc import Mapping
@@ -23,22 +24,22 @@ __all__ = ["TestReport", "exercise", "sample_settings"]
 
 _SAMPLE: Final[Mapping[str, Value]] = {"host": "127.0.0.1", "port": 1, "integer": 0, "number": 0.0}
 _ROUNDS: Final = 16
-"""Number of deadlines that a test passes while it waits for its declared failure."""
+"""Maximum number of deadlines during the wait for a declared failure."""
 
 
 class TestReport(NamedTuple):
-    """Result of a document's tests."""
+    """Results of a document's tests."""
 
     problems: list[Problem]
     """One problem for each failed test."""
     exercised: frozenset[Exercised]
-    """Commands, polls and messages that passed or failed tests have used."""
+    """Commands, polls and messages that any test has used."""
 
 
 class _Complaint(NamedTuple):
     text: str
     step: int | None = None
-    """Index of the step, from 0; None for a test without steps."""
+    """Index of the failed step, from 0; None for a test without steps."""
 
 
 def exercise(profile: Profile) -> TestReport:
@@ -54,7 +55,7 @@ def exercise(profile: Profile) -> TestReport:
 
 
 def sample_settings(settings: Mapping[str, Setting]) -> dict[str, Value]:
-    """Return a value for every setting: its default, or a sample of its type.
+    """Return a value for every setting: the default, or a sample of the setting's type.
 
     Optional settings stay empty.
     """
@@ -93,7 +94,7 @@ def _problem(profile: Profile, test: DocumentTest, complaint: _Complaint) -> Pro
 def _run(
     driver: Driver, settings: Mapping[str, Value], test: DocumentTest, used: set[Exercised]
 ) -> _Complaint:
-    """Return the failure, or empty text for a pass; add the used parts to `used`."""
+    """Return the failure text, or "" for a pass; add the used parts to `used`."""
     used |= _asked(driver, test)
     try:
         trial = TestEngine(_narrowed(driver, test), settings, driver.polls)
@@ -110,7 +111,7 @@ def _run(
 
 
 def _asked(driver: Driver, test: DocumentTest) -> set[Exercised]:
-    """Return the requests of a test in one instant, even if it fails before them."""
+    """Return the requests of a one-instant test, even if the test fails before sending them."""
     asked: set[Exercised] = set()
     if isinstance(test.reply_to, int):
         poll = driver.polls[test.reply_to]
@@ -124,10 +125,10 @@ def _asked(driver: Driver, test: DocumentTest) -> set[Exercised]:
 
 
 def _narrowed(driver: Driver, test: DocumentTest) -> Driver:
-    """Return the driver with only the polls of the test.
+    """Return a copy of the driver with only the polls that the test names.
 
-    In one instant, polls are due at once. A test without a request is about unsolicited frames and
-    the steps of the connections.
+    In a one-instant test, polls are due immediately. A test without a request checks unsolicited
+    frames and the steps of connections.
     """
     if test.steps:
         polls = tuple(poll for poll in driver.polls if poll.name in test.polls)
@@ -146,7 +147,7 @@ def _narrowed(driver: Driver, test: DocumentTest) -> Driver:
 
 
 def _in_an_instant(trial: TestEngine, test: DocumentTest) -> list[str]:
-    """Connect, send, and feed the reply; return the complaints."""
+    """Connect, send, and feed the reply; return the failure messages."""
     command = test.run or (test.reply_to if isinstance(test.reply_to, str) else None)
     checks = bool(test.expect or test.sent or test.fails is not None)
     asked = trial.driver.commands.get(command or "")
@@ -176,7 +177,7 @@ def _in_an_instant(trial: TestEngine, test: DocumentTest) -> list[str]:
 
 
 def _check_failure(trial: TestEngine, expected: str) -> list[str]:
-    """Pass time until the declared failure; complain if it never comes."""
+    """Let time pass until the declared failure; return a message if the failure does not occur."""
     for _ in range(_ROUNDS):
         if any(expected in failure for failure in trial.failures):
             return []
@@ -237,7 +238,7 @@ def _act(trial: TestEngine, step: DialogueStep) -> None:
 
 
 def _check(trial: TestEngine, step: DialogueStep) -> list[str]:
-    """Return the complaints after a step."""
+    """Return the failure messages after a step."""
     complaints: list[str] = []
     if step.fails:
         complaints += _check_told(trial, step)
@@ -259,7 +260,7 @@ def _check(trial: TestEngine, step: DialogueStep) -> list[str]:
 
 
 def _check_told(trial: TestEngine, step: DialogueStep) -> list[str]:
-    """Complain about a missing declared failure, and forget other reports of the step."""
+    """Report a missing declared failure, and discard other events of the step."""
     failures = list(trial.failures)
     if step.of:
         ended = [one for one in trial.ended if one.command == step.of]
@@ -273,12 +274,12 @@ def _check_told(trial: TestEngine, step: DialogueStep) -> list[str]:
 
 
 def _isolated(driver: Driver, *, keeps_conditions: bool) -> Driver:
-    """Return the driver with connections that are ready at once and send nothing by themselves.
+    """Return a copy of the driver with connections that need no steps and send nothing themselves.
 
     Args:
         driver: the loaded driver.
-        keeps_conditions: whether commands keep requires and verify. A test of bytes has no robot to
-            report the signals.
+        keeps_conditions: whether to keep the `requires` and `verify` conditions of commands.
+            Without a robot, a test of bytes has no signals for these conditions.
     """
     transports = {
         name: spec._replace(on_connect=(), on_close=(), keepalive=None, stale_after_s=None)

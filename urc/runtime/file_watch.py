@@ -1,6 +1,6 @@
-"""Detection of changed, new and deleted files by polling, which needs no extra package.
+"""Detection of changed, new and deleted files by polling, without an extra package.
 
-Layer 4. Editors often replace a file, so the path is polled, not the open file.
+Layer 4. The watch polls the path, not the open file, because editors often replace files.
 """
 
 import os
@@ -15,13 +15,13 @@ _State = tuple[int, int, int] | None
 
 
 class FileWatcher:
-    """The last known states of some files."""
+    """The last known state of each watched file."""
 
     def __init__(self, files: Iterable[str]) -> None:
         self._states = {file: _state(file) for file in files}
 
     def add(self, files: Iterable[str]) -> None:
-        """Watch further files; known files keep their states."""
+        """Watch additional files; files that are already watched keep their states."""
         for file in files:
             if file not in self._states:
                 self._states[file] = _state(file)
@@ -31,14 +31,14 @@ class FileWatcher:
         return [file for file, state in self._states.items() if _state(file) != state]
 
     def states(self) -> list[object]:
-        """Return the current state of every file; equal results mean no change in between."""
+        """Return the state of every file; equal results mean that no file has changed."""
         return [_state(file) for file in self._states]
 
 
 def wait_for_change(watched: FileWatcher, sleep: Callable[[float], None] = time.sleep) -> list[str]:
-    """Return the changed files, once one has changed and all are stable for one period.
+    """Return the changed files after at least one has changed and all are stable for one period.
 
-    Otherwise, a program that writes a file in several steps would be caught half-way.
+    The stable period ensures that files written in several steps are complete.
     """
     while not watched.changed():
         sleep(PERIOD_S)

@@ -1,4 +1,4 @@
-"""The guard of a session, with the driver's transports and held commands."""
+"""Creation of a session's guard client from the driver's transports and held commands."""
 
 import logging
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ from urc.runtime.transport_chain import BuiltTransport, make_lines
 __all__ = ["start_guard_client"]
 
 _SLOW_TO_OPEN: Final = frozenset(("ssh", "serial", "mqtt", "ros"))
-"""Transports that open slowly or maybe not again, so they are not reset at once."""
+"""Transport types that are not reset immediately, because they open slowly or might not reopen."""
 
 _SOONER: Final = 0.9
 
@@ -42,9 +42,9 @@ def start_guard_client(
     Args:
         driver: the loaded driver.
         settings: a value for every setting.
-        table: the kinds of transport.
+        table: the available transport types.
         clock: source of time for a guard in this process.
-        is_guarded: whether the guard is a separate process.
+        is_guarded: whether to run the guard in a separate process.
 
     Raises:
         UrcError: a transport cannot be built with these settings.
@@ -67,7 +67,7 @@ def _held(command: Command, driver: Driver) -> HeldSpec:
 
 
 def _is_slow_to_open(spec: TransportSpec, driver: Driver) -> bool:
-    """Return whether a stalled transport gets time, instead of a reset at once."""
+    """Return whether a stalled transport gets extra time instead of an immediate reset."""
     said = {
         one.hold.on_stall
         for one in driver.commands.values()
@@ -79,10 +79,11 @@ def _is_slow_to_open(spec: TransportSpec, driver: Driver) -> bool:
 
 
 def _silent_s(spec: TransportSpec) -> float | None:
-    """Return the silence after which a transport is reset during motion, or None for never.
+    """Return the silence in seconds after which a transport is reset during motion; None for never.
 
-    This time is a little shorter than the engine's timeout, because the engine's output would queue
-    up behind the motion. A connectionless transport has no buffer that a reset could discard.
+    The result is slightly shorter than the engine's timeout, because the engine's output would
+    queue up behind the motion frames. A connectionless transport has no send buffer that a reset
+    could discard.
     """
     if spec.stale_after_s is None or spec.type in ("udp", "serial"):
         return None

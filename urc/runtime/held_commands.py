@@ -1,4 +1,4 @@
-"""The held commands of a robot, and the interfaces that the motion controller needs."""
+"""The held commands of a robot, and the interfaces that the motion controller uses."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,16 +25,16 @@ __all__ = [
 
 
 class MotionFrames(Protocol):
-    """The controller's interface to the engine: `urc.protocol.motion_encoder.MotionEncoder`."""
+    """The engine as the controller uses it: `urc.protocol.motion_encoder.MotionEncoder`."""
 
     def is_lasting(self, command: str) -> bool:
         """Return whether the stop frame of a held command never changes."""
 
     def has_stops(self, command: str) -> bool:
-        """Return whether the last rendered stop frames are enough for now."""
+        """Return whether the last rendered stop frames are still sufficient."""
 
     def is_ready(self, command: str) -> bool:
-        """Return whether its transport is connected, and the steps are done."""
+        """Return whether the command's transport is connected, with all connection steps done."""
 
     def stop_frame(self, command: str) -> Payload | FrameVariants:
         """Return the stop frame of a held command; raise `UrcError` on failure."""
@@ -42,47 +42,47 @@ class MotionFrames(Protocol):
     def motion_frame(
         self, command: str, arguments: Mapping[str, Reading], now: float
     ) -> Payload | CountedFrame:
-        """Return the frame of a held command; raise `UrcError` with the reason of a refusal."""
+        """Return the motion frame of a held command; raise `UrcError` with a refusal's reason."""
 
 
 class MotionBackend(Protocol):
-    """The controller's interface to the writer of motion: the guard process, or this one."""
+    """The interface to the writer of motion frames: a guard process, or a guard in this process."""
 
     def arm(self, command: str, terms: HoldTerms) -> None:
-        """Accept ticks of `command` from now on, under these terms."""
+        """Accept ticks of `command` from now on, under `terms`."""
 
     def tick(self, command: str, data: Payload | CountedFrame) -> None:
         """Renew the lease of `command`; `data` is its newest frame."""
 
     def renew(self, command: str, stop: Payload | FrameVariants) -> None:
-        """Replace the stop frame of `command`; this arms nothing."""
+        """Replace the stop frame of `command` without arming the command."""
 
     def is_stopping(self, command: str) -> bool:
-        """Return whether `command` may be moving, or its stop may be repeated."""
+        """Return whether `command` may be moving, or its stop may still be repeated."""
 
     def is_open(self, command: str) -> bool:
-        """Return whether its transport is connected, by the last report."""
+        """Return whether the transport of `command` is connected, as last reported."""
 
     def release(self, command: str) -> None:
         """Stop `command` after its release."""
 
     def stop(self, stops: Mapping[str, Payload | FrameVariants]) -> None:
-        """Stop all motion at once, with these stop frames of all held commands."""
+        """Stop all motion immediately; `stops` maps each held command to its stop frame."""
 
     async def stops(self) -> Sequence[tuple[str, Reason]]:
-        """Wait for the next written stop frames; return command and reason of each.
+        """Wait for written stop frames; return the command and the reason of each.
 
-        The list is in order, and has at least one entry. A cancellation loses none. A control that
-        `stop` stopped is reported as ``stopped`` even without motion, because its transport has
+        The list is in order and is never empty. Cancelling the wait loses no stop. A control
+        stopped by `stop` is reported as ``stopped`` even without motion, after the transport has
         accepted the stop.
         """
 
 
 class MotionSession(Protocol):
-    """The part of a session that a motion controller needs."""
+    """The part of a session that the motion controller uses."""
 
     on_motion: Callable[[MotionEvent], None] | None
-    """Callback for the engine's events of held commands; set by the motion controller."""
+    """Callback for the engine's held-command events; set by the motion controller."""
 
     @property
     def frames(self) -> MotionFrames:
@@ -90,46 +90,46 @@ class MotionSession(Protocol):
 
     @property
     def backend(self) -> MotionBackend | None:
-        """The guard; None for a robot without held commands."""
+        """The motion backend; None for a robot without held commands."""
 
 
 @dataclass(slots=True)
 class HeldControl:
-    """One held command, from its page's point of view."""
+    """The state of one held command, as seen by its page."""
 
     line: str
     hold: Hold
     period_s: float
-    """Shortest time between two of its frames, in seconds."""
+    """Minimum interval between two frames of the command, in seconds."""
     slew: SlewRateLimiter | None
     defaults: Mapping[str, Reading]
-    """Defaults of the arguments that slew limits."""
+    """Default values of the arguments with a slew rate limit."""
     needs_ready_line: bool
-    """Whether a stop that was sent before its transport was ready is repeated."""
+    """Whether to repeat a stop that was sent before its transport was ready."""
     is_armed: bool = False
     is_lasting: bool = False
-    """Whether its stop frame stays the same while it is armed."""
+    """Whether the stop frame stays the same while the command is armed."""
     motion_state: Literal["rest", "moving", "ending"] = "rest"
-    """``ending``: released, and its stop is not reported as written yet."""
+    """``ending`` means: released, but the stop is not yet reported as written."""
     stop: Payload | FrameVariants | None = None
-    """Stop frame of the command, as stored by the motion backend."""
+    """Stop frame of the command, as known to the motion backend."""
     is_owed_again: bool = False
-    """Whether its stop was sent before the transport was ready, and must be repeated."""
+    """Whether the stop was sent before the transport was ready, and must be repeated."""
     needs_release: bool = False
     why: str = ""
-    """Reason for which it needs a release."""
+    """Reason why the control must be released before new motion; "" without one."""
     closed_epoch: int = -1
-    """Epoch of the lease in which it was stopped; it continues only in a later one."""
+    """Epoch of the lease in which the command was stopped; motion requires a later epoch."""
 
     def rest(self) -> None:
-        """Set the control to rest."""
+        """Reset the control to the state of rest."""
         if self.slew is not None:
             self.slew.reset()
 
     def close(self, why: str, epoch: int) -> None:
-        """Accept no tick before a release and a new lease after `epoch`.
+        """Refuse ticks until the control is released and the lease is newer than `epoch`.
 
-        The first reason stays, because later ones follow from it.
+        The first reason is kept, because later reasons are consequences of the first.
         """
         if not self.needs_release:
             self.why = why
@@ -140,7 +140,7 @@ class HeldControl:
         self.closed_epoch = epoch
 
     def limited(self, arguments: Mapping[str, Reading], now: float) -> Mapping[str, Reading]:
-        """Return the arguments after the slew rate limit."""
+        """Return the arguments, limited by the slew rate."""
         if self.slew is None:
             return arguments
         return self.slew.limit({**self.defaults, **arguments}, now)
@@ -165,7 +165,7 @@ def control_of(driver: Driver, command: Command) -> HeldControl:
 
 
 def period_of(driver: Driver, command: Command) -> float:
-    """Return the shortest allowed time between two frames of a held command, in seconds."""
+    """Return the minimum interval between two frames of a held command, in seconds."""
     hold = command.hold
     repeat_s = STALLED_S if hold is None else hold.repeat_s
     rate_s = 1 / command.rate_per_s if command.rate_per_s else 0.0
@@ -175,9 +175,9 @@ def period_of(driver: Driver, command: Command) -> float:
 
 
 _LOSSY = frozenset(("udp", "serial", "mqtt", "ros"))
-"""Transports on which one stop may be lost."""
+"""Transport types on which a single stop frame may be lost."""
 
 
 def is_lossy(driver: Driver, transport: str) -> bool:
-    """Return whether written data may be lost on this transport without notice."""
+    """Return whether written data may be lost on this transport without an error."""
     return driver.transports[transport].type in _LOSSY

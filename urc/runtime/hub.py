@@ -1,11 +1,11 @@
 """The latest value of every signal and the state of every link of one robot.
 
-Layer 4. The newest value wins: a slow reader sees the newest reading, never a queue of old ones.
-Log entries (faults, state changes) are kept in a bounded list that counts the dropped ones. One
-event loop uses the hub; it has no task and no timer of its own.
+Layer 4. Readers always see the newest reading; a slow reader never receives a queue of old
+readings. Log entries (faults and state changes) are kept in a bounded list, with a count of the
+dropped entries. The hub is used on one event loop, and has no tasks or timers.
 
-All readers get their values from the hub: pages, cards, recordings and the command line. So
-redaction removes the values of secret settings here, on the way in.
+Pages, cards, recordings and the command line all read their values from the hub. The hub therefore
+redacts secret settings in all incoming data.
 """
 
 import asyncio
@@ -40,11 +40,11 @@ __all__ = [
 
 
 STREAM_KEPT: Final = 500
-"""Number of stored readings of each such signal."""
+"""Number of stored readings of each streamed signal."""
 
 
 class SampleHistory:
-    """The last readings of some signals, each with its revision of the hub."""
+    """The last readings of selected signals, each with the hub revision of its arrival."""
 
     def __init__(self) -> None:
         self._kept: dict[str, deque[tuple[int, Sample]]] = {}
@@ -55,13 +55,13 @@ class SampleHistory:
         return bool(self._kept)
 
     def watch(self, names: Iterable[str]) -> None:
-        """Store every reading of these signals from now on."""
+        """Store every reading of the given signals from now on."""
         for name in names:
             self._kept.setdefault(name, deque(maxlen=STREAM_KEPT))
             self._counts.setdefault(name, 0)
 
     def append(self, samples: Iterable[Sample], revision: int) -> None:
-        """Store the samples of a revision."""
+        """Store the samples of one hub revision."""
         for sample in samples:
             name = sample[0]
             kept = self._kept.get(name)
@@ -70,7 +70,7 @@ class SampleHistory:
                 self._counts[name] += 1
 
     def filled(self, newest: Iterable[Sample], since: int) -> Sequence[Sample]:
-        """Return the newest readings, and older ones after the revision `since`."""
+        """Return the newest readings, and all streamed readings after the revision `since`."""
         found: list[Sample] = []
         for sample in newest:
             rows: list[Sample] = []
@@ -82,13 +82,14 @@ class SampleHistory:
         return found
 
     def firsts(self, names: Sequence[str]) -> dict[str, int]:
-        """Return the number of the first reading of each signal; the last is its newest."""
+        """Return the number of each signal's first reading; `names` ends with the newest ones."""
         counts = self._counts
         return {name: counts[name] - names.count(name) + 1 for name in counts if name in names}
 
 
 LinkState = Literal["idle", "connecting", "live", "silent", "lost"]
-"""idle: not requested yet. silent: connected, but overdue. lost: not connected."""
+"""Meaning of some states: ``idle``: not requested yet; ``silent``: connected, but data is overdue;
+``lost``: not connected."""
 
 NOTES_KEPT = 500
 TRAFFIC_KEPT = 1000
@@ -97,52 +98,52 @@ TAP_KEPT = 10_000
 
 @dataclass(frozen=True, slots=True)
 class LinkStatus:
-    """State of one transport."""
+    """The published state of one transport."""
 
     transport: str
     state: LinkState
     address: str
     since_s: float
-    """Monotonic time at which this state began, in seconds."""
+    """Monotonic time at which the present state began, in seconds."""
     detail: str = ""
-    """One-line reason of a bad state."""
+    """Reason for an abnormal state, in one line."""
     attempts: int = 0
-    """Number of failed attempts since the last good frame."""
+    """Number of failed attempts since the last valid frame."""
     faults: int = 0
     """Number of protocol violations since the session began."""
 
 
 @dataclass(frozen=True, slots=True)
 class LogEntry:
-    """A log entry: a fault or a change of state."""
+    """A log entry about a fault or a change of state."""
 
     time_s: float
     level: Literal["info", "warning", "error"]
     source: str
-    """Name of the transport or command."""
+    """Name of the transport or command that caused the entry."""
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Traffic:
-    """Bytes of a connection; only recorded while a reader watches."""
+    """Traffic of a connection, recorded only while a reader watches."""
 
     time_s: float
     transport: str
     direction: Literal["sent", "received"]
     data: bytes
     envelope: Envelope | None = None
-    """Message with these bytes, on a transport with messages."""
+    """Message to which the bytes belong, on a transport with messages."""
 
 
 class HubSubscription:
-    """A reader's position: the last revision that it has seen, and a wake-up for newer ones."""
+    """A reader's position: the last revision seen, and an event for newer revisions."""
 
     def __init__(self, hub: "Hub") -> None:
         self._hub = hub
         self._event = asyncio.Event()
         self.seen = 0
-        """Revision up to which this reader has taken everything."""
+        """Revision of the last change that this reader has taken."""
 
     async def changed(self) -> None:
         """Return when the hub has a newer revision than `seen`."""
@@ -151,7 +152,7 @@ class HubSubscription:
             await self._event.wait()
 
     def wake(self) -> None:
-        """Let `changed` check again."""
+        """Wake the waiting `changed` call, so that it checks again."""
         self._event.set()
 
     def changes(self) -> list[Sample]:
@@ -163,20 +164,20 @@ class HubSubscription:
 
 @dataclass(frozen=True, slots=True)
 class SequenceProgress:
-    """Progress of a sequence."""
+    """Progress of a running or ended sequence."""
 
     command: str
     place: int
-    """Number of started steps, without nested ones."""
+    """Number of started top-level steps."""
     of: int
     state: Literal["idle", "running", "paused"]
     reason: str = ""
-    """Reason of a failure, or ""."""
+    """Reason of the sequence's failure, or ""."""
 
 
 @dataclass(frozen=True, slots=True)
 class MotionRecord:
-    """An accepted tick of a held command; only reported while a tap is open."""
+    """An accepted tick of a held command, reported only while a tap is open."""
 
     time_s: float
     command: str
@@ -185,28 +186,29 @@ class MotionRecord:
 
 @dataclass(frozen=True, slots=True)
 class AuditRecord:
-    """An entry of the audit log."""
+    """An audit log entry, as passed to taps."""
 
     time_s: float
-    """Monotonic time; the entry itself has the time of day, which may be adjusted."""
+    """Monotonic time of the entry, in seconds; the time of day inside the entry may be adjusted by
+    the system."""
     entry: "AuditEntry"
 
 
 Tapped: TypeAlias = Sample | LogEntry | Traffic | LinkStatus | MotionRecord | AuditRecord
-"""Item of a tap."""
+"""One event in a tap."""
 
 
 class EventTap:
-    """A complete, ordered stream of events for one reader; it counts its losses."""
+    """A complete, ordered stream of events for one reader, with a count of lost events."""
 
     def __init__(self) -> None:
         self.dropped = 0
-        """Number of items lost because the reader was too slow, since the tap was opened."""
+        """Number of events lost because the reader was too slow, since the tap was opened."""
         self._kept: deque[Tapped] = deque()
         self._event = asyncio.Event()
 
     def push(self, items: Iterable[Tapped]) -> None:
-        """Add items; beyond `TAP_KEPT`, drop the oldest ones."""
+        """Add events; if the tap exceeds `TAP_KEPT`, drop the oldest ones."""
         for item in items:
             if len(self._kept) == TAP_KEPT:
                 self._kept.popleft()
@@ -215,20 +217,20 @@ class EventTap:
         self._event.set()
 
     async def filled(self) -> None:
-        """Return when items are available."""
+        """Return when events are available."""
         while not self._kept:
             self._event.clear()
             await self._event.wait()
 
     def drain(self) -> list[Tapped]:
-        """Return all items and empty the tap."""
+        """Return all events and empty the tap."""
         taken = list(self._kept)
         self._kept.clear()
         return taken
 
 
 class Hub:
-    """Latest values of one robot, with a revision that grows with every change."""
+    """Latest values of one robot, with a revision number that grows with every change."""
 
     def __init__(
         self,
@@ -240,32 +242,32 @@ class Hub:
 
         Args:
             signals: the driver's signals.
-            redactor: removes secrets from all input; None if the robot has none.
-            streams: transports whose traffic may split a message over several pieces.
+            redactor: removes secrets from all incoming data; None for a robot without secrets.
+            streams: names of transports whose traffic may split a message into several pieces.
         """
         self.signals = signals
         self._redactor = redactor if redactor is not None and redactor.is_needed else None
         self._stream_lines = frozenset(streams)
         self.names = tuple(signals)
-        """Index → signal name, in the order of the driver, fixed for the session."""
+        """Signal names in the order of the driver, fixed for the session."""
         self.index = {name: place for place, name in enumerate(self.names)}
         self.revision = 0
         self.links: dict[str, LinkStatus] = {}
         self.links_count = 0
-        """Number of changes of the links."""
+        """Number of link state changes so far."""
         self.progress: dict[str, SequenceProgress] = {}
-        """Sequence → its progress; sequences that never ran are missing."""
+        """Sequence → its progress; sequences that have never run are missing."""
         self.progress_count = 0
-        """Number of changes of the progress."""
+        """Number of sequence progress changes so far."""
         self.notes: deque[LogEntry] = deque(maxlen=NOTES_KEPT)
         self.notes_count = 0
-        """Total number of log entries; the deque holds the last ones."""
+        """Total number of log entries, including entries that the list has dropped."""
         self.traffic: deque[Traffic] = deque(maxlen=TRAFFIC_KEPT)
         self.traffic_count = 0
         self.traffic_watchers = 0
-        """Number of readers of traffic; traffic is recorded while it is above 0."""
+        """Number of readers of traffic; while above 0, traffic is recorded."""
         self.streams = SampleHistory()
-        """Signals of which every reading counts; none by default."""
+        """Signals for which every reading is kept; empty by default."""
         self._latest: dict[str, Sample] = {}
         self._changed: dict[str, int] = {}
         self._wakers: set[Callable[[], None]] = set()
@@ -273,7 +275,7 @@ class Hub:
         self._traffic_taps: set[EventTap] = set()
 
     def publish(self, samples: Iterable[Sample]) -> None:
-        """Store readings; a repeated value also counts as a change, because its age is new."""
+        """Store readings; a repeated value also counts as a change, because its time is new."""
         taken = samples if type(samples) is tuple else tuple(samples)
         if self._redactor is not None:
             value = self._redactor.value
@@ -319,7 +321,7 @@ class Hub:
         return bool(self._taps)
 
     def publish_record(self, done: MotionRecord | AuditRecord) -> None:
-        """Report an operator's action; only taps receive it."""
+        """Report an operator's action to the open taps."""
         if self._redactor is not None and isinstance(done, MotionRecord):
             done = replace(done, arguments=self._redactor.value(done.arguments))
         for tap in self._taps:
@@ -337,7 +339,7 @@ class Hub:
         self._wake()
 
     def saw(self, traffic: Traffic) -> None:
-        """Add traffic; the possible beginning of a secret is delayed until more bytes arrive."""
+        """Add traffic; hold back a possible beginning of a secret until more bytes arrive."""
         if self._redactor is not None:
             is_stream = traffic.envelope is None and traffic.transport in self._stream_lines
             if is_stream:
@@ -352,11 +354,11 @@ class Hub:
 
     @property
     def holds_back(self) -> bool:
-        """Whether some traffic is delayed."""
+        """Whether some traffic is held back."""
         return self._redactor is not None and self._redactor.is_holding
 
     def tell_rest(self, now_s: float) -> None:
-        """Publish the delayed traffic, because no more bytes arrived."""
+        """Publish traffic that was held back, after a pause without further bytes."""
         if self._redactor is not None:
             for (transport, direction), data in self._redactor.rest():
                 went: Literal["sent", "received"] = "sent" if direction == "sent" else "received"
@@ -371,7 +373,7 @@ class Hub:
         self._wake()
 
     def latest(self, name: str) -> Sample | None:
-        """Return the newest reading of a signal, or None."""
+        """Return the newest reading of a signal, or None without a reading."""
         return self._latest.get(name)
 
     def changed_since(self, revision: int) -> Sequence[Sample]:
@@ -380,9 +382,9 @@ class Hub:
         return [sample for name, sample in self._latest.items() if changed[name] > revision]
 
     def readings_since(self, revision: int, *, joined: int = 0) -> Sequence[Sample]:
-        """Return the same, and every reading of the signals in `streams`, the newest last.
+        """Return the newest readings, and every streamed reading, after `revision`; oldest first.
 
-        Stream readings from before `joined`, the revision at which the reader began, are left out.
+        Streamed readings from before `joined`, the reader's first revision, are left out.
         """
         newest = self.changed_since(revision)
         return self.streams.filled(newest, max(revision, joined)) if self.streams else newest
@@ -396,7 +398,7 @@ class Hub:
 
     @contextmanager
     def heed(self, wake: Callable[[], None]) -> Iterator[None]:
-        """Call `wake` at each change during the context; it must return at once."""
+        """Call `wake` at each change while the context is open; `wake` must return immediately."""
         self._wakers.add(wake)
         try:
             yield
@@ -408,7 +410,7 @@ class Hub:
         """Open a tap on all samples and log entries for the duration of the context.
 
         Args:
-            with_traffic: whether to include the bytes of the connections, recorded from now on.
+            with_traffic: whether to include the bytes of the connections, from now on.
         """
         tap = EventTap()
         self._taps.add(tap)

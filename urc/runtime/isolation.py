@@ -1,7 +1,7 @@
-"""A preview of a third-party document in a separate process with limited memory and time.
+"""Previews of third-party documents in a separate process with limited memory and time.
 
-``python -m urc.runtime.isolation`` reads the task from its standard input, as JSON, and writes the
-preview. The cost of a document never affects the calling program.
+``python -m urc.runtime.isolation`` reads a task as JSON from standard input and prints the preview.
+An expensive document therefore cannot slow down the calling program.
 """
 
 import json
@@ -19,28 +19,28 @@ from urc.runtime.package_preview import PackagePreview, look
 __all__ = ["PreviewWorker", "bound_this_process", "look_apart"]
 
 TOTAL_S: Final = 60.0
-"""Limit of a preview, in seconds; it is long, for small and busy machines."""
+"""Maximum time for a preview, in seconds, chosen for small and busy machines."""
 PROCESSOR_S: Final = 30
 MEMORY_BYTES: Final = 1 << 30
 COMMAND: Final = ("-P", "-m", "urc.runtime.isolation")
-"""Arguments of Python; -P prevents imports from the working folder."""
+"""Command-line arguments of Python; ``-P`` prevents imports from the working folder."""
 _ANSWER_BYTES: Final = 16 << 20
 
 
 def look_apart(
     document: Path, folder: Path, widgets: Sequence[str], *, total_s: float = TOTAL_S
 ) -> PackagePreview:
-    """Return the result of `urc.runtime.package_preview.look`, or raise its errors.
+    """Return the result of `urc.runtime.package_preview.look`, or raise the same errors.
 
     Args:
         document: the document of the package.
-        folder: folder with all files that the package needs.
+        folder: folder that contains all files of the package and its dependencies.
         widgets: names of the included widgets.
-        total_s: limit of the preview, in seconds.
+        total_s: maximum time for the preview, in seconds.
 
     Raises:
         ProblemsError: the document has errors.
-        UrcError: it refers to a file outside, or exceeds the limits of memory and time.
+        UrcError: the document refers to an outside file, or exceeds the limits of memory or time.
     """
     asked = json.dumps([str(document), str(folder), list(widgets)])
     command = [sys.executable, *COMMAND]
@@ -73,16 +73,16 @@ class PreviewWorker:
         self._seen: dict[Path, PackagePreview] = {}
 
     def __call__(self, document: Path, folder: Path, widgets: Sequence[str]) -> PackagePreview:
-        """Return the result of `look_apart`, or raise its errors."""
+        """Return the cached or new result of `look_apart`, or raise the same errors."""
         if document not in self._seen:
             self._seen[document] = look_apart(document, folder, widgets)
         return self._seen[document]
 
 
 def bound_this_process(processor_s: int, memory_bytes: int) -> None:
-    """Limit this process, and lower its priority, so that motion comes first.
+    """Limit the resources of this process, and lower its priority below motion.
 
-    On Windows, only the caller's timeout applies.
+    On Windows, only the timeout of the caller applies.
     """
     try:
         import resource
@@ -95,7 +95,7 @@ def bound_this_process(processor_s: int, memory_bytes: int) -> None:
 
 
 def _said(line: str) -> Any:
-    """Return a line as JSON, with its text in translatable form."""
+    """Return a permission line as JSON, with its text in translatable form."""
     if not isinstance(line, Phrase):
         return line
     if line.pieces:

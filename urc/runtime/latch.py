@@ -1,7 +1,7 @@
-"""The part of a lease that survives a restart, in one small file: latch, epoch, pending stop.
+"""The part of a lease that survives a restart, in a small file: latch, epoch, pending stop.
 
-Writing may be slow, or fail on a full disk, and stopping must wait for neither. So a thread writes
-the newest state, and failures are reported without an exception.
+Writing can be slow, or fail on a full disk; a stop must not wait for either. A thread therefore
+writes the newest state, and failures are reported without an exception.
 """
 
 import asyncio
@@ -30,17 +30,20 @@ class Latch(NamedTuple):
 
     state: LeaseState
     is_owed: bool = False
-    """Whether the robot has not received the last stop yet."""
+    """Whether the last stop has not yet reached the robot."""
 
 
 _UNKNOWN = Latch(LeaseState(latched_by=_UNREADABLE), is_owed=True)
 
 
 class LatchStore:
-    """The file of one robot. Call `load` first, then `keep` from the event loop."""
+    """The stored latch of one robot.
+
+    Call `load` before the first `keep`; call `keep` on the event loop.
+    """
 
     def __init__(self, folder: Path, robot: str) -> None:
-        """Choose the file, without reading or writing it."""
+        """Select the file, without reading or writing."""
         self._file = folder / f"{robot}.latch.json"
         self._newest: Latch | None = None
         self._writing: asyncio.Task[None] | None = None
@@ -48,14 +51,15 @@ class LatchStore:
         self.fault = ""
         """Reason why the newest state cannot be stored, or ""."""
         self.on_fault: Callable[[str], None] = _untold
-        """Called with every new `fault`, and with "" after a recovery."""
+        """Callback for every new `fault`, called with "" after a recovery."""
 
     def load(self) -> Latch:
         """Return the stored state.
 
-        An unreadable or invalid file means latched, because the true state is unknown. The robot
-        gets the stop once more, unless the file says that it has received it. Page numbers start
-        at one in each run, so the page that stopped the robot is named as one before a restart.
+        An unreadable or invalid file counts as latched, because the true state is unknown. In this
+        case the robot receives the stop again, unless the file confirms an earlier delivery. Page
+        numbers restart at one in each run, so the name of the page that stopped the robot is marked
+        as from before the restart.
         """
         try:
             with self._file.open("rb") as file:
@@ -73,7 +77,7 @@ class LatchStore:
         return _UNKNOWN
 
     def save(self, kept: Latch) -> None:
-        """Write `kept` soon and return at once; only the newest state counts.
+        """Schedule the writing of `kept` and return immediately; only the newest state is written.
 
         A failed write is retried every few seconds.
         """
@@ -85,7 +89,7 @@ class LatchStore:
             self._writing = asyncio.get_running_loop().create_task(self._write())
 
     async def settle(self) -> None:
-        """Wait until the newest state is written, or its writing has failed."""
+        """Wait until the newest state is written, or the write has failed."""
         if self._writing is not None:
             await self._writing
 
@@ -111,7 +115,7 @@ class LatchStore:
         self.on_fault(fault)
 
     def _replace(self, kept: Latch) -> None:
-        """Replace the file atomically: after a crash, it is either old or new."""
+        """Replace the file atomically, so that a crash leaves either the old or the new content."""
         by = kept.state.latched_by[:_LONGEST_NAME]
         text = json.dumps({"epoch": kept.state.epoch, "latched_by": by, "owed": kept.is_owed})
         put_private(self._file, text.encode())

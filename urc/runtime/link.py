@@ -1,20 +1,21 @@
-"""The link to a robot: one transport, and its part of the driver's engine.
+"""The link to a robot: one transport, and its share of the driver's engine.
 
-Theory of operation. `run` is a loop of three waits. The loop waits for a reason to connect: a
-persistent link always has one; else the engine sends `Open`, or each request opens the link. Then
-the loop waits for the backoff, and for the end of the connection. A reader and a writer run while
-the connection is open. Every end (by the robot, the engine or a rule below) goes through `_end`,
-and one place stops both tasks.
+Theory of operation. `run` is a loop with three waits. First, the loop waits for a reason to
+connect: always present on a persistent link, otherwise an `Open` event or a request. Then the loop
+waits for the backoff delay, and finally for the end of the connection. A reader and a writer run
+while the connection is open. Every connection end, by the robot, the engine or a rule of the link,
+goes through `_end`; one place stops both tasks.
 
-A connection is good from its first good frame, and only that resets the backoff. So URC does not
-hammer a robot that accepts connections and closes them. With steps of a connection
-(``on_connect``), no frame counts before they are done: a robot may greet and then refuse the login.
-Pages show the `LinkState`; while attempts fail, the state stays and the count of attempts grows.
+A connection counts as good after its first valid frame; only a good connection resets the backoff.
+URC therefore does not flood a robot that accepts connections and closes them again. With
+``on_connect`` steps, frames do not count until the steps are done, because a robot may send a
+greeting and then refuse the login. Pages show the `LinkState`; while attempts fail, only the count
+of attempts changes.
 
-The link uses only the five members of a transport, so the transport may live in another process. A
-transport that is also a `Prompt` saves task switches. Bytes that arrive while the reader waits go
-straight to the engine, and the engine's bytes go straight to the kernel. The tasks handle bytes
-that must wait, large amounts and errors.
+The link uses only the five transport members, so a transport may run in another process. A
+transport that implements `Prompt` saves task switches. Bytes that arrive while the reader waits are
+passed directly to the engine, and the engine's bytes directly to the kernel. The reader and writer
+tasks handle bytes that must wait, large amounts of data, and errors.
 """
 
 import asyncio
@@ -35,16 +36,17 @@ from urc.transports.base import NOTICE, Prompt, SupportsSettle, Transport, Trans
 __all__ = ["Link"]
 
 SLICE_BYTES = 4096
-"""Limit of the bytes that the engine takes before other tasks of the loop run."""
+"""Maximum number of bytes that the engine processes before other tasks of the loop run."""
 SLICE_S = 0.001
-"""Limit of the engine's time for them, in seconds; a slower engine gets fewer bytes."""
+"""Maximum processing time of the engine before other tasks run, in seconds; a slower engine gets
+fewer bytes."""
 _LEAST_SLICE_BYTES = 512
 _CHUNK_COST = 32
-"""Fixed cost of a chunk, in bytes, because many tiny chunks would also block the loop."""
+"""Fixed cost of a received chunk, in bytes, because many tiny chunks would also block the loop."""
 SETTLE_S = 1.0
-"""Age of a connection, in seconds, after which the robot has accepted it."""
+"""Age after which a connection counts as accepted by the robot, in seconds."""
 _GRACE_S = 1.0
-"""Tolerance for a transport that exceeds its own time limit, in seconds."""
+"""Grace period for a transport that exceeds its own time limit, in seconds."""
 _LOOK_S = 0.01
 _NOTHING_YET = "connected; nothing received yet"
 _LOGGING_IN = "connected; the steps of the connection are not done yet"
@@ -53,7 +55,7 @@ log = logging.getLogger(__name__)
 
 
 class Link:
-    """A transport that is kept connected, with the traffic between it and the engine."""
+    """A transport that is reopened after every loss, and its traffic with the engine."""
 
     def __init__(
         self,
@@ -66,17 +68,17 @@ class Link:
         random: Callable[[], float],
         expects_frames: bool,
     ) -> None:
-        """Prepare the link; `run` does the work.
+        """Prepare the link; `run` operates the connection.
 
         Args:
-            spec: the driver's declaration.
-            transport: the transport for `spec`, closed.
+            spec: the transport's declaration in the driver.
+            transport: the transport described by `spec`, still closed.
             dispatcher: the owner of the engine.
-            hub: receives states, log entries and traffic.
+            hub: destination of states, log entries and traffic.
             clock: source of time.
-            random: returns a number in [0, 1) for the jitter.
-            expects_frames: whether the robot sends without a request. The link then becomes live
-                with the first frame, else with the connection.
+            random: returns a number in [0, 1) for the jitter of the backoff.
+            expects_frames: whether the robot sends frames without a request. If so, the link
+                becomes live with the first frame; otherwise, when the connection opens.
         """
         self._spec = spec
         self._name = spec.name
@@ -88,19 +90,20 @@ class Link:
         self._expects_frames = expects_frames
         self._is_persistent = spec.connection == "persistent"
         self._is_stream = (spec.framing.sent or spec.framing).type != "datagram"
-        """Whether bytes may be joined and split; else each piece is a datagram or a message."""
+        """Whether bytes may be joined and split; if false, each piece is a datagram or a message.
+        """
         self._wanted = asyncio.Event()
         if self._is_persistent:
             self._wanted.set()
         self._retry_s = clock.now()
         """Monotonic time of the next attempt."""
         self._ended: asyncio.Future[str] | None = None
-        """Reason for the end of the connection; None while not connected."""
+        """Future with the reason for the end of the connection; None without a connection."""
         self._forget_connection()
         self._is_overdue = False
-        """Whether the robot is silent since the last request."""
+        """Whether the robot has been silent since the last request."""
         self.tried = asyncio.Event()
-        """Set after the first attempt, or at once if the engine decides when to connect."""
+        """Set after the first attempt, or immediately if the engine decides when to connect."""
         if not self._is_persistent:
             self.tried.set()
         self._report = LinkReport(spec.name, transport.address, hub, clock)
@@ -109,15 +112,15 @@ class Link:
         )
 
     def _forget_connection(self) -> None:
-        """Reset the state of the connection."""
+        """Reset the state of one connection."""
         self._close_reason: str | None = None
-        """Reason of the engine for closing the connection; later data is dropped."""
+        """The engine's reason for closing the connection, after which further data is dropped."""
         self._heard_s = self._clock.now()
         self._is_reader_waiting = False
         self._is_ready = not self._spec.on_connect
-        """Whether the steps of the connection are done; true without steps."""
+        """Whether the connection's steps are done; true for a transport without steps."""
         self._has_heard = False
-        """Whether a good frame arrived before the steps were done."""
+        """Whether a valid frame arrived before the steps were done."""
         self._has_stood = False
         """Whether the connection is older than `SETTLE_S`."""
 
@@ -127,7 +130,7 @@ class Link:
         return self._outgoing.is_full
 
     def want_open(self) -> None:
-        """Connect as soon as the backoff allows it."""
+        """Connect as soon as the backoff permits."""
         self._wanted.set()
 
     def want_close(self, reason: str) -> None:
@@ -150,13 +153,13 @@ class Link:
         return self._ended is not None
 
     def send(self, sent: Send) -> None:
-        """Write the bytes of the engine; secret bytes are not shown."""
+        """Write bytes from the engine; secret bytes are hidden from the traffic view."""
         ended = self._ended
         if ended is not None and self._close_reason is None and not ended.done():
             self._outgoing.write(sent.data, is_secret=sent.is_secret, counted=sent.counted)
 
     def frame_received(self) -> None:
-        """Handle a good frame: clear all failures, unless the login is still running."""
+        """Handle a valid frame: clear all failures, unless connection steps are still running."""
         self._has_heard = True
         if not self._is_ready:
             return
@@ -168,7 +171,7 @@ class Link:
         self._report.publish()
 
     def ready(self) -> None:
-        """Handle the end of the connection's steps: earlier good frames count from now on."""
+        """Handle the end of the connection's steps; earlier valid frames count from now on."""
         self._is_ready = True
         if self._has_heard:
             self.frame_received()
@@ -196,7 +199,7 @@ class Link:
         """Wait until all sent bytes are written and, if the transport can tell, have arrived.
 
         Returns:
-            A message about undelivered bytes, or "". Takes a few seconds at most.
+            A message about undelivered bytes, or "". The wait takes a few seconds at most.
         """
         until = self._clock.now() + STUCK_S
         while self.is_connected and not self._outgoing.is_written:
@@ -211,7 +214,7 @@ class Link:
         return ""
 
     async def run(self) -> None:
-        """Keep the link connected until cancelled; then close everything."""
+        """Keep the link connected until cancelled, then close the transport."""
         try:
             while True:
                 await self._wanted.wait()
@@ -255,7 +258,7 @@ class Link:
         return ""
 
     async def _serve(self) -> None:
-        """Serve the open connection until it ends, then set the state."""
+        """Serve the open connection until its end, then set the state."""
         self._ended = asyncio.get_running_loop().create_future()
         self._forget_connection()
         transport, prompt = self._transport, None
@@ -295,7 +298,7 @@ class Link:
             self._report.show("connecting", _NOTHING_YET)
 
     def _conclude(self, reason: str) -> None:
-        """Set state and backoff after the end of a connection."""
+        """Set the state and the backoff after the end of a connection."""
         asked = self._close_reason
         is_flushed = self._outgoing.is_written
         self._outgoing.reset()
@@ -314,7 +317,7 @@ class Link:
                 self._retry_s = self._clock.now() + self._spec.backoff.initial_s
 
     def _lose(self, state: LinkState, reason: str) -> None:
-        """Count a failed attempt and set the time of the next one."""
+        """Count a failed attempt, and schedule the next one."""
         self._is_overdue = state == "silent"
         self._report.fail(state, reason)
         backoff = self._spec.backoff
@@ -373,7 +376,7 @@ class Link:
                     size = min(size * 2, SLICE_BYTES)
 
     def _take_now(self, data: bytes) -> bool:
-        """Handle received bytes at once, unless they are many or others come first."""
+        """Handle received bytes immediately, unless they are many or earlier bytes are waiting."""
         if len(data) > _LEAST_SLICE_BYTES or not self._is_reader_waiting:
             return False
         ended = self._ended
@@ -413,7 +416,7 @@ class Link:
         return alarms
 
     def _settled(self) -> float | None:
-        """Note that the robot has accepted the connection; a refusal would have come by now."""
+        """Record that the robot has accepted the connection, because no refusal arrived in time."""
         self._has_stood = True
         self._stand()
         self.publish()
@@ -432,7 +435,7 @@ class Link:
             self._report.show("live")
 
     def _check_idle(self) -> float | None:
-        """Close a connection after too long a silence, or return the remaining time."""
+        """Close a connection that was silent too long; otherwise, return the remaining time."""
         limit_s = self._spec.timeouts.idle_s or 0.0
         left_s = self._heard_s + limit_s - self._clock.now()
         if left_s > 0:

@@ -1,4 +1,4 @@
-"""The published status of one transport: its state, its counts, and a rate-limited log."""
+"""The published status of one transport: state, counters, and a rate-limited log."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -12,13 +12,14 @@ from urc.runtime.redaction import REDACTED
 __all__ = ["REDACTED", "LinkReport", "LogRateLimiter"]
 
 BURST = 4
-"""Number of log entries of one kind before the rate limit applies."""
+"""Number of log entries of one kind before the rate limit starts."""
 REFILL_S = 10.0
-"""Interval of further log entries of one kind, in seconds."""
+"""Minimum interval of further log entries of one kind, in seconds."""
 HELD_S = 0.3
-"""Delay of the possible beginning of a secret, in seconds."""
+"""Time for which a possible beginning of a secret is held back, in seconds."""
 KINDS = 64
-"""Limit of kinds; further kinds of a third-party engine share one limit."""
+"""Maximum number of kinds of log entries; further kinds of a third-party engine share one rate
+limit."""
 
 
 @dataclass(slots=True)
@@ -29,14 +30,14 @@ class _Kind:
 
 
 class LogRateLimiter:
-    """A token bucket for each kind of log entry."""
+    """A token bucket that limits each kind of log entry."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._kinds: dict[str, _Kind] = {}
 
     def admit(self, kind: str) -> int | None:
-        """Return the number of suppressed entries of this kind, or None to suppress this one."""
+        """Return the number of suppressed entries of this kind, or None to suppress this entry."""
         now = self._clock.now()
         if kind not in self._kinds:
             kind = kind if len(self._kinds) < KINDS else ""
@@ -53,7 +54,7 @@ class LogRateLimiter:
 
 
 class LinkReport:
-    """The published state of one transport, sent to the hub."""
+    """The state of one transport, published to the hub."""
 
     def __init__(self, transport: str, address: str, hub: Hub, clock: Clock) -> None:
         self._transport = transport
@@ -73,11 +74,11 @@ class LinkReport:
 
     @property
     def is_well(self) -> bool:
-        """Whether a good frame would change nothing."""
+        """Whether another valid frame would leave the state unchanged."""
         return self.state == "live" and not self.attempts and not self._detail
 
     def show(self, state: LinkState, detail: str = "") -> None:
-        """Set the state. A new state is logged; a new detail is only shown."""
+        """Set the state. A new state is logged; a new detail is only published."""
         if state == self.state and detail == self._detail:
             return
         if state != self.state:
@@ -105,7 +106,7 @@ class LinkReport:
         self.log("warning", f"fault {fault.code}", f"{fault.code}: {fault.message}")
 
     def log(self, level: Literal["info", "warning", "error"], kind: str, text: str) -> None:
-        """Log an entry, within the rate limit of its kind."""
+        """Add a log entry, within the rate limit of its kind."""
         untold = self._limiter.admit(kind)
         if untold is None:
             return
@@ -113,7 +114,7 @@ class LinkReport:
         self._hub.log(LogEntry(self._clock.now(), level, self._transport, text + more))
 
     def saw(self, direction: Literal["sent", "received"], data: Payload) -> None:
-        """Record traffic while it has readers."""
+        """Record traffic while the hub has readers of traffic."""
         if self._hub.traffic_watchers:
             envelope = data if isinstance(data, Envelope) else None
             shown, now = traffic_of(data), self._clock.now()
@@ -128,7 +129,7 @@ class LinkReport:
         self._hub.tell_rest(self._clock.now())
 
     def publish(self) -> None:
-        """Send the state to the hub if it has changed."""
+        """Publish the state if it has changed."""
         if not self._is_changed:
             return
         self._is_changed = False

@@ -1,7 +1,8 @@
-"""Detection of hosts that mean this machine itself, or a device plugged into it.
+"""Detection of host names that mean this machine, or a device attached to it.
 
-A package with such a fixed host would talk to local programs of the person who installs it. A
-package may use this machine only through a setting, which a person sees and fills in.
+A package with a fixed local host would connect to local programs of the person who installs the
+package. A package may therefore address this machine only through a setting, which a person sees
+and fills in.
 """
 
 import ipaddress
@@ -19,13 +20,13 @@ __all__ = ["check_hosts", "is_near"]
 
 _LOCAL: Final = re.compile(r"(.*\.)?localhost(\.localdomain)?\.?|ip6-(localhost|loopback)", re.I)
 _BEGINS: Final = re.compile(r"127\.|169\.254\.|\[?(::1|fe[89ab][0-9a-f]:)|localhost", re.I)
-"""Beginning of a host that settings complete."""
+"""Pattern of the beginning of a local host, for hosts that settings complete."""
 _URL: Final = re.compile(r"[a-z]+://(?P<host>\[[^\]]*\]|[^/:?#]*)", re.I)
 _OPTIONS: Final = ("host", "url")
 
 
 def is_near(host: str) -> bool:
-    """Return whether `host`, in any notation, is this machine or link-local."""
+    """Return whether `host`, in any notation, is this machine or a link-local address."""
     text = host.strip().removeprefix("[").removesuffix("]").partition("%")[0]
     if _LOCAL.fullmatch(text):
         return True
@@ -40,7 +41,7 @@ def is_near(host: str) -> bool:
 
 
 def check_hosts(profile: Profile) -> None:
-    """Raise `UrcError` if the document of a package has this machine as a fixed host."""
+    """Raise `UrcError` if a package's document contains this machine as a fixed host."""
     for spec in profile.driver.transports.values():
         if spec.tunnel or spec.options.get("mode") == "listen":
             continue  # resolved on another machine, or the robot connects to URC
@@ -53,7 +54,7 @@ def check_hosts(profile: Profile) -> None:
 
 
 def _fixed(options: Mapping[str, object]) -> str:
-    """Return the local host that does not depend on a setting, or ""."""
+    """Return a local host that does not depend on a setting, or ""."""
     for name in _OPTIONS:
         value = options.get(name)
         text = value.source if isinstance(value, Template) else value

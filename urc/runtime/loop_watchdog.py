@@ -1,7 +1,7 @@
-"""A watchdog of the event loop: a blocked loop delays everything in this process.
+"""A watchdog of the event loop, because a blocked loop delays all work of this process.
 
-The guard stops motion without the loop, when its lease runs out. The watchdog notices and counts
-the delay and reports it; after a long one, operators must start a new gesture.
+If the loop is blocked, the guard stops motion when the lease runs out. The watchdog detects, counts
+and reports each delay; after a long delay, operators must start a new gesture.
 """
 
 import logging
@@ -14,25 +14,25 @@ __all__ = ["EVERY_S", "LATE_S", "TOO_LATE_S", "LoopWatchdog"]
 
 EVERY_S: Final = 0.1
 LATE_S: Final = 0.1
-"""Delay that is counted and reported, in seconds."""
+"""Minimum delay that is counted and reported, in seconds."""
 TOO_LATE_S: Final = 0.5
-"""Delay that stops motion regardless of its lease, in seconds."""
+"""Delay that stops motion regardless of the lease, in seconds."""
 QUIET_S: Final = 10.0
-"""Delays that are closer together, in seconds, are reported once."""
+"""Interval within which several delays are reported only once, in seconds."""
 
 log = logging.getLogger(__name__)
 
 
 class LoopWatchdog:
-    """A periodic check of the clock."""
+    """A periodic check for a blocked event loop."""
 
     def __init__(self, clock: Clock, late: Callable[[float, bool], None]) -> None:
         """Prepare.
 
         Args:
             clock: source of time.
-            late: called with each counted delay, in seconds, and whether it is the first of
-                several close together.
+            late: callback with each counted delay in seconds, and whether the delay is the first of
+                a series.
         """
         self._clock = clock
         self._late = late
@@ -51,7 +51,7 @@ class LoopWatchdog:
         self._alarm = self._clock.call_at(self._due_s, self._check)
 
     def end(self) -> None:
-        """End the checks; may be called twice."""
+        """End the checks; a second call does nothing."""
         if self._alarm is not None:
             self._alarm.cancel()
             self._alarm = None

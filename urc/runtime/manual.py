@@ -1,7 +1,7 @@
-"""The manual page of a profile, as Markdown: the robot, its signals and its commands.
+"""The manual page of a profile in Markdown: the robot, its signals and its commands.
 
-Layer 4, a pure function: the same profile gives the same page. The page is for operators and quotes
-the descriptions of the document.
+This module is on layer 4 and is a pure function: the same profile always produces the same page.
+The page is for operators and quotes the descriptions of the document.
 """
 
 import math
@@ -35,7 +35,7 @@ _LIMITS: Final = (
 
 
 def manual(profile: Profile) -> str:
-    """Return the manual page."""
+    """Return the manual page as Markdown."""
     driver = profile.driver
     sections = (
         ("Settings", _settings(profile.settings)),
@@ -174,7 +174,7 @@ def _what_goes_out(command: Command, spec: TransportSpec | None) -> Iterator[str
 
 
 def _constant_bytes(command: Command, spec: TransportSpec | None) -> bytes | None:
-    """Return the bytes of a constant frame, or None for a frame that varies."""
+    """Return the bytes of a frame that never varies; None for a variable frame."""
     if command.send.names or spec is None:
         return None
     try:
@@ -226,7 +226,7 @@ def _need(argument: Argument) -> str:
 
 
 def _releases(driver: Driver) -> Iterator[str]:
-    """Yield the frames that the server sends after a release or the loss of the operator."""
+    """Describe the frames that the server sends after a release or the loss of the operator."""
     for command in driver.commands.values():
         if command.hold is not None and command.hold.step_s is not None:
             lasts = shown_duration(command.hold.step_s)
@@ -243,7 +243,7 @@ def _releases(driver: Driver) -> Iterator[str]:
 
 
 def _by_itself(watchdog_s: float | None) -> str:
-    """Return the robot's own behaviour without further frames, not even the release."""
+    """Describe the robot's own behaviour when no further frames arrive, not even a release."""
     if watchdog_s is None:
         return "The document does not say whether the robot stops by itself."
     if math.isinf(watchdog_s):
@@ -252,7 +252,7 @@ def _by_itself(watchdog_s: float | None) -> str:
 
 
 def _interfaces(profile: Profile) -> Iterator[str]:
-    """Yield the widgets of each interface, or of the generated one."""
+    """Yield the widgets of each declared interface, or of the generated interface."""
     for place, interface in enumerate(profile.interfaces.values()):
         found = {
             slot: interface.widgets.get(slot) or profile.slots.get(slot) for slot in interface.shown
@@ -312,7 +312,7 @@ def _descriptions(named: Iterable[Signal | Argument | Setting]) -> Iterator[str]
 
 
 def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Yield a table without its empty columns."""
+    """Yield the lines of a table without empty columns."""
     kept = [place for place in range(len(header)) if any(row[place] for row in rows)]
     yield f"| {' | '.join(header[place] for place in kept)} |"
     yield f"|{'---|' * len(kept)}"
@@ -321,12 +321,12 @@ def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str
 
 
 def _plain(text: str) -> str:
-    """Return the text of a document with escaped Markdown."""
+    """Return text from a document with escaped Markdown characters."""
     return printable(" ".join(text.split())).translate(_MARKUP)
 
 
 def _code(text: str) -> str:
-    """Return text as code, with escaped bars, which would end the cell of a table."""
+    """Return text as Markdown code, with escaped bars, which would otherwise end the table cell."""
     clean = printable(text).replace("|", "\\|")
     if "`" in clean:
         return f"`` {clean} ``"

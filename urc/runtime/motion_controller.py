@@ -1,18 +1,19 @@
 """The motion controller of one robot: the lease, and the state of each held command.
 
-Theory of operation. Pages send ticks of sampled input, and releases. For each tick, the controller
-checks three things: the lease of the page, the age of the tick, and the arguments, by the engine.
-The controller then hands the frame to the motion backend, which owns the connection and its time
-limits. The first tick of a gesture arms the control. The same tick also renders the stop frame, so
-that a stop needs neither the engine nor the document.
+Theory of operation. Pages send ticks of sampled input, and release messages. For each tick, the
+controller checks the lease of the page and the age of the tick; the engine checks the arguments.
+The controller then passes the frame to the motion backend, which owns the connection and enforces
+the time limits. The first tick of a gesture arms the control. The stop frame is rendered at the
+same time, so that a stop needs neither the engine nor the document.
 
-A control that stopped without a release stays closed until its page releases it. So a stick that is
-still held after the link reconnects moves nothing.
+After a stop without a release, the control stays disarmed until its page sends a release. A stick
+that is still held after a reconnection therefore moves nothing.
 
-A controller outlives the sessions of its robot, because the latch also holds while the robot is
-disconnected. `attach` adds the engine and the backend of a session, `detach` removes them.
+A controller outlives the sessions of its robot, because the latch persists while the robot is
+disconnected. `attach` adds the engine and the backend of a session; `detach` removes both.
 
-The module is synchronous, and callers pass the time. The backend reports its stops by `stopped`.
+This module is synchronous, and callers pass the time. The backend reports each written stop by
+calling `stopped`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -39,9 +40,9 @@ from urc.runtime.held_commands import (
 __all__ = ["MotionFrames", "MotionController", "MotionBackend", "Verb", "is_lossy"]
 
 Verb = str
-"""``take``, ``ask``, ``yes``, ``no``, ``force``, ``leave`` or ``reset``."""
+"""A lease request: ``take``, ``ask``, ``yes``, ``no``, ``force``, ``leave`` or ``reset``."""
 Moved = Callable[[Operator, int, str, Mapping[str, Reading], Payload, float], None]
-"""Arguments: operator, epoch of the lease, command, arguments, frame, and time."""
+"""Arguments of the callback: operator, epoch of the lease, command, arguments, frame, time."""
 MOST_SCREENS = 256
 _FIRST_TICKS = 2**31
 _NO_ROBOT = "the robot is not connected"
@@ -57,16 +58,16 @@ class _Screen:
 
 
 class MotionController:
-    """The lease and the held commands of one robot."""
+    """The motion controller of one robot, with the lease and the held commands."""
 
     def __init__(
         self, driver: Driver, *, kept: LeaseState | None = None, is_owed: bool = False
     ) -> None:
-        """Start without an operator and without a connected robot.
+        """Begin without an operator and without a connected robot.
 
         Args:
-            driver: the driver; its commands with ``hold`` are the controls.
-            kept: the lease from before a restart: a latched stop stays latched.
+            driver: the driver; commands with ``hold`` become controls.
+            kept: the lease state from before a restart; a latched stop stays latched.
             is_owed: whether the last stop has not reached the robot and must be sent first.
         """
         self.lease = Lease(kept)
@@ -82,29 +83,30 @@ class MotionController:
         self._screens: dict[str, _Screen] = {}
         self._unconfirmed = {*self._holds, *self._stops} if is_owed else set[str]()
         self.on_change: Callable[[LeaseState], None] = _ignore
-        """Called after each change of the lease, and after the confirmation of a stop."""
+        """Callback after each change of the lease, and after the confirmation of a stop."""
         self.on_moved: Moved = _unseen
-        """Called for each tick whose frame went to the backend; must neither block nor raise."""
+        """Callback for each tick whose frame was passed to the backend; must neither block nor
+        raise."""
         self.on_refused: Callable[[str, str], None] = _unrefused
-        """Called with the control and the message when the robot refuses to move."""
+        """Callback with the control and the message when the robot refuses to move."""
 
     @property
     def can_move(self) -> bool:
-        """Whether the robot has a held command, autonomous motion or a stop command."""
+        """Whether the robot has a held command, autonomous motion, or a stop command."""
         return bool(self._holds) or self._moves or bool(self._stops)
 
     @property
     def has_own_stop(self) -> bool:
-        """Whether STOP sends anything to the robot; else URC only blocks its own commands."""
+        """Whether STOP sends anything to the robot; if false, STOP only blocks URC's commands."""
         return bool(self._holds) or bool(self._stops)
 
     @property
     def owed(self) -> list[str]:
-        """Return the stop commands that are still to be sent."""
+        """Return the stop commands that still have to be sent."""
         return [name for name in self._stops if name in self._unconfirmed]
 
     def given(self, command: str) -> None:
-        """Note that a stop command has reached the robot."""
+        """Record that a stop command has reached the robot."""
         if command in self._unconfirmed:
             self._unconfirmed.discard(command)
             if self.is_confirmed:
@@ -115,7 +117,7 @@ class MotionController:
         return command in self._holds
 
     def rests(self, command: str) -> bool:
-        """Return whether a held command is at rest and its last stop was reported."""
+        """Return whether a held command is at rest, and its last stop was reported as written."""
         return self._controls[command].motion_state == "rest"
 
     @property
@@ -131,7 +133,7 @@ class MotionController:
     # -- the robot
 
     def attach(self, session: MotionSession) -> None:
-        """Connect a session: its engine, backend and events. Send an outstanding stop."""
+        """Attach a session: its engine, backend and events. An outstanding stop is sent."""
         self._frames, self._backend = session.frames, session.backend
         session.on_motion = self.handle
         backend = self._backend
@@ -139,7 +141,7 @@ class MotionController:
             backend.stop(self._stop_frames(self._holds))
 
     def detach(self) -> None:
-        """End the session: its backend stops all motion, and no control stays armed."""
+        """Detach the session: the backend stops all motion, and every control is disarmed."""
         self._frames = self._backend = None
         for control in self._controls.values():
             control.is_owed_again = False
@@ -149,7 +151,7 @@ class MotionController:
     # -- pages
 
     def join(self, client: Operator) -> None:
-        """Add a page; raise `UrcError` at the limit of pages."""
+        """Add a page; raise `UrcError` if the maximum number of pages is reached."""
         if len(self._screens) >= MOST_SCREENS:
             raise UrcError(f"{MOST_SCREENS} pages already show this robot")
         self._screens[client.id] = _Screen(client)
@@ -160,13 +162,13 @@ class MotionController:
         self._settle(self.lease.leave(client))
 
     def heartbeat(self, client: str, now: float) -> int:
-        """Return the current tick number for this page, which the page echoes."""
+        """Return the number of a new beat, which the page echoes in its inputs."""
         return self._screens[client].freshness.issue(now)
 
     # -- the lease
 
     def drive(self, client: str, verb: Verb, now: float, for_s: float = REQUEST_S) -> str:
-        """Apply a page's request for the lease; return the reason of a refusal, or ""."""
+        """Apply a page's lease request; return the reason of a refusal, or ""."""
         who, lease = self._screens[client].client, self.lease
         if verb == "take":
             outcome: LeaseChanged | LeaseRefused | None = lease.acquire(who, now)
@@ -195,9 +197,9 @@ class MotionController:
         self._settle(self.lease.stop(by), is_stopped=True)
 
     def halt(self) -> list[str]:
-        """Stop all motion; a new motion needs a new gesture and a new lease.
+        """Stop all motion; new motion requires a new gesture and a new lease.
 
-        Controls that the backend has already stopped get no second stop.
+        Controls that the backend has already stopped receive no second stop.
 
         Returns:
             The commands that may have moved.
@@ -210,12 +212,12 @@ class MotionController:
         return halted
 
     def _moving(self) -> list[str]:
-        """Return the commands with ticks since their last reported stop."""
+        """Return the commands with a tick after their last reported stop."""
         controls = self._controls.items()
         return [name for name, one in controls if one.is_armed and one.motion_state != "rest"]
 
     def expire(self, now: float) -> None:
-        """Handle the timeouts of the lease."""
+        """Apply the timeouts of the lease."""
         self._settle(self.lease.expire(now))
 
     # -- motion
@@ -267,13 +269,13 @@ class MotionController:
     def _abandon(
         self, command: str, control: HeldControl, backend: MotionBackend, why: str
     ) -> None:
-        """End a motion for which no frame can be rendered."""
+        """End a motion because its frame cannot be rendered."""
         if control.is_armed:
             backend.release(command)
         self._close(control, why)
 
     def release(self, client: str, command: str) -> None:
-        """Note the release of a control; only its holder may release it."""
+        """Handle the release of a control; only the holder of the control may release it."""
         holder = self.lease.state.holder
         control = self._controls.get(command)
         if control is None or holder is None or holder.id != client:
@@ -290,7 +292,7 @@ class MotionController:
             self._renew_stops(control.line)  # the counter of this stop frame is used up
 
     def handle(self, event: MotionEvent) -> None:
-        """Handle an event of the engine."""
+        """Handle an engine event about a held command."""
         match event:
             case NumbersUsed(line):
                 self._renew_stops(line)
@@ -300,7 +302,7 @@ class MotionController:
                 self._refused(command, why)
 
     def _refused(self, command: str, why: str) -> None:
-        """Stop a motion that the robot refuses, and report its message."""
+        """Stop a motion that the robot has refused, and report the robot's message."""
         control, backend = self._controls.get(command), self._backend
         if control is None or backend is None or control.motion_state != "moving":
             return
@@ -308,7 +310,7 @@ class MotionController:
         self.on_refused(command, why)
 
     def stopped(self, command: str, reason: Reason) -> None:
-        """Handle a report of the backend: the stop of a control was written."""
+        """Handle a report of the backend that the stop of a control was written."""
         control = self._controls.get(command)
         if control is None:
             return
@@ -325,7 +327,7 @@ class MotionController:
     # -- renewed stops
 
     def _is_too_early(self, command: str, control: HeldControl) -> bool:
-        """Return whether a written stop may not count, because the robot was not ready for it."""
+        """Return whether a written stop may be ineffective, because the robot was not ready."""
         frames, backend = self._frames, self._backend
         if frames is None or backend is None:
             return False
@@ -346,7 +348,7 @@ class MotionController:
             self._backend.stop(self._stop_frames(owed))
 
     def _renew_stops(self, line: str) -> None:
-        """Render the stops of `line` again, with counters after the last sent frame."""
+        """Render the stop frames of `line` again, with counters after the last sent frame."""
         frames, backend = self._frames, self._backend
         if frames is None or backend is None:
             return
@@ -397,7 +399,7 @@ class MotionController:
     def _stop_frames(
         self, commands: Sequence[str] | Mapping[str, object]
     ) -> dict[str, Payload | FrameVariants]:
-        """Return the stop frames; a failure of one must not prevent the others."""
+        """Return the stop frames; if rendering fails, use the frame rendered at arming."""
         made: dict[str, Payload | FrameVariants] = {}
         for name in commands:
             control = self._controls[name]

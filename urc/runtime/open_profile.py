@@ -1,7 +1,7 @@
-"""The document of a robot as users open it: with local widgets and installed interfaces.
+"""Loading of a robot's document, with local widgets and installed interfaces.
 
-Layer 4. A driver's document names no interface; an installed driver gets the interfaces that were
-installed for it.
+Layer 4. A driver's document names no interface, so an installed driver uses the interfaces that
+were installed for it.
 """
 
 from os import PathLike
@@ -19,14 +19,14 @@ __all__ = ["open_document"]
 
 _DRIVER: Final = "driver.yaml"
 _MADE: Final = "default"
-"""Name of the generated interface of a document without one."""
+"""Name of the generated interface for a document that declares none."""
 
 
 def open_document(path: str | PathLike[str]) -> Profile:
-    """Return the profile of a robot's or driver's document.
+    """Load the document of a robot or driver, and return its profile.
 
     Raises:
-        ProblemsError: the document has errors, which the exception lists.
+        ProblemsError: the document has errors; the exception lists them.
     """
     profile = load_profile(path, built_in_catalog(), widget_folder_of(path))
     home = ecosystem_of(Path(path))

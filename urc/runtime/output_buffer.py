@@ -1,7 +1,7 @@
-"""The output buffer of one transport: joined, bounded, and shown as traffic after the writing.
+"""The output buffer of one transport: joins and bounds data, and reports traffic once written.
 
-A `Prompt` transport passes bytes straight to the kernel if the buffer is empty. Other bytes wait
-for the writer's task, which can block.
+With an empty buffer, a `Prompt` transport passes bytes directly to the kernel. Other bytes wait for
+the writer's task, which may block.
 """
 
 import asyncio
@@ -19,34 +19,39 @@ from urc.transports.base import Prompt, Transport
 __all__ = ["MAX_QUEUED_BYTES", "STUCK_S", "OutputBuffer"]
 
 MAX_QUEUED_BYTES = 262_144
-"""Limit of the buffer, in bytes; beyond it the connection is closed with a message."""
+"""Maximum size of the buffer, in bytes; beyond this limit, the connection is closed with a message.
+"""
 STUCK_S = 5.0
-"""Time without accepted bytes, in seconds, after which the connection is stalled."""
+"""Time without accepted bytes after which the connection counts as stalled, in seconds."""
 
 
 class _Waiting(NamedTuple):
-    """One item of the buffer."""
+    """One entry of the output buffer."""
 
     data: Payload
     shown: Payload
-    """Payload to show as traffic."""
+    """Payload to report as traffic."""
     counted: CountedFrame | None = None
-    """Frame with counters, which are used up once it is sent; such a frame is never joined."""
+    """Frame with counters, which are used up when the frame is sent; never joined with other data.
+    """
 
 
 @runtime_checkable
 class _Shared(Protocol):
-    """A transport that also sends frames with counters of the guard."""
+    """A transport that can also send frames with counters through the guard."""
 
     def offer_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> bool:
-        """Send it without waiting; return whether that worked. `left` gets the sent frame."""
+        """Send a counted frame without waiting; return whether the frame was accepted.
+
+        `left` receives the frame that was sent.
+        """
 
     async def send_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> None:
-        """Send it and wait until it is sent. `left` gets the sent frame."""
+        """Send a counted frame; wait until the frame is sent. `left` gets the sent frame."""
 
 
 class OutputBuffer:
-    """A buffer for one transport. Any failure ends the connection, through `give_up`."""
+    """The output buffer of one transport. Any failure ends the connection by calling `give_up`."""
 
     def __init__(
         self,
@@ -61,12 +66,12 @@ class OutputBuffer:
         """Prepare the buffer.
 
         Args:
-            transport: receives the bytes.
-            report: publishes the traffic.
-            hub: knows whether traffic has readers.
+            transport: destination of the bytes.
+            report: publishes the written data as traffic.
+            hub: hub of the session, which knows whether traffic has readers.
             clock: source of time.
-            give_up: ends the connection for a reason.
-            is_stream: whether bytes may be joined; else each piece is a datagram or a message.
+            give_up: ends the connection for the given reason.
+            is_stream: whether bytes may be joined; if false, each piece is a datagram or a message.
         """
         self._transport = transport
         self._report = report
@@ -84,7 +89,7 @@ class OutputBuffer:
 
     @property
     def is_full(self) -> bool:
-        """Whether the buffer is too long for new commands."""
+        """Whether the buffer is too full for new commands."""
         return self._bytes > MAX_QUEUED_BYTES // 2
 
     @property
@@ -93,7 +98,7 @@ class OutputBuffer:
         return not self._bytes
 
     def reset(self, prompt: Prompt | None = None) -> None:
-        """Empty the buffer; `prompt` is the transport if it supports immediate writes."""
+        """Empty the buffer; `prompt` is the transport if it supports writing without waiting."""
         self._prompt = prompt
         self._waiting.clear()
         self._bytes = 0
@@ -103,9 +108,9 @@ class OutputBuffer:
     def write(
         self, data: Payload, *, is_secret: bool = False, counted: CountedFrame | None = None
     ) -> None:
-        """Write `data` at once if possible, else as soon as the transport accepts it.
+        """Write `data` immediately if possible, otherwise as soon as the transport accepts it.
 
-        Secrets are not shown.
+        Secret data is hidden from the traffic view.
         """
         shared = counted if self._shared is not None else None
         item = _Waiting(data, REDACTED if is_secret else data, shared)
@@ -133,15 +138,15 @@ class OutputBuffer:
         return True
 
     def _left(self, item: _Waiting, data: Payload) -> None:
-        """Show a frame as it was sent: its counters may differ from the rendered ones."""
+        """Report a frame as sent, because its counters may differ from the rendered frame."""
         self._report.saw("sent", data if item.shown is item.data else item.shown)
 
     def wake(self) -> None:
-        """Wake the writer, because the connection closes once all data is written."""
+        """Wake the writer, because the connection closes after all data is written."""
         self._has_some.set()
 
     async def run(self, is_closing: Callable[[], bool]) -> None:
-        """Write until cancelled; after the last write of a closing connection, give it up.
+        """Write until cancelled; on a closing connection, call `give_up` after the last write.
 
         Raises:
             TransportError: writing failed.
@@ -164,12 +169,12 @@ class OutputBuffer:
                 self._give_up("")
 
     def _wait_for_rest(self) -> None:
-        """Let the writer check that the kernel accepts the rest in time."""
+        """Wake the writer, which then checks that the kernel accepts the remaining data in time."""
         self._waiting.append(_Waiting(b"", b""))
         self._has_some.set()
 
     def _next(self) -> _Waiting:
-        """Return the next write: a stream up to a frame with counters, else one item."""
+        """Return the next data to write: stream data up to a frame with counters, or one entry."""
         waiting = self._waiting
         if not self._is_stream or len(waiting) == 1 or waiting[0].counted is not None:
             return waiting.pop(0)
@@ -180,7 +185,7 @@ class OutputBuffer:
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
-        """Give the robot `STUCK_S` to accept the bytes."""
+        """Wait up to `STUCK_S` for the robot to accept the bytes."""
         reason = f"the robot has accepted no bytes for {STUCK_S:g} s"
         alarm = self._clock.call_at(self._clock.now() + STUCK_S, lambda: self._give_up(reason))
         try:

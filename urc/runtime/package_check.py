@@ -1,4 +1,4 @@
-"""A check of a package's document for a repository: its errors, including failed tests.
+"""A check of a package's document for a repository, including the document's tests.
 
 ``python -m urc.runtime.package_check DOCUMENT`` prints the errors as a JSON list. The process
 limits its own memory and time, so that a third-party document cannot block the repository.
@@ -28,10 +28,11 @@ _FAULT_LONGEST: Final = 500
 
 
 def examine(document: Path) -> list[str]:
-    """Return the errors of a package's document, one line each.
+    """Return the errors of a package's document, one line per error.
 
     Args:
-        document: ``TOP/drivers/puppet/driver.yaml``, next to the packages that it needs.
+        document: path such as ``TOP/drivers/puppet/driver.yaml``, next to the packages that it
+            needs.
     """
     top = document.parent.parent.parent
     checked = check(
@@ -68,11 +69,11 @@ def problems(document: Path) -> list[Problem]:
 
 
 def examine_apart(document: Path, total_s: float = _TOTAL_S) -> list[str]:
-    """Return the same for a third-party document, from a separate process with limits.
+    """Return the errors of a third-party document, found by a separate process with limits.
 
     Args:
-        document: as for `examine`.
-        total_s: limit of the process, in seconds.
+        document: path of the document, as for `examine`.
+        total_s: maximum time of the process, in seconds.
     """
     command = [sys.executable, "-P", "-m", "urc.runtime.package_check", str(document)]
     try:

@@ -1,8 +1,8 @@
-"""A preview of a package from its documents, before it is installed or updated.
+"""A preview of a package's permissions and risks, before its installation or update.
 
-Files, keys, agents, commands on other machines and hosts normally come from settings. A package may
-name them itself, but the person who installs it must know. So they are listed apart from the
-permissions.
+Files, keys, agents, remote programs and hosts normally come from settings. A package may specify
+them as constants, but the person who installs the package must know. The preview therefore lists
+constants separately from the permissions.
 """
 
 import re
@@ -27,16 +27,16 @@ __all__ = ["PackagePreview", "look", "permissions", "risks_of"]
 
 
 def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[str]:
-    """Return the permissions of a package, one line each.
+    """Return the permissions of a package, one line per permission.
 
     Args:
         document: the document of the package.
-        folder: folder with all files of the package; references outside are an error.
+        folder: folder with all files of the package; references to files outside are an error.
         widgets: names of the included widgets.
 
     Raises:
         ProblemsError: the document has errors.
-        UrcError: it refers to a file outside.
+        UrcError: the document refers to a file outside the folder.
     """
     checked = check(document, built_in_catalog(), widget_folder_of(document))
     _check_inside(checked, folder)  # first, because a problem would show a line of an outside file
@@ -87,7 +87,7 @@ def _of_profile(profile: Profile) -> list[str]:
 
 
 def _of_transport(spec: TransportSpec, profile: Profile) -> str:
-    """Return the line of a connection: its type, and the source of each option."""
+    """Return the description of a connection: its type, and the source of each option."""
     options = [
         joined(" ", (name, _told(value, profile))) for name, value in sorted(spec.options.items())
     ]
@@ -104,7 +104,7 @@ def _of_transport(spec: TransportSpec, profile: Profile) -> str:
 
 
 def _told(value: Any, profile: Profile) -> str:
-    """Return an option as written, with the defaults of its settings."""
+    """Return an option as written, followed by the defaults of its settings."""
     if isinstance(value, Template):
         text = value.source
         used = [
@@ -135,7 +135,7 @@ _URL_HOST: Final = re.compile(r"[a-z+]+://(?:[^/@]*@)?(?P<host>\[[^\]]*\]|[^/:?#
 
 
 def risks_of(profile: Profile) -> list[str]:
-    """Return the fixed names of a package, one line each; most packages have none."""
+    """Return the fixed names of local resources in a package, one line each; usually none."""
     found = [
         line
         for spec in profile.driver.transports.values()
@@ -171,7 +171,7 @@ def _risks_of_transport(spec: TransportSpec, profile: Profile) -> Iterator[str]:
 
 
 def _own(value: Any, profile: Profile) -> str:
-    """Return the fixed text of an option, or "" if it comes from settings."""
+    """Return the fixed text of an option, or "" for a text that depends on settings."""
     if value is None or value is False:
         return ""
     if not isinstance(value, Template):
@@ -188,7 +188,7 @@ def _own(value: Any, profile: Profile) -> str:
 
 
 def _fixed_host(options: Mapping[str, object]) -> str:
-    """Return the host that does not depend on a setting, or ""."""
+    """Return the fixed host of a transport, or "" for a host that depends on settings."""
     host, url = options.get("host"), options.get("url")
     text = host.source if isinstance(host, Template) and not host.settings else host
     if isinstance(text, str):
@@ -210,12 +210,12 @@ class PackagePreview(NamedTuple):
     """The preview of a package."""
 
     permissions: list[str]
-    """Permissions, one line each."""
+    """Permissions, one line per permission."""
     wire: Mapping[str, str]
-    """``commands.beep.send`` → its value: all keys that decide the sent bytes and the decoding of
-    the replies."""
+    """``commands.beep.send`` → its value, for all keys that affect sent bytes or the decoding of
+    replies."""
     risks: list[str]
-    """Local resources without a setting; see `risks_of`."""
+    """Local resources that the package uses without a setting; see `risks_of`."""
 
 
 def look(document: Path, folder: Path, widgets: Sequence[str]) -> PackagePreview:
@@ -244,7 +244,7 @@ def look(document: Path, folder: Path, widgets: Sequence[str]) -> PackagePreview
 
 
 def _flat(value: object, path: str) -> Iterator[tuple[str, str]]:
-    """Yield the path and text of every leaf value."""
+    """Yield the path and text of every leaf value of a document."""
     if isinstance(value, dict) and value:
         for key, inner in value.items():
             yield from _flat(inner, f"{path}.{key}" if path else str(key))

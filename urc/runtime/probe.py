@@ -1,8 +1,7 @@
-"""A connection test of a robot: each transport is tried once.
+"""A connection test of a robot, which tries each transport once.
 
-Layer 4. The test opens a session as a page does, so it uses the driver's logins, polls and
-timeouts. The test sends no motion. A transport that only opens for a request, and that no poll
-uses, is opened and closed once.
+Layer 4. The test opens an ordinary session, so it uses the driver's logins, polls and timeouts. The
+test sends no motion. An on-demand transport that no poll uses is opened and closed once.
 """
 
 import asyncio
@@ -20,11 +19,11 @@ from urc.transports.base import TransportError
 __all__ = ["LONGEST_S", "ProbeResult", "Verdict", "probe"]
 
 LONGEST_S: Final = 12.0
-"""Limit of a test, in seconds, regardless of the driver; the orderly close comes on top."""
+"""Maximum duration of a test, in seconds, for any driver; the orderly close takes extra time."""
 _ANSWER_S: Final = 4.0
-"""Time for a connected robot to send a frame, in seconds."""
+"""Time in which a connected robot must send a frame, in seconds."""
 _FIRST_S: Final = 1.0
-"""Time after which an idle transport is considered unused by polls, in seconds."""
+"""Time after which an idle transport counts as unused by polls, in seconds."""
 _LOOK_S: Final = 0.05
 _CLOSE_S: Final = 2.0
 
@@ -32,18 +31,19 @@ Verdict = Literal["answers", "opens", "fails"]
 
 
 class ProbeResult(NamedTuple):
-    """Result of one transport."""
+    """Test result of one transport."""
 
     transport: str
     type: str
     address: str
     """Address for people."""
     verdict: Verdict
-    """answers: it is live. opens: it connects but the robot sends nothing. fails: neither."""
+    """Meaning of the results: ``answers``: live; ``opens``: connects, but the robot sends nothing;
+    ``fails``: no connection."""
     text: str
-    """One-line description of the result."""
+    """Description of the result, in one line."""
     advice: str
-    """One-line advice, or "" for a good result."""
+    """Advice in one line; "" for a good result."""
 
 
 async def probe(
@@ -52,12 +52,12 @@ async def probe(
     *,
     longest_s: float = LONGEST_S,
 ) -> list[ProbeResult]:
-    """Test every transport of a robot; each wait is bounded.
+    """Test every transport of a robot; every wait has a time limit.
 
     Args:
-        opened: returns the session to test.
+        opened: returns a new session to test.
         table: the kinds of transport.
-        longest_s: limit of the test, in seconds.
+        longest_s: maximum duration of the test, in seconds.
 
     Raises:
         UrcError: the session cannot be built with these settings.
@@ -97,12 +97,12 @@ def _is_connected(status: LinkStatus) -> bool:
 
 
 def _is_settled(status: LinkStatus | None, since_s: float, connected_s: float) -> bool:
-    """Return whether the result of a transport is final.
+    """Return whether the test result of a transport is final.
 
     Args:
-        status: state of the transport.
+        status: present state of the transport.
         since_s: time since the start of the test, in seconds.
-        connected_s: time since the connection opened, in seconds.
+        connected_s: time since the connection opened, in seconds; None without a connection.
     """
     if status is None:
         return False
@@ -114,7 +114,7 @@ def _is_settled(status: LinkStatus | None, since_s: float, connected_s: float) -
 
 
 async def _opened_alone(session: Session, names: list[str], table: Table) -> dict[str, ProbeResult]:
-    """Open and close the transports without a request."""
+    """Open and close the transports that only requests would open."""
     driver = session.profile.driver
     tried: dict[str, ProbeResult] = {}
     if not names:
@@ -192,7 +192,7 @@ _ADVICE: Final = (
 
 
 def advice(text: str) -> str:
-    """Return advice about a failure, by the words of its message."""
+    """Return advice about a failure, chosen by the words of its message."""
     lower = text.lower()
     for words, what in _ADVICE:
         if any(word in lower for word in words):
