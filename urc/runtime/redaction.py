@@ -1,9 +1,9 @@
-"""Redaction: removal of the values of secret settings from all shown or stored data.
+"""Redaction of the values of secret settings in all displayed or stored data.
 
-Layer 4, pure. The engine marks secret frames, and the link redacts them. This module redacts other
-data for the hub, such as the echo of a password or a command with a token. A stream may bring an
-echo letter by letter. So the possible beginning of a secret is delayed until more data arrives, or
-none for a while.
+Layer 4, pure. The engine marks secret frames, and the link redacts these frames. For the hub, this
+module redacts other data, such as the echo of a password or a command with a token. An echo may
+arrive in a stream one character at a time. The possible beginning of a secret is therefore held
+back until more data arrives, or until a pause.
 """
 
 import base64
@@ -19,21 +19,23 @@ from urc.runtime.secret_forms import forms
 __all__ = ["REDACTED", "Redactor", "secret_texts", "stand_ins"]
 
 REDACTED = "‹secret›".encode()
-"""Replacement for secret bytes in shown data."""
+"""Replacement for secret bytes in displayed data."""
 
 _SHORTEST = 3
-"""Shortest secret to cut out of a frame; shorter ones occur too often, so the frame is hidden."""
+"""Minimum length of a secret to replace inside a frame; for shorter secrets, which occur too often,
+the whole frame is hidden."""
 _SHORTEST_CODED = 6
 _SHORTEST_PART = 4
-"""Shortest part of a cut secret to redact; shorter ones occur in many words."""
+"""Minimum length of a truncated secret to redact; shorter parts occur in many words."""
 _SHORTEST_NUMBER = 4
-"""Fewest digits of a secret number to redact; shorter ones equal too many readings."""
+"""Minimum number of digits of a secret number to redact; shorter numbers would match too many
+readings."""
 _CUT = re.compile(rb"['\"]?\s*(?:\.\.\.|\xe2\x80\xa6|['\"]|$)")
-"""Text after a cut: dots, a quotation mark, or the end."""
+"""Text after a truncated value: dots, a quotation mark, or the end."""
 
 
 def stand_ins(profile: Profile, settings: Mapping[str, Value]) -> dict[str, Value]:
-    """Return the settings with placeholders for secrets, for tests of a document."""
+    """Return the settings with placeholders instead of secrets, for a document's tests."""
     return {
         name: "SECRET" if profile.settings[name].is_secret and isinstance(value, str) else value
         for name, value in settings.items()
@@ -42,7 +44,7 @@ def stand_ins(profile: Profile, settings: Mapping[str, Value]) -> dict[str, Valu
 
 
 def secret_texts(profile: Profile, settings: Mapping[str, Value]) -> list[str]:
-    """Return the values of a robot's secret settings."""
+    """Return the values of a robot's secret settings as text."""
     return [
         str(settings[name])
         for name, setting in profile.settings.items()
@@ -51,10 +53,10 @@ def secret_texts(profile: Profile, settings: Mapping[str, Value]) -> list[str]:
 
 
 class Redactor:
-    """Redaction of secrets in frames, texts and streams."""
+    """A redactor of secrets in frames, texts and streams."""
 
     def __init__(self, secrets: Iterable[str], encodings: Iterable[str] = ("utf-8",)) -> None:
-        """Prepare for these secrets, written in any of the encodings; empty ones do not count."""
+        """Prepare the redaction of `secrets` in the given encodings; empty secrets are ignored."""
         names, texts = tuple(encodings), [text for text in secrets if text]
         written = [text.encode(name, "replace") for text in texts for name in names]
         self._plain = tuple(dict.fromkeys(written))
@@ -69,7 +71,8 @@ class Redactor:
             for text in texts
             if len(text.encode("utf-8", "replace")) < _SHORTEST
         )
-        """Short secrets, redacted in a text only as whole words; else most texts would vanish."""
+        """Short secrets, redacted only as whole words in text; otherwise, most texts would be
+        unreadable."""
         self._numbers = frozenset(
             int(text) for text in texts if text.isdecimal() and len(text) >= _SHORTEST_NUMBER
         )
@@ -77,14 +80,14 @@ class Redactor:
 
     @classmethod
     def of(cls, profile: Profile, settings: Mapping[str, Value]) -> "Redactor":
-        """Return the redactor for a robot's secret settings."""
+        """Return the redactor for the secret settings of a robot."""
         secrets = secret_texts(profile, settings)
         encodings = (spec.encoding for spec in profile.driver.transports.values())
         return cls(secrets, dict.fromkeys(("utf-8", *encodings)))
 
     @property
     def is_needed(self) -> bool:
-        """Whether the robot has any secret."""
+        """Whether the robot has any secrets."""
         return bool(self._all)
 
     def whole(self, data: bytes) -> bytes:
@@ -97,7 +100,7 @@ class Redactor:
         return data
 
     def text(self, text: str) -> str:
-        """Return the redacted form of a text, which may end with the cut beginning of a secret."""
+        """Return the redacted form of a text, which may end with a truncated secret."""
         if not self._all:
             return text
         if any(word.search(text) for word in self._short):
@@ -108,7 +111,7 @@ class Redactor:
         return shown.decode("utf-8", "replace")
 
     def value(self, value: Any) -> Any:
-        """Return the redacted form of a reading: None for a secret number."""
+        """Return the redacted form of a reading; a secret number becomes None."""
         if isinstance(value, str):
             return self.text(value)
         if isinstance(value, bytes):
@@ -120,19 +123,19 @@ class Redactor:
         return None if value in self._numbers else value
 
     def _in_bytes(self, data: bytes) -> bytes:
-        """Return the redacted form of a blob, in which short secrets occur by chance."""
+        """Return the redacted form of a blob, without short secrets, which match by chance."""
         for secret in self._long:
             if len(secret) >= _SHORTEST_PART:
                 data = data.replace(secret, REDACTED)
         return data
 
     def envelope(self, envelope: Envelope) -> Envelope:
-        """Return the redacted form of a message."""
+        """Return the redacted form of a message envelope."""
         shown = self.value(envelope.attributes)
         return envelope._replace(attributes=shown, body=self.value(envelope.body))
 
     def stream(self, key: tuple[str, str], data: bytes) -> bytes:
-        """Return the redacted data of the stream `key` that can be shown after `data`."""
+        """Add `data` to the stream `key`; return the redacted data that can now be shown."""
         if not self._all:
             return data
         shown = self.whole(self._held.pop(key, b"") + data)
@@ -144,17 +147,17 @@ class Redactor:
 
     @property
     def is_holding(self) -> bool:
-        """Whether the possible beginning of a secret is delayed."""
+        """Whether a possible beginning of a secret is held back."""
         return bool(self._held)
 
     def rest(self) -> list[tuple[tuple[str, str], bytes]]:
-        """Return the delayed data of each stream, after a pause."""
+        """Return the held-back data of each stream, after a pause."""
         held = list(self._held.items())
         self._held.clear()
         return [(key, REDACTED if len(data) >= _SHORTEST else data) for key, data in held]
 
     def _beginning(self, data: bytes) -> int:
-        """Return the number of bytes at the end of `data` that may begin a secret."""
+        """Return the number of bytes at the end of `data` that may be the beginning of a secret."""
         longest = 0
         for secret in self._all:
             for size in range(min(len(secret) - 1, len(data)), longest, -1):
@@ -165,7 +168,7 @@ class Redactor:
 
 
 def _base64(secret: bytes) -> list[bytes]:
-    """Return the forms of a secret inside base64 text, one for each alignment."""
+    """Return the forms of a secret inside base64 text, one for each byte alignment."""
     found = []
     for shift in range(3):
         code = base64.b64encode(bytes(shift) + secret).rstrip(b"=")
@@ -177,7 +180,7 @@ def _base64(secret: bytes) -> list[bytes]:
 
 
 def _without_cut(secret: bytes, shown: bytes) -> bytes:
-    """Return a text without a cut beginning of `secret` at its end or before a quote."""
+    """Return `text` without a truncated secret at the end or before a quotation mark."""
     at = shown.find(secret[:_SHORTEST_PART])
     while at >= 0 and len(secret) > _SHORTEST_PART:
         size = _SHORTEST_PART

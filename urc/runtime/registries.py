@@ -1,6 +1,6 @@
-"""The built-in tables of transports and framings.
+"""The built-in tables of transport types and framing types.
 
-The module imports no transport, framing or event loop; each is imported at its first use.
+The module does not import any transport or framing; each is imported at its first use.
 """
 
 from urc.registry import Registries

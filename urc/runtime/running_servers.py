@@ -1,10 +1,10 @@
-"""The running dashboards of this user on this machine: their addresses and start keys.
+"""The running dashboards of the current user on this machine: addresses and start keys.
 
-Layer 4. While it runs, each server keeps one small file that only its owner can read::
+Layer 4. Each running server keeps one small file that only its owner can read::
 
     servers/1a2b3c4d.json    {"address": "http://127.0.0.1:8080/", "key": "…", "pid": 4711}
 
-A program sends the key with each request, as ``Authorization: Bearer …``.
+Programs send the key with each request, as ``Authorization: Bearer …``.
 """
 
 import json
@@ -23,10 +23,10 @@ _MOST_BYTES = 4096
 
 
 class RunningServer(NamedTuple):
-    """A dashboard that runs, or ran before the machine lost its power."""
+    """A running dashboard, or one that was running when the machine lost power."""
 
     address: str
-    """Address, such as ``http://127.0.0.1:8080/``."""
+    """Base address, such as ``http://127.0.0.1:8080/``."""
     key: str
     """Start key."""
     pid: int
@@ -34,17 +34,17 @@ class RunningServer(NamedTuple):
 
 
 def headers(server: RunningServer) -> dict[str, str]:
-    """Return the headers of a program's requests to `server`."""
+    """Return the HTTP headers of a program's requests to `server`."""
     return {"authorization": f"Bearer {server.key}"}
 
 
 @contextmanager
 def announced(data: Path, name: str, server: RunningServer) -> Iterator[None]:
-    """Announce `server` to other programs of this user for the duration of the context.
+    """Announce `server` to other programs of the user while the context is open.
 
     Args:
         data: URC's data folder.
-        name: unique name of the server.
+        name: unique name of the server, used as file name.
         server: the server.
 
     Raises:
@@ -61,10 +61,10 @@ def announced(data: Path, name: str, server: RunningServer) -> Iterator[None]:
 
 
 def servers(data: Path) -> dict[Path, RunningServer]:
-    """Return the servers of the data folder by their files, the newest first.
+    """Return the servers announced in the data folder, the newest first.
 
-    The file of a killed server is removed. If the system cannot tell whether the process runs, the
-    server stays in the list, although its address may not respond.
+    Files of killed servers are removed. If the system cannot tell whether a process runs, its
+    server stays in the list, although the address may not respond.
     """
     found: dict[Path, RunningServer] = {}
     for file in _files(data):
@@ -95,7 +95,7 @@ def _read(file: Path) -> RunningServer | None:
 
 
 def _may_run(pid: int) -> bool:
-    """Return whether such a process exists, or may exist."""
+    """Return whether the process exists, or may exist."""
     if os.name != "posix":
         return True  # on Windows, signal 0 is Ctrl-C
     try:

@@ -1,7 +1,7 @@
-"""A held command that a script sends for a limited time, under the rules of motion.
+"""Timed execution of a held command by a script, under the normal rules of motion.
 
-The script samples no input, but it renews the lease as long as it ticks. If it hangs, is killed or
-loses its connection, the lease runs out, and the guard writes the stop.
+The script samples no input, but renews the lease with regular ticks. If the script hangs, is killed
+or loses its connection, the lease expires, and the guard writes the stop.
 """
 
 import asyncio
@@ -20,13 +20,14 @@ from urc.runtime.session import CommandFailed, Session
 __all__ = ["LONGEST_HOLD_S", "hold"]
 
 LONGEST_HOLD_S: Final = 60.0
-"""Limit of a scripted hold, in seconds; longer motion needs an operator at a dashboard."""
+"""Maximum duration of a scripted hold, in seconds; longer motion requires an operator at a
+dashboard."""
 _TICK_S: Final = 0.05
 _LOOK_S: Final = 0.01
 _STOP_OUT_S: Final = 10.0
-"""Time for the connection to accept the stop, in seconds."""
+"""Maximum time for the transport to accept the stop, in seconds."""
 _WORKED_OFF_S: Final = 0.5
-"""Time for a broker or bridge to pass the stop on, in seconds, before the connection closes."""
+"""Time for a broker or bridge to forward the stop before the connection closes, in seconds."""
 _US: Final = Operator("send", "a program")
 
 
@@ -37,17 +38,17 @@ async def hold(
     for_s: float,
     why_not: Callable[[], str],
 ) -> None:
-    """Hold a command for a time, release it, and return once its stop is sent.
+    """Hold a command for a time, release the command, and return after its stop is sent.
 
     Args:
         session: a session opened with ``motion``.
         name: name of a command with ``hold``.
-        arguments: name → value.
+        arguments: argument name → value.
         for_s: duration, from 0 to `LONGEST_HOLD_S` seconds.
-        why_not: returns the reason to end early, or "".
+        why_not: returns the reason to end early, or "" to continue.
 
     Raises:
-        CommandFailed: it was refused, or ended early; the robot got a stop.
+        CommandFailed: the command was refused, or ended early with a stop.
     """
     backend = session.backend
     if backend is None:
@@ -77,7 +78,7 @@ def _now() -> float:
 
 
 async def _until_ready(session: Session, backend: MotionBackend, name: str) -> None:
-    """Wait until the transport is connected and its steps are done or failed."""
+    """Wait until the transport is connected and its connection steps are done or failed."""
     line = session.profile.driver.commands[name].transport
     until = _now() + queue_limit_s(session.profile.driver.transports[line], None)
     while not (backend.is_open(name) and session.frames.is_ready(name)):
@@ -95,7 +96,7 @@ async def _ticks(
     for_s: float,
     why_not: Callable[[], str],
 ) -> tuple[bool, str]:
-    """Tick until the end of the time; return whether the robot moved, and why it ended early."""
+    """Tick until the time is over; return whether the robot moved, and why the hold ended early."""
     number, next_s = 0, _now()
     ends_s = next_s + for_s
     while (now := _now()) < ends_s:
@@ -114,9 +115,9 @@ async def _ticks(
 async def _stop_is_out(
     session: Session, controller: MotionController, backend: MotionBackend, name: str
 ) -> None:
-    """Wait until the transport has accepted the stop, and its repetitions on a lossy transport.
+    """Wait until the transport has accepted the stop, including repeats on a lossy transport.
 
-    The guard reopens a lost connection, and sends the stop first.
+    If the connection is lost, the guard reopens the connection and sends the stop first.
     """
     driver = session.profile.driver
     until = _now() + _STOP_OUT_S

@@ -1,4 +1,4 @@
-"""URC from a Python script: the same profile, the same engine, no dashboard.
+"""Python scripting: the same profile and engine as the dashboard, without a dashboard.
 
     import asyncio
     from urc import connect
@@ -31,7 +31,7 @@ log = logging.getLogger(__name__)
 
 
 def load(path: str | PathLike[str]) -> Profile:
-    """Return the profile in a file.
+    """Load a file and return its profile.
 
     Raises:
         ProblemsError: the document has errors; `problems` lists them.
@@ -45,15 +45,15 @@ def load(path: str | PathLike[str]) -> Profile:
 async def connect(
     profile: Profile | str | PathLike[str], **settings: Value
 ) -> AsyncIterator["ConnectedRobot"]:
-    """Connect a robot for the duration of the block; lost connections are reopened.
+    """Connect a robot while the context is open; lost connections are reopened.
 
     Args:
-        profile: a result of `load`, or the path of a file.
-        settings: values by name, with ``_`` for ``-``; missing settings take their defaults.
+        profile: profile returned by `load`, or path of a file.
+        settings: values by name, with ``_`` instead of ``-``; missing settings use their defaults.
 
     Raises:
         UrcError: the profile has errors, or a setting is wrong or missing. An unreachable robot
-            is not an error here; `command` reports it, and `state` shows it.
+            raises no error in `connect`; `command` reports the failure, and `state` shows it.
     """
     opened = profile if isinstance(profile, Profile) else load(profile)
     given = {_setting_name(opened, name): _as_text(value) for name, value in settings.items()}
@@ -67,17 +67,17 @@ async def connect(
 
 
 class ConnectedRobot:
-    """A connected robot, for scripts; `session` gives access to everything else."""
+    """A connected robot for scripts; the attribute `session` offers all other functions."""
 
     def __init__(self, session: Session) -> None:
-        """Store the session; scripts call `connect` instead."""
+        """Store the session; scripts call `connect` instead of this constructor."""
         self.session = session
 
     async def command(self, name: str, /, **arguments: Reading) -> dict[str, Reading]:
-        """Run a command and return the values of its reply; the wait is bounded.
+        """Run a command and return the values of its reply; the wait has a time limit.
 
         Raises:
-            CommandFailed: with a `code` and a message.
+            CommandFailed: the command failed; the exception has a `code` and a message.
         """
         replied = await self.session.command(name, arguments)
         return dict(replied.values)
@@ -86,7 +86,7 @@ class ConnectedRobot:
         """Return the newest reading of a signal, or None.
 
         Raises:
-            UrcError: the driver has no such signal.
+            UrcError: the driver has no signal of this name.
         """
         self._check(name)
         return self.session.hub.latest(name)
@@ -95,7 +95,7 @@ class ConnectedRobot:
         """Return ``idle``, ``connecting``, ``live``, ``silent`` or ``lost``.
 
         Raises:
-            UrcError: the driver has no such transport.
+            UrcError: the driver has no transport of this name.
         """
         if transport not in self.session.hub.links:
             known = ", ".join(self.session.hub.links)
@@ -103,9 +103,9 @@ class ConnectedRobot:
         return self.session.hub.links[transport].state
 
     async def watch(self, *names: str) -> AsyncIterator[Sample]:
-        """Yield new readings of the named signals, or of all, until the caller stops.
+        """Yield new readings of the named signals, or of all signals, until the caller stops.
 
-        Only the newest reading counts: a slow script skips readings and never falls behind.
+        Only the newest reading is kept, so a slow script skips readings and never falls behind.
 
         Raises:
             UrcError: the driver has no such signal.

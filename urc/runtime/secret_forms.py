@@ -1,4 +1,4 @@
-"""The possible forms of a secret in sent data: plain or encoded."""
+"""The possible forms of a secret in sent data, plain or encoded."""
 
 import base64
 import json
@@ -10,15 +10,16 @@ __all__ = ["HIDDEN", "SecretForms", "forms"]
 
 HIDDEN = "•••"
 _SHORTEST = 4
-"""Shortest secret to search in encoded forms; shorter ones match too often."""
+"""Minimum length of a secret to search in encoded form; shorter secrets match too often."""
 _LONGEST = 4096
 
 
 class SecretForms:
-    """A search for secrets as plain text, in JSON, in URLs, in hex and in base64.
+    """A search for secrets as plain text and in JSON, URL, hex and base64 encoding.
 
-    In base64 the secret may be part of a longer text, such as ``user:password`` in a header. Then
-    the whole base64 text is hidden, because the first and last letters depend on their neighbours.
+    A secret in base64 may be part of a longer text, such as ``user:password`` in a header. In
+    base64, the whole encoded text is hidden, because neighbouring bytes change the first and last
+    letters.
     """
 
     def __init__(self, secrets: Iterable[str] = ()) -> None:
@@ -46,7 +47,7 @@ class SecretForms:
 
 
 def forms(secret: str) -> list[str]:
-    """Return the written forms of a secret: plain, in JSON, in a URL, in hex."""
+    """Return the encoded forms of a secret: plain, JSON, URL, hex."""
     found = [secret, json.dumps(secret, ensure_ascii=False)[1:-1], json.dumps(secret)[1:-1]]
     if _SHORTEST <= len(secret) <= _LONGEST:
         data = secret.encode("utf-8", "surrogatepass")
@@ -56,7 +57,7 @@ def forms(secret: str) -> list[str]:
 
 
 def _based(secret: str) -> list[str]:
-    """Return the parts of its base64 forms that do not depend on neighbouring bytes."""
+    """Return the parts of the secret's base64 forms that do not depend on neighbouring bytes."""
     data = secret.encode("utf-8", "surrogatepass")
     found: list[str] = []
     for first in range(3):

@@ -39,17 +39,17 @@ __all__ = ["CommandFailed", "Motion", "Session", "FifoEvent", "resolve_settings"
 
 
 class FifoEvent:
-    """A FIFO queue in front of an event."""
+    """An event whose waiters proceed in FIFO order."""
 
     def __init__(self, event: asyncio.Event) -> None:
-        """Store the event, which must never be cleared."""
+        """Store the event, which must never be cleared later."""
         self._event = event
         self._turn = asyncio.Lock()  # FIFO
         self._waiting = 0
 
     @property
     def is_open(self) -> bool:
-        """Whether a new caller would overtake no other."""
+        """Whether a new caller may proceed without overtaking other callers."""
         return self._event.is_set() and not self._waiting
 
     async def wait(self) -> None:
@@ -63,20 +63,22 @@ class FifoEvent:
 
 
 Motion = Literal["none", "here", "guarded"]
-"""Writer of motion: none, this process, or the guard, which stops the robot if URC fails."""
+"""Writer of motion frames: none, a guard in this process, or a guard process, which stops the robot
+if URC fails."""
 
 _LOOK_S = 0.02
 new = tuple.__new__
-"""Creates a named tuple without the cost of its class, because every command does it."""
+"""Function that creates a named tuple without the constructor's cost, because every command creates
+several."""
 _GRACE_S = 2.0
-"""Tolerance beyond the sum of a command's declared waits, in seconds."""
+"""Tolerance added to the sum of a command's declared waits, in seconds."""
 
 
 class CommandFailed(UrcError):
-    """A command that failed.
+    """The failure of a command.
 
-    `code` is one of ``timed-out``, ``refused``, ``disconnected``, ``bad-argument``, ``queue-full``,
-    ``unknown-command``; `message` is for people.
+    `code` is ``timed-out``, ``refused``, ``disconnected``, ``bad-argument``, ``queue-full`` or
+    ``unknown-command``; `message` is for display.
     """
 
     def __init__(self, code: str, message: str) -> None:
@@ -92,10 +94,10 @@ def _check_settings(profile: Profile, settings: Mapping[str, Value]) -> None:
 
 
 class Session:
-    """One robot, connected for the duration of the context. It opens once.
+    """One robot, connected while the context is open. It opens once.
 
     ``async with Session(profile, settings, catalog.transports) as session:`` starts the links and
-    returns at once; `hub` has their results.
+    returns immediately; `hub` publishes their state.
     """
 
     def __init__(
@@ -108,18 +110,18 @@ class Session:
         random: Callable[[], float] = random_share,
         motion: Motion = "none",
     ) -> None:
-        """Prepare the session without opening anything.
+        """Prepare the session without opening connections.
 
         Args:
             profile: the loaded profile.
-            settings: a value for every setting of the profile, as from `resolve_settings`.
-            transports: the table of transports.
-            clock: source of time; by default the running loop.
+            settings: a value for every setting of the profile, as returned by `resolve_settings`.
+            transports: table of the available transport types.
+            clock: source of time; None for the running event loop.
             random: returns a number in [0, 1) for the jitter of the backoff.
-            motion: writer of held commands.
+            motion: writer of held commands, as one of the values of `Motion`.
 
         Raises:
-            UrcError: a setting has no value, or a transport cannot be built with these settings.
+            UrcError: a setting has no value, or a transport cannot be built with the settings.
         """
         _check_settings(profile, settings)
         self.profile = profile
@@ -133,9 +135,9 @@ class Session:
         fresh = TimeAndNonce(time.time, secrets.token_bytes)
         engine = Engine(driver, self.settings, fresh=fresh, is_compiled=True)
         self.frames: MotionFrames = engine.motions
-        """Renders the frames of held commands."""
+        """Renderer of the frames of held commands."""
         self.backend = self._make_backend(engine, transports, motion)
-        """Writer of the frames; None without motion."""
+        """Writer of held-command frames; None without motion."""
         self._dispatcher = Dispatcher(
             engine,
             self.hub,
@@ -147,10 +149,10 @@ class Session:
         )
         self._links = self._made_links(transports, random)
         self.on_motion: Callable[[MotionEvent], None] | None = None
-        """Takes the engine's events of held commands: set by `MotionController.attach`."""
+        """Handler of the engine's held-command events, set by `MotionController.attach`."""
         self._stops = 0
         self._untried = {name: FifoEvent(link.tried) for name, link in self._links.items()}
-        """Links before the end of their first attempt: commands wait for it, in order."""
+        """Links whose first attempt has not ended; commands wait for these links, in order."""
         self._numbers = count(1)
         self._group = asyncio.TaskGroup()
         self._tasks: list[asyncio.Task[None]] = []
@@ -245,7 +247,7 @@ class Session:
             await self._group.__aexit__(None, None, None)
 
     async def _say_goodbye(self) -> None:
-        """Run the `on_close` steps of the drivers, within their time limit."""
+        """Run the `on_close` steps of the driver, within their time limit."""
         polite = [
             link
             for name, link in self._links.items()
@@ -266,15 +268,15 @@ class Session:
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
     ) -> Replied:
-        """Run a command and return its reply; the wait is always bounded.
+        """Run a command and return its reply; the wait always has a time limit.
 
-        A command waits for the first attempt of a persistent link.
+        A command waits for the first connection attempt of a persistent link.
 
         Args:
             name: name of the command in the driver.
-            arguments: name → value; missing arguments take their defaults.
-            confirmed_by: people who confirmed it, for the two-person rule.
-            on_sent: called with each sent payload, except secrets and payloads of a sequence.
+            arguments: argument name → value; missing arguments use their defaults.
+            confirmed_by: people who confirmed the command, for the two-person rule.
+            on_sent: callback with each sent payload, except secrets and payloads of a sequence.
 
         Raises:
             CommandFailed: the command was refused, timed out, or lost its connection.
@@ -296,7 +298,7 @@ class Session:
         return outcome
 
     async def settle(self) -> str:
-        """Wait until all sent data has arrived, before the session closes.
+        """Wait until all sent data has arrived; call this method before closing the session.
 
         Returns:
             A message about undelivered bytes, or "". Takes a few seconds at most.
@@ -305,10 +307,10 @@ class Session:
         return "; ".join(filter(None, found))
 
     def pull(self, sequence: str, what: Pull) -> None:
-        """Pause a sequence, run one more step, continue, or end it.
+        """Pause, step, continue or end a sequence.
 
-        ``step`` before the start of a sequence starts it paused. Without a running sequence of this
-        name, nothing else happens.
+        ``step`` starts a sequence that is not running, paused at its first step. Other verbs have
+        no effect without a running sequence of this name.
         """
         self._dispatcher.pull(sequence, what)
 
@@ -316,16 +318,16 @@ class Session:
         """End every sequence of the driver and refuse autonomous motion.
 
         Args:
-            reason: reason for people; "" allows autonomous motion again.
+            reason: reason to display; "" permits autonomous motion again.
         """
         self._stops += reason != ""
         self._dispatcher.latch(reason)
 
     async def _first_attempt(self, name: str, given: Mapping[str, Reading]) -> None:
-        """Wait until the links of a command have ended their first attempt, within a limit.
+        """Wait until the links of a command have ended their first attempt, within a time limit.
 
         Raises:
-            CommandFailed: the command moves the robot, and STOP was pressed during the wait.
+            CommandFailed: STOP was pressed during the wait for a command that moves the robot.
         """
         driver, stops = self.profile.driver, self._stops
         command = driver.commands.get(name)
@@ -350,13 +352,13 @@ class Session:
 
 
 def _limit_s(driver: Driver, name: str) -> float:
-    """Return the declared limit of a command plus a tolerance, in seconds."""
+    """Return the declared time limit of a command, plus a tolerance, in seconds."""
     known = driver.commands.get(name)
     paused_s = PAUSE_S if known is not None and known.steps else 0.0
     return longest_s(driver, name) + paused_s + _GRACE_S
 
 
 def _expects_frames(driver: Driver, transport: str) -> bool:
-    """Return whether the robot sends frames on this transport without a request."""
+    """Return whether the robot sends frames on this transport without requests."""
     polls = any(poll.transport == transport and poll.reply for poll in driver.polls)
     return polls or any(message.transport == transport for message in driver.messages.values())

@@ -1,6 +1,6 @@
-"""Conversion of the operator's settings from text to typed values.
+"""Conversion of an operator's settings from text to typed values.
 
-Each command that opens a robot uses this module. The module needs no network and no event loop.
+Every command that opens a robot uses this module. The module needs no network and no event loop.
 """
 
 import math
@@ -28,7 +28,7 @@ _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 _ONE_SETTING = re.compile(r"\{\{\s*settings\.[a-z]\w*\s*\}\}")
 _LEFT_OUT: Final = object()
 _LONGEST = 4096
-"""Limit of a setting, in characters."""
+"""Maximum length of a setting, in characters."""
 _NO_ENVIRONMENT: Mapping[str, str] = MappingProxyType({})
 
 
@@ -44,16 +44,16 @@ def resolve_settings(
     *,
     allows_any_port: bool = False,
 ) -> tuple[dict[str, Value], tuple[str, ...]]:
-    """Return the value of each setting, and the names of settings without one.
+    """Return the value of each setting, and the names of settings without a value.
 
     Args:
         profile: profile with the settings.
         given: name → text, from ``--set``; overrides all other sources.
-        environ: the environment; ``URC_SET_NAME`` overrides the default.
-        allows_any_port: whether port 0 is allowed, for a server whose port the system chooses.
+        environ: environment variables; ``URC_SET_NAME`` overrides the default of a setting.
+        allows_any_port: whether to permit port 0, for a server that lets the system choose.
 
     Raises:
-        UrcError: an unknown name, or an invalid text.
+        UrcError: a name is unknown, or a text is invalid.
     """
     for name in given:
         if name not in profile.settings:
@@ -81,15 +81,16 @@ def resolve_settings(
 
 
 def parse_setting(setting: Setting, text: str, *, allows_any_port: bool = False) -> Value:
-    """Return the value of `text` for `setting`.
+    """Convert `text` to the type of `setting` and return the value.
 
     Args:
-        setting: setting with type and range.
-        text: the operator's text.
+        setting: setting with a type and a range.
+        text: text from the operator.
         allows_any_port: whether port 0 is allowed, for a server whose port the system chooses.
 
     Raises:
-        UrcError: one line with the found and the expected value. Secrets are not repeated.
+        UrcError: the text is invalid; the message shows the found and the expected value. Secret
+            values are not shown in the message.
     """
     if len(text) > _LONGEST:
         raise UrcError(f"is {len(text)} characters long; {_LONGEST} are allowed")
@@ -119,10 +120,10 @@ def parse_setting(setting: Setting, text: str, *, allows_any_port: bool = False)
 def options_of(spec: TransportSpec, settings: Mapping[str, Value]) -> dict[str, object]:
     """Return the options of a transport, with templates evaluated over ``settings``.
 
-    An option that is only an empty setting is left out.
+    An option that consists only of an empty setting is left out.
 
     Raises:
-        UrcError: a template needs a missing setting, or fails.
+        UrcError: a template uses a missing setting, or fails.
     """
     options: dict[str, object] = {}
     for name, option in spec.options.items():

@@ -1,6 +1,6 @@
-"""The stored settings of each robot, one small file for each.
+"""The stored settings of robots, in one small file per robot.
 
-The file may contain secrets, so only its owner can read it.
+A settings file may contain secrets, so only its owner can read the file.
 """
 
 from collections.abc import Iterable
@@ -18,7 +18,7 @@ from urc.problems import UrcError
 __all__ = ["DRIVEN", "StoredSettings", "SettingsStore", "in_use", "names_kept", "pin"]
 
 DRIVEN: Final = ("robot", "driver")
-"""Kinds of packages with settings; for equal names, the robot comes first."""
+"""Kinds of packages that have settings; for equal names, a robot precedes a driver."""
 
 _MOST_BYTES: Final = 1 << 20
 _Name = Annotated[str, msgspec.Meta(max_length=200)]
@@ -26,20 +26,21 @@ _Text = Annotated[str, msgspec.Meta(max_length=4096)]
 
 
 class StoredSettings(msgspec.Struct, frozen=True):
-    """The stored choices for one robot."""
+    """The stored settings and choices for one robot."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)] = 1
     version: _Name = ""
-    """Version of the installed package; "" for the newest."""
+    """Chosen version of the installed package; "" for the newest version."""
     interface: _Name = ""
-    """Interface to show first; "" for the document's first."""
+    """Interface to show first; "" for the first interface of the document."""
     settings: dict[_Name, _Text] = {}
-    """Setting → text of the operator; missing settings take their defaults."""
+    """Setting → text from the operator; missing settings use their defaults."""
     destination: _Name = ""
-    """Destination for which the secrets were entered, from `urc.runtime.destination`. "" means
-    unknown; then they must be entered again."""
+    """Destination for which the secrets were entered, from `urc.runtime.destination`. "" means an
+    unknown destination; the secrets must then be entered again."""
     package: _Name = ""
-    """Package of the settings, such as ``drivers/puppet``; "" for a document given by path."""
+    """Package to which the settings belong, such as ``drivers/puppet``; "" for a document given by
+    path."""
 
 
 class SettingsStore:
@@ -50,7 +51,7 @@ class SettingsStore:
         self.file = folder / f"{quote(name, safe='')}.json"
 
     def load(self) -> StoredSettings:
-        """Return the stored settings, or an empty `StoredSettings`.
+        """Return the stored settings; without a file, return an empty `StoredSettings`.
 
         Raises:
             UrcError: the file cannot be read, or is damaged.
@@ -70,7 +71,7 @@ class SettingsStore:
         """Write the settings atomically: after a power failure, the file is either old or new.
 
         Raises:
-            UrcError: the file cannot be written; then it is unchanged.
+            UrcError: the file cannot be written and stays unchanged.
         """
         data = msgspec.json.format(msgspec.json.encode(kept, order="sorted"), indent=1) + b"\n"
         try:
@@ -79,7 +80,7 @@ class SettingsStore:
             raise UrcError(f"{self.file}: {error.strerror or error}") from None
 
     def is_of(self, package: str) -> bool:
-        """Return whether the file exists and may belong to this package."""
+        """Return whether the file exists and may belong to `package`."""
         try:
             kept = self.load()
         except UrcError:
@@ -90,18 +91,18 @@ class SettingsStore:
         return kept.package == package or not (kept.package or kept.destination)
 
     def forget(self) -> None:
-        """Delete the file, if it exists."""
+        """Delete the settings file, if the file exists."""
         with suppress(OSError):
             self.file.unlink(missing_ok=True)
 
 
 def names_kept(folder: Path, removed: Iterable[Lock], left: Iterable[Lock]) -> list[str]:
-    """Return the robots whose settings are deleted together with removed packages.
+    """Return the robots whose settings become obsolete when packages are removed.
 
     Args:
         folder: folder of the files.
         removed: packages to remove.
-        left: packages that stay installed; a robot with such a package keeps its settings.
+        left: packages that remain installed; a robot with such a package keeps its settings.
     """
     stay = {lock.key.name for lock in left if lock.key.kind in DRIVEN}
     roots = {lock.key.name: lock.root for lock in removed if lock.key.kind in DRIVEN}
@@ -113,14 +114,14 @@ def names_kept(folder: Path, removed: Iterable[Lock], left: Iterable[Lock]) -> l
 
 
 def in_use(folder: Path, name: str, installed: Iterable[Lock]) -> Lock | None:
-    """Return the installed package that a robot's name refers to, or None.
+    """Return the installed package that a robot name refers to, or None.
 
-    The result is the chosen version, or else the newest version. If a robot and a driver have the
-    same name, it is the robot.
+    The result is the version that the operator chose, or else the newest version. If a robot and a
+    driver have the same name, the robot is chosen.
 
     Args:
         folder: folder of the files.
-        name: name of the robot.
+        name: robot name.
         installed: all installed packages.
     """
     locks = [lock for lock in installed if lock.key.kind in DRIVEN and lock.key.name == name]
@@ -139,7 +140,7 @@ def in_use(folder: Path, name: str, installed: Iterable[Lock]) -> Lock | None:
 
 
 def pin(folder: Path, lock: Lock) -> None:
-    """Make a robot keep its version when others are installed; raise `UrcError`.
+    """Pin a robot to its present version before an installation; raise `UrcError` on failure.
 
     Args:
         folder: folder of the files.

@@ -1,6 +1,6 @@
-"""Hints why a test set no signal, and how to correct the test.
+"""Hints about signals that a test failed to set, with corrections of the test.
 
-Layer 4, pure. The module runs only after a failed test.
+Layer 4, pure. This module is used only after a failed test.
 """
 
 from collections.abc import Iterator
@@ -27,11 +27,11 @@ _WAITED_FOR: Final = {
     "xml": "for the end of the XML element",
     "regex": "for bytes that complete the pattern",
 }
-"""Framing → the missing part of an incomplete frame."""
+"""Framing type → the missing part of an incomplete frame."""
 
 
 class _Asked(NamedTuple):
-    """A request whose reply a frame may be."""
+    """A request whose reply may match a frame."""
 
     how: str
     """Line of the test that would send the request."""
@@ -40,7 +40,7 @@ class _Asked(NamedTuple):
 
 
 class SignalHints:
-    """A search for the reason why a test has not set a signal."""
+    """A search for the reason why a test did not set a signal."""
 
     def __init__(self, trial: TestEngine, *, in_steps: bool) -> None:
         self._trial = trial
@@ -48,7 +48,7 @@ class SignalHints:
         self._in_steps = in_steps
 
     def of(self, signal: str) -> str:
-        """Return the reason, as a continuation of "nothing set it", or ""."""
+        """Return the reason as a continuation of "nothing set it", or "" without one."""
         for transport in self._driver.transports:
             reason = self._of_line(transport, signal)
             if reason:
@@ -88,7 +88,7 @@ class SignalHints:
         return f"{text} waits {what}{passes}"
 
     def _answered_by(self, transport: str, fed: bytes, signal: str) -> str:
-        """Return the unsent request whose reply the frame may be."""
+        """Return an unsent request whose reply the frame may be, or None."""
         spec = self._driver.transports[transport]
         for asked in self._could_ask():
             reads = [asked.reply.read, *(stage.read for stage in asked.reply.stages)]
@@ -103,7 +103,7 @@ class SignalHints:
         return ""
 
     def _asked_in_vain(self, transport: str, fed: bytes, signal: str) -> str:
-        """Return the sent request whose form fits no frame, if all frames have another form."""
+        """Return the sent request whose reply format matches none of the received frames, or ""."""
         spec = self._driver.transports[transport]
         for label, reply in self._were_asked(transport):
             reads = [reply.read, *(stage.read for stage in reply.stages)]
@@ -118,7 +118,7 @@ class SignalHints:
         return ""
 
     def _were_asked(self, transport: str) -> Iterator[tuple[str, Reply]]:
-        """Yield the requests of the test that expect a reply on this transport."""
+        """Yield the sent requests of the test that expect a reply on this transport."""
         for poll in self._trial.polls:
             is_ours = poll.transport == transport and ("poll", poll.name) in self._trial.used
             if is_ours and poll.reply is not None:
@@ -139,7 +139,7 @@ class SignalHints:
             return False
 
     def _could_ask(self) -> Iterator[_Asked]:
-        """Yield the requests that the test could have sent."""
+        """Yield the requests that the test could send."""
         used = self._trial.used
         for poll in self._trial.polls:
             if poll.reply is not None and ("poll", poll.name) not in used:
@@ -151,7 +151,7 @@ class SignalHints:
 
 
 def _shown(data: bytes, encoding: str) -> str:
-    """Return bytes as text if possible, else in hex."""
+    """Return bytes as readable text if possible, otherwise in hex."""
     cut = data[:_SHOWN]
     more = " …" if len(data) > _SHOWN else ""
     try:

@@ -1,6 +1,6 @@
-"""Comparison of the expected and the actual results of a document's test.
+"""Comparison of expected and actual results in a document's tests.
 
-Layer 4, pure. Each complaint is part of one line and contains both values.
+Layer 4, pure. Each mismatch is described in part of a line, with both values.
 """
 
 import math
@@ -21,16 +21,16 @@ from urc.runtime.test_engine import TestEngine, encoded
 __all__ = ["check_bytes", "check_reply", "check_values", "first", "is_same"]
 
 _SINGLE: Final = 1e-7
-"""Relative precision of four-byte floats."""
+"""Relative precision of four-byte floating-point numbers."""
 _SHOWN: Final = 3
-"""Limit of reported failures of one test."""
+"""Maximum number of reported failures per test."""
 _SHOWN_BYTES: Final = 48
 _BEFORE_BYTES: Final = 16
-"""Shown bytes of a long frame, and how many of them come before the first difference."""
+"""Number of shown bytes of a long frame, and the number of them before the first difference."""
 
 
 def first(failures: list[str]) -> list[str]:
-    """Return the first failures, and the number of further ones."""
+    """Return the first failures, followed by the number of further failures."""
     more = len(failures) - _SHOWN
     return [*failures[:_SHOWN], f"and {more} more"] if more > 0 else list(failures)
 
@@ -38,7 +38,7 @@ def first(failures: list[str]) -> list[str]:
 def check_values(
     trial: TestEngine, expect: Mapping[str, Expected], hints: SignalHints
 ) -> Iterator[str]:
-    """Yield a complaint for each signal with an unexpected state."""
+    """Yield a message for each signal with an unexpected state."""
     for name, wanted in expect.items():
         state = (
             wanted
@@ -75,7 +75,7 @@ def _wanted(state: ExpectedState) -> str:
 def check_bytes(
     trial: TestEngine, driver: Driver, sent: Mapping[str, Fed | tuple[Fed, ...]]
 ) -> Iterator[str]:
-    """Yield a complaint for each transport with unexpected sent data, and forget the data."""
+    """Yield a message for each transport with unexpected sent data; discard compared data."""
     for name, text in sent.items():
         found = trial.sent.pop(name, [])
         pieces = pieces_of(text)
@@ -100,7 +100,7 @@ def check_reply(
     wanted: Mapping[str, object],
     of: str,
 ) -> Iterator[str]:
-    """Yield the complaints about the first finished command, and forget it."""
+    """Yield the mismatches of the first finished command, and discard its result."""
     place = next((place for place, one in enumerate(ended) if of in ("", one.command)), None)
     if place is None:
         yield f"{of or 'the command'} should be done, but is not: no answer, or no command was run"
@@ -119,7 +119,7 @@ def check_reply(
 
 
 def _check_messages(transport: str, wanted: list[Envelope], found: list[Payload]) -> Iterator[str]:
-    """Yield a complaint about the first unexpected message."""
+    """Yield a message about the first unexpected envelope."""
     for place in range(max(len(wanted), len(found))):
         one = wanted[place] if place < len(wanted) else None
         other = found[place] if place < len(found) else None
@@ -141,7 +141,7 @@ def _is_message(found: Envelope, wanted: Envelope) -> bool:
 
 
 def _is_alike(found: object, wanted: object) -> bool:
-    """Compare data, with the number rules of tests."""
+    """Compare data with the tolerance rules for numbers in tests."""
     if isinstance(found, Mapping) and isinstance(wanted, Mapping):
         return found.keys() == wanted.keys() and all(
             _is_alike(found[name], wanted[name]) for name in wanted
@@ -160,7 +160,10 @@ def _on_wire(sent: Iterable[Payload]) -> bytes:
 
 
 def _framed(text: str | bytes, driver: Driver, transport: str) -> bytes:
-    """Return every byte on the wire. Bytes are complete already; text is a frame's payload."""
+    """Return the expected bytes on the wire, with framing.
+
+    Bytes are used unchanged; text is the payload of one frame.
+    """
     if isinstance(text, bytes):
         return text
     payload = encoded(text, driver, transport)
@@ -171,7 +174,7 @@ def _framed(text: str | bytes, driver: Driver, transport: str) -> bytes:
 
 
 def is_same(found: object, expected: object) -> bool:
-    """Compare by value: 42 equals 42.0, true does not equal 1, and fractions have a tolerance."""
+    """Compare values: 42 equals 42.0, true differs from 1, and fractions have a tolerance."""
     if isinstance(found, tuple) and isinstance(expected, tuple):
         return len(found) == len(expected) and all(map(is_same, found, expected))
     if isinstance(found, bool) != isinstance(expected, bool):
@@ -182,7 +185,7 @@ def is_same(found: object, expected: object) -> bool:
 
 
 def _difference(transport: str, wanted: bytes, found: bytes) -> str:
-    """Return both sides in hex and text around the first different byte."""
+    """Return both values in hex and text, around the first different byte."""
     at = next((i for i, (a, b) in enumerate(zip(wanted, found, strict=False)) if a != b), None)
     offset = min(len(wanted), len(found)) if at is None else at
     start = max(0, offset - _BEFORE_BYTES) if max(len(wanted), len(found)) > _SHOWN_BYTES else 0
@@ -191,7 +194,7 @@ def _difference(transport: str, wanted: bytes, found: bytes) -> str:
 
 
 def _bytes_shown(data: bytes, start: int) -> str:
-    """Return the bytes from `start`, with dots for omitted ones."""
+    """Return the bytes from `start`, with dots for omitted bytes."""
     if not data:
         return "nothing"
     part = data[start : start + _SHOWN_BYTES]

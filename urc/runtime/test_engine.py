@@ -1,6 +1,6 @@
-"""An engine under test, with a simulated clock and a transport that always connects.
+"""A test bench for an engine, with a simulated clock and transports that always connect.
 
-Layer 4, without I/O and asyncio. The module collects all output of the engine for the test.
+Layer 4, without I/O and asyncio. All output of the engine is collected for the test.
 """
 
 import json
@@ -37,17 +37,17 @@ __all__ = ["Exercised", "Kind", "TestEngine", "encoded"]
 
 Kind = Literal["command", "poll", "message"]
 Exercised = tuple[Kind, str]
-"""Kind and name of an item that a test can use."""
+"""Kind and name of a part of a driver that a test can use."""
 _TWO_PEOPLE: Final = ("who wrote the test", "who runs it")
-"""Confirmations for every command, because a test is about the wire."""
+"""Confirmations for every command, because tests check the bytes on the wire."""
 _BRINGS_OBJECTS: Final = frozenset(("ros",))
-"""Transport types whose messages are objects; the others carry bytes."""
+"""Transport types with objects as messages; all other types carry bytes."""
 _MOST_TICKS: Final = 20_000
-"""Limit of deadlines during one wait of a test."""
+"""Maximum number of deadlines during one wait of a test."""
 
 
 class _Watched(Engine):
-    """An engine that notes its commands, and the messages of decoded frames."""
+    """An engine that records its commands, and the messages of decoded frames."""
 
     def __init__(self, driver: Driver, settings: Mapping[str, Value], fresh: TimeAndNonce) -> None:
         super().__init__(driver, settings, fresh=fresh)
@@ -76,7 +76,7 @@ class TestEngine:
     """One running test.
 
     Raises:
-        UrcError: from every method, for an impossible action; the message is for people.
+        UrcError: raised by every method for an impossible action; the message is for display.
     """
 
     def __init__(
@@ -85,9 +85,9 @@ class TestEngine:
         """Prepare the test.
 
         Args:
-            driver: driver with only the polls of the test.
-            settings: value of every setting.
-            polls: all polls of the document.
+            driver: driver with only the polls that the test names.
+            settings: a value for every setting.
+            polls: all polls of the document, by name.
         """
         self.driver = driver
         self.settings = settings
@@ -99,23 +99,23 @@ class TestEngine:
         """Simulated time, in seconds."""
         self.samples: dict[str, Sample] = {}
         self.fresh: set[str] = set()
-        """Signals that were set since the last `forget`."""
+        """Signals set since the last call of `forget`, with their samples."""
         self.fed: dict[str, bytes] = {}
-        """Transport → all bytes from the robot since the connection opened."""
+        """Transport → all bytes received from the robot since the connection opened."""
         self.sent: dict[str, list[Payload]] = {}
-        """Transport → sent payloads that no check has read."""
+        """Transport → sent payloads that no check has read yet."""
         self.failures: list[str] = []
         self.ended: list[Replied | Failed] = []
-        """Finished commands that no check has read."""
+        """Finished commands that no check has read yet."""
         self.closed: set[str] = set()
-        """Transports that the engine has closed, until a check reads them."""
+        """Transports closed by the engine that no check has read yet."""
         self._requests = 0
         self._numbers: dict[str, list[object]] = {}
-        """Transport → numbers of the requests without a response."""
+        """Transport → numbers of the unanswered requests."""
 
     @property
     def used(self) -> set[Exercised]:
-        """Commands, polls and messages that the test has used."""
+        """Commands, polls and messages used by the test."""
         return self.engine.used
 
     def connect_lines(self) -> None:
@@ -132,15 +132,15 @@ class TestEngine:
         self.perform(self.engine.start(transport, self.now))
 
     def close(self, transport: str) -> None:
-        """Close a connection from the robot's side."""
+        """Close a connection as if the robot closed it."""
         self.perform(self.engine.closed(transport, "", self.now))
 
     def leave(self) -> None:
-        """Start the orderly close of all connections."""
+        """Start an orderly close of all connections."""
         self.perform(self.engine.finish(self.now))
 
     def run(self, command: str, arguments: Mapping[str, Reading]) -> None:
-        """Run a command; a held command sends the first frame of a gesture."""
+        """Run a command; for a held command, send the first frame of a gesture."""
         self._requests += 1
         known = self.driver.commands.get(command)
         if known is not None and known.hold is not None:
@@ -150,7 +150,7 @@ class TestEngine:
         self.perform(self.engine.command(request, self.now))
 
     def _send(self, command: Command, arguments: Mapping[str, Reading]) -> None:
-        """Send a motion frame, which bypasses the queue, waits for no reply, and may be refused."""
+        """Send a motion frame, which bypasses the queue and waits for no reply."""
         name, number = command.name, self._requests
         self.used.add(("command", name))
         try:
@@ -171,7 +171,7 @@ class TestEngine:
         self.ended.append(failed)
 
     def feed(self, transport: str, piece: Fed) -> None:
-        """Feed data as if the robot sent it."""
+        """Pass data to the engine as if the robot sent it."""
         data: Payload
         if isinstance(piece, Envelope):
             data = self._envelope(transport, piece)
@@ -182,7 +182,7 @@ class TestEngine:
         self.perform(self.engine.receive(transport, data, self.now))
 
     def _envelope(self, transport: str, piece: Envelope) -> Envelope:
-        """Return the message as the transport delivers it: a response gets its request's number."""
+        """Return the message as a transport delivers it: a response gets its request's number."""
         body = piece.body
         if body is not None and self.driver.transports[transport].type not in _BRINGS_OBJECTS:
             body = body if isinstance(body, bytes) else json.dumps(body).encode()
@@ -196,7 +196,7 @@ class TestEngine:
         return Envelope(piece.verb, attributes, body)
 
     def fall_silent(self) -> None:
-        """Pass the time that ends a frame by silence."""
+        """Let time pass until silence ends the frame."""
         for name in self.fed:
             due = self.engine.lines[name].receiver.decoder.deadline
             if due is not None:
@@ -204,7 +204,7 @@ class TestEngine:
                 self.perform(self.engine.tick(self.now))
 
     def wait(self, seconds: float) -> None:
-        """Pass simulated time, with all deadlines in it."""
+        """Let simulated time pass, and handle all deadlines in it."""
         end = self.now + seconds
         for _ in range(_MOST_TICKS):
             if not self.pass_to_deadline(end):
@@ -213,7 +213,7 @@ class TestEngine:
         raise UrcError(f"more than {_MOST_TICKS} deadlines are due within {seconds:g} s")
 
     def pass_to_deadline(self, end: float = float("inf")) -> bool:
-        """Pass time to the next deadline before `end`; return whether one exists."""
+        """Advance to the next deadline before `end`; return whether a deadline exists."""
         due = self.engine.deadline
         if due is None or due > end:
             return False
@@ -222,7 +222,7 @@ class TestEngine:
         return True
 
     def perform(self, events: list[Event]) -> None:
-        """Perform events as a link does."""
+        """Perform events in the same way as a link."""
         for poll in self.driver.polls:
             if self.engine.lines[poll.transport].has(poll.name) or poll.reply is None:
                 self.used.add(("poll", poll.name))
@@ -252,7 +252,7 @@ class TestEngine:
                         self.failures.append(f"closed: {reason}")
 
     def forget(self) -> None:
-        """Start a new collection of set signals."""
+        """Begin a new collection of set signals."""
         self.fresh.clear()
 
 

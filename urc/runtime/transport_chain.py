@@ -1,4 +1,4 @@
-"""The transports of a driver, with tunnels before the transports that they carry."""
+"""The transports of a driver, with each tunnel before the transports inside the tunnel."""
 
 from collections.abc import Mapping
 from typing import NamedTuple, cast
@@ -14,7 +14,7 @@ __all__ = ["BuiltTransport", "make_lines", "make_transports"]
 
 
 class BuiltTransport(NamedTuple):
-    """A transport, with the values it was built from."""
+    """A transport, and the values from which it was built."""
 
     spec: TransportSpec
     factory: str
@@ -26,10 +26,10 @@ class BuiltTransport(NamedTuple):
 def make_lines(
     driver: Driver, settings: Mapping[str, Value], table: Table
 ) -> dict[str, BuiltTransport]:
-    """Return name → closed transport; tunnels come before the transports that they carry.
+    """Return name → closed transport, with each tunnel before the transports inside it.
 
     Args:
-        driver: the loaded driver, without circular tunnels.
+        driver: the loaded driver; tunnels must not be circular.
         settings: a value for every setting.
         table: the kinds of transport.
 

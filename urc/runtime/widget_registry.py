@@ -1,4 +1,4 @@
-"""Widgets available to a document: those of URC, and those of the document's package."""
+"""The widgets available to a document: built-in widgets, and widgets of the document's package."""
 
 from os import PathLike
 from pathlib import Path
@@ -17,8 +17,9 @@ __all__ = ["WidgetRegistry", "hidden_beside", "hidden_widget", "widget_folder_of
 def widget_folder_of(document: str | PathLike[str]) -> WidgetFolder:
     """Return the widgets for a document.
 
-    An installed package uses the widgets of its own ecosystem. A package in development uses the
-    packages next to it. Any other document uses the folder ``widgets`` next to it.
+    An installed package uses the installed widgets. A package in development uses the widget
+    packages in the neighbouring folders. Any other document uses the folder ``widgets`` next to the
+    document.
     """
     home = ecosystem_of(Path(document)) or _workshop_of(Path(document))
     ours = shipped("widgets")
@@ -29,13 +30,13 @@ def widget_folder_of(document: str | PathLike[str]) -> WidgetFolder:
 
 
 def hidden_beside(document: str | PathLike[str]) -> list[Path]:
-    """Return the folders of a document's widgets that are never used."""
+    """Return the document's widget folders that are never used."""
     registry = widget_folder_of(document)
     return registry.hidden() if isinstance(registry, WidgetRegistry) else []
 
 
 def hidden_widget(manifest: str, name: str) -> Problem:
-    """Return the warning about a widget with the name of a built-in one."""
+    """Return the warning about a widget with the same name as a built-in widget."""
     return Problem(
         "shipped-name",
         f"this widget is never used: the built-in widget {name!r} takes precedence",
@@ -46,21 +47,21 @@ def hidden_widget(manifest: str, name: str) -> Problem:
 
 
 def _workshop_of(document: Path) -> Path | None:
-    """Return the folder of packages that contains a package's own document, or None."""
+    """Return the top folder of packages that contains a document, or None."""
     home = document.resolve().parent
     is_package = home.parent.name in FOLDERS and (home / MANIFEST).is_file()
     return home.parent.parent if is_package else None
 
 
 class WidgetRegistry(WidgetFolder):
-    """The built-in widgets, and the installed ones, which never replace a built-in one."""
+    """Built-in and installed widgets; an installed widget never replaces a built-in one."""
 
     def __init__(self, folder: Path, brought: Path) -> None:
         super().__init__(folder)
         self._brought = WidgetFolder(brought)
         self._brought.problems = self.problems
         self._hidden: set[str] = set()
-        """Requested names that are both built-in and installed."""
+        """Requested widget names that are both built-in and installed."""
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -72,7 +73,7 @@ class WidgetRegistry(WidgetFolder):
         return sorted({*super().names(), *self._brought.names()})
 
     def get(self, name: str) -> Widget | None:
-        """Return a widget, or None."""
+        """Return a widget by name, or None."""
         if not super().has(name):
             return self._brought.get(name)
         if name not in self._hidden and self._hides(name):
@@ -82,11 +83,11 @@ class WidgetRegistry(WidgetFolder):
         return super().get(name)
 
     def hidden(self) -> list[Path]:
-        """Return the folders of installed widgets that a built-in one hides."""
+        """Return the folders of installed widgets that are hidden by a built-in widget."""
         return [self._brought.place(name) for name in self._brought.names() if self._hides(name)]
 
     def _hides(self, name: str) -> bool:
-        """Return whether a built-in widget hides an installed one of this name."""
+        """Return whether a built-in widget hides an installed widget of this name."""
         if not (super().has(name) and self._brought.has(name)):
             return False
         return super().place(name).resolve() != self._brought.place(name).resolve()
@@ -96,5 +97,5 @@ class WidgetRegistry(WidgetFolder):
         return super().has(name) or self._brought.has(name)
 
     def place(self, name: str) -> Path:
-        """Return the folder of the widget with this name."""
+        """Return the folder of a widget, by name."""
         return super().place(name) if super().has(name) else self._brought.place(name)

@@ -1,1 +1,1 @@
-"""Recordings: the events of a robot in a file, and their playback."""
+"""Recordings: files with the events of a robot, and their playback."""

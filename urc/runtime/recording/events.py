@@ -1,7 +1,7 @@
-"""Decoding of a recording's messages into events.
+"""Decoding of recorded messages into events.
 
-Layer 4, pure. A file may be damaged or come from any program, so a message that `shapes` would not
-write is ignored.
+Layer 4, pure. A file may be damaged or come from a different program, so messages that do not match
+`shapes` are ignored.
 """
 
 import base64
@@ -20,7 +20,7 @@ _MOST: Final = 2**31 - 1
 
 
 def is_state(topic: str) -> bool:
-    """Return whether the last message of a topic is a state: a signal or a transport."""
+    """Return whether the last message of a topic describes a state: a signal or a transport."""
     return topic.startswith((SIGNALS, LINK))
 
 
@@ -32,13 +32,13 @@ def topic_of(signal: str) -> str:
 def event_of(
     topic: str, data: bytes, time_s: float, signals: Mapping[str, Signal]
 ) -> Sample | LinkStatus | LogEntry | Traffic | None:
-    """Return the event of a message, as if it happened now; None for an unknown message.
+    """Return the event of a message, with the time `time_s`; None for an unknown message.
 
     Args:
-        topic: topic of the message.
+        topic: topic of the message in the recording.
         data: its JSON.
         time_s: time of the event, in monotonic seconds.
-        signals: signals of the displayed profile, which may have changed since the recording.
+        signals: signals of the displayed profile, which may differ from the recorded profile.
     """
     try:
         told = msgspec.json.decode(data)

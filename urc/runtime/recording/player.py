@@ -1,8 +1,8 @@
-"""Playback of a recording: its readings go to a hub as if the robot sent them now.
+"""Playback of a recording, which passes readings to a hub as if the robot sent them now.
 
-Layer 4. `Player` keeps its position and state even without viewers. A dashboard opens its `session`
-in place of a robot. The player plays decoded values, not bytes. A reply can only be decoded
-together with its request, and a new session would send its requests at other times.
+Layer 4. `Player` keeps its position and state while no page is open. A dashboard opens the player's
+`session` in place of a robot. The player plays decoded values, not bytes. Decoding a reply requires
+the matching request, but a new session would send its requests at different times.
 """
 
 import asyncio
@@ -33,15 +33,15 @@ __all__ = ["FASTEST", "Player", "REFUSAL"]
 FASTEST: Final = 100.0
 REFUSAL: Final = "this is a recording: nothing reaches a robot"
 _REST_S: Final = 0.25
-"""Pause between the end and the next start of a looped recording, in seconds."""
+"""Pause between the end and the next start of a repeated recording, in seconds."""
 _AHEAD: Final = 256
-"""Number of messages to read at once."""
+"""Number of messages to read in one step."""
 
 log = logging.getLogger(__name__)
 
 
 class Player:
-    """The position and state of a playback. The playback runs on one event loop."""
+    """The position and state of a playback. All methods must be called on one event loop."""
 
     def __init__(
         self,
@@ -54,15 +54,15 @@ class Player:
         is_looped: bool = False,
         clock: Clock | None = None,
     ) -> None:
-        """Prepare the playback, paused at its start.
+        """Prepare the playback, paused at the start position.
 
         Args:
             recording: the recording to play.
-            profile: profile whose pages show the recording.
-            settings: valid settings of the profile; nothing connects with them.
-            speed: recorded seconds per second.
+            profile: profile that pages use to display the recording.
+            settings: valid settings of the profile; the playback opens no connection.
+            speed: playback speed; 1.0 is real time.
             start_s: start position, in seconds.
-            is_looped: whether the playback restarts at its end.
+            is_looped: whether to restart the playback at the end.
             clock: source of time.
         """
         self.recording = recording
@@ -72,18 +72,18 @@ class Player:
         self._clock: Clock = clock or LoopClock()
         self._speed = min(speed, FASTEST)
         self._base_s = self._within(start_s)
-        """Position at the time `_since_s`, in seconds."""
+        """Position at the monotonic time `_since_s`, in seconds."""
         self._since_s: float | None = None
-        """Monotonic time of the last start; None while paused."""
+        """Monotonic time of the last start, in seconds; None while paused."""
         self._wants_to_run = True
         self._is_open = False
         self._number = 0
-        """Number of changes of position or state so far."""
+        """Number of changes to position or state so far."""
         self._changed = asyncio.Event()
 
     @property
     def began_s(self) -> float:
-        """UTC time of the recording's start, in seconds since 1970."""
+        """Start time of the recording, as UTC time in seconds since 1970."""
         return self.recording.start_ns / 1e9
 
     @property
@@ -93,34 +93,34 @@ class Player:
 
     @property
     def position_s(self) -> float:
-        """Position, from 0 to `length_s`."""
+        """Position in seconds, from 0 to `length_s`."""
         if self._since_s is None:
             return self._base_s
         return self._within(self._base_s + (self._clock.now() - self._since_s) * self._speed)
 
     @property
     def is_playing(self) -> bool:
-        """Whether the playback runs, or will run with the first viewer."""
+        """Whether the playback runs, or will run as soon as a page is open."""
         return self._wants_to_run
 
     @property
     def speed(self) -> float:
-        """Recorded seconds per second."""
+        """Playback speed; 1.0 is real time."""
         return self._speed
 
     def play(self) -> None:
-        """Start; at the end, start from the beginning."""
+        """Start the playback; at the end, restart from the beginning."""
         at_end = self.position_s >= self.length_s
         self._wants_to_run = True
         self._stand(0.0 if at_end else self.position_s, is_moved=at_end)
 
     def pause(self) -> None:
-        """Pause at the current position."""
+        """Pause the playback at the current position."""
         self._wants_to_run = False
         self._stand(self.position_s)
 
     def seek(self, position_s: float) -> None:
-        """Move to a position, limited to the recording."""
+        """Move to a position in seconds, limited to the length of the recording."""
         self._stand(self._within(position_s), is_moved=True)
 
     def _within(self, position_s: float) -> float:
@@ -135,7 +135,7 @@ class Player:
 
     @asynccontextmanager
     async def session(self) -> AsyncIterator["PlaybackSession"]:
-        """Open a session for a dashboard, which continues at the last position."""
+        """Open a session for a dashboard; playback continues at the last position."""
         played = PlaybackSession(self.profile, self.settings)
         playing = asyncio.create_task(self._play(played.hub))
         self._is_open = True
@@ -151,7 +151,7 @@ class Player:
     # -- the task
 
     async def _play(self, hub: Hub) -> None:
-        """Play while a viewer is present; on an error, report it and pause."""
+        """Play while a page is open; on an error, report the error and pause."""
         while True:
             try:
                 await self._play_on(hub)
@@ -187,7 +187,7 @@ class Player:
     async def _follow(
         self, hub: Hub, stream: Generator[RecordedMessage, None, None], number: int
     ) -> None:
-        """Send each message of the stream at its time, until the end or a change of position."""
+        """Send each message of the stream when due, until the end or a change of position."""
         waiting: deque[RecordedMessage] = deque()
         while True:
             if not waiting:
@@ -203,7 +203,7 @@ class Player:
                 await self._until(waiting[0].time_ns, number)
 
     def _due_ns(self) -> float:
-        """Return the time of the last due message; at the end of the recording, infinity."""
+        """Return the recorded time of the last due message; infinity at the recording's end."""
         position_s = self.position_s
         if position_s >= self.length_s:
             return math.inf
@@ -235,14 +235,14 @@ class Player:
             await self._changed.wait()
 
     def _forget(self, hub: Hub, known: Set[str]) -> None:
-        """Clear the values that come only later than the current position."""
+        """Clear all values that the recording contains only after the current position."""
         now_s = self._clock.now()
         later = [name for name in hub.signals if topic_of(name) not in known and hub.latest(name)]
         if later:
             hub.publish(tuple(Sample(name, None, now_s) for name in later))
 
     def _publish(self, hub: Hub, messages: Iterable[RecordedMessage]) -> None:
-        """Send messages to the hub, with times relative to the current position."""
+        """Send messages to the hub, with times shifted to the present."""
         now_s = self._clock.now()
         position_ns = self.recording.start_ns + round(self.position_s * 1e9)
         samples: list[Sample] = []
@@ -267,7 +267,7 @@ class Player:
 
 
 class PlaybackSession:
-    """A playback in place of a session; it accepts no command."""
+    """A session that plays a recording; the session refuses every command."""
 
     def __init__(self, profile: Profile, settings: Mapping[str, Value]) -> None:
         """Start without values."""
@@ -288,7 +288,7 @@ class PlaybackSession:
         raise CommandFailed("not-allowed", REFUSAL)
 
     def pull(self, sequence: str, what: Pull) -> None:
-        """Do nothing, because no sequence runs."""
+        """Do nothing, because a recording runs no sequence."""
 
     def latch(self, reason: str) -> None:
-        """Do nothing, because nothing moves."""
+        """Do nothing, because a recording moves no robot."""

@@ -1,7 +1,7 @@
-"""A reader of recordings, which also reads the file of a killed process.
+"""A reader of recordings, including incomplete files of killed processes.
 
-Layer 4. The reader provides the parts that a player needs: the document, the time range, and the
-messages in order from any time on. The reader processes files of any length piece by piece.
+Layer 4. The reader provides the recorded document, the time range, and the messages in order from
+any start time. Files of any length are processed piece by piece.
 """
 
 import json
@@ -22,7 +22,8 @@ from urc.runtime.recording.shapes import LOG, PROFILE
 __all__ = ["RecordedMessage", "Recording", "open_recording"]
 
 _RECORD_BYTES: Final = 64 * 1024 * 1024
-"""Limit of a record, also after decompression, in bytes; a longer one means a damaged file."""
+"""Maximum size of a record, also after decompression, in bytes; a longer record indicates a damaged
+file."""
 
 
 class RecordedMessage(NamedTuple):
@@ -35,16 +36,16 @@ class RecordedMessage(NamedTuple):
 
 
 class Recording(NamedTuple):
-    """The content of a recording."""
+    """The contents of a recording."""
 
     file: Path
     document: str
-    """The profile of the robot at that time, or ""."""
+    """Document of the robot's profile at recording time, or ""."""
     start_ns: int
     """Time of the first message, in nanoseconds since 1970."""
     end_ns: int
     topics: Mapping[Any, str] = NOTHING
-    """Channel → topic, from the summary at the end of the file."""
+    """Channel number → topic, from the summary at the end of the file."""
     unread_bytes: int = 0
     """Number of unreadable bytes at the end; -1 for a readable file without a proper end."""
 
@@ -54,14 +55,14 @@ class Recording(NamedTuple):
         return (self.end_ns - self.start_ns) / 1e9
 
     def messages(self, from_ns: int) -> Generator[RecordedMessage, None, None]:
-        """Yield the messages from a time on, in order; end early at damage in the file.
+        """Yield the messages from a start time on, in order; stop at a damaged end of the file.
 
-        An unreadable piece in the middle becomes a log message.
+        An unreadable piece in the middle is reported as a log message.
         """
         yield from _messages(self, from_ns, math.inf)
 
     def before(self, until_ns: int) -> list[RecordedMessage]:
-        """Return the state before a time: the last message of each signal and transport."""
+        """Return the state before a time: the last message of each signal and each transport."""
         last: dict[str, RecordedMessage] = {}
         for message in _messages(self, 0, until_ns):
             if is_state(message.topic):
@@ -70,14 +71,14 @@ class Recording(NamedTuple):
 
 
 def open_recording(file: Path, *, has_profile: bool = False) -> Recording:
-    """Return the content of a recording.
+    """Open a recording and return its contents.
 
     Args:
         file: path of the recording.
-        has_profile: whether another profile than the recorded one is used.
+        has_profile: whether the recording is shown with a different profile than the recorded one.
 
     Raises:
-        UrcError: the file is unreadable, not a recording of URC, or empty.
+        UrcError: the file is unreadable, empty, or not a URC recording.
     """
     check_installed()
     from mcap.records import Attachment, Channel, Chunk, Footer
@@ -133,7 +134,7 @@ def _messages(recording: Recording, from_ns: int, before_ns: float) -> Iterator[
 
 
 def _unpacked(chunk: Any) -> Iterable[object]:
-    """Return the records of a chunk; raise for a damaged or too large one."""
+    """Return the records of a chunk; raise an error for a damaged or oversized chunk."""
     from mcap.stream_reader import breakup_chunk
 
     data = chunk.data

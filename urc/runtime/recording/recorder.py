@@ -1,10 +1,11 @@
 """The recorder of one session, which writes an MCAP file.
 
-Layer 4. Theory of operation. `Recorder.put` queues events and returns. The call never waits for a
-disk, because motion uses the same event loop. A separate thread does all slow work: it reads the
-document, creates the file, and writes. Once a second it flushes, so a killed process loses that
-second and the end of the file. When the queue is full, new events are lost, and the file has their
-count. When the disk is full, the recording ends, and `fault` has the reason.
+Layer 4. Theory of operation. `Recorder.put` queues events and returns immediately. `put` never
+waits for a disk, because motion uses the same event loop. A separate thread does all slow work:
+reading the document, creating the file, and writing. The thread flushes the file once a second, so
+a killed process loses at most that second and the end of the file. If the queue is full, new events
+are lost and counted in the file. If the disk is full, the recording ends, and `fault` contains the
+reason.
 """
 
 import asyncio
@@ -34,19 +35,21 @@ __all__ = ["Recorder", "check_installed", "named", "recorded"]
 _SUFFIX: Final = ".mcap"
 _MISSING: Final = "recordings need the package mcap: pip install 'urc[record]'"
 MOST_WAITING: Final = 50_000
-"""Limit of the queue, in events."""
+"""Maximum number of queued events."""
 MOST_WAITING_BYTES: Final = 64 * 1024 * 1024
 _PIECE_BYTES: Final = 200
 """Approximate size of a small event, in bytes."""
 _TRIES: Final = 1000
-"""Number of names to try for a file."""
+"""Maximum number of names to try for a new file."""
 _GATHER_S: Final = 0.05
-"""Time to gather events on the loop, in seconds; a wake-up for each event would cost more."""
+"""Time for which events are gathered on the event loop, in seconds; waking the thread for each
+event would be slower."""
 _CHUNK_BYTES: Final = 256 * 1024
-"""Size of an MCAP chunk, in bytes; the library's default of 1 MiB blocks the interpreter longer."""
+"""Size of an MCAP chunk, in bytes; the library's default of 1 MiB would block the interpreter
+longer."""
 _SLICE: Final = 100
 _PAUSE_S: Final = 0.001
-"""Pause of the thread after so many events, in seconds, so that other threads can run."""
+"""Pause of the thread after every `_SLICE` events, in seconds, so that other threads can run."""
 _WHOLE_S: Final = 1.0
 _CLOSE_S: Final = 10.0
 _SECOND_NS: Final = 1_000_000_000
@@ -76,17 +79,17 @@ class Recorder:
         Args:
             place: path of a new file, or of a folder.
             profile: profile of the robot.
-            is_folder: whether `place` is a folder; `named` then gives the file its name.
-            document: the profile as one document; read from its file by default.
+            is_folder: whether `place` is a folder; if so, `named` chooses the file name.
+            document: the whole profile as one document; None to read the profile's file.
         """
         self.file = place
-        """Path of the file, valid once `is_begun`."""
+        """Path of the recording, valid when `is_begun` is true."""
         self.fault = ""
-        """Reason why writing has stopped, or ""."""
+        """Reason why the recording has stopped, or ""."""
         self.is_begun = False
-        """Whether the file exists."""
+        """Whether the file has been created."""
         self.counts: Counter[str] = Counter()
-        """Topic → number of written messages."""
+        """Topic → number of messages written so far."""
         self._is_folder = is_folder
         self._profile = profile
         self._document = document
@@ -103,12 +106,12 @@ class Recorder:
         self._wakes = threading.Condition()
         self._is_closing = False
         self._is_faulty = False
-        """Whether a bug in URC has prevented an event from being written."""
+        """Whether a bug in URC has prevented the recording of an event."""
         self._thread = threading.Thread(target=self._run, name="urc-recorder", daemon=True)
         self._thread.start()
 
     def record(self, events: Iterable[Tapped], lost: int = 0) -> None:
-        """Queue events, with the number of lost events before them; return at once."""
+        """Queue events, together with the number of events lost before them; return immediately."""
         with self._wakes:
             self._lost += lost
             for event in events:
@@ -122,7 +125,7 @@ class Recorder:
             self._wakes.notify()
 
     def close(self) -> None:
-        """Write the queue and the end of the file, for ten seconds at most."""
+        """Write the queued events and the end of the file, within ten seconds."""
         with self._wakes:
             self._is_closing = True
             self._wakes.notify()
@@ -193,7 +196,7 @@ class Recorder:
         self.is_begun = True
 
     def _follow(self) -> None:
-        """Write queued events until the end."""
+        """Write queued events until the recorder closes."""
         whole_s = time.monotonic()
         while (batch := self._next()) is not None:
             for number, event in enumerate(batch, 1):
@@ -207,7 +210,7 @@ class Recorder:
                     raise UrcError(f"{self.file} was removed, or moved away")
 
     def _next(self) -> list[Tapped] | None:
-        """Return queued events; [] after a second without any, None at the end."""
+        """Return queued events; [] after a second without events; None at the end."""
         with self._wakes:
             self._wakes.wait_for(lambda: self._waiting or self._is_closing, _WHOLE_S)
             batch = list(self._waiting)
@@ -246,7 +249,7 @@ class Recorder:
 
 
 def _size(event: Tapped) -> int:
-    """Return the approximate size of a queued event, in bytes."""
+    """Return the approximate memory size of a queued event, in bytes."""
     held: object = None
     if isinstance(event, Traffic):
         held = event.data
@@ -260,7 +263,10 @@ def _size(event: Tapped) -> int:
 
 
 def named(folder: Path, robot: str, number: int = 1, utc_s: float | None = None) -> Path:
-    """Return the name of a recording: ``puppet-20261123T141502Z.mcap``, the second with ``-2``."""
+    """Return the path of a recording, such as ``puppet-20261123T141502Z.mcap``.
+
+    A second file of the same second gets the suffix ``-2``.
+    """
     at = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime(utc_s))
     more = "" if number == 1 else f"-{number}"
     return folder / f"{robot}-{at}{more}{_SUFFIX}"
@@ -274,15 +280,15 @@ async def recorded(
     *,
     is_folder: bool = False,
 ) -> AsyncIterator[Recorder]:
-    """Record all events of a hub during the context, without slowing it down.
+    """Record all events of a hub while the context is open, without delaying the hub.
 
-    The hub's log names the file, or the reason of a failure.
+    The hub's log shows the name of the file, or the reason of a failure.
 
     Args:
-        hub: hub of the session, ideally before the session opens; it passes no secrets on.
-        place: the file, or a folder, as for `Recorder`.
-        profile: profile of the robot, from a file.
-        is_folder: whether `place` is a folder.
+        hub: hub of the session, preferably before the session opens; the hub redacts secrets.
+        place: path of a new file, or of a folder, as for `Recorder`.
+        profile: profile of the robot, loaded from a file.
+        is_folder: whether `place` is a folder for the new file.
     """
     recorder = Recorder(place, profile, is_folder=is_folder)
     with hub.tap(with_traffic=True) as tap:

@@ -1,9 +1,9 @@
-"""The content of a recording: topics, and events as JSON messages.
+"""The contents of a recording: its topics, and events as JSON messages.
 
 Layer 4, pure. A recording is an MCAP file (https://mcap.dev/spec) of JSON messages. The file
-contains their JSON Schemas, so any MCAP program can show it. Images and the log use message types
-that such programs know by name (``foxglove.CompressedImage``, ``foxglove.Log``; see
-https://docs.foxglove.dev/docs/visualization/message-schemas/introduction).
+includes the JSON Schemas of its messages, so any MCAP program can display the messages. Images and
+the log use standard message types, ``foxglove.CompressedImage`` and ``foxglove.Log``: see
+https://docs.foxglove.dev/docs/visualization/message-schemas/introduction.
 """
 
 import base64
@@ -43,14 +43,14 @@ __all__ = [
 ]
 
 PROFILE: Final = "profile.yaml"
-"""Name of the attachment with the robot's whole document."""
+"""Name of the attachment that contains the robot's complete document."""
 LOG: Final = "/log"
 DRIVING: Final = "/driving"
 SIGNALS, LINK, WIRE, COMMANDS = "/signals/", "/link/", "/wire/", "/commands/"
 _SECOND_NS: Final = 1_000_000_000
 _LAST_S: Final = 1e9
 _LAST_NS: Final = 2**63 - 1
-"""Latest time that every MCAP program can read, in nanoseconds."""
+"""Latest time that every MCAP program can read, in nanoseconds since 1970."""
 LEVELS: Final = {"info": 2, "warning": 3, "error": 4}
 _TEXT: Final = {"type": "string"}
 _WHOLE: Final = {"type": "integer"}
@@ -97,11 +97,11 @@ _encode: Final = msgspec.json.Encoder(enc_hook=lambda value: _plain(value)).enco
 
 
 class McapChannel(NamedTuple):
-    """One topic of a recording, with its message type."""
+    """One topic of a recording, and its message type."""
 
     topic: str
     shape: str
-    """Name of the schema."""
+    """Name of the topic's JSON Schema."""
     schema: Mapping[str, object]
 
 
@@ -141,14 +141,14 @@ def _signal_channel(signal: Signal) -> McapChannel:
 
 
 class RecordingEncoder:
-    """An encoder for one recording; it has state, because its times never decrease."""
+    """A stateful encoder for one recording; the encoded times never decrease."""
 
     def __init__(self, driver: Driver, utc_ns: Callable[[float], int]) -> None:
         """Start a recording.
 
         Args:
             driver: driver of the robot.
-            utc_ns: monotonic seconds → nanoseconds since 1970.
+            utc_ns: converts monotonic seconds to nanoseconds since 1970.
         """
         self._signals = driver.signals
         self._commands = driver.commands
@@ -156,7 +156,7 @@ class RecordingEncoder:
         self._told_ns = 0
 
     def messages(self, event: Tapped) -> list[tuple[str, int, bytes]]:
-        """Return topic, time and JSON of each message for an event."""
+        """Return the topic, the time and the JSON text of each message for an event."""
         match event:
             case Sample():
                 return [self._sample(event)]
@@ -206,7 +206,7 @@ class RecordingEncoder:
         return COMMANDS + command, time_ns, _json(arguments)
 
     def _ended(self, entry: AuditEntry, time_ns: int) -> list[tuple[str, int, bytes]]:
-        """Return the message for the end of a motion, which else would seem to continue."""
+        """Return the message that ends a motion, which would otherwise seem to continue."""
         command = self._commands.get(entry.command)
         if entry.what != "stopped" or command is None or command.hold is None:
             return []
@@ -217,9 +217,9 @@ class RecordingEncoder:
         return WIRE + traffic.transport, self._now(traffic.time_s), _json(told)
 
     def _now(self, time_s: float) -> int:
-        """Return the time, or the last used time if that is later: playback uses the file's order.
+        """Return `time_s`, or the last used time if later: playback follows the order of the file.
 
-        A reading has the time of its first byte; traffic has the time of its arrival.
+        The time of a reading is the arrival of its first byte; the time of traffic is its arrival.
         """
         time_ns = self._utc_ns(min(max(time_s, 0.0), _LAST_S)) if time_s == time_s else 0
         self._told_ns = min(max(self._told_ns, time_ns), _LAST_NS)
@@ -262,7 +262,7 @@ def _json(told: Mapping[str, object]) -> bytes:
 
 
 def _mended(value: Any) -> Any:
-    """Return the value with all parts that JSON cannot express replaced."""
+    """Return `value` with replacements for all parts that JSON cannot express."""
     if isinstance(value, str):
         return value.encode("utf-8", "replace").decode()
     if isinstance(value, float):
