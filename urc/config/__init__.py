@@ -1,1 +1,1 @@
-"""The way from YAML to a checked, linked and compiled model."""
+"""Conversion of YAML documents into a checked, linked and compiled model."""

@@ -1,4 +1,4 @@
-"""Commands with autonomous motion: their key, their sequences, and their limits."""
+"""Parsing and checks of commands with autonomous motion."""
 
 from collections.abc import Mapping
 
@@ -13,7 +13,7 @@ __all__ = ["link_moves", "parse_moves", "refuse_moving", "runs_what_moves", "wit
 
 
 def parse_moves(part: Node, problems: Problems) -> tuple[bool, Template | None]:
-    """Return whether a command starts autonomous motion, and the condition for it, if any."""
+    """Return whether a command starts autonomous motion, and the condition under ``moves``."""
     said = part.get("moves")
     if said is None or isinstance(said.data, bool):
         return bool(said and said.data), None
@@ -21,7 +21,7 @@ def parse_moves(part: Node, problems: Problems) -> tuple[bool, Template | None]:
 
 
 def link_moves(problems: Problems, part: Node, command: Command) -> None:
-    """Report names in the condition under ``moves`` that are no arguments."""
+    """Report each name in the condition under ``moves`` that is not an argument."""
     condition = command.moves_if
     if condition is None:
         return
@@ -42,7 +42,7 @@ def runs_what_moves(command: Command, arguments: Mapping[str, Template | Reading
 
 
 def with_moving_steps(commands: Mapping[str, Command]) -> dict[str, Command]:
-    """Return the commands; a sequence moves when one of its commands moves or is held."""
+    """Return all commands, and mark each sequence that runs a moving or held command."""
     found = dict(commands)
 
     def does(step: object) -> bool:
@@ -68,7 +68,7 @@ def refuse_moving(
     command: Command,
     arguments: Mapping[str, Template | Reading],
 ) -> None:
-    """Report autonomous motion of a command at a place where it runs automatically."""
+    """Report a command with autonomous motion that `part` would run automatically."""
     if runs_what_moves(command, arguments):
         problems.error(
             part,

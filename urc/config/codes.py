@@ -1,6 +1,6 @@
-"""The meaning of each code of a problem: ``codes.md``, for `urc explain` and for SARIF.
+"""Reader of ``codes.md``, the explanations of problem codes for `urc explain` and SARIF.
 
-Every page has the same four parts, and an example is an indented code block.
+Every page has the same four parts. An example is a fenced block of YAML, or words.
 """
 
 from pathlib import Path
@@ -13,15 +13,15 @@ _PARTS = ("What", "Why", "Example", "Use instead")
 
 
 class CodePage(NamedTuple):
-    """The explanation of one code."""
+    """The explanation of one problem code."""
 
     code: str
     what: str
     """The problem, in one sentence."""
     why: str
-    """The effect of the problem."""
+    """Effect or cause of the problem."""
     example: str
-    """A document, or a part of one, with the problem; words where no text can show it."""
+    """Document, or part of a document, with the problem; words if YAML cannot show the problem."""
     instead: str
     """The same example without the problem, or instructions."""
 
@@ -38,7 +38,7 @@ def pages() -> dict[str, CodePage]:
 
 
 def summaries() -> dict[str, str]:
-    """Return the meaning of each code, in one sentence."""
+    """Return a summary of each code, in one sentence."""
     return {page.code: page.what for page in pages().values()}
 
 

@@ -1,8 +1,8 @@
-"""The default interface: a widget for each signal and command, and their grid.
+"""The default interface: a widget for each signal and command, arranged in a grid.
 
-Pure: the same driver and the same widgets give the same interface. When a widget is missing or does
-not fit its signal, a simpler widget is chosen. Commands with several arguments get no widget: the
-developer page has a form for each.
+The result depends only on the driver and the available widgets. If a widget is missing or does not
+fit its signal, a simpler widget replaces it. Commands with several arguments get no widget, because
+the developer page has a form for each of these commands.
 """
 
 import math
@@ -21,7 +21,7 @@ from urc.model.widget import Widget
 __all__ = ["automatic_slots", "default_interface"]
 
 MOST_PLAIN: Final = 24
-"""Maximum signals with a cell of their own; a table shows more signals."""
+"""Maximum number of signals with separate cells; a table shows all further signals."""
 MOST_COMMANDS: Final = 16
 
 _BATTERY: Final = re.compile(r"batter|charge|\bsoc\b", re.IGNORECASE)
@@ -44,25 +44,25 @@ _GROUPS: Final[tuple[tuple[str, Mapping[str, tuple[str, ...]], frozenset[str]], 
     ("compass", {"heading": ("heading", "bearing", "course")}, frozenset(("heading",))),
     ("compass", {"yaw": ("yaw",)}, frozenset(("yaw",))),
 )
-"""Widget, its inputs by the last words of signals' names, and its required inputs."""
+"""Widget, its inputs with the last words of suitable signal names, and its required inputs."""
 
 _COLUMNS: Final = {"landscape": 4, "phone_portrait": 2, "phone_landscape": 7}
-"""Maximum columns of a default grid, by screen."""
+"""Screen → maximum number of columns in a default grid."""
 _LOW_ROWS: Final = 2
-"""Visible rows on a phone in landscape."""
+"""Number of visible rows on a phone in landscape."""
 _BIG: Final = frozenset(
     (
         *("attitude", "camera", "depth", "dpad", "image", "joystick", "log", "map", "pano360"),
         *("path-pad", "plot", "scan", "scene3d", "table", "terminal", "vector-pad"),
     )
 )
-"""Widgets with two rows and two columns."""
+"""Widgets that span two rows and two columns."""
 _STEERED: Final = 2
-"""Rank of controls that steer."""
+"""Rank of steering controls."""
 
 
 def automatic_slots(driver: Driver, registry: WidgetFolder) -> dict[str, WidgetUse]:
-    """Return the widget of each slot: views of signals first, then controls."""
+    """Return the widget of each slot, with displays of signals before controls."""
     slots: dict[str, WidgetUse] = {}
     left = dict(driver.signals)
     for use in _grouped(left, registry):
@@ -82,7 +82,7 @@ def automatic_slots(driver: Driver, registry: WidgetFolder) -> dict[str, WidgetU
 
 
 def _put(slots: dict[str, WidgetUse], use: WidgetUse) -> None:
-    """Add the widget of a slot, under a free and valid slot name."""
+    """Add a widget under a free and valid slot name."""
     name = re.sub(r"[^a-z0-9_-]", "-", use.slot.lower()).lstrip("-_0123456789")[:60] or "slot"
     names = (name, *(f"{name}-{number}" for number in range(2, len(slots) + 3)))
     free = next(one for one in names if one not in slots)
@@ -93,7 +93,7 @@ def _put(slots: dict[str, WidgetUse], use: WidgetUse) -> None:
 
 
 def _grouped(left: dict[str, Signal], registry: WidgetFolder) -> Iterator[WidgetUse]:
-    """Yield the widgets that take several signals, and remove those signals from `left`."""
+    """Yield the widgets that show several signals, and remove these signals from `left`."""
     for widget_name, inputs, needed in _GROUPS:
         widget = registry.get(widget_name)
         if widget is None or not needed <= widget.inputs.keys():
@@ -115,7 +115,7 @@ def _grouped(left: dict[str, Signal], registry: WidgetFolder) -> Iterator[Widget
 def _stems(
     signals: Mapping[str, Signal], inputs: Mapping[str, tuple[str, ...]]
 ) -> dict[str, dict[str, Signal]]:
-    """Return the part before the last word of a name → input → signal: ``gps_lat``, ``gps_lon``."""
+    """Group signals by name without the last word: ``gps`` for ``gps_lat`` and ``gps_lon``."""
     stems: dict[str, dict[str, Signal]] = {}
     for signal in signals.values():
         stem, _, last = signal.name.rpartition("_")
@@ -126,7 +126,7 @@ def _stems(
 
 
 def _shown(signal: Signal, registry: WidgetFolder) -> WidgetUse | None:
-    """Return the first widget that fits a signal, from the most specific to the simplest."""
+    """Return the most specific widget that fits a signal."""
     for name in _candidates(signal):
         use = _one_input(registry.get(name), signal)
         if use is not None:
@@ -149,7 +149,7 @@ def _candidates(signal: Signal) -> tuple[str, ...]:
 
 
 def _one_input(widget: Widget | None, signal: Signal) -> WidgetUse | None:
-    """Return the widget with the signal at its first input that fits, if no other is required."""
+    """Bind the signal to the widget's first suitable input; None if more inputs are required."""
     if widget is None:
         return None
     fitting = [
@@ -226,7 +226,7 @@ def _held(command: Command, registry: WidgetFolder) -> WidgetUse | None:
 
 
 def _is_complete(use: WidgetUse, command: Command) -> bool:
-    """Return whether the control gives every required argument; without them no motion starts."""
+    """Return whether the control gives every required argument of its command."""
     given = {name for one in use.given.values() for name in one.names}
     needed = {
         name for name, one in command.arguments.items() if one.is_required and one.default is None
@@ -239,7 +239,7 @@ def _says(name: str, words: tuple[str, ...]) -> bool:
 
 
 def _output(widget: Widget | None, command: Command, names: Mapping[str, str]) -> WidgetUse | None:
-    """Return the widget with the command at its first output that gives these values."""
+    """Bind the command to the widget's first output with the values in `names`."""
     if widget is None or any(port.is_required for port in widget.inputs.values()):
         return None
     is_held = command.hold is not None
@@ -254,7 +254,7 @@ def _output(widget: Widget | None, command: Command, names: Mapping[str, str]) -
 def _with_state(
     use: WidgetUse, argument: Argument, driver: Driver, registry: WidgetFolder
 ) -> WidgetUse:
-    """Show the robot's value, if a signal has the name of the argument or command."""
+    """Bind the signal with the name of the argument or command, if there is one."""
     widget = registry.get(use.widget)
     port = widget.inputs.get("state") if widget is not None else None
     command = next(iter(use.outputs.values()))
@@ -279,9 +279,9 @@ def _use(widget: Widget, slot: str, inputs: Mapping[str, str], title: str) -> Wi
 def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
     """Return an interface named ``default`` that shows every slot.
 
-    Views are on top, the large ones before the small ones. Controls that steer are at the bottom
-    right, near the thumb; other controls take the free places. On a phone in landscape, controls
-    that steer come first, at the right and at the left, and the page scrolls to the rest.
+    Displays are at the top, in the order of their size. Steering controls are at the bottom right,
+    near the thumb. Other controls fill the free places. On a phone in landscape, steering controls
+    are in the first rows, at the right and left edge, and other widgets follow below.
     """
     return Interface(
         name="default",
@@ -315,7 +315,7 @@ def _grid(slots: Mapping[str, WidgetUse], screen: str) -> Layout:
 
 
 def _rank(use: WidgetUse) -> int:
-    """Return the rank of a widget: large views, small views, controls that steer, others."""
+    """Return the rank of a widget: large displays, small displays, steering controls, others."""
     if use.widget in _BIG:
         return _STEERED if use.outputs and not use.inputs else 0
     return 3 if use.outputs else 1
@@ -324,7 +324,7 @@ def _rank(use: WidgetUse) -> int:
 def _free(
     taken: set[tuple[int, int]], columns: int, size: int, first: int, *, is_from_right: bool
 ) -> tuple[int, int]:
-    """Return the first free square at or below the row `first`."""
+    """Return row and column of the first free square at or below the row `first`."""
     places = range(columns - size + 1)
     row = first
     while True:

@@ -1,4 +1,4 @@
-"""The forms of frames: key in a document → the module that parses it."""
+"""Table of frame forms: key in a document → module of its parser."""
 
 from collections.abc import Mapping
 from typing import Final

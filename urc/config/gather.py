@@ -1,9 +1,10 @@
-"""The passes over documents: compose, expand, shape, for a robot and the documents that it names.
+"""The first passes over a document and its references: compose, expand and shape.
 
-Compose merges a document with its base and its includes. Expand fills in `params` and `each`. Shape
-compares the result with the schema. Each pass is a function of one document.
+The compose pass merges a document with its base and its includes. The expand pass replaces `params`
+and `each`. The shape pass compares the result with the schema. Each pass is a function of one
+document.
 
-A robot comes first, because it names its driver and its interfaces.
+URC reads the robot before the driver and the interfaces, because the robot refers to both.
 """
 
 from typing import NamedTuple
@@ -23,18 +24,18 @@ __all__ = ["LoadedSources", "gather"]
 
 
 class LoadedSources(NamedTuple):
-    """The result of the passes over documents."""
+    """The result of `gather`."""
 
     sources: Sources | None
-    """None after an error, and for a partial document."""
+    """The parts of the profile; None after an error, and for a partial document."""
     problems: list[Problem]
     kind: str
     files: tuple[str, ...]
-    """Every requested file, existing or not."""
+    """Every requested file, even if missing."""
 
 
 def gather(path: str) -> LoadedSources:
-    """Return the parts of a document and of its references, or the errors."""
+    """Return the parts of a document and of its references, or the problems."""
     library = Library()
     try:
         document = library.read(path)
@@ -64,10 +65,10 @@ def _is_part(document: Document) -> bool:
 def _prepared(
     document: Document, library: Library, given: Node | None = None, use: Node | None = None
 ) -> Document | None:
-    """Return a document after the passes compose, expand and shape, or None.
+    """Return a document after the compose, expand and shape passes; None after an error.
 
-    `given` is the robot's mapping with `params` and `overrides`. `use` is its reference to the
-    driver.
+    `given` is the robot's mapping with `params` and `overrides`. `use` is the robot's reference to
+    the driver.
     """
     problems = library.problems
     whole, sources = compose(document, library)
@@ -89,7 +90,7 @@ def _prepared(
 
 
 def _place(problem: Problem) -> tuple[str, str, int, int]:
-    """Return the identity of a problem, because two passes may report the same one."""
+    """Return code, file, line and column: the identity of a problem that two passes report."""
     return problem.code, problem.file, problem.line, problem.column
 
 
@@ -118,7 +119,7 @@ def _gather_robot(sources: Sources, library: Library) -> None:
 
 
 def _check_placement(root: Node, problems: Problems) -> None:
-    """Report keys of a driver in a robot that names its driver."""
+    """Report driver keys in a robot that refers to a driver's document."""
     for key in read_schema("robot.schema.json")["$defs"]["inlineDriver"]["properties"]:
         if key in root.data:
             problems.error(
@@ -132,7 +133,7 @@ def _check_placement(root: Node, problems: Problems) -> None:
 
 
 def _driver(part: Node, sources: Sources, library: Library) -> Node:
-    """Return the driver at `part`: declared there, or named."""
+    """Return the driver that `part` declares or refers to."""
     reference, given = part, None
     if isinstance(part.data, dict):
         if "use" not in part.data:
@@ -146,7 +147,7 @@ def _driver(part: Node, sources: Sources, library: Library) -> Node:
 
 
 def _follow(reference: Node, kind: str, library: Library, given: Node | None = None) -> Node | None:
-    """Return the prepared document that `reference` names, or None."""
+    """Return the document that `reference` names after its first passes, or None."""
     document = library.follow(reference, (kind,))
     if document is None:
         return None

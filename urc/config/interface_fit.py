@@ -1,4 +1,4 @@
-"""The fit of an interface that a user adds to a robot, and the widgets that it needs."""
+"""Check whether an interface from a user fits a robot."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,18 +19,18 @@ __all__ = ["InterfaceFit", "fit_interface"]
 
 
 class InterfaceFit(NamedTuple):
-    """The result for one interface on one robot."""
+    """The result of `fit_interface`."""
 
     interface: Interface | None
-    """None when it does not fit."""
+    """The linked interface; None when the interface does not fit."""
     widgets: Mapping[str, Widget] = NOTHING
-    """The widgets in use."""
+    """Name → widget, for all widgets of the interface."""
     fault: str = ""
-    """The reason for a misfit, in one line."""
+    """The reason why the interface does not fit, in one line; otherwise empty."""
 
 
 class _Known(WidgetFolder):
-    """The widgets of a profile and of a folder, in this order of precedence."""
+    """The widgets of a profile and of a folder; the profile takes precedence."""
 
     def __init__(self, widgets: Mapping[str, Widget], behind: WidgetFolder) -> None:
         super().__init__(Path())
@@ -43,7 +43,7 @@ class _Known(WidgetFolder):
         return sorted({*self._mine, *self._behind.names()})
 
     def get(self, name: str) -> Widget | None:
-        """Return a widget, or None."""
+        """Return the widget of this name, or None."""
         return self._mine.get(name) or self._behind.get(name)
 
     def has(self, name: str) -> bool:
@@ -52,12 +52,12 @@ class _Known(WidgetFolder):
 
 
 def fit_interface(path: str, profile: Profile, registry: WidgetFolder) -> InterfaceFit:
-    """Return an interface with the slots of a robot's driver.
+    """Link an interface to the slots of a robot.
 
     Args:
-        path: the interface's document.
-        profile: of the robot.
-        registry: more widgets for the document, after the robot's own.
+        path: path of the interface's document.
+        profile: profile of the robot.
+        registry: further widgets; the robot's own widgets take precedence.
     """
     gathered = gather(path)
     sources = gathered.sources

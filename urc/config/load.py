@@ -1,7 +1,7 @@
-"""The only way from YAML to the model: ordered passes, all problems of a pass at once.
+"""The passes that convert YAML documents into the model, and the collection of their problems.
 
-compose → expand → shape → parse → link → rules. A later pass runs only when the earlier ones found
-no error; warnings never stop a pass.
+The order of the passes is: compose, expand, shape, parse, link, rules. Every pass reports all its
+problems. A pass runs only if the earlier passes found no error; warnings stop no pass.
 """
 
 from collections.abc import Iterable
@@ -34,30 +34,30 @@ __all__ = ["CheckResult", "WidgetFolder", "check", "load_profile"]
 
 
 class CheckResult(NamedTuple):
-    """The result for one document."""
+    """The result of `check`."""
 
     profile: Profile | None
-    """The profile of a robot or driver without errors; a driver has the default interface."""
+    """The profile of a robot or driver without errors; a driver gets the default interface."""
     problems: tuple[Problem, ...]
     kind: str
-    """``robot``, ``driver``, ``interface``, ``widget``, or "" when a first pass stopped."""
+    """``robot``, ``driver``, ``interface`` or ``widget``; "" after an error in the first passes."""
     files: tuple[str, ...] = ()
-    """Every requested document, existing or not; this document is the first."""
+    """Every requested file, even if missing; the checked document is the first."""
     pages: tuple[str, ...] = ()
-    """URLs of web pages in its widgets, as written."""
+    """URLs of web pages in the widgets, as written in the document."""
     widget: Widget | None = None
-    """The widget of a manifest without errors."""
+    """The widget, for a manifest without errors."""
     is_cut_short: bool = False
-    """Whether errors stopped a pass: later passes may have more."""
+    """Whether an error prevented later passes, which may find more problems."""
 
 
 def load_profile(
     path: str | PathLike[str], catalog: Registries, registry: WidgetFolder | None = None
 ) -> Profile:
-    """Return the profile in a robot's or driver's document.
+    """Return the profile of a robot's or driver's document.
 
     Raises:
-        ProblemsError: with every problem of the pass that stopped it.
+        ProblemsError: the document has errors; contains all errors of the failed pass.
     """
     checked = check(path, catalog, registry)
     if checked.profile is not None:
@@ -82,13 +82,13 @@ def load_profile(
 def check(
     path: str | PathLike[str], catalog: Registries, registry: WidgetFolder | None = None
 ) -> CheckResult:
-    """Return every problem of a document of any kind, and of its references.
+    """Check a document of any kind, and its references.
 
     Args:
-        path: the document; problems name it in this form.
-        catalog: the transports and framings.
-        registry: the widgets; by default those that ship with URC.
-            With one registry for several calls, each manifest is read once.
+        path: path of the document, as shown in problems.
+        catalog: the available transports and framings.
+        registry: the available widgets; by default the widgets that ship with URC.
+            Several calls with one registry read each manifest only once.
     """
     path = fspath(path)
     sources, reported, kind, files = gather(path)
@@ -129,7 +129,7 @@ def _pages(uses: Iterable[WidgetUse]) -> tuple[str, ...]:
 
 
 def _told_once(problems: Iterable[Problem]) -> list[Problem]:
-    """Return the problems without the copies that `each` causes."""
+    """Return the problems without the duplicates from the copies of `each`."""
     paths: dict[tuple[str, str, int, int], str] = {}
     return [
         problem
@@ -142,8 +142,6 @@ def _told_once(problems: Iterable[Problem]) -> list[Problem]:
 
 
 class _Parsed(NamedTuple):
-    """The result of the parse pass."""
-
     driver: Driver
     settings: dict[str, Setting]
     interfaces: dict[str, Interface]

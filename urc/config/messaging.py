@@ -1,6 +1,6 @@
-"""Transports that carry messages instead of bytes, and the forms that each allows.
+"""Message transports and their allowed forms of messages.
 
-Transports of packages are not listed here and have no such limits.
+The table contains only built-in transports. Transports of packages allow every form.
 """
 
 from typing import Final, NamedTuple
@@ -9,10 +9,10 @@ __all__ = ["BYTE_LINES", "CARRIERS", "MESSAGING", "MessageTransportRules"]
 
 
 class MessageTransportRules(NamedTuple):
-    """The allowed forms of one transport type."""
+    """The allowed forms of messages on one transport type."""
 
     verbs: tuple[str, ...]
-    """Forms of sent messages."""
+    """Allowed keys under ``send``, such as ``publish``."""
     listen: tuple[str, ...]
     """Additional keys under ``subscribe``, next to ``topic``."""
 

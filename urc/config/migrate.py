@@ -1,4 +1,4 @@
-"""Renames old keys and values in the text of a document, and keeps every other byte."""
+"""Migration of documents: renames old keys and values, and changes no other byte."""
 
 import re
 from collections.abc import Iterator
@@ -18,13 +18,13 @@ _CONTENTS: Final[dict[str, Content]] = {
     "widget": "widget",
 }
 _DEMO: Final = "demo.yaml"
-"""The name of the one document without `kind`: the states of a widget."""
+"""File name of a widget's demo states, the only document without `kind`."""
 _SCALAR: Final = re.compile(r"(?P<head>(?:[&!]\S*\s+)*)(?P<quote>['\"]?).*(?P=quote)", re.DOTALL)
 _BOM: Final = "\ufeff".encode()
 
 
 class Change(NamedTuple):
-    """One renamed key or value."""
+    """A renamed key or value."""
 
     line: int
     column: int
@@ -33,15 +33,15 @@ class Change(NamedTuple):
 
 
 class Migrated(NamedTuple):
-    """A document with the present names."""
+    """The result of `migrate`."""
 
     content: bytes
     changes: tuple[Change, ...]
-    """Changes in the order of the text; empty when the document has no old names."""
+    """Changes in the order of their positions; empty for a document without old names."""
 
 
 def migrate(path: str) -> Migrated:
-    """Return the content of a file with old names replaced, without changing the file.
+    """Return the content of a file with new names, without a change of the file.
 
     Raises:
         ProblemsError: the file cannot be read, is not a document, or has a key under both names.
@@ -67,14 +67,14 @@ def migrate(path: str) -> Migrated:
 
 
 def _replaced(written: str, new: str) -> str:
-    """Return a scalar with another text, and with its anchor, tag and quotes."""
+    """Return a scalar's source with new text, and keep its anchor, tag and quotes."""
     return _SCALAR.sub(
         lambda found: f"{found['head']}{found['quote']}{new}{found['quote']}", written, count=1
     )
 
 
 def _parts(document: Document) -> Iterator[tuple[Content, Path]]:
-    """Yield each part of a document and its place."""
+    """Yield content type and path of each part of a document."""
     kind = kind_of(document)
     data = document.data
     if kind == "robot" and isinstance(data, dict):
@@ -103,7 +103,7 @@ def _parts(document: Document) -> Iterator[tuple[Content, Path]]:
 def _renames(
     document: Document, content: Content, root: Path
 ) -> Iterator[tuple[Span, tuple[str, str]]]:
-    """Yield the place of each old name in one part, with the old and the new name."""
+    """Yield the position of each old name in one part, with its old and new name."""
     keys = [one for one in KEYS if one.content == content]
     values = [one for one in VALUES if one.content == content]
     for path, mapping in _mappings(_at(document.data, root)):
@@ -123,7 +123,7 @@ def _renames(
 
 
 def _mappings(data: object, path: Path = ()) -> Iterator[tuple[Path, dict[str, object]]]:
-    """Yield each mapping at and below `data`, with its path."""
+    """Yield path and value of `data` and every nested mapping."""
     if isinstance(data, dict):
         yield path, data
         for key, inner in data.items():

@@ -1,7 +1,8 @@
-"""A node of a document that fits its schema, and the problems of the nodes.
+"""A typed view of a valid document for the parsers, and a collector of problems.
 
-The parsers read documents only through `Node`. So each value has a place for a problem, and a test
-can see the keys in use. All functions here assume that the shape pass found no error.
+The parsers read documents only through `Node`. Every value therefore has a position for problems,
+and a test can record the keys in use. All functions of this module assume a document that fits its
+schema.
 """
 
 import math
@@ -24,7 +25,7 @@ _LONGEST_S: Final = 86400.0
 
 
 def duration_s(text: str) -> float:
-    """Return ``250ms`` in seconds; the text fits the schema's pattern."""
+    """Return a duration such as ``250ms`` in seconds; the schema has checked the format."""
     found = _DURATION.fullmatch(text)
     if found is None:
         raise ValueError(f"{text!r} is not a duration")
@@ -34,7 +35,7 @@ def duration_s(text: str) -> float:
 
 
 class Node(NamedTuple):
-    """A value of a document, and its place."""
+    """A value of a document, and its path."""
 
     document: Document
     path: Path
@@ -46,28 +47,28 @@ class Node(NamedTuple):
         return str(self.path[-1]) if self.path else ""
 
     def get(self, key: str) -> "Node | None":
-        """Return the part under `key`, or None."""
+        """Return the child under `key`, or None when the key is missing."""
         if key not in self.data:
             return None
         return Node(self.document, (*self.path, key), self.data[key])
 
     def must(self, key: str) -> "Node":
-        """Return the part under `key`, which the schema requires."""
+        """Return the child under `key`, a key that the schema requires."""
         return Node(self.document, (*self.path, key), self.data[key])
 
     def named(self, key: str) -> dict[str, "Node"]:
-        """Return the entries of the mapping under `key`; none when the key is missing."""
+        """Return the entries of the mapping under `key`; empty when the key is missing."""
         inner = self.get(key)
         return inner.entries() if inner else {}
 
     def entries(self) -> dict[str, "Node"]:
-        """Return the entries of a mapping whose keys are names."""
+        """Return the entries of a mapping by name."""
         return {
             name: Node(self.document, (*self.path, name), item) for name, item in self.data.items()
         }
 
     def listed(self, key: str) -> list["Node"]:
-        """Return the items of the list under `key`; none when the key is missing."""
+        """Return the items of the list under `key`; empty when the key is missing."""
         inner = self.get(key)
         return inner.items() if inner else []
 
@@ -78,12 +79,12 @@ class Node(NamedTuple):
         ]
 
     def text(self, key: str, default: str = "") -> str:
-        """Return the text under `key`."""
+        """Return the text under `key`, or the default."""
         inner = self.get(key)
         return default if inner is None else str(inner.data)
 
     def flag(self, key: str, *, default: bool) -> bool:
-        """Return the boolean under `key`."""
+        """Return the boolean under `key`, or the default."""
         inner = self.get(key)
         return default if inner is None else bool(inner.data)
 
@@ -98,14 +99,14 @@ class Node(NamedTuple):
         return None if inner is None else int(inner.data)
 
     def scalar(self, key: str) -> Value:
-        """Return the plain value under `key`, or None when the key is missing."""
+        """Return the scalar under `key`, or None when the key is missing."""
         inner = self.get(key)
         value: Value = None if inner is None else inner.data
         return value
 
 
 class Problems:
-    """The problems of one pass so far."""
+    """A collector of the problems of one pass."""
 
     def __init__(self) -> None:
         self.problems: list[Problem] = []
@@ -114,7 +115,7 @@ class Problems:
         return iter(self.problems)
 
     def error(self, part: Node, code: str, message: str, **place: Any) -> None:
-        """Add an error; `place` has arguments of `Document.problem`, and ``at``: a key inside."""
+        """Add an error; `place` takes ``at``, an inner key, and arguments of `Document.problem`."""
         self._add(part, code, message, "error", **place)
 
     def warn(self, part: Node, code: str, message: str, **place: Any) -> None:
@@ -122,7 +123,7 @@ class Problems:
         self._add(part, code, message, "warning", **place)
 
     def unknown(self, part: Node, code: str, name: str, known: Iterable[str], **place: Any) -> None:
-        """Report a name that is not among the `known` ones; `code` is ``unknown-NOUN``."""
+        """Report an unknown name, and suggest a `known` name; `code` is ``unknown-NOUN``."""
         noun = code.removeprefix("unknown-")
         hint = did_you_mean(name, known, f"{noun}s")
         self.error(part, code, f"there is no {noun} {name!r}", hint=hint, **place)
@@ -142,7 +143,7 @@ class Problems:
         least: float = 0.001,
         most: float = _LONGEST_S,
     ) -> float:
-        """Return the duration under `key` in seconds, from `least` to `most`."""
+        """Return the duration under `key` in seconds; report a value outside `least` to `most`."""
         inner = part.get(key)
         if inner is None:
             return default
@@ -157,7 +158,7 @@ class Problems:
         return seconds
 
     def pattern(self, part: Node, *, is_over_bytes: bool = False) -> Pattern | None:
-        """Compile the pattern at `part`, or report its mistake."""
+        """Compile the pattern at `part`; report an invalid pattern and return None."""
         try:
             return compile_pattern(part.data, is_over_bytes=is_over_bytes)
         except PatternError as error:
@@ -165,7 +166,7 @@ class Problems:
             return None
 
     def template(self, part: Node) -> Template | None:
-        """Compile the template at `part`, or report its mistake."""
+        """Compile the template at `part`; report an invalid template and return None."""
         try:
             return compile_template(part.data)
         except ExpressionError as error:
@@ -173,7 +174,7 @@ class Problems:
             return None
 
     def expression(self, part: Node, *, allows_bytes: bool = False) -> Template | None:
-        """Compile the expression at `part`, or report its mistake."""
+        """Compile the expression at `part`; report an invalid expression and return None."""
         try:
             return compile_expression(part.data, allows_bytes=allows_bytes)
         except ExpressionError as error:
@@ -184,7 +185,7 @@ class Problems:
 
 
 def shown_duration(seconds: float) -> str:
-    """Return seconds in the notation of a document, such as ``250ms``."""
+    """Return a duration in the notation of documents, such as ``250ms``."""
     if seconds and seconds < 1:
         return f"{seconds * 1000:g}ms"
     for unit in ("h", "m"):

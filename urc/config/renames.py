@@ -1,7 +1,7 @@
-"""The table of renamed keys, values and codes of the language.
+"""Tables of renamed keys, values and problem codes.
 
-The single source of `urc migrate`, of the hint of an unknown key, and of `urc explain OLD`. The
-language knows the new names only. Imports nothing of URC.
+`urc migrate`, `urc explain` and the hints for unknown keys use these tables. The language accepts
+only the new names. This module imports no other module of URC.
 """
 
 import re
@@ -19,7 +19,7 @@ __all__ = [
 ]
 
 Content = Literal["driver", "interface", "widget", "demo"]
-"""The part of the language; a robot contains a driver and interfaces."""
+"""Kind of content; a robot contains a driver and interfaces."""
 
 _TRANSPORT: Final = "transports/[^/]+"
 _ARRAY: Final = "signals/[^/]+|commands/[^/]+/args/[^/]+"
@@ -33,19 +33,18 @@ _DEMO: Final = "signals/[^/]+|outputs/[^/]+/arguments/[^/]+"
 
 
 class KeyRename(NamedTuple):
-    """One renamed key."""
+    """A renamed key."""
 
     content: Content
     place: str
-    """A pattern of the path of the mapping with the key, with slashes between its parts."""
+    """Pattern of the path to the mapping with the key, with slashes as separators."""
     old: str
     new: str
     types: tuple[str, ...] = ()
-    """Values of `type` for which the key is renamed; empty for all. A missing `type` always
-    fits."""
+    """Values of `type` in mappings with this rename; empty for all. A missing `type` fits."""
 
     def applies(self, mapping: Mapping[str, Any]) -> bool:
-        """Return whether a mapping at the place has the old key."""
+        """Return whether the rename applies to a mapping."""
         if self.old not in mapping:
             return False
         kind = mapping.get("type")
@@ -55,7 +54,7 @@ class KeyRename(NamedTuple):
 
 
 class ValueRename(NamedTuple):
-    """One renamed value of a key."""
+    """A renamed value of a key."""
 
     content: Content
     place: str
@@ -116,11 +115,11 @@ CODES: Final = {
     "unnoticed-freeze": "no-liveness-check",
     "unnoticed-loss": "no-loss-detection",
 }
-"""Old code of a problem → new code."""
+"""Old problem code → new problem code."""
 
 
 def renamed_hint(path: tuple[str | int, ...], key: str, known: Mapping[str, Any]) -> str:
-    """Return a hint for an old name of a key in the mapping at `path`, or ""."""
+    """Return a hint for a key with an old name in the mapping at `path`, or ""."""
     where = "/".join(map(str, path))
     for one in KEYS:
         if one.old != key or one.new not in known:
@@ -131,7 +130,7 @@ def renamed_hint(path: tuple[str | int, ...], key: str, known: Mapping[str, Any]
 
 
 def renamed_value_hint(key: str, value: str) -> str:
-    """Return a hint for an old value of a key, or ""."""
+    """Return a hint for a value with an old name, or ""."""
     for one in VALUES:
         if (one.key, one.old) == (key, value):
             return f"its name is '{one.new}' now; 'urc migrate' renames it"

@@ -1,6 +1,6 @@
-"""Problems for other programs: SARIF 2.1.0, and annotations of GitHub's workflow runs.
+"""Problem reports in SARIF 2.1.0, and as annotations of GitHub workflow runs.
 
-Pure reporters over `Problem`, in addition to the text and JSON of `urc.problems`.
+`urc.problems` has the report formats for text and JSON.
 """
 
 import os
@@ -17,14 +17,14 @@ _SCHEMA: Final = (
     "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 )
 _DATA: Final = {"%": "%25", "\r": "%0D", "\n": "%0A"}
-"""Escapes in the message of a workflow command."""
+"""Escape sequences in the message of a workflow command."""
 _PROPERTY: Final = str.maketrans(_DATA | {":": "%3A", ",": "%2C"})
-"""Escapes in its properties, which colons and commas separate."""
+"""Escape sequences in the properties of a workflow command, including its separators."""
 _MESSAGE: Final = str.maketrans(_DATA)
 
 
 def to_github(problem: Problem) -> str:
-    """Return the problem as a workflow command of one line."""
+    """Return the problem as a workflow command in one line."""
     properties = {
         "file": _slashed(problem.file),
         "line": str(problem.line),
@@ -42,12 +42,12 @@ def to_github(problem: Problem) -> str:
 def to_sarif(
     problems: Sequence[Problem], version: str, summaries: Mapping[str, str]
 ) -> dict[str, object]:
-    """Return a log of one run.
+    """Return the problems as a SARIF log with one run.
 
     Args:
         problems: all problems.
         version: of URC.
-        summaries: code → its meaning, in one sentence.
+        summaries: problem code → summary in one sentence.
     """
     codes = list(dict.fromkeys(problem.code for problem in problems))
     return {
@@ -106,6 +106,6 @@ def _slashed(file: str) -> str:
 
 
 def _uri(file: str) -> str:
-    """Return a URI reference: relative to the folder of the run as given, or absolute."""
+    """Return a file as a URI reference: relative to the folder of the run, or absolute."""
     path = PurePath(file)
     return path.as_uri() if path.is_absolute() else quote(_slashed(file))

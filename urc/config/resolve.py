@@ -1,6 +1,6 @@
-"""A profile as one document, with the origin of every key.
+"""Conversion of a profile to one document, with the origin of every key.
 
-The result is itself a valid document with the same meaning.
+The result is a valid document with the same meaning.
 """
 
 import json
@@ -27,7 +27,7 @@ _BUILDING: Final = ("extends", "include", "partial", "params", "driver", "interf
 _BESIDE: Final = ("settings", "widgets", "tests", "simulator")
 _PLAIN: Final = re.compile(r"[A-Za-z_](?:[\w./ -]*[\w./-])?|\d+(?:ms|s|m|h)", re.ASCII)
 _WORDS: Final = frozenset(("null", "true", "false", "yes", "no", "on", "off", "y", "n"))
-"""Words that some YAML readers do not read as text."""
+"""Words that some YAML readers do not read as strings."""
 _UNSAFE: Final = re.compile("[\x7f-\x9f\u2028\u2029\ud800-\udfff\ufeff\ufffe\uffff]")
 _BLOCK: Final = re.compile(r"(?:[!-~](?:[ -~]*[!-~])?\n){2,}")
 _INLINE_MOST: Final = 60
@@ -37,7 +37,7 @@ class ResolvedProfile(NamedTuple):
     """The result of `resolve`."""
 
     text: str
-    """The whole document; "" after errors."""
+    """The resolved document; "" after errors."""
     problems: tuple[Problem, ...]
 
 
@@ -45,9 +45,9 @@ def resolve(path: str, registry: WidgetFolder, profile: Profile | None = None) -
     """Return the document at `path` merged with all its sources.
 
     Args:
-        path: a robot, driver, interface or widget.
-        registry: the widgets.
-        profile: the loaded profile. It gives the text a default interface if none is declared.
+        path: path of a robot, driver, interface or widget.
+        registry: the available widgets.
+        profile: the loaded profile; needed for the default interface of a document without one.
     """
     sources, problems, _, _ = gather(path)
     if sources is None:
@@ -92,13 +92,13 @@ def _sections(sources: Sources, registry: WidgetFolder) -> Iterator[tuple[str, o
 
 
 def _layout(part: Node) -> Mapping[str, Node]:
-    """Return the keys of an interface that a robot's document may have."""
+    """Return the interface keys that a robot's document may have."""
     keys = read_schema("interface.schema.json")["$defs"]["inlineInterface"]["properties"]
     return {key: inner for key, inner in part.entries().items() if key in keys}
 
 
 def _slot(parts: list[Node], registry: WidgetFolder) -> Node:
-    """Return the widget of a slot, a later part over an earlier one."""
+    """Return the widget of a slot; later parts override earlier parts."""
     tree = _tree(parts[0])
     for part in parts[1:]:
         over = _tree(part)
@@ -116,7 +116,7 @@ def _tree(part: Node) -> Tree:
 
 
 def _for_widget(tree: Tree, name: str, registry: WidgetFolder) -> Tree:
-    """Return the keys that another widget keeps: bindings of the same names, no options."""
+    """Return the keys of a slot that stay valid for another widget: bindings without options."""
     widget = registry.get(name)
     ports = {**widget.inputs, **widget.outputs} if widget is not None else {}
     value = {key: item for key, item in dict(tree.value).items() if key != "options"}  # type: ignore[call-overload]
@@ -130,7 +130,7 @@ def _for_widget(tree: Tree, name: str, registry: WidgetFolder) -> Tree:
 
 
 def written(key: str, value: object) -> str:
-    """Return ``key: value`` in the notation of a document, without places."""
+    """Return ``key: value`` in the notation of a document, without comments on the origin."""
     return "\n".join(_entry(key, value, 0)) + "\n"
 
 
@@ -140,7 +140,7 @@ def _entry(key: str, node: object, depth: int) -> Iterator[str]:
 
 
 def _value(head: str, node: object, depth: int, place: str) -> Iterator[str]:
-    """Yield the lines of a value after `head`, its indented key."""
+    """Yield the lines of a value; `head` is the indented key."""
     value = node.data if isinstance(node, Node) else node
     if isinstance(value, Mapping):
         entries = node.entries() if isinstance(node, Node) else value
@@ -182,7 +182,7 @@ def _data(node: object) -> object:
 
 
 def _place(node: object) -> str:
-    """Return the place of a value's key, as a comment."""
+    """Return a comment with the origin of a value's key."""
     if not isinstance(node, Node):
         return ""
     mark = node.document.at(node.path)
@@ -201,7 +201,7 @@ def _scalar(value: object) -> str:
 
 
 def _text(text: str) -> str:
-    """Return text without quotes where every YAML reader takes it for text, else with quotes."""
+    """Return a text in quotes, or without quotes if every YAML reader treats it as a string."""
     if _PLAIN.fullmatch(text) and text.lower() not in _WORDS:
         return text
     if "\\" in text and text.isascii() and text.isprintable() and "'" not in text:
@@ -211,7 +211,7 @@ def _text(text: str) -> str:
 
 
 def _default_look(sources: Sources, profile: Profile | None) -> dict[str, object]:
-    """Return the default ``widgets`` and ``interfaces``, where the documents declare none."""
+    """Return default ``widgets`` and ``interfaces`` for documents without interfaces."""
     if profile is None or sources.interfaces:
         return {}
     made: dict[str, object] = {}

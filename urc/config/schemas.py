@@ -1,10 +1,10 @@
-"""The schemas that ship with URC, and a fast check: does a value certainly fit?
+"""The schemas that ship with URC, and a fast check for valid documents.
 
-Both goals of `urc validate` fail when each good document pays for `jsonschema` (decision 4).
+The library `jsonschema` is too slow for both speed goals of `urc validate` (decision 4).
 
-This module turns the keywords of the schemas into closures. It leaves all other cases, including
-unknown keywords, to `jsonschema`; a contract test compares the two. A part of a schema is compiled
-at its first use, so a small document compiles little.
+This module compiles the keywords of the schemas to closures. A positive result is certain. All
+other cases, including unknown keywords, need `jsonschema`. A contract test compares both checks.
+Each part of a schema is compiled at its first use, so small documents compile few parts.
 """
 
 import json
@@ -19,18 +19,18 @@ from urc.source import Document
 __all__ = ["KINDS", "QuickCheck", "fits", "kind_of", "read_schema", "shipped_check"]
 
 KINDS: Final = ("robot", "driver", "interface", "widget")
-"""Kinds of documents; each has a schema."""
+"""Kinds of documents with a schema."""
 
 
 @cache  # the shipped schemas never change at runtime
 def read_schema(name: str) -> Mapping[str, Any]:
-    """Return a shipped schema by its file name."""
+    """Return the shipped schema with this file name."""
     schema: Mapping[str, Any] = json.loads((shipped("schemas") / name).read_text("utf-8"))
     return schema
 
 
 def kind_of(document: Document) -> str:
-    """Return the document's kind, or "" for a missing or unknown kind."""
+    """Return the kind of a document, or "" for a missing or unknown kind."""
     data = document.data
     kind = data.get("kind") if isinstance(data, dict) else None
     return kind if isinstance(kind, str) and kind in KINDS else ""
@@ -43,10 +43,10 @@ def shipped_check() -> "QuickCheck":
 
 
 def fits(reference: str, value: object) -> bool:
-    """Return whether a value certainly fits the schema at ``file#/pointer``.
+    """Return whether a value certainly matches the schema at ``file#/pointer``.
 
-    Passes before the shape pass ask this before they use a key. A value that does not fit stays in
-    the document, and the shape pass reports it.
+    Passes before the shape pass call this function before they use a key. They ignore a value that
+    does not match, and the shape pass reports an error.
     """
     return shipped_check().is_valid_at(reference, value)
 
@@ -61,33 +61,33 @@ _ANNOTATIONS: Final = frozenset(
 
 
 class _UncertainError(Exception):
-    """An error for a keyword that this module does not know."""
+    """An error for a schema keyword that this module does not support."""
 
 
 class QuickCheck:
-    """Fast checks of a set of schemas that refer to each other by file name."""
+    """Fast checks for a set of schemas that refer to each other by file name."""
 
     def __init__(self, read: Callable[[str], Mapping[str, Any]]) -> None:
-        """`read` returns the schema in a file."""
+        """Prepare the checks; `read` returns the schema with a given file name."""
         self._read = read
         self._references: dict[tuple[str, str], _Check] = {}
 
     def is_valid(self, file: str, data: object) -> bool:
-        """Return whether `data` certainly fits the schema in `file`."""
+        """Return whether `data` certainly matches the schema in `file`."""
         try:
             return self.reference(file, "#")(data)
         except _UncertainError:
             return False
 
     def is_valid_at(self, reference: str, data: object) -> bool:
-        """Return whether `data` certainly fits the schema at ``file#/pointer``."""
+        """Return whether `data` certainly matches the schema at ``file#/pointer``."""
         try:
             return self.reference("", reference)(data)
         except _UncertainError:
             return False
 
     def is_valid_inline(self, schema: Mapping[str, Any], data: object) -> bool:
-        """Return whether `data` certainly fits `schema`, which refers to no file."""
+        """Return whether `data` certainly matches `schema`, which must not refer to a file."""
         try:
             return _compile(self, schema, "")(data)
         except _UncertainError:
@@ -161,7 +161,7 @@ def _type(quick: QuickCheck, value: Any, schema: Any, file: str) -> _Check:
 
 
 def _same(left: Any, right: Any) -> bool:
-    """Return whether two values are equal in JSON: 1 equals 1.0, but true does not equal 1."""
+    """Return whether two values are equal in JSON: 1 equals 1.0, but not true."""
     if isinstance(left, bool) or isinstance(right, bool):
         return left is right
     if isinstance(left, (dict, list)) or isinstance(right, (dict, list)):

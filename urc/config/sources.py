@@ -1,6 +1,6 @@
-"""The parts of a profile, and the document of each.
+"""The parts of a profile, with the document of each part.
 
-A robot may have its driver and its interfaces in separate documents.
+The driver and the interfaces of a robot may be in separate documents.
 """
 
 from typing import Final
@@ -12,31 +12,31 @@ from urc.source import Document
 __all__ = ["RESERVED", "Sources"]
 
 _EMULATED: Final = ("signals", "state", "world")
-"""Keys of a simulator with its initial values and its world."""
+"""Keys of a simulator for initial values and the world."""
 RESERVED: Final = (*_EMULATED, "rules")
-"""Keys of a simulator that cannot be names of transports."""
+"""Reserved keys of a simulator, which cannot be names of transports."""
 
 
 class Sources:
-    """The parts of a profile, each with its place."""
+    """The parts of a profile, each with its document and path."""
 
     def __init__(self, root: Node, kind: str) -> None:
         self.root = root
         self.kind = kind
         self.driver = root
-        """The mapping with transports, signals, messages, commands and polls."""
+        """Mapping with transports, signals, messages, commands and polls."""
         self.settings: dict[str, Node] = {}
         self.slots: dict[str, list[Node]] = {}
-        """Slot → its widgets; a later widget changes an earlier one."""
+        """Slot → declarations of its widget; later declarations change earlier ones."""
         self.interfaces: dict[str, Node] = {}
         self.tests: list[Node] = []
         self.simulator: dict[str, Node] = {}
-        """Initial values and world of the emulated robot."""
+        """Initial values and world of the emulated robot, by key."""
         self.rules: dict[str, Node] = {}
         """Rules of the emulated robot by transport."""
 
     def add(self, part: Node) -> None:
-        """Add the settings, widgets, tests and simulator of `part`, over those of earlier parts."""
+        """Add the settings, widgets, tests and simulator of `part`; they override earlier parts."""
         self.settings |= part.named("settings")
         for slot, use in part.named("widgets").items():
             self.slots.setdefault(slot, []).append(use)
@@ -54,7 +54,7 @@ class Sources:
 
 
 def _over(below: Node | None, part: Node) -> Node:
-    """Return a part of a simulator, merged over the same part of the driver."""
+    """Merge a part of a simulator over the same part of the driver's simulator."""
     if below is None:
         return part
     merged = merge(_tree(below), _tree(part), part.path)

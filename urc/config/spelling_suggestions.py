@@ -1,4 +1,4 @@
-"""Suggestions of known words for a misspelt word."""
+"""Hints with known words for a misspelt word."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -7,16 +7,16 @@ __all__ = ["did_you_mean", "listed"]
 
 _MOST: Final = 16
 _SPARE: Final = 8
-"""Excess up to which the list is not cut."""
+"""Maximum excess of words in a list that is still complete."""
 
 
 def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:
-    """Return a hint: the nearest known word, else all known words.
+    """Return a hint with the most similar known word, or with all known words.
 
     Args:
         word: the unknown word.
         known: the known words.
-        noun: the kind of the known words, in the plural: ``signals``.
+        noun: plural noun for the known words, such as ``signals``.
     """
     from difflib import get_close_matches  # 6 ms that only a broken document pays
 
@@ -30,7 +30,7 @@ def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:
 
 
 def listed(names: Iterable[str], most: int | None = _MOST) -> str:
-    """Return names with commas, cut after `most` when the list is much longer."""
+    """Return names separated by commas; shorten a much longer list to `most` names."""
     every = list(names)
     if most is None or len(every) <= most + _SPARE:
         return ", ".join(every)

@@ -1,4 +1,4 @@
-"""Checks of typed values in documents: defaults, expected values, choices and ranges."""
+"""Checks of typed values in documents, such as defaults, choices and ranges."""
 
 from typing import Any, Final
 
@@ -29,7 +29,7 @@ _TYPE_WORDS: Final = {
 
 
 def shown(value: object) -> str:
-    """Return a value in the notation of a document, for messages."""
+    """Return a value in the notation of documents, for messages."""
     if value is None:
         return "nothing"
     if isinstance(value, (list, tuple)):
@@ -40,21 +40,21 @@ def shown(value: object) -> str:
 
 
 def fraction_of(text: str) -> float:
-    """Return the value of a fraction such as ``1/65536``; the text fits the schema's pattern."""
+    """Return the value of a fraction such as ``1/65536``; the schema has checked the format."""
     above, _, below = text.partition("/")
     return int(above) / int(below)
 
 
 def given(data: Any) -> Reading:
-    """Return plain data of a document as a value: a list becomes a tuple."""
+    """Return a document's data as a value: lists become tuples."""
     return tuple(data) if isinstance(data, list) else data
 
 
 def fit(value: Value, kind: str) -> Value:
-    """Return `value` as a value of type `kind`: 3.0 is a whole number.
+    """Return `value` converted to type `kind`; 3.0 counts as a whole number.
 
     Raises:
-        ValueError: it has another type.
+        ValueError: the value has another type.
     """
     if kind == "string" and isinstance(value, str):
         return value
@@ -69,10 +69,10 @@ def fit(value: Value, kind: str) -> Value:
 
 
 def fit_argument(value: Any, kind: str, of: str, size: int | None) -> tuple[Value, ...]:
-    """Return the values for an argument: the elements of an array, or one value.
+    """Return the elements of an array argument, or a tuple with the one value of an argument.
 
     Raises:
-        ValueError: it has another type or size.
+        ValueError: the value has another type or size.
     """
     if kind != "array":
         return (fit(value, kind),)
@@ -84,7 +84,7 @@ def fit_argument(value: Any, kind: str, of: str, size: int | None) -> tuple[Valu
 
 
 def element_of(part: Node, kind: str, problems: Problems) -> str:
-    """Return the type of the elements of an argument; of an array, its ``items``."""
+    """Return the type under ``items`` for an array, or the type `kind` itself."""
     if kind == "array":
         return part.text("items", "number")
     for key in ("items", "size"):
@@ -96,7 +96,7 @@ def element_of(part: Node, kind: str, problems: Problems) -> str:
 
 
 def fit_hint(value: Value, kind: str) -> str:
-    """Return a hint for a value that does not fit type `kind`, when quotes are the cause."""
+    """Return a hint for a value that needs quotes, or no quotes, to be of type `kind`."""
     if kind in ("integer", "number") and isinstance(value, str):
         try:
             float(value)
@@ -111,7 +111,7 @@ def fit_hint(value: Value, kind: str) -> str:
 
 
 def check_range(part: Node, kind: str, problems: Problems) -> tuple[float | None, float | None]:
-    """Return ``min`` and ``max`` of a signal, argument or setting of type `kind`."""
+    """Return ``min`` and ``max`` of a signal, argument or setting; report an empty range."""
     low, high = part.number("min"), part.number("max")
     if kind not in ("integer", "number"):
         for key in ("min", "max"):
@@ -134,7 +134,7 @@ def check_range(part: Node, kind: str, problems: Problems) -> tuple[float | None
 def check_within(
     value: Value, low: float | None, high: float | None, part: Node, problems: Problems
 ) -> None:
-    """Report a number at `part` that is outside ``min`` and ``max``."""
+    """Report a number at `part` below ``min`` or above ``max``."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return
     if low is not None and value < low:
@@ -146,7 +146,7 @@ def check_within(
 def known_argument(
     name: str, part: Node, command: Command, problems: Problems, *, key: bool = True
 ) -> Argument | None:
-    """Return the argument with this name, or report its absence at `part` or its key."""
+    """Return the argument with this name; report an unknown name and return None."""
     argument = command.arguments.get(name)
     if argument is None:
         problems.error(

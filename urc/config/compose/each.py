@@ -1,4 +1,4 @@
-"""`each`: one declaration for many similar items, expanded before the shape pass.
+"""Expansion of `each`: one declaration for many similar items.
 
     signals:
       "joint_{i}": { each: { i: [1, 2, 3] }, unit: rad }
@@ -34,8 +34,6 @@ _RESERVED: Final = ("params", "settings")
 
 
 class _Copy(NamedTuple):
-    """One item of the result."""
-
     name: str | None
     tree: Tree
 
@@ -51,7 +49,7 @@ class Expander:
         """Path of the current item."""
 
     def collection(self, tree: Tree, path: Path) -> Tree:
-        """Return a mapping or list with every `each` of its items expanded."""
+        """Return a mapping or list after the expansion of every `each` in its items."""
         if isinstance(tree.value, dict):
             return self._mapping(tree, path)
         return self._list(tree, path)
@@ -120,7 +118,7 @@ class Expander:
     def _copies(
         self, inner: Tree, path: Path, name: str | None, variables: Mapping[str, list[object]]
     ) -> Iterator[_Copy]:
-        """Yield the item once for every combination of values."""
+        """Yield one copy of the item for every combination of values."""
         self.path = path
         template = _without(inner, "each")
         each = inner.value["each"]  # type: ignore[index]  # a mapping with variables
@@ -135,9 +133,9 @@ class Expander:
     def _variables(
         self, inner: Tree, path: Path, name: str | None
     ) -> Mapping[str, list[object]] | None:
-        """Return the variables of an item, or None when it has no valid `each`.
+        """Return the variables of an item, or None without a valid `each`.
 
-        An `each` of a wrong shape stays in the document; the shape pass reports it.
+        An `each` of the wrong shape stays in the document, and the shape pass reports an error.
         """
         if not isinstance(inner.value, dict) or "each" not in inner.value:
             return None
@@ -189,7 +187,7 @@ class _First:
         self._each = item_at(expander.document.data, path)["each"]
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
-        """Report a word that the variable's mappings do not have."""
+        """Report a key that is missing from the variable's mappings."""
         first: Any = self._each[name][0]
         is_mapping = isinstance(first, dict)
         plain = f"its values are plain: write {{{name}}}"
@@ -218,7 +216,7 @@ class _Rest:
 
 
 def _are_alike(values: list[object]) -> bool:
-    """Return whether all values are plain, or all are mappings with the same keys."""
+    """Return whether all values are scalars, or all values are mappings with the same keys."""
     if isinstance(values[0], dict):
         words = values[0].keys()
         return all(isinstance(one, dict) and one.keys() == words for one in values)
@@ -240,7 +238,7 @@ def _without(tree: Tree, key: str) -> Tree:
 
 
 def _changed(items: list[_Copy], name: str, given: Tree, changed: Tree | None) -> list[_Copy]:
-    """Return the items with the generated item of this name changed, or removed."""
+    """Return the items after the generated item `name` was changed or removed."""
     result = []
     for copy in items:
         if copy.name == name:
@@ -257,7 +255,7 @@ def is_removal(item: object) -> bool:
 
 
 def item_at(data: Any, path: Path) -> Any:
-    """Return the data at a path that exists."""
+    """Return the data at an existing path."""
     for part in path:
         data = data[part]
     return data
@@ -270,7 +268,7 @@ _BY_NAME: Final = ("simulator", "rules")
 
 
 def expand(document: Document, problems: Problems) -> Document:
-    """Return the document with every `each` expanded."""
+    """Return the document after the expansion of every `each`."""
     everywhere = list(_places(document.data))
     _check_names(document, everywhere, problems)
     places = [path for path in everywhere if _has_each(_at(document.data, path))]
@@ -295,7 +293,7 @@ def expand(document: Document, problems: Problems) -> Document:
 
 
 def _without_removals(document: Document, places: list[Path], problems: Problems) -> Document:
-    """Report and drop removals of missing items; the merge has applied the other removals."""
+    """Drop the removals of missing items, and report each of these removals."""
     tree = Tree(document.data, document.mark, document)
     for path in places:
         items = _at(document.data, path)
@@ -333,7 +331,7 @@ def _document(document: Document, tree: Tree) -> Document:
 
 
 def _check_names(document: Document, places: list[Path], problems: Problems) -> None:
-    """Report names with braces that remain; the schemas allow braces."""
+    """Report names that still contain braces, because the schemas allow braces."""
     for path in places:
         named = _at(document.data, path)
         for name, item in named.items() if isinstance(named, dict) else ():
@@ -348,7 +346,7 @@ def _check_names(document: Document, places: list[Path], problems: Problems) -> 
 
 
 def _places(data: object) -> Iterator[Path]:
-    """Yield the places of the mappings and lists whose items may have an `each`."""
+    """Yield the paths of all mappings and lists with items that may have an `each`."""
     if not isinstance(data, dict):
         return
     for root in ((), ("driver",)):
@@ -381,7 +379,7 @@ def _has_each(collection: object) -> bool:
 
 
 def _replaced(tree: Tree, path: Path, change: Any, done: Path = ()) -> Tree:
-    """Return `tree` with its part at `path` changed; the rest is shared."""
+    """Return `tree` with a changed part at `path`; all other parts are not copied."""
     if not path:
         result: Tree = change(tree, done)
         return result

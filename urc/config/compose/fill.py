@@ -1,8 +1,8 @@
-"""Names in single braces → their values: ``{i}`` of an `each`, ``{params.id}`` of a driver.
+"""Replacement of names in single braces, such as ``{i}`` of an `each`, or ``{params.id}``.
 
-Names are filled in while a document is loaded, in keys and texts alike. Templates have double
-braces and are not changed. A text with nothing but one name becomes the value itself, so ``"{i}"``
-may be a number.
+URC replaces these names in keys and texts while it loads a document. Templates have double braces
+and stay unchanged. A text that consists of one name becomes the value itself, so the result of
+``"{i}"`` may be a number.
 """
 
 import re
@@ -24,17 +24,17 @@ __all__ = [
 ]
 
 Names = Mapping[str, object]
-"""Name → a plain value, or a mapping of plain values."""
+"""Name → scalar, or mapping of scalars."""
 
 
 class PlaceholderReporter(Protocol):
-    """A receiver for the names that cannot be filled in."""
+    """A receiver of names that have no value."""
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
         """Report an unknown word after the dot of a known `name`."""
 
     def unquoted(self, path: Path, text: str) -> None:
-        """Report ``max: {i}``, which YAML reads as a mapping without quotes."""
+        """Report an unquoted name such as ``max: {i}``, which YAML reads as a mapping."""
 
 
 _NAME: Final = re.compile(
@@ -46,11 +46,11 @@ _CHARACTERS_MOST: Final = 4 << 20
 
 
 class ExpansionTooLarge(Exception):
-    """An expansion that exceeds the limits of a document."""
+    """An error for an expansion that exceeds the limits of a document."""
 
 
 class ExpansionBudget:
-    """The remaining nodes and characters of an expansion."""
+    """The number of nodes and characters that an expansion may still add."""
 
     def __init__(self, nodes: int) -> None:
         self._nodes = nodes
@@ -132,7 +132,7 @@ class _Filler:
         return Tree([item.value for item in items], tree.mark.copy(marks), tree.home)
 
     def text(self, text: str, path: Path) -> tuple[object, UnfilledText | None]:
-        """Return the text with its names filled in, and the edits for the places of problems."""
+        """Return the text after the replacement of its names, and its edits for error positions."""
         if "{" not in text:
             return text, None
         edits: list[tuple[int, int, int]] = []
@@ -177,12 +177,12 @@ def _item(tree: Tree, key: str | int, item: object) -> Tree:
 def fill(
     tree: Tree, path: Path, names: Names, budget: ExpansionBudget, listener: PlaceholderReporter
 ) -> Tree:
-    """Return `tree` with every name filled in; parts without names are shared, not copied."""
+    """Return `tree` after the replacement of every name; parts without names are not copied."""
     return _Filler(names, budget, listener).tree(tree, path)
 
 
 def fill_key(key: str, names: Names, budget: ExpansionBudget) -> str:
-    """Return a key with every name filled in."""
+    """Return a key after the replacement of every name."""
     return str(_Filler(names, budget, None).text(key, ())[0])
 
 
@@ -197,7 +197,6 @@ def report_unquoted(part: Node, text: str, problems: Problems) -> None:
 
 
 def _written(value: object) -> str:
-    """Return a value as text."""
     if isinstance(value, bool):
         return "true" if value else "false"
     return "" if value is None else str(value)

@@ -1,10 +1,11 @@
-"""`extends` and `include`: a document merged with the documents that it builds on.
+"""Merge of a document with the documents under `extends` and `include`.
 
     extends: base.yaml                  # the whole base, changed by this document
     extends: generic-ros1               # the same, with a document that ships with URC
     include: [parts/battery.yaml]       # parts of documents, below the keys of this document
 
-The keys of a document override those of its includes, and these override those of its base.
+The keys of a document override the keys of its includes. The keys of the includes override the keys
+of the base.
 """
 
 import os
@@ -20,7 +21,7 @@ from urc.source import Document, Path
 __all__ = ["Composed", "compose", "override"]
 
 _DEEPEST: Final = 16
-"""Maximum chain of documents that build on each other."""
+"""Maximum number of documents in a chain of `extends` and `include`."""
 _NODES_MOST: Final = 10_000
 _OWN: Final = ("urc", "kind", "name", "extends", "include", "partial")
 _HEADER: Final = (*_OWN, "title", "summary", "licence", "author")
@@ -31,23 +32,23 @@ _INCLUDED: Final = {
     "driver": ("driver",),
     "interface": ("interface",),
 }
-"""Kind of a document → kinds of the parts that it may include."""
+"""Kind of a document → kinds of its possible includes."""
 
 
 class Composed(NamedTuple):
-    """A document with all that it extends and includes."""
+    """The result of `compose`."""
 
     document: Document | None
-    """None if a required document is missing or invalid."""
+    """The merged document; None if a required document is missing or invalid."""
     sources: tuple[Document, ...]
-    """The merged documents as read; none if the document builds on no other."""
+    """The documents before the merge; empty without `extends` and `include`."""
 
 
 def compose(document: Document, library: Library) -> Composed:
-    """Return a document merged with the documents that it extends and includes.
+    """Merge a document with the documents that it extends and includes.
 
-    The library reads them, and collects the problems of references and clashes. The shape pass
-    checks everything else, in the sources and in the result.
+    The library reads the documents, and collects the problems of references and clashes. The shape
+    pass reports all other problems of the sources and of the result.
     """
     composer = _Composer(library)
     whole = composer.compose(document, ())
@@ -55,7 +56,7 @@ def compose(document: Document, library: Library) -> Composed:
 
 
 def override(document: Document, overrides: Node) -> Document:
-    """Return a driver with the changes under a robot's `overrides`."""
+    """Return a driver after the changes under a robot's `overrides`."""
     mark = overrides.document.at(overrides.path)
     if mark is None:
         return document  # every part has a mark
@@ -78,9 +79,9 @@ class _Composer:
         self._whole: dict[str, Document | None] = {}
 
     def compose(self, document: Document, chain: tuple[str, ...]) -> Document | None:
-        """Return the document merged with its sources; a document without sources stays as it is.
+        """Return the document merged with its sources; a document without sources is unchanged.
 
-        `chain` has the files from the first document to this one.
+        `chain` contains the files from the first document to `document`.
         """
         data = document.data
         if not isinstance(data, dict) or not kind_of(document):
@@ -121,7 +122,7 @@ class _Composer:
     def _sources(
         self, root: Node, chain: tuple[str, ...]
     ) -> tuple[list[Tree | None], list[Tree | None]]:
-        """Return the base, if any, and the includes; None for invalid ones."""
+        """Return the base, if any, and the includes, with None for each invalid document."""
         kind = kind_of(root.document)
         base = root.get("extends")
         return (
@@ -162,7 +163,7 @@ class _Composer:
         return _without(Tree(found.data, found.mark, found), without)
 
     def _merged_includes(self, parts: list[Tree], settled: object) -> list[Tree]:
-        """Return the includes as one layer, or none; report two includes that disagree."""
+        """Return the includes as a list of at most one tree; report contradictory includes."""
         if not parts:
             return []
         clashes = _Clashes(settled)
@@ -183,7 +184,7 @@ class _Composer:
 
 
 class _Clashes:
-    """Values on which two includes disagree, unless the including document sets them."""
+    """A collector of contradictory values in two includes."""
 
     def __init__(self, settled: object) -> None:
         self._settled = settled

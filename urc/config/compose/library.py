@@ -1,6 +1,7 @@
-"""The documents of one check, read through their references.
+"""Reader of all documents that one document refers to.
 
-A path is relative to the document that names it; a name means a document that ships with URC.
+A path in a reference is relative to the referring document. A name without a suffix refers to a
+document that ships with URC.
 """
 
 import os
@@ -31,21 +32,21 @@ class Library:
 
     def __init__(self) -> None:
         self.files: dict[str, None] = {}
-        """Each requested file, existing or not."""
+        """Every requested file, even if missing."""
         self.problems = Problems()
         self._documents: dict[str, Document | None] = {}
 
     def read(self, path: str) -> Document:
-        """Return one document as written in its file.
+        """Return one document before any merge.
 
         Raises:
-            ProblemsError: it cannot be read.
+            ProblemsError: the document cannot be read.
         """
         self.files[path] = None
         return read_document(path)
 
     def follow(self, reference: Node, kinds: tuple[str, ...]) -> Document | None:
-        """Return the document that a reference names, or None after a problem."""
+        """Return the document that a reference names, or None after a reported problem."""
         here = reference.document.source_of(reference.path).file
         if _NAME.fullmatch(reference.data):
             named = _shipped(reference.data, kinds)
@@ -112,7 +113,7 @@ class Library:
 
 
 def _shipped(name: str, kinds: tuple[str, ...]) -> str | None:
-    """Return the file of a document that ships with URC, or None."""
+    """Return the path of a document that ships with URC, or None."""
     files = (shipped("robots") / _SHIPPED[kind] / f"{name}.yaml" for kind in kinds)
     return next((os.path.normpath(file) for file in files if file.is_file()), None)
 

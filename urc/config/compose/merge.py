@@ -1,8 +1,9 @@
-"""The merge of two trees of data with their marks: the upper tree changes the lower tree.
+"""Merge of two trees of data and their marks. The upper tree changes the lower tree.
 
-Mappings are merged by key, and lists of named items by name; other values are replaced. Rules of a
-simulator change by name, and rules without a name stay. A ``null`` removes a key, ``remove: true``
-an item of a list. Every mark of the result keeps its document, so every problem keeps its place.
+Mappings are merged by key, and lists of named items by name. All other values are replaced. Rules
+of a simulator are merged by name, and rules without a name are kept. The value ``null`` removes a
+key, and ``remove: true`` removes an item of a list. Every mark in the result keeps its document, so
+every problem keeps its position.
 """
 
 from collections.abc import Callable
@@ -15,26 +16,25 @@ __all__ = ["Tree", "children", "count_nodes", "item_name", "mark_inside", "merge
 
 _NAMES: Final = ("name", "id")
 _EXCLUSIVE: Final = (frozenset(("grid", "layouts", "tabs")),)
-"""Groups of keys that exclude each other, in addition to forms of frames."""
+"""Groups of mutually exclusive keys, in addition to the forms of frames."""
 _OF_USED_DRIVER: Final = frozenset(("use", "params", "overrides"))
-"""Keys of ``driver`` in a robot that refers to a driver's document."""
+"""Keys under ``driver`` when a robot refers to a driver's document."""
 
 
 class Tree(NamedTuple):
-    """Data and its place."""
+    """Data and its position in a document."""
 
     value: object
     mark: Mark
     home: Document
-    """The document of the text, unless a mark inside has another document."""
+    """The document of this data; inner marks may name another document."""
 
 
 _Clash = Callable[[Path, Tree, Tree], None]
-"""Receives two values of one key; the second is kept."""
+"""A callback with the path, the replaced value and the replacement."""
 
 
 def _pinned(tree: Tree) -> Mark:
-    """Return the mark with its document."""
     if tree.mark.origin is not None:
         return tree.mark
     mark = tree.mark.copy()
@@ -43,12 +43,12 @@ def _pinned(tree: Tree) -> Mark:
 
 
 def mark_inside(inner: Tree, around: Tree) -> Mark:
-    """Return the mark of `inner`, a part of `around`, with its document if that differs."""
+    """Return the mark of `inner`, and add its document if `around` has another one."""
     return _pinned(inner) if inner.home is not around.home else inner.mark
 
 
 def children(tree: Tree) -> dict[str | int, Tree]:
-    """Return the parts of a mapping or list."""
+    """Return the children of a mapping or list, by key or index."""
     home = tree.mark.origin or tree.home
     if isinstance(tree.value, dict):
         inside = tree.value.items()
@@ -73,7 +73,7 @@ def item_name(value: object) -> str | None:
 
 
 def count_nodes(value: object) -> int:
-    """Return the number of keys, values, mappings and lists."""
+    """Return the number of keys, scalars, mappings and lists in a value."""
     if isinstance(value, dict):
         return 1 + len(value) + sum(map(count_nodes, value.values()))
     if isinstance(value, list):
@@ -84,8 +84,8 @@ def count_nodes(value: object) -> int:
 def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) -> Tree:
     """Return `base` with the changes of `over`.
 
-    The base is not modified. `path` is the place of both trees. `clash` receives each replaced
-    value, and its replacement.
+    The base is not modified. Both trees are at `path`. The callback `clash` receives each replaced
+    value and its replacement.
     """
     if path == ("driver",) and isinstance(over.value, dict):
         base = _driver_in_full(base, over.value)
@@ -106,7 +106,7 @@ def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) 
 
 
 def _driver_in_full(base: Tree, over: dict[str, object]) -> Tree:
-    """Return a driver's name as a mapping, where `over` adds params or overrides to it."""
+    """Return a driver's name as a mapping if `over` adds params or overrides."""
     if not isinstance(base.value, str) or not over.keys() <= _OF_USED_DRIVER:
         return base
     mark = base.mark.copy({"use": _pinned(base)})
@@ -131,7 +131,7 @@ def _mappings(base: Tree, over: Tree, path: Path, clash: _Clash | None) -> Tree:
 
 
 def _exclusive(path: Path) -> tuple[frozenset[str], ...]:
-    """Return groups of keys that exclude each other in the mapping at `path`."""
+    """Return the groups of mutually exclusive keys in the mapping at `path`."""
     if path[-1:] == ("send",):
         return (frozenset(WRITE_FORMS),)
     if path[-1:] == ("reply",) or path[-2:-1] == ("messages",):
@@ -144,7 +144,7 @@ def _has_other_type(base: dict[str, object], over: dict[str, object]) -> bool:
 
 
 def _by_name(tree: Tree) -> dict[str, Tree] | None:
-    """Return the items of a list by their names, or None when an item has no name of its own."""
+    """Return the items of a list by name, or None if a name is missing or not unique."""
     found: dict[str, Tree] = {}
     for inner in children(tree).values():
         name = item_name(inner.value)
@@ -170,7 +170,7 @@ def _lists(
 
 
 def _rules(base: Tree, new: dict[str, Tree], over: Tree, path: Path, clash: _Clash | None) -> Tree:
-    """Return rules, some changed by name; new rules come first."""
+    """Merge rules by name; new rules are first in the result."""
     left, items = dict(new), []
     for inner in children(base).values():
         name = item_name(inner.value)

@@ -1,6 +1,7 @@
-"""`params`: values of a driver that each robot chooses, ``{params.id}`` in keys and texts.
+"""Replacement of a driver's parameters, such as ``{params.id}``, in keys and texts.
 
-Params are filled in while the documents are loaded. Settings, in contrast, belong to the operator.
+Each robot gives the values of its driver's parameters, and URC replaces the parameters while it
+loads the documents. In contrast, the operator gives the values of settings.
 """
 
 from collections.abc import Mapping
@@ -26,10 +27,11 @@ _SAMPLES: Final[Mapping[str, Value]] = {
 def fill_params(
     document: Document, given: Node | None, use: Node | None, problems: Problems
 ) -> Document:
-    """Return a driver's document with its params filled in.
+    """Return a driver's document after the replacement of its parameters.
 
-    `given` has the values of the robot, and `use` is its reference to the driver. A driver
-    alone has neither: then a param without a default gets a sample of its type.
+    `given` contains the robot's values, and `use` is the robot's reference to the driver. A driver
+    without a robot has neither. In this case, a parameter without a default gets a sample value of
+    its type.
     """
     data = document.data
     if not isinstance(data, dict):
@@ -139,7 +141,7 @@ def _sample(kind: str, bounds: tuple[float | None, float | None], choices: list[
 
 
 class _Filler:
-    """A filler for the params of one document, which records their use."""
+    """A replacer of the parameters in one document that records the used parameters."""
 
     def __init__(self, document: Document, values: Mapping[str, Value], problems: Problems) -> None:
         self.used: set[str] = set()
@@ -148,7 +150,6 @@ class _Filler:
         self._problems = problems
 
     def document(self) -> Document:
-        """Return the document with everything filled in."""
         document, data = self._document, self._document.data
         assert isinstance(data, dict)  # noqa: S101 - checked by the caller
         budget = ExpansionBudget(_NODES_MOST - count_nodes(data) + len(data))
@@ -178,7 +179,7 @@ class _Filler:
         report_unquoted(Node(self._document, path, None), text, self._problems)
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
-        """Report a param that the driver does not declare."""
+        """Report a parameter that the driver does not declare."""
         place: dict[str, Any] = {"offset": offset, "length": len(name) + len(word) + bool(word)}
         self._problems.error(
             Node(self._document, path, None),
@@ -190,7 +191,7 @@ class _Filler:
 
 
 class _Watched(Mapping[str, Value]):
-    """Values that record the names in use."""
+    """A mapping of values that records each used name."""
 
     def __init__(self, values: Mapping[str, Value], used: set[str]) -> None:
         self._values = values

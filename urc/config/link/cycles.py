@@ -1,4 +1,4 @@
-"""Cycles of names: signals that depend on themselves, and sequences that run themselves."""
+"""Search for cycles: signals that depend on themselves, and sequences that run themselves."""
 
 from collections.abc import Callable, Iterable
 
@@ -6,11 +6,11 @@ __all__ = ["cycle_from"]
 
 
 def cycle_from(start: str, following: Callable[[str], Iterable[str]]) -> list[str]:
-    """Return the shortest path from `start` back to itself, or nothing.
+    """Return the shortest path from `start` back to `start`, or an empty list.
 
     Args:
-        start: a name.
-        following: returns the names that a name needs.
+        start: first name of the path.
+        following: function that returns the direct dependencies of a name.
     """
     came_from: dict[str, str] = {}
     waiting = [start]

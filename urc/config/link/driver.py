@@ -1,4 +1,4 @@
-"""Names of transports, signals, settings and arguments in a driver, wherever they are used."""
+"""Checks of all names of transports, signals, settings and arguments in a driver."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -40,9 +40,9 @@ _NUMBERS: Final = ("port", "integer", "number")
 def check_option(
     part: Node, kind: str, template: Template, settings: Mapping[str, Setting], problems: Problems
 ) -> None:
-    """Report a setting of the wrong type.
+    """Report a setting in `template` with the wrong type for the option at `part`.
 
-    For a built-in transport, `kind` names a definition of the driver's schema.
+    `kind` is the option's definition in the driver's schema, which only built-in transports have.
     """
     found = _ONE_SETTING.fullmatch(template.source)
     setting = settings.get(found[1]) if found else None
@@ -66,13 +66,13 @@ def check_option(
 
 
 class NameUses:
-    """The names in use; rules report the unused names."""
+    """The used names of a driver; rules report the unused names."""
 
     def __init__(self) -> None:
         self.settings: set[str] = set()
         self.transports: set[str] = set()
         self.signals: set[str] = set()
-        """Signals that a frame can set."""
+        """Names of the signals that a frame can set."""
 
 
 class _Linker:
@@ -83,7 +83,7 @@ class _Linker:
         self.uses = NameUses()
 
     def transport(self, part: Node, key: str, name: str) -> None:
-        """Check the transport that `part` names under `key`, or omits."""
+        """Check the transport name under `key`, which `part` may omit."""
         if name in self.driver.transports:
             self.uses.transports.add(name)
             return
@@ -100,7 +100,7 @@ class _Linker:
             )
 
     def fields(self, part: Node, read: ReadSpec) -> None:
-        """Check that each field of a reply or message is a signal, or local to the document."""
+        """Check that each field of a reply or message is a signal or starts with ``_``."""
         found = read_form(part)
         if found is None:
             return
@@ -118,7 +118,7 @@ class _Linker:
         self._beside(part, read)
 
     def field(self, part: Node, name: str, place: Mapping[str, int | bool]) -> None:
-        """Check one name of a signal that is set at `part`."""
+        """Check the name of one signal that `part` sets."""
         if name in self.driver.signals:
             self.uses.signals.add(name)
         elif not name.startswith("_"):
@@ -131,7 +131,6 @@ class _Linker:
             )
 
     def _beside(self, part: Node, read: ReadSpec) -> None:
-        """Check the names in the keys next to a form."""
         known = [
             name for name in read.fields if name not in read.sets and name not in read.collects
         ]
@@ -164,7 +163,7 @@ class _Linker:
             self.template(place, template, known)
 
     def template(self, part: Node, template: Template, known: Iterable[str] = ()) -> None:
-        """Check the names in a template."""
+        """Check every name in a template."""
         allowed = {*known, "settings"}
         for used in sorted(template.names - allowed):
             name, hint = self._meant(used, allowed - {COUNTERS, NONCE})
@@ -209,7 +208,7 @@ class _Linker:
             )
 
     def _meant(self, name: str, allowed: Iterable[str]) -> tuple[str, str]:
-        """Return an unknown name as written, and a hint for it."""
+        """Return an unknown name as written in the document, and a hint."""
         if name == NONCE:
             return "nonce", "a nonce is only available in 'send'"
         if name == COUNTERS:
@@ -276,7 +275,7 @@ def link_driver(
 
 
 def _check_poll_names(part: Node, driver: Driver, problems: Problems) -> None:
-    """Report a name of two polls, or of a poll and a command, which a test could not tell apart."""
+    """Report two polls, or a poll and a command, with the same name."""
     seen: set[str] = set(driver.commands)
     for inner, poll in zip(part.listed("polls"), driver.polls, strict=True):
         if poll.name in seen:
@@ -310,7 +309,7 @@ def link_simulator(
     settings: Mapping[str, Setting],
     problems: Problems,
 ) -> tuple[Mapping[str, Reading], WorldSpec | None]:
-    """Check every name in the emulated robot; return its initial values and its world."""
+    """Check every name in the emulated robot; return its initial values and world."""
     if not sources.simulator and not sources.rules:
         return NOTHING, None
     from urc.config.link.rules import link_rules, link_values

@@ -1,4 +1,4 @@
-"""Checks of names and arguments in conditions, correlations and commands that are run."""
+"""Checks of names and arguments in conditions, in reply matching and in calls of commands."""
 
 from collections.abc import Iterable, Mapping
 from typing import Protocol
@@ -27,29 +27,29 @@ __all__ = [
 
 
 class Linker(Protocol):
-    """The parts of the link pass that flow needs."""
+    """The functions of the link pass that this module needs."""
 
     driver: Driver
     problems: Problems
 
     def transport(self, part: Node, key: str, name: str) -> None:
-        """Check the transport that `part` names under `key`, or omits."""
+        """Check the transport name under `key`, which `part` may omit."""
 
     def fields(self, part: Node, read: ReadSpec) -> None:
-        """Check that each field is a signal, or local to the document."""
+        """Check that each field is a signal or starts with ``_``."""
 
     def field(self, part: Node, name: str, place: Mapping[str, int | bool]) -> None:
-        """Check one name of a signal that is set at `part`."""
+        """Check the name of one signal that `part` sets."""
 
     def template(self, part: Node, template: Template, known: Iterable[str] = ()) -> None:
-        """Check the names in a template."""
+        """Check every name in a template."""
 
     def templates(self, part: Node, spec: WriteSpec, known: Iterable[str] = ()) -> None:
         """Check the names in every template under ``send:``."""
 
 
 def link_command(linker: Linker, part: Node, command: Command) -> None:
-    """Check the keys of a command, except its frame."""
+    """Check the keys of a command, except the keys of its frame."""
     known = {*linker.driver.signals, *command.arguments}
     if command.reply is not None and "reply" in part.data:
         link_reply(linker, part.must("reply"), command.reply, command.arguments, command.send)
@@ -73,7 +73,7 @@ def link_command(linker: Linker, part: Node, command: Command) -> None:
 
 
 def _link_slew(problems: Problems, slew: Mapping[str, Node], command: Command) -> None:
-    """Check that `slew` limits only numbers without choices."""
+    """Check that `slew` limits only numeric arguments without choices."""
     for name, inner in slew.items():
         argument = known_argument(name, inner, command, problems)
         if argument is None:
@@ -94,7 +94,7 @@ def link_requirements(linker: Linker, part: Node, command: Command) -> None:
 
 
 def refuse_two_person(linker: Linker, part: Node, command: Command) -> None:
-    """Report a command that needs two people at a place where it runs automatically."""
+    """Report a command that needs two people if `part` would run it automatically."""
     if _needs_two(command):
         linker.problems.error(
             part,
@@ -139,7 +139,7 @@ def link_poll(linker: Linker, part: Node, poll: Poll) -> None:
 def link_reply(
     linker: Linker, part: Node, reply: Reply, arguments: Iterable[str], send: WriteSpec
 ) -> None:
-    """Check every stage, the error replies and the correlation."""
+    """Check the stages, error replies and counter of a reply."""
     stages = part.listed("stages")
     reads = [reply.read, *(one.read for one in reply.stages)]
     errors = [reply.faults, *(one.faults for one in reply.stages)]
@@ -170,7 +170,7 @@ def link_reply(
 
 
 def link_asides(linker: Linker, part: Node, asides: ProvisionalReplies) -> None:
-    """Check the provisional replies, in any form."""
+    """Check the provisional replies under ``resend:`` and ``extend:``."""
     for key, read in (("resend", asides.resend), ("extend", asides.extend)):
         inner = part.get(key)
         if inner is not None and read is not None and isinstance(inner.data, dict):
@@ -178,7 +178,7 @@ def link_asides(linker: Linker, part: Node, asides: ProvisionalReplies) -> None:
 
 
 def link_refusals(linker: Linker, part: Node, faults: tuple[ErrorReply, ...]) -> None:
-    """Check the error replies of any form under ``errors:``."""
+    """Check the error replies under ``errors:``."""
     for inner, fault in zip(_refusal_parts(part), faults, strict=True):
         linker.fields(inner, fault.read)
         if fault.text is not None:
@@ -186,7 +186,7 @@ def link_refusals(linker: Linker, part: Node, faults: tuple[ErrorReply, ...]) ->
 
 
 def said_on(driver: Driver, transport: str) -> Iterable[str]:
-    """Return the names for all templates of a transport: counters, clocks, values of its login."""
+    """Return the names that every template of a transport may use, such as counters and clocks."""
     learnt = driver.learnt(transport) if transport in driver.transports else frozenset()
     return (COUNTERS, NONCE, NOW, *learnt)
 
@@ -212,7 +212,7 @@ def link_keepalives(linker: Linker, part: Node) -> None:
 
 
 def _link_counting(linker: Linker, part: Node, transport: str) -> None:
-    """Check a command that counts as traffic for a keepalive."""
+    """Check each command that counts as traffic for a keepalive."""
     command = find_command(linker, part, str(part.data))
     if command is not None and (command.steps or command.transport != transport):
         what = "is a sequence" if command.steps else f"goes to {command.transport!r}"
@@ -225,7 +225,7 @@ def _link_counting(linker: Linker, part: Node, transport: str) -> None:
 
 
 def find_command(linker: Linker, part: Node, name: str) -> Command | None:
-    """Return the command or sequence that `part` names, or report its absence."""
+    """Return the command or sequence that `part` names, or report an unknown name."""
     command = linker.driver.commands.get(name)
     if command is None:
         linker.problems.unknown(part, "unknown-command", name, linker.driver.commands)
@@ -235,9 +235,9 @@ def find_command(linker: Linker, part: Node, name: str) -> Command | None:
 def link_arguments(
     problems: Problems, part: Node, command: Command, given: Mapping[str, Node], at: str
 ) -> None:
-    """Check plain values for the arguments of `command`.
+    """Check the constant values in `given` for the arguments of `command`.
 
-    A missing argument is reported at the key `at` of `part`.
+    A missing argument is reported at the key `at` in `part`.
     """
     for name, inner in given.items():
         argument = known_argument(name, inner, command, problems)
@@ -260,7 +260,7 @@ def link_arguments(
 
 
 def check_value(part: Node, argument: Argument, problems: Problems) -> None:
-    """Check a plain value at `part` for an argument."""
+    """Check the constant value at `part` for an argument."""
     value = part.data
     try:
         elements = fit_argument(value, argument.type, argument.items, argument.size)

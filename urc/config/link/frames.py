@@ -1,6 +1,6 @@
-"""Constant frames that their own framing cannot carry, reported before a connection opens.
+"""Checks of constant frames that their framing cannot carry.
 
-Frames with expressions are checked when they are built.
+Frames with expressions can only be checked later, when URC builds them.
 """
 
 from collections.abc import Iterable
@@ -17,7 +17,7 @@ __all__ = ["check_frames"]
 
 
 def check_frames(part: Node, driver: Driver, problems: Problems) -> None:
-    """Report constant texts under ``send:`` that would become two frames, or none."""
+    """Report constant texts under ``send:`` that do not result in exactly one frame."""
     for name, inner in part.named("commands").items():
         command = driver.commands.get(name)
         if command is not None:
@@ -66,7 +66,7 @@ def _check_one(part: Node, send: WriteSpec, spec: TransportSpec, problems: Probl
 
 
 def _text(templates: Iterable[tuple[Node, Template]], encoding: str) -> bytes | None:
-    """Return the bytes of a constant text, or None; other code reports its mistakes."""
+    """Return the bytes of a constant text, or None for a variable or invalid text."""
     found = [template for _, template in templates]
     if len(found) != 1 or not found[0].is_constant:
         return None
@@ -77,7 +77,7 @@ def _text(templates: Iterable[tuple[Node, Template]], encoding: str) -> bytes | 
 
 
 def _bytes(send: WriteSpec) -> bytes | None:
-    """Return the bytes of constant ``hex`` and ``bytes``; None for variable ones."""
+    """Return the bytes of constant ``hex`` or ``bytes``, or None for variable bytes."""
     pieces = cast("tuple[object, ...]", send.options.get("pieces", (None,)))
     fixed = [one for one in pieces if isinstance(one, bytes)]
     return b"".join(fixed) if len(fixed) == len(pieces) else None
@@ -88,7 +88,7 @@ def _what(send: WriteSpec) -> str:
 
 
 def _check_end(part: Node, problems: Problems) -> None:
-    """Warn of a text that ends with a backslash and a letter, as if it were a line end."""
+    """Warn of a text that ends with a backslash and a letter instead of a control character."""
     if isinstance(part.data, str) and part.data.endswith(("\\n", "\\r")):
         problems.warn(
             part,

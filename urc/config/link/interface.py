@@ -1,4 +1,4 @@
-"""Names of an interface: the widget of each slot, and its bindings."""
+"""Checks of the names in an interface: widgets, and their bindings and options."""
 
 from collections.abc import Mapping
 from typing import NamedTuple, TypeVar
@@ -25,7 +25,7 @@ _T = TypeVar("_T")
 def link_slots(
     sources: Sources, driver: Driver, registry: WidgetFolder, problems: Problems
 ) -> dict[str, WidgetUse]:
-    """Return the widget of each slot, before the changes of an interface."""
+    """Return the widget of each slot, without the changes of an interface."""
     slots: dict[str, WidgetUse] = {}
     for slot, parts in sources.slots.items():
         use: WidgetUse | None = None
@@ -44,9 +44,9 @@ def link_interface(
     registry: WidgetFolder,
     problems: Problems,
 ) -> Interface:
-    """Return the interface with its own changes to the slots.
+    """Return the interface with its changes to the slots.
 
-    `slots` has the slots of the driver. Without a driver, the interface is checked alone.
+    `slots` contains the slots of the driver. Without a driver, the check covers only the interface.
     """
     shown = set(interface.shown)
     uses = {}
@@ -88,7 +88,7 @@ def _use(
     registry: WidgetFolder,
     problems: Problems,
 ) -> WidgetUse | None:
-    """Return the slot `base` with the changes at `part`; None when they were reported."""
+    """Return the slot `base` with the changes at `part`; None after a reported problem."""
     name = part.text("use", base.widget if base else "")
     if not name:
         if driver is not None:
@@ -131,7 +131,7 @@ def _use(
 
 
 class _Bound(NamedTuple):
-    """The bindings so far, with the fields of `WidgetUse`."""
+    """The collected bindings of a widget; the fields are those of `WidgetUse`."""
 
     inputs: dict[str, str]
     lists: dict[str, tuple[str, ...]]
@@ -182,7 +182,7 @@ def _bindings(
 def _bind_input(
     part: Node, widget: Widget, bound: _Bound, driver: Driver | None, problems: Problems
 ) -> None:
-    """Add the signal, or the signals, of one input."""
+    """Bind one input to its signal or signals."""
     port = widget.inputs[part.name]
     if isinstance(part.data, dict):
         problems.error(
@@ -262,7 +262,7 @@ def _check_signal(
 
 
 def misfit(port: WidgetPort, signal: Signal) -> str:
-    """Return why a signal cannot be bound to an input, or "" when it can."""
+    """Return the reason why a signal does not fit an input, or "" if it fits."""
     types = (*port.types, "integer") if "number" in port.types else port.types
     if signal.type not in types:
         return f"type {' or '.join(port.types)} is expected, the signal is {signal.type}"
@@ -285,7 +285,7 @@ def misfit(port: WidgetPort, signal: Signal) -> str:
 def _options(
     part: Node, widget: Widget, base: WidgetUse | None, problems: Problems
 ) -> tuple[dict[str, object], dict[str, str], dict[str, tuple[str, ...]]]:
-    """Return the options with the manifest's defaults, and the files and pages in them."""
+    """Return options, files and pages; the options include the manifest's defaults."""
     options: dict[str, object] = {
         name: schema["default"]
         for name, schema in widget.options.items()

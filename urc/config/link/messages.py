@@ -1,4 +1,4 @@
-"""Messages of message transports: do they fit the transport type?"""
+"""Checks that messages fit the type of their transport."""
 
 from collections.abc import Iterator, Mapping
 
@@ -15,7 +15,7 @@ _ANSWERED = ("call", "goal", "request")
 
 
 def check_messages(part: Node, driver: Driver, problems: Problems) -> None:
-    """Report messages that a transport cannot carry, and messages without a source."""
+    """Report messages that a transport cannot carry, and received messages without a topic."""
     for name, inner in part.named("messages").items():
         spec = driver.transports.get(driver.messages[name].transport)
         _check_read(inner, spec, problems, wants_topic=True)
@@ -41,7 +41,7 @@ def check_messages(part: Node, driver: Driver, problems: Problems) -> None:
 
 
 def _check_answer(part: Node | None, spec: TransportSpec | None, problems: Problems) -> None:
-    """Report a reply whose form expects a reply itself."""
+    """Report an acknowledgement or reply in a form that expects another reply."""
     verb = _check_send(part, spec, problems)
     if part is not None and verb in _ANSWERED:
         problems.error(
@@ -107,7 +107,7 @@ def _check_send(part: Node | None, spec: TransportSpec | None, problems: Problem
 
 
 def _check_ros(part: Node, problems: Problems) -> None:
-    """Report messages that a ROS bridge cannot pass on: it carries JSON, and needs the type."""
+    """Report messages without a type, or in a form that a ROS bridge cannot carry."""
     for key in ("text", "hex", "bytes", "struct"):
         if key in part.data:
             problems.error(
@@ -170,7 +170,7 @@ def _check_read(
 
 
 def _answers(part: Node) -> list[Node]:
-    """Return a received frame, its stages, and the error replies of each."""
+    """Return a received frame with its stages and all error replies."""
     stages = part.listed("stages") if "stages" in part.data else []
     given = [one for one in (part, *stages) if "errors" in one.data]
     refusals = [inner for one in given for inner in one.listed("errors")]
@@ -178,7 +178,7 @@ def _answers(part: Node) -> list[Node]:
 
 
 def _check_head(part: Node, spec: TransportSpec, problems: Problems) -> None:
-    """Report headers on a transport whose replies have none."""
+    """Report response headers on a transport without response headers."""
     if "head" in part.data and spec.type != "http" and spec.type in (*MESSAGING, *BYTE_LINES):
         problems.error(
             part,
@@ -193,7 +193,7 @@ def _check_head(part: Node, spec: TransportSpec, problems: Problems) -> None:
 def check_via(
     parts: Mapping[str, Node], transports: Mapping[str, TransportSpec], problems: Problems
 ) -> set[str]:
-    """Report each `tunnel` that cannot carry its transport; return all tunnels."""
+    """Report each `tunnel` that cannot carry its transport; return the names of all tunnels."""
     carriers: set[str] = set()
     for name, spec in transports.items():
         if not spec.tunnel:

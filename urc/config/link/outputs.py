@@ -1,4 +1,4 @@
-"""Outputs of a widget → commands of the driver, with the arguments for their values."""
+"""Links from the outputs of a widget to the commands of the driver."""
 
 from collections.abc import Mapping, Sequence
 from typing import Final
@@ -21,16 +21,16 @@ _GIVERS: Final = {
     "boolean": "switch",
     "string": "text",
 }
-"""Type of an argument → the shipped widgets that give a value of it."""
+"""Type of an argument → names of the shipped widgets that give a value of this type."""
 
 
 def link_output(
     part: Node, port: WidgetPort, widget: Widget, driver: Driver | None, problems: Problems
 ) -> tuple[str, OutputBinding]:
-    """Return the command that an output is bound to, and the arguments for its values.
+    """Return the command of an output, and the arguments for the output's values.
 
-    `part` is the value in ``bind``: a name, or a mapping. Without a driver, the interface is
-    checked alone.
+    `part` is the output's value in ``bind``: a name or a mapping. Without a driver, the check
+    covers only the interface.
     """
     is_short = isinstance(part.data, str)
     name = part.data if is_short else part.text("command")
@@ -85,7 +85,7 @@ def _given(part: Node, port: WidgetPort, widget: Widget, problems: Problems) -> 
 def _check_hold(
     part: Node, port: WidgetPort, widget: Widget, command: Command, problems: Problems
 ) -> bool:
-    """Return whether a hold-to-run output has a held command."""
+    """Return whether output and command are both held or both not; report a mismatch."""
     if port.is_held and command.hold is None:
         problems.error(
             part,
@@ -106,7 +106,7 @@ def _check_hold(
 
 
 def _check_targets(part: Node, command: Command, problems: Problems) -> bool:
-    """Check the named arguments and their constants; return whether all of them exist."""
+    """Check the arguments and constants of a binding; return whether every argument exists."""
     is_known = True
     for inner in part.named("args").values():
         is_known &= known_argument(inner.data, inner, command, problems, key=False) is not None
@@ -127,7 +127,7 @@ def _check_values(
     given: OutputBinding,
     problems: Problems,
 ) -> None:
-    """Report required arguments without a value, and values that do not fit their argument."""
+    """Report required arguments without a value, and values of the wrong type or unit."""
     if port.types and not port.arguments:
         return  # it gives a value without a name
     taken = targets(command, port, given)
@@ -181,7 +181,7 @@ def _remedy(
 
 
 def _giver(argument: Argument) -> str:
-    """Return a hint with the widgets that give a value for an argument."""
+    """Return a hint with the names of widgets that give a value for an argument."""
     widgets = "select" if argument.choices else _GIVERS.get(argument.type, "")
     return f"use a widget with a value for {argument.name}: {widgets}" if widgets else ""
 
@@ -194,7 +194,7 @@ def _check_nothing(
     given: OutputBinding,
     problems: Problems,
 ) -> None:
-    """Report an output whose values all have no effect."""
+    """Report an output without any value that has an effect."""
     what = f"{port.name!r} of widget {widget.name!r} gives {listed(port.arguments)}"
     free = [name for name in command.arguments if name not in given.fixed]
     if free:
@@ -211,7 +211,7 @@ def _check_nothing(
 
 
 def _stands_still(command: Command, given: OutputBinding) -> bool:
-    """Return whether a held command sends the same values while held as on release."""
+    """Return whether a held command sends its release values while the control is held."""
     release = command.hold.release if command.hold is not None else {}
     return bool(command.arguments) and all(
         given.fixed.get(name, one.default) == release.get(name, one.default)
@@ -226,7 +226,7 @@ def _is_of_type(port: WidgetPort, argument: Argument) -> bool:
 
 
 def _misfit(port: WidgetPort, argument: Argument) -> str:
-    """Return why an argument cannot take the value of an output, or "" when it can."""
+    """Return the reason why an argument cannot take an output's value, or "" if it can."""
     if not _is_of_type(port, argument):
         given = "number" if port.is_held else " or ".join(port.types)
         return f"it is {given}, and the argument is {argument.type}"
@@ -236,6 +236,6 @@ def _misfit(port: WidgetPort, argument: Argument) -> str:
 
 
 def _place(part: Node, source: str) -> Node:
-    """Return the place of a value in the `args` of a binding, or the binding itself."""
+    """Return the node of a value in the `args` of a binding, or the node of the binding."""
     args = part.get("args") if isinstance(part.data, dict) else None
     return (args.get(source) if args is not None else None) or part

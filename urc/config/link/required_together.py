@@ -1,4 +1,4 @@
-"""Relations between the bindings and options of one widget, as its manifest declares them."""
+"""Checks of the relations that a widget's manifest declares between bindings and options."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -17,15 +17,15 @@ __all__ = ["link_together"]
 
 _NOTHING_GIVEN: Final = OutputBinding()
 _LOCAL: Final = re.compile(r"/(?![/\\])")
-"""Start of an address on the same server."""
+"""Pattern of an absolute path on the same server."""
 
 
 def link_together(
     part: Node, use: WidgetUse, widget: Widget, driver: Driver, problems: Problems
 ) -> None:
-    """Check bindings and options that depend on each other.
+    """Check the bindings and options that depend on each other.
 
-    `part` is the slot in this document, with some keys of `use`, the complete slot.
+    `use` is the complete slot. `part` is the part of the slot that this document declares.
     """
     bound = {**use.inputs, **use.lists, **use.outputs}
     _check_needs(part, use, widget, bound, problems)
@@ -81,9 +81,9 @@ def _check_groups(
 def _check_instead(
     part: Node, widget: Widget, bound: Mapping[str, object], problems: Problems
 ) -> None:
-    """Warn of a binding in this document that another binding of the slot overrides.
+    """Warn of a binding or option in this document that another binding of the slot replaces.
 
-    An interface may override a binding of the driver, which is no mistake of the driver.
+    A driver gets no warning, because its interfaces may override its bindings.
     """
     said = (*part.named("bind").items(), *part.named("options").items())
     for port in widget.inputs.values():
@@ -104,7 +104,7 @@ def _check_instead(
 def _check_units(
     part: Node, use: WidgetUse, widget: Widget, driver: Driver, problems: Problems
 ) -> None:
-    """Report two bindings with different units where the widget compares them."""
+    """Report two bindings of a widget that need the same unit but have different units."""
     mine = part.named("bind")
     for port in (*widget.inputs.values(), *widget.outputs.values()):
         place = mine.get(port.name) or mine.get(port.unit_of)
@@ -126,7 +126,7 @@ def _check_units(
 
 
 def _units(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[tuple[str, str]]:
-    """Yield the signals or arguments of a port, as text, with their units."""
+    """Yield a description and the unit of each signal or argument of a port."""
     single = use.inputs.get(port.name)
     for name in (single,) if single is not None else use.lists.get(port.name, ()):
         signal = driver.signals.get(name)
@@ -137,7 +137,7 @@ def _units(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[tuple[s
 
 
 def _arguments(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[Argument]:
-    """Yield the arguments that take the values of an output."""
+    """Yield the arguments that receive the values of an output."""
     command = driver.commands.get(use.outputs.get(port.name, ""))
     if command is not None:
         taken = targets(command, port, use.given.get(port.name, _NOTHING_GIVEN))
@@ -148,7 +148,7 @@ def _arguments(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[Arg
 
 
 def _check_order(part: Node, use: WidgetUse, widget: Widget, problems: Problems) -> None:
-    """Report an option that is not below the option that limits it."""
+    """Report an option that is not smaller than its upper limit, another option."""
     own = part.named("options")
     for name, schema in widget.options.items():
         above = schema.get("less_than") if isinstance(schema, Mapping) else None
@@ -165,7 +165,6 @@ def _check_order(part: Node, use: WidgetUse, widget: Widget, problems: Problems)
 
 
 def _check_local(part: Node, widget: Widget, problems: Problems) -> None:
-    """Report an address on another server."""
     options = part.get("options")
     for name, inner in named_texts(options, widget.options, "same_origin") if options else ():
         if inner.data and not _LOCAL.match(inner.data):
@@ -181,7 +180,7 @@ def _check_local(part: Node, widget: Widget, problems: Problems) -> None:
 def _check_given(
     part: Node, use: WidgetUse, widget: Widget, driver: Driver, problems: Problems
 ) -> None:
-    """Report a text of the options that does not fit its argument."""
+    """Report an option's value that its command argument cannot take."""
     options = part.get("options")
     if options is None:
         return
@@ -216,7 +215,7 @@ def _check_text(
 
 
 def _read(text: str, argument: Argument) -> bool | float | str | None:
-    """Return the value that a page reads from a text for an argument; None when it cannot."""
+    """Convert a text to an argument's value as a page does; None for an invalid text."""
     if argument.type == "boolean":
         return {"true": True, "false": False}.get(text)
     if argument.type not in ("integer", "number"):

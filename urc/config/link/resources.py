@@ -1,10 +1,10 @@
-"""Files and web pages in the options of a widget.
+"""Checks of files and web pages in a widget's options.
 
-A dashboard serves exactly the files that a document names. A file must be in the folder of the
-document, so that no package can publish other files of the disk.
+The dashboard serves only the files that a document names for its widgets. These files must be in
+the document's folder, so that no package can publish other files of the server.
 
-The host of a web page becomes part of the security policy of the page that shows it. Its URL must
-therefore be unambiguous for all browsers.
+The content security policy of a page contains the host of every embedded web page. The URLs of web
+pages must therefore be unambiguous for all browsers.
 """
 
 import ipaddress
@@ -23,13 +23,13 @@ FILE_TYPES: Final = (
     *(".urdf", ".stl", ".dae", ".glb", ".obj", ".mtl", ".md", ".txt", ".json", ".csv"),
     *(".png", ".jpg", ".jpeg", ".webp", ".gif", ".svg", ".wav", ".mp3", ".ogg"),
 )
-"""File types for widgets; none of them is executable."""
+"""Served file types, without executable types."""
 
 MOST_BYTES: Final = 64 << 20
-"""Of one file."""
+"""Maximum size of one file, in bytes."""
 
 LONGEST_URL: Final = 2000
-"""In characters."""
+"""Maximum length of a URL, in characters."""
 
 _URL: Final = re.compile(
     r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*):(?://(?P<authority>[^/?#\\]*))?(?P<rest>.*)", re.DOTALL
@@ -41,7 +41,7 @@ _LAST_PORT: Final = 65535
 
 
 def link_files(options: Node, widget: Widget, problems: Problems) -> dict[str, str]:
-    """Return file names in the options → paths.
+    """Return a mapping from the file names in the options to their paths.
 
     The options of the slot fit their schema. The widget's manifest marks the options that name
     files.
@@ -68,7 +68,7 @@ def link_files(options: Node, widget: Widget, problems: Problems) -> dict[str, s
 def named_texts(
     options: Node, schemas: Mapping[str, object], keyword: str
 ) -> Iterator[tuple[str, Node]]:
-    """Yield the name and text of each option whose schema has `keyword: true`."""
+    """Yield name and text of each option with `keyword: true` in its schema."""
     for name, part in options.entries().items():
         schema = schemas.get(name)
         if not isinstance(schema, Mapping):
@@ -94,10 +94,10 @@ def _is_below(place: FilePath, folder: FilePath) -> bool:
 
 
 def link_pages(options: Node, widget: Widget, problems: Problems) -> dict[str, tuple[str, ...]]:
-    """Return options that may name pages → their URLs.
+    """Return a mapping from each option for web pages to its URLs.
 
     The options of the slot fit their schema. The widget's manifest marks the options that name
-    pages. An empty text is valid: it names no page.
+    pages. An empty text is valid, and means no page.
     """
     found: dict[str, tuple[str, ...]] = {}
     for name, part in named_texts(options, widget.options, "page"):

@@ -1,4 +1,4 @@
-"""Names in the rules of the emulated robot, and its initial values."""
+"""Checks of the emulated robot's rules and initial values."""
 
 from collections.abc import Iterable, Mapping
 
@@ -19,9 +19,9 @@ __all__ = ["link_rules", "link_values", "settable"]
 def link_values(
     parts: Mapping[str, Node], driver: Driver, problems: Problems
 ) -> dict[str, Reading]:
-    """Return the initial values of the emulated robot, in the types of the signals.
+    """Return the initial values of the emulated robot, converted to the types of the signals.
 
-    `parts` has the `signals` and `state` of the simulator.
+    `parts` contains the nodes `signals` and `state` of the simulator.
     """
     values: dict[str, Reading] = {}
     if "state" in parts:
@@ -41,7 +41,7 @@ def link_values(
 
 
 def settable(name: str, part: Node, driver: Driver, problems: Problems) -> Signal | None:
-    """Return the signal for a value at `part`; report a signal that cannot be set."""
+    """Return the signal `name`; report an unknown or computed signal at `part`."""
     signal = driver.signals.get(name)
     if signal is None:
         text = f"{name!r} is not a signal"
@@ -102,7 +102,7 @@ def link_rules(
 ) -> None:
     """Check the rules of one transport.
 
-    `state` has the names of the robot's own state, and `world` its world.
+    `state` contains the names of the emulated robot's state, and `world` describes its world.
     """
     always = {"now", *state, *linker.driver.signals} | ({"world"} if world is not None else set())
     told = frozenset[str]() if world is None else frozenset(world.senses)
@@ -118,7 +118,7 @@ def link_rules(
 
 
 def _given(linker: Linker, part: Node, rule: SimulatorRule) -> set[str]:
-    """Return the names from the frame of a rule; check the request that it names."""
+    """Check the trigger of a rule; return the field names of the trigger's frame."""
     match = rule.match
     if isinstance(match, ReadSpec):
         fields = set(match.fields)
@@ -218,7 +218,7 @@ def _check_told(linker: Linker, part: Node, told: frozenset[str]) -> None:
 
 
 def _check_word(linker: Linker, part: Node, value: Template) -> None:
-    """Check a plain text for a signal: a word, or a value that should be an expression."""
+    """Check a constant text that a rule gives to a signal."""
     signal = linker.driver.signals[part.name]
     if signal.formula is None and (signal.states or signal.type != "string"):
         text = value.evaluate({})
@@ -227,7 +227,7 @@ def _check_word(linker: Linker, part: Node, value: Template) -> None:
 
 
 def _check_answers(linker: Linker, places: tuple[Node, ...], rule: SimulatorRule) -> None:
-    """Report `auto` replies of periodic rules, and replies to a request that has none."""
+    """Report `auto` replies of a periodic rule, because a periodic rule has no request."""
     if rule.every_s is None:
         return
     for place in places:

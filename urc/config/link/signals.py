@@ -1,4 +1,4 @@
-"""Computed signals: their names, and no cycles between them."""
+"""Checks of computed signals: their names and their cycles."""
 
 from collections.abc import Callable, Iterable, Mapping
 
@@ -15,7 +15,7 @@ _Check = Callable[[Node, Template, Iterable[str]], None]
 
 
 def link_signals(part: Node, driver: Driver, check: _Check, problems: Problems) -> None:
-    """Check every computed signal of the driver at `part`; `check` checks a template's names."""
+    """Check every computed signal at `part`; `check` checks the names in a template."""
     set_by_frames = _set_by_frames(driver)
     for name, inner in part.named("signals").items():
         formula = driver.signals[name].formula
@@ -49,7 +49,7 @@ def link_signals(part: Node, driver: Driver, check: _Check, problems: Problems) 
 
 
 def _set_by_frames(driver: Driver) -> dict[str, str]:
-    """Return signal → the frame that sets it, as text."""
+    """Return signal → description of the frame that sets the signal."""
     found: dict[str, str] = {}
     for message in driver.messages.values():
         found |= dict.fromkeys(message.read.fields, f"message {message.name!r}")
@@ -64,6 +64,6 @@ def _set_by_frames(driver: Driver) -> dict[str, str]:
 
 
 def _needed(name: str, signals: Mapping[str, Signal]) -> list[str]:
-    """Return the signals from which the signal `name` is computed."""
+    """Return the signals in the formula of the signal `name`."""
     formula = signals[name].formula
     return sorted(formula.names & signals.keys()) if formula else []

@@ -1,4 +1,4 @@
-"""Comparisons of signals with texts that their states lack."""
+"""Checks of comparisons between a signal and a text that is not one of its states."""
 
 import ast
 from collections.abc import Iterable, Mapping
@@ -14,7 +14,7 @@ __all__ = ["check_words"]
 def check_words(
     problems: Problems, part: Node, template: Template, signals: Mapping[str, Signal]
 ) -> None:
-    """Warn of each text in a comparison that is not a state of its signal."""
+    """Warn of each comparison of a signal with a text that is not one of its states."""
     worded = {
         name: dict(signals[name].states)
         for name in template.names
@@ -39,7 +39,7 @@ def check_words(
 
 
 def _compared(python: str) -> Iterable[tuple[str, str]]:
-    """Return name and text of each comparison of a name with a text, or with a list of texts."""
+    """Yield name and text of each comparison between a name and one or more texts."""
     for node in ast.walk(ast.parse(python, mode="eval")):
         if not isinstance(node, ast.Compare):
             continue
@@ -55,7 +55,7 @@ def _compared(python: str) -> Iterable[tuple[str, str]]:
 
 
 def _name(node: ast.expr) -> str:
-    """Return the name of a value read there; "" for anything else."""
+    """Return the name of the value that `node` reads, or "" if `node` reads no value."""
     if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
         return str(node.slice.value) if isinstance(node.value, ast.Name) else ""
     return ""

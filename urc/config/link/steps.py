@@ -1,4 +1,4 @@
-"""Names in the frames, replies and runs of sequences, and cycles of sequences."""
+"""Checks of sequences: names in their steps, and cycles."""
 
 from collections.abc import Iterator
 
@@ -21,12 +21,12 @@ __all__ = ["link_sequences", "steps_of"]
 
 
 def steps_of(part: Node) -> Node:
-    """Return the list of steps of the sequence at `part`, in either notation."""
+    """Return the list of steps of the sequence at `part`, which is a list or a mapping."""
     return part.must("steps") if isinstance(part.data, dict) else part
 
 
 def link_sequences(linker: Linker, part: Node) -> None:
-    """Check the steps of every sequence and transport of the driver at `part`."""
+    """Check the steps of every sequence and every transport of the driver at `part`."""
     commands = part.named("commands")
     for name, inner in part.named("sequences").items():
         if name in commands:
@@ -61,13 +61,13 @@ def link_sequences(linker: Linker, part: Node) -> None:
 
 
 class _Walk:
-    """The check of one sequence, with the names known to its later steps."""
+    """The check of one sequence; earlier steps define names for later steps."""
 
     def __init__(self, linker: Linker, *, is_named: bool, is_late: bool = True) -> None:
         self._linker = linker
         self._is_named = is_named
         self._is_late = is_late
-        """Whether the steps run after the login, and know the values from it."""
+        """Whether the steps run after the login, and may use the values of the login."""
         self._known: set[str] = set(linker.driver.signals)
 
     def steps(self, part: Node, steps: tuple[sequence.Step, ...]) -> None:
@@ -155,7 +155,7 @@ class _Walk:
             self._known |= command.reply.names
 
     def _learnt(self, transport: str) -> frozenset[str]:
-        """Return names that a transport knows after its login, without the names of the steps."""
+        """Return the names that a transport's login defines, without the names of its steps."""
         driver = self._linker.driver
         return (
             driver.learnt(transport)
@@ -177,7 +177,7 @@ class _Walk:
             self._linker.transport(part, key, name)
 
     def _must_last(self, part: Node, transport: str) -> None:
-        """Report steps that wait for a frame on a transport that cannot receive it."""
+        """Report steps that wait for a frame on a transport without a permanent connection."""
         spec = self._linker.driver.transports.get(transport)
         if self._is_named and spec is not None and spec.connection == "per_request":
             self._linker.problems.error(
@@ -189,7 +189,7 @@ class _Walk:
 
 
 def _loops(start: str, driver: Driver) -> str:
-    """Return the first sequence with a loop: `start` or one that it runs; "" without a loop."""
+    """Return `start`, or the first sequence that it runs, with a loop; "" without a loop."""
     waiting, seen = [start], {start}
     while waiting:
         name = waiting.pop(0)
@@ -202,7 +202,7 @@ def _loops(start: str, driver: Driver) -> str:
 
 
 def _runs(name: str, driver: Driver) -> list[str]:
-    """Return the commands and sequences that the sequence `name` runs."""
+    """Return the names of the commands and sequences that the sequence `name` runs."""
     return [step.command for step in _steps_in(name, driver) if isinstance(step, sequence.RunStep)]
 
 

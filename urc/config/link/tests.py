@@ -1,4 +1,4 @@
-"""Names in the tests of documents."""
+"""Checks of the names in a document's tests."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -21,7 +21,7 @@ def link_test(
     settings: Mapping[str, Setting],
     problems: Problems,
 ) -> DocumentTest:
-    """Return the test with values in the signals' types, and with the index of its poll."""
+    """Return the test with typed values and a poll index; report mistakes."""
     if test.steps:
         _check_polls(part, driver, problems)
         steps = _link_steps(part, test.steps, driver, problems)
@@ -52,7 +52,7 @@ def _check_purpose(part: Node, test: DocumentTest, driver: Driver, problems: Pro
 
 
 def _reads(test: DocumentTest, driver: Driver) -> bool:
-    """Return whether the fed frames must match: as a reply to a command, or as messages."""
+    """Return whether every fed frame must match a reply or a message."""
     if test.feed and test.run is None and test.reply_to is None:
         return True
     asked = test.run if test.run is not None else test.reply_to
@@ -62,7 +62,7 @@ def _reads(test: DocumentTest, driver: Driver) -> bool:
 
 _COMES: Final = ("message", "response", "feedback")
 _GOES: Final = ("publish", "call", "goal", "cancel", "request")
-"""Kinds of messages that a test feeds, and kinds that it expects to be sent."""
+"""Kinds of sent messages that a test may expect."""
 
 
 def _check_transports(part: Node, driver: Driver, problems: Problems) -> None:
@@ -133,7 +133,7 @@ def _link_steps(
 
 
 def _link_expect(part: Node, driver: Driver, problems: Problems) -> dict[str, Expected]:
-    """Return the expected values, with the types of their signals."""
+    """Return the expected values in the types of their signals."""
     return {
         name: _state(name, inner, driver, problems) for name, inner in part.named("expect").items()
     }
@@ -173,7 +173,7 @@ def _setting(part: Node, settings: Mapping[str, Setting], problems: Problems) ->
 def _expected(
     name: str, part: Node, driver: Driver, problems: Problems, *, is_part: bool = False
 ) -> Value | tuple[Value, ...]:
-    """Return the value at `part`, or None for a `part` of an expected value."""
+    """Return the expected value at `part`; None if empty or invalid, or a part of a value."""
     signal = driver.signals.get(name)
     if signal is None:
         problems.unknown(part, "unknown-signal", name, driver.signals, key=True)

@@ -1,4 +1,4 @@
-"""Names in the world of an emulated robot, and in the readings of its rules."""
+"""Checks of the names in an emulated robot's world, and of its rules' ``world`` readings."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -21,9 +21,10 @@ _READING: Final = re.compile(r"_item\(ns\['world'\], '(\w+)'\)(?:, '(\w+)'\))?")
 def link_world(
     linker: Linker, part: Node, spec: WorldSpec, state: Iterable[str], parts: Mapping[str, Node]
 ) -> WorldSpec:
-    """Check every name in a world; return it with the commands that reset its watchdog.
+    """Check every name in a world; return the world with the commands that reset its watchdog.
 
-    `state` has the names of the robot's own state, and `parts` the parts of the simulator.
+    `state` contains the names of the emulated robot's state, and `parts` the nodes of the
+    simulator.
     """
     driver, problems, own = linker.driver, linker.problems, {*state}
     known = {"now", "world", *own, *driver.signals}
@@ -39,7 +40,7 @@ def link_world(
 
 
 def check_readings(problems: Problems, part: Node, template: Template) -> None:
-    """Report unknown readings of the world in a template."""
+    """Report each unknown name after ``world.`` in a template."""
     for name, inner in _READING.findall(template.python):
         if name not in READINGS:
             text, hint = f"the world has no {name!r}", did_you_mean(name, READINGS, "readings")

@@ -1,1 +1,1 @@
-"""Parts of a document → values of the model; names are still text."""
+"""Parsers that convert parts of a document to values of the model, before names are resolved."""

@@ -1,4 +1,4 @@
-"""Bytes in documents: names of control characters, numbers, lists of both, or text."""
+"""Parser of bytes: names of control characters, numbers, lists of names and numbers, or text."""
 
 import re
 from typing import Final
@@ -16,7 +16,7 @@ CONTROL_NAMES: Final = {name: bytes((place,)) for place, name in enumerate(_NAME
     "DEL": b"\x7f",
     "CRLF": b"\r\n",
 }
-"""Names of control characters that documents may use."""
+"""Name of a control character → its byte."""
 _HEX = re.compile(r"0x((?:[0-9A-Fa-f]{2})+)")
 _TEMPLATE = re.compile(r"\{\{.*?\}\}")
 _BACKSLASH = re.compile(r"\\(?:x[0-9A-Fa-f]{2}|[abefnrtv0])")
@@ -24,7 +24,7 @@ _SPELT = {r"\r": "CR", r"\n": "LF", r"\t": "TAB", r"\0": "NUL", r"\e": "ESC", r"
 
 
 def parse_bytes(part: Node | None, encoding: str, problems: Problems) -> bytes | None:
-    """Return the bytes of `part`: none without a part, None when reported."""
+    """Return the bytes at `part`: empty without a part, None after a reported problem."""
     if part is None:
         return b""
     if isinstance(part.data, list):

@@ -1,6 +1,7 @@
-"""The checksum of a framing: mapping → algorithm, range and place, as declared.
+"""Parser of a checksum: algorithm, range of bytes, and declared position.
 
-The framing resolves places that depend on the rest of the frame (`at: end`, `over: payload`).
+The framing resolves positions that depend on the rest of the frame, such as `at: end` or `over:
+payload`.
 """
 
 from typing import Any, Final, NamedTuple
@@ -30,7 +31,7 @@ _NEEDED: Final = {
 
 
 class DeclaredTrailer(NamedTuple):
-    """The declared place of a checksum after a text or after each of its lines."""
+    """The declared position of a checksum after a text, or after each line of a text."""
 
     mark: bytes
     is_padded: bool
@@ -40,15 +41,15 @@ class DeclaredTrailer(NamedTuple):
 
 
 class DeclaredChecksum(NamedTuple):
-    """A checksum as declared, before its place is resolved."""
+    """A declared checksum before its position is resolved."""
 
     part: Node
     algorithm: CrcSpec | FoldSpec | str
     bits: int
     over: ByteRange | str
-    """``payload``, ``frame``, or a range of the frame."""
+    """Covered bytes: ``payload``, ``frame``, or a range of the frame."""
     at: int | None
-    """Index of the first byte; None for the end of the frame."""
+    """Index of the first checksum byte in the frame; None for the end of the frame."""
     is_big: bool
     spelling: Spelling
     salt: Salt
@@ -56,16 +57,16 @@ class DeclaredChecksum(NamedTuple):
     closes: bool
     before: bytes
     trailer: "DeclaredTrailer | None" = None
-    """Place after a text; `at` is then None."""
+    """Position after a text, or None; a checksum with a trailer has no `at`."""
 
     @property
     def size(self) -> int:
-        """Size in the frame, in bytes."""
+        """Size of the checksum in the frame, in bytes."""
         return spelt_size(self.bits, self.spelling)
 
 
 def parse_checksum(part: Node, encoding: str, problems: Problems) -> DeclaredChecksum | None:
-    """Return the checksum at `part`, or None when it was reported."""
+    """Return the checksum at `part`, or None after a reported problem."""
     algorithm = _algorithm(part.must("algorithm"), problems)
     salt = _salt(part.get("salt"), encoding, problems)
     over, at = part.get("over"), part.get("at")
@@ -107,7 +108,7 @@ def values_of(algorithm: CrcSpec | FoldSpec | str) -> frozenset[int]:
 
 
 def _trailer(part: Node, encoding: str, problems: Problems) -> DeclaredTrailer | None:
-    """Return the place of the checksum at `part` after a text; None for a fixed place."""
+    """Return the position of the checksum at `part` after a text; None for a fixed position."""
     mark = parse_bytes(part.get("after"), encoding, problems) or b""
     each = parse_bytes(part.get("each"), encoding, problems) or b""
     for key, bytes_found in (("after", mark), ("each", each)):

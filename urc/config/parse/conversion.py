@@ -1,4 +1,4 @@
-"""The keys of a conversion, on a signal or on a field of one frame."""
+"""Parser of the conversion of a signal or field."""
 
 import re
 from itertools import pairwise
@@ -12,13 +12,13 @@ from urc.model.values import Conversion
 __all__ = ["CONVERSION_KEYS", "parse_conversion", "parse_states"]
 
 CONVERSION_KEYS: Final = ("base", "scale", "offset", "polynomial", "points", "not_available")
-"""All keys of a conversion but ``states``."""
+"""All keys of a conversion, except ``states``."""
 _A_NUMBER: Final = re.compile(r"[+-]?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]{1,3})?")
 _OF_NUMBERS: Final = ("base", "scale", "offset", "polynomial", "points")
 
 
 def parse_conversion(part: Node, problems: Problems, kind: str = "number") -> Conversion:
-    """Return the conversion among the keys of `part`, without its states.
+    """Return the conversion that the keys of `part` declare, without its states.
 
     `kind` is the type of the converted value. Strings and booleans have no arithmetic.
     """
@@ -45,9 +45,9 @@ def parse_conversion(part: Node, problems: Problems, kind: str = "number") -> Co
 
 
 def _numbers_in(absent: object) -> tuple[float, ...]:
-    """Return the number in a quoted text, because some forms read numbers and some read text.
+    """Return the number in a text, if any, because some forms read numbers and others text.
 
-    Text with leading zeros is no number: ``"000"`` does not mean 0.
+    A text with leading zeros is not a number: ``"000"`` does not mean 0.
     """
     if not isinstance(absent, str) or _A_NUMBER.fullmatch(absent) is None:
         return ()
@@ -56,7 +56,7 @@ def _numbers_in(absent: object) -> tuple[float, ...]:
 
 
 def parse_states(part: Node, kind: str, problems: Problems) -> tuple[tuple[str, str], ...]:
-    """Return the states of a signal or conversion, by their raw texts."""
+    """Return the states of a signal or conversion as pairs of raw text and state."""
     states = part.named("states")
     if kind in ("integer", "number"):
         for raw, inner in states.items():

@@ -1,4 +1,4 @@
-"""A driver: mapping → `Driver`, with compiled patterns and templates."""
+"""Parser of a driver: mapping → `Driver`, with compiled patterns and templates."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -28,7 +28,7 @@ __all__ = ["parse_driver", "spoken_name"]
 
 
 def parse_driver(part: Node, problems: Problems, catalog: Registries) -> Driver:
-    """Return the driver in the mapping at `part`; report mistakes and use defaults."""
+    """Return the driver at `part`; report invalid values and replace them with defaults."""
     transports = {
         name: parse_transport(inner, problems, catalog)
         for name, inner in part.named("transports").items()
@@ -65,12 +65,12 @@ def parse_driver(part: Node, problems: Problems, catalog: Registries) -> Driver:
 
 
 def _discovery(part: Node | None) -> tuple[str, ...]:
-    """Return the types of services."""
+    """Return the service types under ``discovery``."""
     return () if part is None else tuple(str(one.data) for one in part.listed("mdns"))
 
 
 def _set_by_frames(part: Node) -> frozenset[str]:
-    """Return the signals that are not computed."""
+    """Return the names of all signals without a formula."""
     signals = part.named("signals").items()
     return frozenset(name for name, inner in signals if "value" not in inner.data)
 
@@ -95,9 +95,9 @@ def _types(part: Node, problems: Problems) -> tuple[Mapping[str, Any], Mapping[s
 
 
 class _Lines:
-    """The transports of a driver, with the only one as the default.
+    """The transports of a driver; the only transport of a driver is the default.
 
-    A transport that only forwards others does not count.
+    Transports with `mode: forward` are ignored in the choice of the default.
     """
 
     def __init__(self, transports: Mapping[str, TransportSpec], context: FormContext) -> None:
@@ -108,18 +108,18 @@ class _Lines:
         self.only = own[0] if len(own) == 1 else ""
 
     def name(self, part: Node, key: str) -> str:
-        """Return the transport that `part` names under `key`, or the default."""
+        """Return the name of the transport under `key`, or of the default transport."""
         return part.text(key, self.only)
 
     def context(self, name: str) -> FormContext:
-        """Return the context of forms on the transport `name`, which may not exist."""
+        """Return the context of forms on the transport `name`; an unknown transport is allowed."""
         spec = self._transports.get(name)
         encoding = spec.encoding if spec else FormContext().encoding
         return self._context._replace(encoding=encoding, framing=spec.framing if spec else None)
 
 
 def spoken_name(name: str) -> str:
-    """Return a name in the form for people: ``joint_1`` → ``Joint 1``."""
+    """Return a readable title for a name: ``joint_1`` → ``Joint 1``."""
     words = name.replace("_", " ").replace("-", " ").strip()
     return words[:1].upper() + words[1:]
 
@@ -198,7 +198,7 @@ def _argument(part: Node, problems: Problems) -> Argument:
 
 
 def _check_argument(part: Node, kind: str, of: str, problems: Problems) -> None:
-    """Report a reserved name, and keys without effect for the type."""
+    """Report a reserved name, and keys without effect for an argument's type."""
     if part.name in ("settings", "pi"):
         what = "the settings" if part.name == "settings" else "the number"
         problems.error(
@@ -219,7 +219,7 @@ def _check_argument(part: Node, kind: str, of: str, problems: Problems) -> None:
 
 
 def _default(inner: Node, argument: Node, kind: str, problems: Problems) -> Reading:
-    """Return the default; for an array, a list of its size."""
+    """Return an argument's default; report an array default of the wrong size."""
     if kind != "array":
         return _fitting(inner, kind, problems)
     if not isinstance(inner.data, list):

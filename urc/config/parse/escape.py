@@ -1,4 +1,4 @@
-"""Byte stuffing of a framing: mapping → escaped bytes and their replacements."""
+"""Parser of byte stuffing: escaped bytes and their replacements."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -13,7 +13,7 @@ __all__ = ["parse_escape"]
 def parse_escape(
     part: Node, layout: FrameLayout, options: Mapping[str, Any], encoding: str, problems: Problems
 ) -> EscapeSpec | None:
-    """Return ``escape`` of the framing at `part`, or None."""
+    """Return the byte stuffing under ``escape``; None if missing or invalid."""
     if "escape" not in part.data:
         return None
     inner = part.must("escape")
@@ -44,7 +44,7 @@ def _marks(part: Node, layout: FrameLayout, options: Mapping[str, Any]) -> tuple
 
 
 def _one(part: Node, encoding: str, problems: Problems) -> int | None:
-    """Return the byte at `part`."""
+    """Return the one byte at `part`."""
     found = parse_bytes(part, encoding, problems)
     if found is None or len(found) == 1:
         return None if found is None else found[0]
@@ -120,7 +120,7 @@ def _table(
 
 
 def _check_hidden(part: Node, at: str, table: Mapping[int, int], problems: Problems) -> None:
-    """Report a replacement for an escaped byte that would need an escape itself."""
+    """Report a replacement of an escaped byte if the replacement needs an escape itself."""
     wrong = next((one for one in table.values() if one in table), None)
     if wrong is not None:
         text = f"{wrong:02X} replaces an escaped byte, and needs an escape itself"

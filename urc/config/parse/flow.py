@@ -1,4 +1,4 @@
-"""The flow of commands: queues, rates, conditions, held commands and keepalives."""
+"""Parser of queues, rates, conditions, held commands and keepalives."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -40,13 +40,13 @@ __all__ = [
 
 _PER_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
 NOTHING_SENT: Final = WriteSpec("text", {"template": compile_template("")})
-"""The frame of a sequence itself: empty, because only its steps send."""
+"""The empty frame of a sequence, because only the steps of a sequence send frames."""
 
 
 def line_with_flow(
     spec: TransportSpec, part: Node, context: FormContext, problems: Problems
 ) -> TransportSpec:
-    """Return the transport with its queue, keepalive, timeouts and steps."""
+    """Return the transport with its queue, keepalive, timeouts, login and close steps."""
     queue = part.get("queue")
     if spec.connection == "per_request":
         refuse(part, ("keepalive",), "has no effect: each request opens a connection", problems)
@@ -81,7 +81,7 @@ def aged_by_lines(
 ) -> dict[str, Signal]:
     """Return the signals with the `stale_after` of their transports.
 
-    A signal stays as it is if it has a `stale_after`, or if its transport has none.
+    A `stale_after` of the signal itself takes precedence.
     """
     ages: dict[str, list[float]] = {}
     frames = [(one.transport, one.read) for one in messages.values()]
@@ -145,14 +145,14 @@ def command_with_flow(command: Command, part: Node, problems: Problems) -> Comma
 
 
 def _refuse_asides(reply: Node | None, problems: Problems) -> None:
-    """Report `resend` and `extend` of a held command, whose newest values are sent all the time."""
+    """Report `resend` and `extend` of a held command: its next value follows anyway."""
     for inner in [reply, *reply.listed("stages")] if reply is not None else ():
         why = "has no effect with 'hold': the next value follows anyway"
         refuse(inner, ("resend", "extend"), why, problems)
 
 
 def _check_stop(command: Command, part: Node, problems: Problems) -> None:
-    """Report keys that would block or delay a command of STOP."""
+    """Report keys that would block or delay a stop command."""
     moves = () if part.data.get("moves") is False else ("moves",)  # false is the default of a stop
     hindering = (*moves, "confirm", "requires", "coalesce", "rate_limit")
     refuse(part, hindering, "has no effect with 'stop': nothing may delay a stop", problems)
@@ -204,9 +204,10 @@ def poll_with_flow(
 def parse_sequence(
     part: Node, title: str, only: str, context: FormContext, problems: Problems
 ) -> Command:
-    """Return the command for a sequence.
+    """Return a sequence as a command.
 
-    `part` is the list of steps, or a mapping with it. `only` is the only transport, or "".
+    `part` is a list of steps, or a mapping with the key ``steps``. `only` is the name of the
+    driver's only transport, or "".
     """
     inner = part.must("steps") if isinstance(part.data, dict) else part
     steps = parse_steps(inner, StepContext(only, is_named=True, forms=context), problems)
@@ -239,7 +240,7 @@ def _arguments(part: Node) -> dict[str, Reading]:
 
 
 _NUMBERED_IN_FLIGHT: Final = 16
-"""Requests in flight where numbers match each reply to its request."""
+"""Default maximum number of requests in flight when replies are matched by number."""
 
 
 def _queue(part: Node | None, kind: str) -> Queue:
@@ -320,7 +321,7 @@ def _confirm(part: Node) -> Confirm:
 
 
 def parse_choice_questions(part: Node, argument: Argument, problems: Problems) -> Argument:
-    """Return the argument with the confirmations of some of its choices."""
+    """Return the argument with the confirmation questions of its choices."""
     asked = part.named("confirm")
     if not asked:
         return argument
@@ -348,12 +349,12 @@ def parse_choice_questions(part: Node, argument: Argument, problems: Problems) -
 
 
 def _written(value: Value) -> str:
-    """Return a choice as a key of a document."""
+    """Return a choice in the notation of a key."""
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _retries(part: Node | None, problems: Problems) -> tuple[int, Retry]:
-    """Return the number of retries and their waits."""
+    """Return the number of retries, and the delays before them."""
     if part is None:
         return 0, Retry()
     if not isinstance(part.data, dict):

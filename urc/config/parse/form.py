@@ -1,7 +1,7 @@
-"""Forms of frames: the table of forms, and the form of a given place.
+"""Lookup of the form of a frame, and the interface of the form parsers.
 
-A form is a module of this package. A form of received frames has the functions of `ReadForm`, and
-a form of sent frames has the functions of `WriteForm`.
+Each form has a module in the package ``forms``. Modules of received forms have the functions of
+`ReadForm`, and modules of sent forms have the functions of `WriteForm`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -30,26 +30,26 @@ __all__ = [
 ]
 
 _BODIES = ("json", "text", "hex", "bytes", "struct")
-"""Forms that may be the body of an envelope."""
+"""Allowed forms of an envelope's body."""
 _NO_READ = ReadSpec("regex")
 _NO_WRITE = WriteSpec("text")
 
 
 class FormContext(NamedTuple):
-    """The context of a form."""
+    """Properties of the driver and transport that a form parser needs."""
 
     encoding: str = "utf-8"
-    """Encoding of the transport of the frame."""
+    """Text encoding of the transport."""
     signals: frozenset[str] = frozenset()
-    """Names of the driver's signals."""
+    """Names of all signals of the driver."""
     types: Mapping[str, tuple[Item, ...]] = NOTHING
-    """The driver's reusable structs."""
+    """Name → items, for the reusable structs under ``types``."""
     enums: Mapping[str, tuple[tuple[int, str], ...]] = NOTHING
-    """The driver's enums."""
+    """Name → numbers and words, for the driver's enums."""
     catalog: Registries | None = None
-    """The known framings, for a frame with a framing of its own."""
+    """Available framings, for a frame that declares its own framing."""
     framing: FramingSpec | None = None
-    """Framing of the transport; None for a frame with a framing of its own."""
+    """Framing of the transport; None for a frame that declares its own framing."""
 
 
 class ReadForm(Protocol):
@@ -59,7 +59,7 @@ class ReadForm(Protocol):
         """Return the declaration at `part`, or None when a problem was reported."""
 
     def place_of(self, part: Node, field: str) -> tuple[Node, dict[str, Any]]:
-        """Return the place of `field`, as arguments of `Problems.error`."""
+        """Return the position of `field`, as arguments of `Problems.error`."""
 
 
 class WriteForm(Protocol):
@@ -69,11 +69,11 @@ class WriteForm(Protocol):
         """Return the declaration at `part`, or None when a problem was reported."""
 
     def templates(self, part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
-        """Return every template of the frame, with its place."""
+        """Return every template of the frame, with its position."""
 
 
 def read_form(part: Node) -> tuple[Node, ReadForm] | None:
-    """Return the value of the form's key in a reply or message, and the form's module."""
+    """Return the value under the form's key in a reply or message, and the form's module."""
     for key in READ_FORMS:
         inner = part.get(key)
         if inner is not None:
@@ -82,7 +82,7 @@ def read_form(part: Node) -> tuple[Node, ReadForm] | None:
 
 
 def write_form(part: Node) -> tuple[Node, WriteForm]:
-    """Return the value of ``send:``, or of the form's key in it, and the form's module."""
+    """Return the value under ``send:`` or under its form's key, and the form's module."""
     if isinstance(part.data, dict):
         for key in part.data:
             if key in WRITE_FORMS:
@@ -92,7 +92,7 @@ def write_form(part: Node) -> tuple[Node, WriteForm]:
 
 
 def body_form(part: Node) -> tuple[Node, WriteForm] | None:
-    """Return the value of a form's key inside an envelope, and the form's module."""
+    """Return the value under a form's key in an envelope, and the form's module."""
     for key in part.data:
         if key in _BODIES:
             return part.must(key), cast("WriteForm", import_module(WRITE_FORMS[key]))
@@ -100,7 +100,7 @@ def body_form(part: Node) -> tuple[Node, WriteForm] | None:
 
 
 def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec:
-    """Return the form of a received frame."""
+    """Return the declaration of the received frame at `part`, in any form."""
     given = [key for key in READ_FORMS if key in part.data]
     if len(given) != 1:
         found = " and ".join(f"'{key}'" for key in given)
@@ -124,6 +124,6 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
 
 
 def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec:
-    """Return the form of the frame under ``send:``."""
+    """Return the declaration of the sent frame under ``send:``, in any form."""
     inner, form = write_form(part)
     return form.parse_write(inner, problems, context) or _NO_WRITE

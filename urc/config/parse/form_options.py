@@ -1,4 +1,4 @@
-"""The keys next to a form of received frames: fields, set, when, and the lines of a reply."""
+"""Parser of the keys next to a received form: `fields`, `set`, `when` and `lines`."""
 
 from urc.config.node import Node, Problems
 from urc.config.parse.conversion import parse_conversion, parse_states
@@ -13,7 +13,7 @@ __all__ = ["beside_form", "parse_lines", "with_collected"]
 
 
 def beside_form(part: Node, spec: ReadSpec, problems: Problems) -> ReadSpec:
-    """Return `spec` with the keys next to its form in the reply or message at `part`."""
+    """Return `spec` with the additional keys of the reply or message at `part`."""
     conversions = {
         name: _conversion(inner, problems) for name, inner in part.named("fields").items()
     }
@@ -48,7 +48,7 @@ def beside_form(part: Node, spec: ReadSpec, problems: Problems) -> ReadSpec:
 
 
 def with_collected(part: Node, spec: ReadSpec, problems: Problems) -> ReadSpec:
-    """Return `spec` with the values that the message at `part` collects from several frames."""
+    """Return `spec` with the values that the message at `part` collects over several frames."""
     found: dict[str, Collect] = {}
     for name, inner in part.named("collect").items():
         if name in spec.fields:
@@ -91,7 +91,7 @@ def _conversion(part: Node, problems: Problems) -> Conversion:
 
 
 def parse_lines(part: Node | None, problems: Problems) -> int | Pattern | None:
-    """Return the number of frames of a reply, or the pattern of its last frame."""
+    """Return the number of frames in a reply, or the pattern of the last frame."""
     if part is None:
         return None
     if isinstance(part.data, dict):

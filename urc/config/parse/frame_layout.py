@@ -1,6 +1,6 @@
-"""The layout of a frame: places of start, length field, payload, checksum and end.
+"""Parser of a frame layout: positions of start, length field, payload, checksum and end.
 
-Places count from the first byte of the whole frame, without a delimiter or byte stuffing.
+Positions are byte offsets from the start of the frame, without a delimiter or byte stuffing.
 """
 
 from typing import Any, Final, NamedTuple
@@ -20,13 +20,13 @@ from urc.model.framing import (
 __all__ = ["MARKED", "checksums_of", "parse_layout"]
 
 MARKED: Final = ("fixed", "length", "brackets")
-"""Framings whose frames have start, length or end bytes."""
+"""Framing types with start, length or end bytes."""
 _SPELT: Final = ("delimiter", "brackets", "idle", "datagram")
-"""Framings that may encode their bytes as digits."""
+"""Framing types that may encode bytes as digits."""
 
 
 class _Frame(NamedTuple):
-    """A frame before its checksum has a place."""
+    """A frame layout without its checksum."""
 
     start: bytes
     end: bytes
@@ -35,7 +35,7 @@ class _Frame(NamedTuple):
 
 
 def parse_layout(part: Node, encoding: str, problems: Problems, longest: int) -> FrameLayout:
-    """Return the layout of the framing at `part`; report a mistake and use its default."""
+    """Return the layout of the framing at `part`; report invalid values and use defaults."""
     kind = part.text("type")
     start = end = b""
     if kind in MARKED:
@@ -67,7 +67,7 @@ def parse_layout(part: Node, encoding: str, problems: Problems, longest: int) ->
 
 
 def _digits(part: Node, problems: Problems) -> Digits:
-    """Return the digits that encode the bytes of the framing at `part`."""
+    """Return the digit encoding of the framing at `part`."""
     digits: Any = part.text("decode") if part.text("type") in _SPELT else ""
     if digits and "escape" in part.data:
         text = "'escape' has no effect with 'decode': digits need no escape"
@@ -106,7 +106,7 @@ def _trail_of(written: DeclaredChecksum, start: bytes) -> TrailerSpec:
 
 
 def checksums_of(part: Node) -> list[Node]:
-    """Return the checksums of the framing at `part`, which has one or a list."""
+    """Return the checksums of the framing at `part`, which may declare one or several."""
     inner = part.get("checksum") if part.text("type") != "xml" else None
     if inner is None:
         return []
@@ -128,7 +128,7 @@ def _check_marks(part: Node, problems: Problems) -> None:
 def _placed(
     part: Node, frame: _Frame, written: list[DeclaredChecksum], problems: Problems
 ) -> FrameLayout:
-    """Return the layout with the places that depend on each other."""
+    """Return the layout after the positions of all parts are resolved."""
     start, end, size, length = frame
     head, tail = len(start), len(end)
     if length is not None and length.is_loose:
@@ -218,7 +218,7 @@ def _over(written: DeclaredChecksum, behind: int, layout: FrameLayout) -> ByteRa
 def _check_checksum(
     part: Node, checksum: ChecksumSpec, layout: FrameLayout, problems: Problems
 ) -> None:
-    """Report a checksum or window outside the frame, or over another part of it."""
+    """Report a checksum or window outside the frame, and a checksum over another part."""
     at, size, frame_size = checksum.at, checksum.size, layout.size
     if at < 0 and at + size > 0:
         text = f"a checksum of {size} bytes at {at} exceeds the end of the frame"
@@ -267,7 +267,7 @@ def _check_window(
 
 
 def _check_size(part: Node, layout: FrameLayout, longest: int, problems: Problems) -> None:
-    """Report frames that cannot hold their own parts, or exceed the largest size."""
+    """Report frames that are too small for their parts, or larger than the maximum size."""
     least = layout.head + layout.tail
     if layout.size is not None and layout.size < least:
         problems.error(
@@ -290,7 +290,7 @@ _MOST_BYTES = 8
 
 
 def _parse_length(part: Node, encoding: str, problems: Problems) -> LengthSpec:
-    """Return the length field at `part`; report a mistake and use its default."""
+    """Return the length field at `part`; report invalid values and use defaults."""
     size = part.integer("size") or 1
     spelling = part.text("as", "raw")
     flag, until = part.get("flag"), part.get("until")
@@ -314,7 +314,7 @@ def _parse_length(part: Node, encoding: str, problems: Problems) -> LengthSpec:
 
 
 def _check_length(part: Node, start: bytes, length: LengthSpec, problems: Problems) -> None:
-    """Report a length field that overlaps the start bytes, or has keys without effect."""
+    """Report a length field over the start bytes, or with keys without effect."""
     if length.offset < len(start):
         problems.error(
             part,
@@ -343,7 +343,7 @@ def _check_length(part: Node, start: bytes, length: LengthSpec, problems: Proble
 
 
 def _check_loose(part: Node, problems: Problems) -> None:
-    """Report keys that need a fixed start of the payload, where the length field has none."""
+    """Report keys that need a fixed payload position, for a length field of variable size."""
     for key in ("payload", "escape"):
         if key in part.data:
             text = f"'{key}' has no effect when 'until' ends the length"

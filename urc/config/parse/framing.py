@@ -1,4 +1,4 @@
-"""The framing of a transport or of one reply: mapping → `FramingSpec`."""
+"""Parser of the framing of a transport or reply: mapping → `FramingSpec`."""
 
 from collections.abc import Callable
 from re import _constants, _parser  # type: ignore[attr-defined]  # no public API for the syntax tree
@@ -19,13 +19,13 @@ __all__ = ["parse_framing"]
 _SWITCHABLE: Final = (
     "delimiter", "fixed", "length", "slip", "cobs", "regex", "brackets", "json", "xml",
 )  # fmt: skip
-"""Framings that find the end of a frame in its bytes, so that another framing may follow."""
+"""Framing types that detect the end of a frame from its bytes, as `switch` requires."""
 
 
 def parse_framing(
     part: Node, encoding: str, problems: Problems, catalog: Registries
 ) -> FramingSpec:
-    """Return the framing at `part`; report a mistake and use its default."""
+    """Return the framing at `part`; report invalid values and use defaults."""
     kind = part.must("type")
     if kind.data == "switch" and catalog.framings.get(kind.data) is not None:
         return _switch(part, encoding, problems, catalog)
@@ -57,7 +57,7 @@ def parse_framing(
 
 
 def _with_common_options(part: Node, spec: FramingSpec, problems: Problems) -> FramingSpec:
-    """Return the framing with the options of every framing type."""
+    """Return the framing with the options that all framing types share."""
     if "timeout" not in part.data and "strip_ansi" not in part.data:
         return spec
     timeout_s = problems.duration(part, "timeout", 0.0, least=0.001, most=60) or None
@@ -181,7 +181,7 @@ def _check_case(
     before: list[tuple[bytes, FramingSpec]],
     problems: Problems,
 ) -> None:
-    """Report a case that is never reached, or whose frames begin with other bytes."""
+    """Report an unreachable case, and a case with a framing that starts with other bytes."""
     for other, _ in before:
         if first.startswith(other):
             problems.error(
@@ -205,7 +205,7 @@ _REPEATS = (_constants.MAX_REPEAT, _constants.MIN_REPEAT)
 
 
 def _check_pattern(part: Node, problems: Problems) -> None:
-    """Report mistakes in a pattern for a stream, such as an unclear end of its frames."""
+    """Report mistakes in the pattern of a framing, such as an undefined end of a frame."""
     text: str = part.data
     far = next((place for place, char in enumerate(text) if ord(char) > 127), None)
     if far is not None:
@@ -242,7 +242,7 @@ def _check_pattern(part: Node, problems: Problems) -> None:
 
 
 def _parts(operation: Any, argument: Any) -> list[Any]:
-    """Return the sequences inside one node of a pattern."""
+    """Return the child sequences of one node in a parsed pattern."""
     if operation is _constants.SUBPATTERN:
         return [argument[3]]
     if operation in _REPEATS:
@@ -258,7 +258,7 @@ def _has_anchor(tree: Any) -> bool:
 
 
 def _is_open(tree: Any) -> bool:
-    """Return whether the last item of a sequence may take more or fewer bytes."""
+    """Return whether the last item of a sequence has a variable number of bytes."""
     items = list(tree)
     if not items:
         return True

@@ -1,4 +1,4 @@
-"""Headers of web requests that a document may not set."""
+"""Check for HTTP headers that a document may not set."""
 
 from urc._headers import is_reserved
 from urc.config.node import Node, Problems

@@ -1,4 +1,4 @@
-"""An interface: grid → slots, each of them a rectangle."""
+"""Parser of an interface: grid → rectangular slots."""
 
 import re
 from typing import Final
@@ -10,11 +10,11 @@ from urc.model.interface import DEBUG, SCREENS, Interface, Layout, Slot, Tab
 __all__ = ["check_names", "parse_interface"]
 
 _MOST: Final = 48
-"""Maximum rows or columns of one grid."""
+"""Maximum number of rows or columns in one grid."""
 _NAME = re.compile(r"[a-z][a-z0-9_-]{0,63}")
 _EMPTY = re.compile(r"\.+")
 _Cell = tuple[str, int]
-"""The content of a cell, and its offset in the text."""
+"""The slot name in a cell, and its offset in the text of the grid."""
 
 
 def parse_interface(part: Node, name: str, problems: Problems) -> Interface:
@@ -51,7 +51,7 @@ def parse_interface(part: Node, name: str, problems: Problems) -> Interface:
 
 
 def check_names(root: Node, problems: Problems) -> None:
-    """Report an interface with the name of the built-in interface."""
+    """Report an interface with the reserved name of the built-in interface."""
     if DEBUG in root.named("interfaces"):
         problems.error(
             root.must("interfaces"),
@@ -77,7 +77,7 @@ def _check_beside_tabs(part: Node, problems: Problems) -> None:
 
 
 def _tab(part: Node, problems: Problems, around: Node | None = None) -> Tab:
-    """Return one page; the mirroring keys of `around` are the defaults of its tabs."""
+    """Return one page; for a tab, the key ``mirror`` of `around` is the default."""
     is_mirrored = around.flag("mirror", default=True) if around is not None else True
     left = part.get("left_handed")
     return Tab(

@@ -1,4 +1,4 @@
-"""The settings of a profile."""
+"""Parser of the settings of a profile."""
 
 from typing import Final
 
@@ -15,11 +15,11 @@ _VALUE_TYPES: Final = {
     "boolean": "boolean",
     "port": "integer",
 }
-"""Type of a setting → type of its value; a missing type means text."""
+"""Type of a setting → type of its value; other settings contain text."""
 
 
 def parse_setting(part: Node, problems: Problems) -> Setting:
-    """Return one setting."""
+    """Return the setting at `part`; report its mistakes."""
     kind = part.text("type")
     low, high = check_range(
         part, _VALUE_TYPES.get(kind, "string") if kind != "port" else kind, problems
@@ -66,7 +66,7 @@ def parse_setting(part: Node, problems: Problems) -> Setting:
 
 
 def _check_choices(part: Node, kind: str, choices: tuple[str, ...], problems: Problems) -> None:
-    """Report a setting of type choice without choices, and choices of another type."""
+    """Report a setting of type ``choice`` without choices, and other settings with choices."""
     if kind == "choice" and not choices:
         problems.error(part, "missing-key", "a setting of type choice needs 'choices'", key=True)
     if kind != "choice" and choices:
@@ -81,7 +81,7 @@ def _check_choices(part: Node, kind: str, choices: tuple[str, ...], problems: Pr
 
 
 def setting_value(part: Node, kind: str, choices: tuple[str, ...], problems: Problems) -> Value:
-    """Return the value of a setting in a document, or None when it was reported."""
+    """Return the value of a setting in a document, or None after a reported problem."""
     wanted = _VALUE_TYPES.get(kind, "string")
     try:
         value = fit(part.data, wanted)
@@ -102,5 +102,5 @@ def setting_value(part: Node, kind: str, choices: tuple[str, ...], problems: Pro
 
 
 def _is_host(text: str) -> bool:
-    """Return whether a name or address is plausible: no scheme, no port, no blank."""
+    """Return whether a text may be a host name or address, without scheme, port and spaces."""
     return 0 < len(text) <= 253 and not any(char.isspace() or char in "/@?#'\"" for char in text)

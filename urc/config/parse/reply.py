@@ -1,4 +1,4 @@
-"""The reply to a request: mapping → `Reply`, with its stages, its errors and its correlation."""
+"""Parser of the reply to a request: mapping → `Reply`, with stages and error replies."""
 
 from urc.config.form_table import READ_FORMS
 from urc.config.node import Node, Problems
@@ -20,16 +20,16 @@ __all__ = [
 ]
 
 _OF_THE_WHOLE = ("match", "stages", "framing")
-"""Keys of the whole reply, not of one of its stages."""
+"""Keys of the whole reply that a stage may not have."""
 _BESIDE_SILENCE = (
     "fields", "head", "set", "when", "lines", "match", "timeout", "framing", "resend", "extend",
 )  # fmt: skip
 _MOST_BUSY_S = 600.0
-"""Default of ``within``: maximum time of a busy robot, in seconds."""
+"""Default of ``within``: maximum total time of a delayed reply, in seconds."""
 
 
 def parse_reply(part: Node | None, problems: Problems, context: FormContext) -> Reply | None:
-    """Return the reply at `part`, or None."""
+    """Return the reply at `part`, or None without a part."""
     if part is None:
         return None
     own, context = parse_own_framing(part, problems, context)
@@ -65,15 +65,15 @@ def parse_reply(part: Node | None, problems: Problems, context: FormContext) -> 
 
 
 def implied_reply(send: WriteSpec) -> Reply | None:
-    """Return the reply of a request whose protocol always has one, even without `reply`.
+    """Return the implied reply of a request if its protocol always replies, or None.
 
-    So a refused request fails, and does not count as done once it is sent.
+    With an implied reply, a refused request fails instead of counting as done after it is sent.
     """
     return Reply(ReadSpec("any")) if send.options.get("verb") in NUMBERED else None
 
 
 def parse_stage(part: Node, problems: Problems, context: FormContext) -> Stage:
-    """Return one stage of the reply to any request."""
+    """Return one stage of a reply."""
     errors, faults = parse_errors(part, problems, context)
     if "silence" in part.data:
         return _silence(part, errors, faults, problems)
@@ -92,7 +92,7 @@ def _silence(
     faults: tuple[ErrorReply, ...],
     problems: Problems,
 ) -> Stage:
-    """Return the stage for a robot that is silent on success."""
+    """Return the stage of a reply that treats silence as success."""
     beside = (*READ_FORMS, *_BESIDE_SILENCE)
     refuse(part, beside, "has no effect with 'silence', which is the reply", problems)
     read, within_s = ReadSpec("silence"), problems.duration(part, "silence", 0.3, most=60)
@@ -121,7 +121,7 @@ def _asides(part: Node, problems: Problems, context: FormContext) -> Provisional
 
 
 def _aside(part: Node | None, problems: Problems, context: FormContext) -> ReadSpec | None:
-    """Return a frame in any form; a text is a pattern."""
+    """Return the declaration of a frame in any form; a plain text is a pattern."""
     if part is None:
         return None
     if isinstance(part.data, dict):
@@ -133,7 +133,7 @@ def _aside(part: Node | None, problems: Problems, context: FormContext) -> ReadS
 def parse_errors(
     part: Node, problems: Problems, context: FormContext
 ) -> tuple[tuple[Pattern, ...], tuple[ErrorReply, ...]]:
-    """Return the error replies under ``errors:``: patterns, and replies of any form."""
+    """Return the patterns under ``errors:``, and the error replies in other forms."""
     patterns: list[Pattern] = []
     faults: list[ErrorReply] = []
     for inner in part.listed("errors"):
@@ -149,7 +149,7 @@ def parse_errors(
 
 
 def refuse(part: Node, keys: tuple[str, ...], why: str, problems: Problems) -> None:
-    """Report each of `keys` in `part`."""
+    """Report each of `keys` that occurs in `part`, with the reason `why`."""
     for key in keys:
         if key in part.data:
             problems.error(part, "misplaced-key", f"'{key}' {why}", at=key, key=True)
@@ -158,7 +158,7 @@ def refuse(part: Node, keys: tuple[str, ...], why: str, problems: Problems) -> N
 def parse_own_framing(
     part: Node, problems: Problems, context: FormContext
 ) -> tuple[FramingSpec | None, FormContext]:
-    """Return the reply's own framing, if any, and the context of its forms."""
+    """Return the reply's own framing or None, and the context for the reply's forms."""
     inner = part.get("framing")
     if inner is None:
         return None, context

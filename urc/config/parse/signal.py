@@ -1,4 +1,4 @@
-"""A signal: mapping → `Signal`, with its conversion, limits, axes and formula."""
+"""Parser of a signal: mapping → `Signal`, with its conversion, limits, axes and formula."""
 
 from collections.abc import Mapping
 from itertools import pairwise
@@ -20,7 +20,7 @@ _BYTES: Final = ("image", "blob")
 
 
 def parse_signal(part: Node, title: str, problems: Problems) -> Signal:
-    """Return the signal at `part`; `title` is the default of its title."""
+    """Return the signal at `part`; `title` is the default title."""
     kind = part.text("type", "number")
     element = part.text("items", "number") if kind == "array" else kind
     _check_vector(part, kind, problems)
@@ -57,10 +57,10 @@ def parse_signal(part: Node, title: str, problems: Problems) -> Signal:
 
 
 def with_ages(signals: Mapping[str, Signal], polls: tuple[Poll, ...]) -> dict[str, Signal]:
-    """Return the signals, each with the age in seconds at which it is stale.
+    """Return the signals with the age in seconds at which each signal is stale.
 
-    The age is three periods of its fastest poll. A computed signal has the smallest age of its
-    inputs.
+    The default age is three periods of the signal's fastest poll, at least 1 s, or 5 s without a
+    poll. A computed signal has the smallest age of its inputs.
     """
     aged = {name: _with_age(one, polls) for name, one in signals.items()}
     for name, one in signals.items():
@@ -71,7 +71,7 @@ def with_ages(signals: Mapping[str, Signal], polls: tuple[Poll, ...]) -> dict[st
 
 
 def _bases(name: str, signals: Mapping[str, Signal]) -> set[str]:
-    """Return the received signals that a computed signal depends on; a cycle ends the search."""
+    """Return the received signals that a computed signal depends on, even through a cycle."""
     found: set[str] = set()
     seen: set[str] = set()
     waiting = [name]
@@ -110,7 +110,7 @@ def _check_vector(part: Node, kind: str, problems: Problems) -> None:
 
 
 def _check_rotation(part: Node, kind: str, problems: Problems) -> None:
-    """Warn of a rotation without an axis convention, unless it is computed."""
+    """Warn of a received rotation signal without an axis convention."""
     is_named = not {*part.name.split("_")}.isdisjoint(_ROTATIONS)
     is_angle = kind in _NUMBERS and part.text("unit") in ANGLE_UNITS
     if is_named and is_angle and "value" not in part.data:
@@ -190,7 +190,7 @@ def _formula(part: Node, problems: Problems) -> Template | None:
 
 
 def _check_hysteresis(part: Node, values: Mapping[str, float | None], problems: Problems) -> None:
-    """Warn of an alarm that ends only after the opposite alarm has begun."""
+    """Warn of an alarm that ends only after the start of the opposite alarm."""
     width = part.number("hysteresis") or 0.0
     low = values["low"] if values["low"] is not None else values["lolo"]
     high = values["high"] if values["high"] is not None else values["hihi"]

@@ -1,4 +1,4 @@
-"""The emulated robot of a document: its initial values, and the rules of each transport."""
+"""Parser of an emulated robot: its world, and the rules of each transport."""
 
 import math
 from collections.abc import Mapping
@@ -41,9 +41,9 @@ _DEGREES: Final = {
     "laser": ("first", "last"),
     "camera": ("fov", "tilt"),
 }
-"""Part → numbers that documents give in degrees."""
+"""Part of a world → fields that documents give in degrees."""
 _KEYS: Final = {"first": "from", "last": "to"}
-"""Fields of a laser → its keys."""
+"""Field of a laser → key in the document."""
 _LONGEST_S: Final = 3600.0
 
 Spec = TypeVar("Spec", bound=Any)
@@ -104,7 +104,7 @@ def _pair(part: Node, key: str) -> tuple[float, float]:
 
 
 def _filled(spec: Spec, part: Node, key: str) -> Spec:
-    """Return `spec` with the plain values of the document, and degrees as radians."""
+    """Return `spec` with the values of the document, and convert degrees to radians."""
     values: dict[str, object] = {}
     inner = part.get(key)
     for field in spec._fields:
@@ -192,7 +192,7 @@ _TRIGGERS: Final = ("match", "command", "poll", "every")
 
 
 class SimulatorSpec(NamedTuple):
-    """The emulated robot of a document, before its names are resolved."""
+    """The parsed emulated robot of a document, before names are resolved."""
 
     rules: Mapping[str, list[SimulatorRule]] = NOTHING
     """By transport."""
@@ -202,7 +202,7 @@ class SimulatorSpec(NamedTuple):
 def parse_simulator(
     sources: Sources, driver: Driver, catalog: Registries, problems: Problems
 ) -> SimulatorSpec:
-    """Return the rules of each transport, and the world, before their names are resolved."""
+    """Return the rules of each transport and the world, before names are resolved."""
     found: dict[str, list[SimulatorRule]] = {}
     context = FormContext(catalog=catalog)
     if any(_needs_types(part.data) for part in sources.rules.values()):
@@ -227,7 +227,7 @@ def parse_simulator(
 
 
 def _check_names(part: Node, rules: list[SimulatorRule], problems: Problems) -> None:
-    """Report two rules of one name, which a derived document could not tell apart."""
+    """Report two rules with the same name, because derived documents refer to rules by name."""
     seen: set[str] = set()
     for inner, rule in zip(part.items(), rules, strict=True):
         if rule.name and rule.name in seen:
@@ -237,7 +237,7 @@ def _check_names(part: Node, rules: list[SimulatorRule], problems: Problems) -> 
 
 
 def _needs_types(data: object) -> bool:
-    """Return whether the data has a binary form at any place."""
+    """Return whether the data contains a ``struct`` form."""
     if isinstance(data, dict):
         return "struct" in data or any(map(_needs_types, data.values()))
     return isinstance(data, list) and any(map(_needs_types, data))
@@ -273,7 +273,7 @@ def _rule(part: Node, transport: str, problems: Problems, context: FormContext) 
 
 
 def _speaks(part: Node) -> bool:
-    """Return whether a rule has a reply of its own, immediate or delayed."""
+    """Return whether a rule declares its own reply, immediate or delayed."""
     return any("send" in one.data or "answer" in one.data for one in (part, *part.listed("then")))
 
 

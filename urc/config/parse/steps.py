@@ -1,4 +1,4 @@
-"""Sequences: list of steps → `Step` values."""
+"""Parser of sequences: list of steps → `Step` values."""
 
 from typing import Final, NamedTuple
 
@@ -24,7 +24,7 @@ _BESIDE: Final = {
     "if": ("then", "else"),
     "fail": (),
 }
-"""Verb → additional keys of its step."""
+"""Verb of a step → additional keys of the step."""
 VERBS: Final = tuple(_BESIDE)
 _OF_REQUESTS: Final = ("match", "stages", "resend", "extend")
 _NEVER: Final = compile_template("")
@@ -32,17 +32,17 @@ _NO_PATTERN: Final = "^$"
 
 
 class StepContext(NamedTuple):
-    """The context of steps."""
+    """Properties of a sequence that the parsers of its steps need."""
 
     transport: str
-    """Transport of these steps, or the only transport; "" when each step must name one."""
+    """Default transport of the steps, or "" if each step must name its transport."""
     is_named: bool
-    """The steps are a sequence of their own, so they may name a transport."""
+    """Whether the steps form a named sequence, and may therefore name a transport."""
     forms: FormContext
 
 
 def parse_steps(part: Node, context: StepContext, problems: Problems) -> tuple[sequence.Step, ...]:
-    """Return the steps in the list at `part`, with their branches."""
+    """Return the steps in the list at `part`, including their branches."""
     steps = _steps(part, context, problems)
     count = sum(1 for _ in sequence.all_steps(steps))
     if count > sequence.MAX_STEPS:
@@ -205,7 +205,7 @@ def _timeout_s(part: Node, problems: Problems) -> float | None:
 def _else(
     part: Node, context: StepContext, problems: Problems
 ) -> tuple[tuple[sequence.Step, ...] | None, str]:
-    """Return the steps after a failed wait, or the message of the failure."""
+    """Return the steps under ``else`` and None, or the message of the failure."""
     inner = part.get("else")
     if inner is None:
         return None, ""
@@ -233,7 +233,7 @@ def _if(
 
 
 def _values(parts: dict[str, Node], problems: Problems) -> dict[str, Template | Value]:
-    """Return plain values, and templates for texts with expressions."""
+    """Return the given values, and compile texts as templates."""
     values: dict[str, Template | Value] = {}
     for name, inner in parts.items():
         if isinstance(inner.data, str):

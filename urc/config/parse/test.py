@@ -1,4 +1,4 @@
-"""A test of a document: mapping → `DocumentTest`."""
+"""Parser of a document's test: mapping → `DocumentTest`."""
 
 from typing import Final
 
@@ -10,26 +10,26 @@ from urc.model.values import Value
 __all__ = ["parse_test"]
 
 _AT_ONCE: Final = ("feed", "reply_to", "run", "args", "expect", "sent", "fails")
-"""Keys of a test in one instant."""
+"""Keys that only a test without steps may have."""
 _IN_STEPS: Final = ("polls", "ready")
-"""Keys about the execution of steps."""
+"""Keys that only a test with steps may have."""
 _VERBS: Final = (
     "message", "response", "feedback", "publish", "call", "goal", "cancel", "request",
 )  # fmt: skip
-"""Kinds of messages."""
+"""Kinds of messages in a test."""
 _ADDRESS: Final = (
     "topic", "type", "service", "action", "method", "path", "url", "query", "headers", "qos",
     "retain", "ok", "status", "reason",
 )  # fmt: skip
-"""Keys of a message that are not its body."""
+"""Keys of a message's address and status."""
 _BODIES: Final = ("json", "text", "hex")
-"""Keys of a message that are its body."""
+"""Keys of a message's body."""
 _HAPPENS: Final = ("feed", "run", "wait", "connects", "closes", "leaves")
-"""Keys of a step that exclude each other."""
+"""Mutually exclusive keys of a step."""
 
 
 def parse_test(part: Node, problems: Problems) -> DocumentTest:
-    """Return one test, before its names are resolved."""
+    """Return the test at `part`, before names are resolved."""
     line, column, source = _place(part)
     reply_to = part.scalar("reply_to")
     if isinstance(reply_to, float):
@@ -100,7 +100,7 @@ def _step(part: Node, problems: Problems) -> DialogueStep:
 
 
 def _place(part: Node) -> tuple[int, int, str]:
-    """Return line, column and the text of the line."""
+    """Return line, column and source line of `part`."""
     mark, home = part.document.at(part.path), part.document.source_of(part.path)
     line, column = (mark.span.line, mark.span.column) if mark else (1, 1)
     return line, column, home.lines[line - 1]
@@ -141,7 +141,7 @@ def _pieces(part: Node, problems: Problems) -> Fed | tuple[Fed, ...]:
 
 
 def _wire(part: Node, problems: Problems) -> Fed:
-    """Return text, the bytes under ``hex``, or a message."""
+    """Return fed data: a text, the bytes under ``hex``, or a message."""
     if not isinstance(part.data, dict):
         return str(part.data)
     inner = part.get("hex")

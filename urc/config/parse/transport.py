@@ -1,4 +1,4 @@
-"""Transports of a driver: mapping → `TransportSpec`."""
+"""Parser of a driver's transport: mapping → `TransportSpec`."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -23,7 +23,7 @@ _COMMON: Final = (
 
 
 def parse_transport(part: Node, problems: Problems, catalog: Registries) -> TransportSpec:
-    """Return one transport."""
+    """Return the transport at `part`; report its mistakes."""
     kind = part.must("type")
     if catalog.transports.get(kind.data) is None:
         problems.error(
@@ -58,7 +58,7 @@ def parse_transport(part: Node, problems: Problems, catalog: Registries) -> Tran
 
 
 def _framing(part: Node, encoding: str, problems: Problems, catalog: Registries) -> FramingSpec:
-    """Return the framing of received frames, with the framing of sent frames if it differs."""
+    """Return the framing of received frames, with any separate framing of sent frames."""
     own = part.get("framing")
     if own is None:
         return FramingSpec("datagram")  # the schema requires 'framing' for streams
@@ -70,7 +70,7 @@ def _framing(part: Node, encoding: str, problems: Problems, catalog: Registries)
 
 
 def _option(part: Node, problems: Problems) -> object:
-    """Return an option: plain, a template, or a list or mapping of them."""
+    """Return an option: a scalar, a template, or a list or mapping of scalars and templates."""
     tree = compiled_tree(part, problems)
     if isinstance(tree, Template) and tree.is_constant:
         return tree.evaluate({})
@@ -107,6 +107,6 @@ def _backoff(part: Node | None, problems: Problems) -> Backoff:
 
 
 def option_templates(part: Node, spec: TransportSpec) -> Iterator[tuple[Node, Template]]:
-    """Yield every template in the options of the transport at `part`, with its place."""
+    """Yield every template in the options of the transport at `part`, with its position."""
     for name, tree in spec.options.items():
         yield from placed_templates(part.must(name), tree)

@@ -1,4 +1,4 @@
-"""A driver's ``types:``: named structs, each parsed once, after the types that it needs."""
+"""Parser of a driver's reusable structs under ``types``, in the order of their dependencies."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -15,7 +15,7 @@ Items = tuple[Item, ...]
 def parse_types(
     part: Node, enums: Mapping[str, tuple[tuple[int, str], ...]], problems: Problems
 ) -> Mapping[str, Items]:
-    """Return every type of the driver at `part`; an invalid type is empty."""
+    """Return name → items for every type of the driver at `part`; an invalid type is empty."""
     parts = part.named("types")
     types: dict[str, Items] = {}
     needed = {name: set(_names(inner.data)) & parts.keys() for name, inner in parts.items()}
@@ -37,7 +37,7 @@ def _parse(
     enums: Mapping[str, tuple[tuple[int, str], ...]],
     problems: Problems,
 ) -> None:
-    """Parse the types that `name` needs, then `name` itself."""
+    """Parse the dependencies of the type `name`, then the type itself."""
     if name in types:
         return
     types_above = (*above, name)
@@ -55,7 +55,7 @@ def _parse(
 
 
 def _names(data: Any) -> Iterator[str]:
-    """Yield every word of a type's items that may be another type."""
+    """Yield every possible type name in a type's items."""
     for item in data if isinstance(data, list) else ():
         if isinstance(item, str):
             yield item.strip().partition(" ")[0]

@@ -1,4 +1,4 @@
-"""A widget's manifest → `Widget`, and the folder that reads manifests by name."""
+"""Parser of a widget's manifest, and reader of a folder with widgets."""
 
 import re
 from collections.abc import Iterable
@@ -57,7 +57,7 @@ def parse_widget(document: Document, problems: Problems) -> Widget:
 
 
 def _check_names(part: Node, widget: Widget, problems: Problems) -> None:
-    """Report each name of an input, output or option that the manifest does not have."""
+    """Report each reference to an input, output or option that the manifest does not declare."""
     ports, options = {**widget.inputs, **widget.outputs}, widget.options
     told: list[tuple[Node, Iterable[str]]] = []
     told += [(inner, (*ports, *options)) for inner in part.listed("at_least_one_of")]
@@ -133,7 +133,7 @@ def _check_defaults(options: Node, problems: Problems) -> None:
 
 
 def _nearby(file: FilePath) -> str:
-    """Return a path relative to the current folder, if possible."""
+    """Return a path relative to the current folder, or the absolute path if necessary."""
     try:
         return str(file.relative_to(FilePath.cwd()))
     except (OSError, ValueError):
@@ -141,7 +141,7 @@ def _nearby(file: FilePath) -> str:
 
 
 class WidgetFolder:
-    """The widgets of one folder; each manifest is read once, at its first use."""
+    """The widgets of one folder. A manifest is read once, at the first use of the widget."""
 
     def __init__(self, folder: FilePath) -> None:
         self.folder = folder
@@ -151,7 +151,7 @@ class WidgetFolder:
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Return the path of every requested manifest, existing or not."""
+        """Return the path of every requested manifest, even if missing."""
         return tuple(str(self.folder / name / "widget.yaml") for name in self._widgets)
 
     def names(self) -> list[str]:
@@ -162,13 +162,13 @@ class WidgetFolder:
             return []
 
     def get(self, name: str) -> Widget | None:
-        """Return a widget, or None when it is missing or its manifest is broken."""
+        """Return a widget, or None if the widget is missing or its manifest is invalid."""
         if name not in self._widgets:
             self._widgets[name] = self._read(name) if self.has(name) else None
         return self._widgets[name]
 
     def has(self, name: str) -> bool:
-        """Return whether the folder has a widget of this name, broken or not."""
+        """Return whether the folder has a widget of this name, even with an invalid manifest."""
         return bool(_NAME.fullmatch(name)) and (self.folder / name / "widget.yaml").is_file()
 
     def place(self, name: str) -> FilePath:
@@ -176,7 +176,7 @@ class WidgetFolder:
         return self.folder / name
 
     def hint(self, name: str) -> str:
-        """Return a hint for an unknown name."""
+        """Return a hint for an unknown widget name."""
         return did_you_mean(name, self.names(), "widgets")
 
     def _read(self, name: str) -> Widget | None:

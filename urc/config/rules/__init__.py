@@ -1,1 +1,1 @@
-"""Rules about a whole profile."""
+"""Rules that check a complete profile."""

@@ -1,4 +1,4 @@
-"""Rules about silent robots: silent by design, or silent on success."""
+"""Rules about transports without replies, and about silence as a reply."""
 
 from typing import Final
 
@@ -13,7 +13,7 @@ _HINT: Final = "remove 'replies: never', or remove the waits for this transport"
 
 
 def check_answers(part: Node, driver: Driver, problems: Problems) -> None:
-    """Report waits on a transport without replies, and silence that no error reply can end."""
+    """Report waits on a transport without replies, and silence as a reply without error replies."""
     for name, inner in part.named("commands").items():
         one = driver.commands[name]
         _check_silence(inner, one.reply, driver.transports.get(one.transport), problems)
@@ -48,7 +48,7 @@ def check_answers(part: Node, driver: Driver, problems: Problems) -> None:
 def _check_silence(
     part: Node, reply: Reply | None, spec: TransportSpec | None, problems: Problems
 ) -> None:
-    """Report a stage of silence that no error reply can end."""
+    """Report a stage that treats silence as success but has no error reply."""
     place = part.get("reply")
     if reply is None or place is None or (spec is not None and (spec.errors or spec.faults)):
         return

@@ -1,6 +1,6 @@
-"""Rules about traffic and safety: excessive rates and unsafe motion.
+"""Rules about traffic: rates, timeouts and secrets.
 
-All are warnings about declared values, never about defaults.
+All rules give warnings, and only about declared values, not about defaults.
 """
 
 from collections.abc import Iterator
@@ -21,15 +21,15 @@ from urc.model.sequence import SendStep, Step, UntilStep, WaitStep, all_steps
 __all__ = ["check_flow"]
 
 _GOOD_BYE_S = 2.0
-"""Time limit of ``on_close`` in seconds, see `urc.protocol.engine`."""
+"""Time limit of ``on_close`` in seconds, as in `urc.protocol.engine`."""
 _BITS_OF_A_BYTE = 10
-"""Bits of a byte on a serial line, with start and stop bit."""
+"""Number of bits per byte on a serial line, including start and stop bit."""
 
 
 def check_flow(part: Node, driver: Driver, secrets: frozenset[str], problems: Problems) -> None:
-    """Add the warnings about the driver at `part`.
+    """Warn of excessive traffic, early timeouts and visible secrets in the driver at `part`.
 
-    `secrets` has the names of secret settings.
+    `secrets` contains the names of secret settings.
     """
     for name, inner in part.named("transports").items():
         _check_line(inner, driver.transports[name], problems)
@@ -79,7 +79,7 @@ def _wait_s(step: Step) -> float:
 
 
 def _check_baud(part: Node, driver: Driver, spec: TransportSpec, problems: Problems) -> None:
-    """Warn of polls whose smallest frames already exceed the baud rate of a serial line."""
+    """Warn of polls that need more than the baud rate of a serial line."""
     baud = spec.options.get("baud")
     if isinstance(baud, bool) or not isinstance(baud, (int, float)) or baud <= 0:
         return
@@ -96,7 +96,7 @@ def _check_baud(part: Node, driver: Driver, spec: TransportSpec, problems: Probl
 
 
 def _least_bytes(poll: Poll) -> int:
-    """Return the number of bytes of a request and its reply, as far as they are fixed."""
+    """Return the minimum number of bytes in a request and its reply."""
     template = poll.send.options.get("template")
     source = getattr(template, "source", "")
     literal = sum(len(text) for _, text, _ in split_template(source))
@@ -106,7 +106,7 @@ def _least_bytes(poll: Poll) -> int:
 def _check_stages(
     part: Node, reply: Reply, transport: str, driver: Driver, problems: Problems
 ) -> None:
-    """Warn of a long second stage that delays the polls of a line with one request in flight."""
+    """Warn of a long second stage that delays the polls of its transport."""
     if not reply.stages or driver.transports[transport].queue.in_flight > 1:
         return
     periods = [poll.every_s for poll in driver.polls if poll.transport == transport]
@@ -123,7 +123,7 @@ def _check_stages(
 
 
 def _check_haste(part: Node, driver: Driver, name: str, problems: Problems) -> None:
-    """Warn when the signals of a condition are polled less often than its time limit."""
+    """Warn of a verification that ends before its signals are polled again."""
     verify = driver.commands[name].verify
     if verify is None:
         return
@@ -155,7 +155,7 @@ def _check_poll(part: Node, poll: Poll, problems: Problems) -> None:
 
 
 def _digested(part: Node, send: WriteSpec) -> set[str]:
-    """Return the settings that are sent only inside a hash that changes every time."""
+    """Return the settings that are sent only as part of a changing hash."""
     inner, form = write_form(part)
     found = [template for _, template in form.templates(inner, send)]
     digested = {name for one in found for name in digested_settings(one)}

@@ -1,6 +1,7 @@
 """Rules about frames: patterns that match too much, and unused names.
 
-All are warnings. Two declarations that match one frame are reported only with an example frame.
+All are warnings. Two declarations for the same frame are reported only if an example frame matches
+both.
 """
 
 import re
@@ -21,18 +22,18 @@ from urc.patterns import Pattern, can_be_empty, example
 __all__ = ["check_frames_apart"]
 
 _FILLINGS: Final = ("0", "7", "-1.5", "q", "Zq", "a b", "~", "A5", "F", "+12", "x_1", "")
-"""Sample values of a field; a pattern may reject some of them."""
+"""Sample values of a field; a pattern may reject some values."""
 _VARIANTS: Final = 6
 _SHOWN: Final = 40
 _WORD: Final = re.compile(r"\w+")
 _LETTERS: Final = re.compile(r"\^([A-Za-z0-9 :,=/_-]*)")
 _GROUP: Final = re.compile(r"\(\?(?:P<\w+>|:)")
 _MAY_BE_LESS: Final = re.compile(r"[*?|{]|\(\)")
-"""Characters of a group that may be empty."""
+"""Pattern of the parts of a group that may match empty text."""
 
 
 def check_frames_apart(part: Node, driver: Driver, problems: Problems) -> None:
-    """Add the warnings about the frames of the driver at `part`."""
+    """Warn of ambiguous, empty or unused declarations of frames in the driver at `part`."""
     _check_messages(part, driver, problems)
     for inner, reply in _replies(part, driver):
         _check_refusals(inner, reply, problems)
@@ -95,20 +96,20 @@ def _stages(part: Node, reply: Reply) -> Iterator[tuple[Node, ReadSpec]]:
 
 
 class _Text:
-    """A declaration of text frames, with a test for a match and some sample frames."""
+    """A declaration of text frames, with a matching test and sample frames."""
 
     def __init__(self, pattern: Pattern | None, text: str = "") -> None:
         self._pattern = pattern
         self._text = text
         self.head = text if pattern is None else _head(pattern.source)
-        """The certain first characters of its frames; "" when none is certain."""
+        """Fixed characters at the start of every frame, or ""."""
 
     def takes(self, text: str) -> bool:
         return text == self._text if self._pattern is None else bool(_finds(self._pattern, text))
 
     @cached_property
     def samples(self) -> tuple[str, ...]:
-        """Some frames that match."""
+        """Sample frames that match the declaration."""
         if self._pattern is None:
             return (self._text,)
         groups = self._pattern.groups
@@ -117,7 +118,7 @@ class _Text:
         return tuple(dict.fromkeys(one for one in made if _finds(self._pattern, one)))
 
     def takes_all_of(self, other: "_Text") -> bool:
-        """Return whether every sample of `other` matches this declaration, too."""
+        """Return whether every sample of `other` also matches this declaration."""
         if not (self.head.startswith(other.head) or other.head.startswith(self.head)):
             return False
         return bool(other.samples) and all(map(self.takes, other.samples))
@@ -128,7 +129,7 @@ def _finds(pattern: Pattern, text: str) -> bool:
 
 
 def _head(source: str) -> str:
-    """Return the fixed characters at the start of a pattern; "" when they are not obvious."""
+    """Return the fixed characters at the start of a pattern, or "" if they are not obvious."""
     found = _LETTERS.match(source)
     if found is None or "|" in source:
         return ""
@@ -136,7 +137,7 @@ def _head(source: str) -> str:
 
 
 def _check_messages(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn of a message whose frames match an earlier message, which takes them."""
+    """Warn of a message if an earlier message already matches all its frames."""
     seen: list[tuple[str, str, ReadSpec, _Text | None]] = []
     for name, inner in part.named("messages").items():
         message = driver.messages[name]
@@ -161,7 +162,7 @@ def _check_messages(part: Node, driver: Driver, problems: Problems) -> None:
 def _shared(
     first: ReadSpec, earlier: _Text | None, second: ReadSpec, later: _Text | None
 ) -> str | None:
-    """Return the example of a frame that both match, as text; None when none is known."""
+    """Return an example of a frame that both declarations match, as text, or None."""
     if first.topic != second.topic:
         return None
     if first.when is not None or first.lines is not None or second.lines is not None:
@@ -189,7 +190,7 @@ def _items(read: ReadSpec) -> tuple[Item, ...]:
 
 
 def _covers(first: tuple[Item, ...], second: tuple[Item, ...]) -> bool:
-    """Return whether every frame of `second` provably matches `first`."""
+    """Return whether every frame of `second` certainly matches `first`."""
     size = fixed_size(first)
     if size is None or size != fixed_size(second):
         return False
@@ -198,7 +199,7 @@ def _covers(first: tuple[Item, ...], second: tuple[Item, ...]) -> bool:
 
 
 def _asked(items: tuple[Item, ...]) -> dict[tuple[int, int], object] | None:
-    """Return the fixed values, (offset, size) → value, or None when there are other conditions."""
+    """Return (offset, size) → constant, or None if a match depends on other conditions."""
     found: dict[tuple[int, int], object] = {}
     offset = 0
     for item in items:
@@ -214,7 +215,7 @@ def _asked(items: tuple[Item, ...]) -> dict[tuple[int, int], object] | None:
 
 
 def _check_refusals(part: Node, reply: Reply, problems: Problems) -> None:
-    """Warn of an error pattern that matches a reply: errors are tried first."""
+    """Warn of an error pattern that matches a successful reply, because errors are tried first."""
     good = _text_of(reply.read) if reply.read.when is None and reply.read.lines is None else None
     errors = [(inner, "an error", "errors") for inner in part.listed("errors")]
     asides = [("resend", "a resend request"), ("extend", "a busy reply")]
@@ -247,7 +248,7 @@ def _check_refusals(part: Node, reply: Reply, problems: Problems) -> None:
 
 
 def _check_shared_refusals(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn of an error pattern of a transport that matches the reply to some request."""
+    """Warn of a transport's error pattern that matches a successful reply."""
     for name, inner in part.named("transports").items():
         spec = driver.transports[name]
         requests = [(one.transport, one.reply) for one in driver.commands.values()]
@@ -270,7 +271,7 @@ def _patterns_of(asides: ProvisionalReplies) -> Iterator[Pattern]:
 
 
 def _check_struct_refusals(part: Node, reply: Reply, problems: Problems) -> None:
-    """Warn of a binary error reply that differs from the reply in only a field."""
+    """Warn of a binary error reply that differs from a successful reply only in fields."""
     given = [inner for inner in part.listed("errors") if isinstance(inner.data, dict)]
     if len(given) != len(reply.faults) or reply.read.form != "struct":
         return
@@ -291,7 +292,7 @@ def _check_struct_refusals(part: Node, reply: Reply, problems: Problems) -> None
 def _check_empty(
     part: Node, read: ReadSpec, signals: Mapping[str, Signal], problems: Problems
 ) -> None:
-    """Warn of a number from a group that may be empty."""
+    """Warn of a numeric field with a group that may match empty text."""
     pattern = read.options.get("pattern")
     if read.form != "regex" or not isinstance(pattern, Pattern):
         return
@@ -327,7 +328,7 @@ def _is_plain_number(signal: Signal) -> bool:
 
 
 def _check_words(part: Node, problems: Problems) -> None:
-    """Warn of types and enums that are never used."""
+    """Warn of unused types and enums."""
     if "types" not in part.data and "enums" not in part.data:
         return
     everywhere = _words(part.data)
@@ -344,12 +345,12 @@ def _check_words(part: Node, problems: Problems) -> None:
 
 
 def _words(data: Any) -> Counter[str]:
-    """Return the number of times that each word occurs in the texts of a part."""
+    """Return the number of occurrences of each word in the texts of a part."""
     return Counter(word for text in _texts(data) for word in _WORD.findall(text))
 
 
 def _texts(data: Any) -> Iterator[str]:
-    """Yield every text value."""
+    """Yield every text in nested data."""
     if isinstance(data, str):
         yield data
     elif isinstance(data, dict):

@@ -1,8 +1,8 @@
-"""Rules about motion: facts of the robot for held commands, and the load of their transport.
+"""Rules about held commands: watchdog, lease, repetition and load of the transport.
 
-If this machine loses its power, only the robot's own watchdog can stop it, so a driver must declare
-it. A contradiction with the watchdog is an error: the motion would stutter, or outlast the lease.
-The other problems are warnings.
+If the URC server loses power, only the robot's own watchdog can stop the robot. A driver must
+therefore declare the watchdog. A contradiction with the watchdog is an error, because the motion
+would stutter or outlast the lease. All other problems are warnings.
 """
 
 import math
@@ -20,15 +20,15 @@ from urc.model.payload import WriteSpec, each_of
 __all__ = ["check_motion", "least_frame_bytes"]
 
 _ASKED: Final = frozenset(("websocket", "ros"))
-"""Transport types that check liveness while a command is held."""
+"""Transport types with their own liveness check during held commands."""
 LONG_LEASE_S: Final = 0.5
 _BITS_OF_A_BYTE: Final = 10
-"""Bits of a byte on a serial line, with start and stop bit."""
+"""Number of bits per byte on a serial line, including start and stop bit."""
 _ROUNDING: Final = 1.000001
 
 
 def check_motion(part: Node, driver: Driver, problems: Problems) -> None:
-    """Report problems of the held commands of the driver at `part`."""
+    """Report problems of all held commands in the driver at `part`."""
     held = [
         (inner.must("hold"), driver.commands[name], hold)
         for name, inner in part.named("commands").items()
@@ -156,7 +156,7 @@ def _check_lease(part: Node, hold: Hold, problems: Problems) -> None:
 def _check_baud(
     held: list[tuple[Node, Command, Hold]], spec: TransportSpec, problems: Problems
 ) -> None:
-    """Report motion whose smallest frames already exceed the baud rate of a serial line."""
+    """Report held commands that need more than the baud rate of a serial line."""
     baud = spec.options.get("baud")
     if isinstance(baud, bool) or not isinstance(baud, (int, float)) or baud <= 0:
         return
@@ -179,7 +179,7 @@ def _check_baud(
 def _check_will(
     held: list[tuple[Node, Command, Hold]], spec: TransportSpec, problems: Problems
 ) -> None:
-    """Warn of motion through a broker without a last will that stops the robot."""
+    """Warn of held commands through an MQTT broker without a last will."""
     if spec.type != "mqtt" or spec.options.get("will") is not None:
         return
     part, command, _ = held[0]
@@ -194,12 +194,12 @@ def _check_will(
 
 
 def _bearable_ms(excess: float, held: list[tuple[Node, Command, Hold]]) -> int:
-    """Return the shortest repeat that the line can carry, if all commands slow down alike."""
+    """Return the shortest period in milliseconds for the line, if all periods grow equally."""
     return math.ceil(min(hold.repeat_s for _, _, hold in held) * excess * 1000 - 1e-6)
 
 
 def _notices(spec: TransportSpec, driver: Driver) -> bool:
-    """Return whether silence of the robot is noticed on a transport."""
+    """Return whether URC would notice a silent robot on a transport."""
     if spec.stale_after_s is not None or spec.timeouts.idle_s is not None:
         return True
     asked = [poll for poll in driver.polls if poll.transport == spec.name]
@@ -211,9 +211,9 @@ def _notices(spec: TransportSpec, driver: Driver) -> bool:
 
 
 def least_frame_bytes(send: WriteSpec, spec: TransportSpec) -> int:
-    """Return the smallest number of bytes of a frame, with those of its framing.
+    """Return the minimum size of a frame with its framing, in bytes.
 
-    A part that depends on values counts as one byte. Byte stuffing counts as none.
+    A part that depends on values counts as one byte. Byte stuffing is not counted.
     """
     frames = each_of(send)
     return sum(max(1, sum(_payload_bytes(one))) for one in frames) + len(frames) * _around(spec)

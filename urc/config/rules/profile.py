@@ -1,4 +1,4 @@
-"""The last pass: rules over a whole profile, all of them warnings."""
+"""The last pass: rules about a complete profile, which give only warnings."""
 
 import re
 from pathlib import PurePath
@@ -15,7 +15,7 @@ from urc.model.interface import Interface
 __all__ = ["check_profile"]
 
 _ENDINGS: Final = (".yaml", ".yml")
-"""Suffixes of document files; a text from another source has no file name."""
+"""File suffixes of documents; other sources of text have no file name."""
 
 
 def check_profile(
@@ -25,7 +25,7 @@ def check_profile(
     uses: NameUses,
     problems: Problems,
 ) -> None:
-    """Add a warning for each unused declaration, and for polls that are too fast."""
+    """Warn of unused declarations, inconsistent names, unfilled slots and fast polls."""
     _check_name(sources, problems)
     _check_unused(sources, driver, uses, problems)
     _check_slots(sources, interfaces, problems)
@@ -38,7 +38,7 @@ def check_profile(
 
 
 def _check_name(sources: Sources, problems: Problems) -> None:
-    """Warn of a robot whose file has another name than the robot."""
+    """Warn of a robot with a different name from its file."""
     file = PurePath(sources.root.document.file)
     name = sources.root.text("name")
     # In a package, the folder has the robot's name, and the file is always `robot.yaml`.
@@ -83,9 +83,9 @@ def _check_unused(sources: Sources, driver: Driver, uses: NameUses, problems: Pr
 
 
 def _check_slots(sources: Sources, interfaces: dict[str, Interface], problems: Problems) -> None:
-    """Warn of a slot that this document fills and no interface shows.
+    """Warn of a slot that the robot's document fills but no interface shows.
 
-    A driver's document fills slots for every interface, so only the slots of the robot are checked.
+    A driver's document may fill slots for other interfaces, so its slots are not checked.
     """
     if not sources.interfaces:
         return
@@ -103,9 +103,10 @@ def _check_slots(sources: Sources, interfaces: dict[str, Interface], problems: P
 
 
 def _check_unfilled(sources: Sources, interfaces: dict[str, Interface], problems: Problems) -> None:
-    """Warn of an empty slot in a robot's own grid.
+    """Warn of an unfilled slot in a robot's own grid.
 
-    An interface in its own document serves several drivers, and may have slots that a driver lacks.
+    An interface in a separate document is not checked, because it may serve several drivers with
+    different slots.
     """
     for name, interface in interfaces.items():
         part = sources.interfaces[name]
@@ -129,7 +130,7 @@ def _check_unfilled(sources: Sources, interfaces: dict[str, Interface], problems
 
 
 def _drawn(part: Node, slot: str) -> tuple[Node, int] | None:
-    """Return the first grid of an interface that shows a slot, and the offset in its text."""
+    """Return the first grid of an interface that shows a slot, and the slot's text offset."""
     for page in (part, *part.named("tabs").values()):
         one = page.get("grid")
         several = [*page.named("layouts").values(), *page.named("left_handed").values()]
@@ -143,7 +144,7 @@ def _drawn(part: Node, slot: str) -> tuple[Node, int] | None:
 def _check_pace(part: Node, poll: Poll, driver: Node, problems: Problems) -> None:
     """Warn of a poll whose reply timeout is longer than its period.
 
-    An explicit timeout up to the default gives no warning, because the default gives none either.
+    A declared timeout up to the default causes no warning, because the default causes none.
     """
     if poll.reply is None:
         return
@@ -168,7 +169,7 @@ def _check_pace(part: Node, poll: Poll, driver: Node, problems: Problems) -> Non
 
 
 def _place(part: Node, near: Node) -> str:
-    """Return the place of `part`, as seen from `near`."""
+    """Return the position of `part` as text, relative to `near`."""
     mark = part.document.at(part.path)
     file = part.document.source_of(part.path).file
     line = f"line {mark.span.line if mark else 1}"
@@ -176,7 +177,7 @@ def _place(part: Node, near: Node) -> str:
 
 
 def _check_rate(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn of polls that together exceed the request rate of their transport."""
+    """Warn of polls that exceed the request rate of their transport in total."""
     for name, transport in driver.transports.items():
         if not transport.min_gap_s:
             continue

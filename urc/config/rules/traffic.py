@@ -1,6 +1,6 @@
-"""Rules about the traffic of a transport: late motion, and polls that are too fast or too slow.
+"""Rules about the traffic of a transport, such as late motion and the rate of polls.
 
-All are warnings about declared values, never about defaults.
+All rules check declared values, never defaults.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ __all__ = ["check_traffic"]
 
 
 def check_traffic(part: Node, driver: Driver, problems: Problems) -> None:
-    """Add the warnings about the traffic and the motion of the driver at `part`."""
+    """Report problems of the traffic and motion of the driver at `part`."""
     for name, inner in part.named("commands").items():
         command = driver.commands[name]
         spec = driver.transports.get(command.transport)
@@ -37,7 +37,7 @@ def check_traffic(part: Node, driver: Driver, problems: Problems) -> None:
 
 
 def _check_counted(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn of commands that fill the robot's buffer without a reply that shows their end."""
+    """Warn of commands without a reply on a transport that counts the robot's unread bytes."""
     requests = [
         (inner, one.transport, one.reply, one.priority)
         for name, inner in part.named("commands").items()
@@ -63,7 +63,7 @@ def _check_counted(part: Node, driver: Driver, problems: Problems) -> None:
 
 
 def _check_ports(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn of two transports that listen on one port of this machine."""
+    """Warn of two transports that listen on the same port of this machine."""
     seen: dict[tuple[str, str, str], str] = {}
     for name, inner in part.named("transports").items():
         options = driver.transports[name].options
@@ -88,7 +88,7 @@ def _written(value: object) -> str:
 
 
 def _check_kept(part: Node, command: Command, problems: Problems) -> None:
-    """Report motion that a broker would keep or repeat."""
+    """Report a motion command that a broker would store or repeat."""
     attributes = command.send.options.get("attributes")
     if not isinstance(attributes, Mapping):
         return
@@ -106,7 +106,7 @@ def _check_kept(part: Node, command: Command, problems: Problems) -> None:
 
 
 def _check_pace(part: Node, command: Command, spec: TransportSpec, problems: Problems) -> None:
-    """Warn of a held command whose period is shorter than its rate limit allows."""
+    """Warn of a held command that repeats faster than its rate limit allows."""
     if command.hold is None:
         return
     repeat_s = command.hold.repeat_s
@@ -125,7 +125,7 @@ def _check_pace(part: Node, command: Command, spec: TransportSpec, problems: Pro
 
 
 def _check_silence(part: Node, spec: TransportSpec, driver: Driver, problems: Problems) -> None:
-    """Warn of a transport that counts as silent, or closes, between two polls."""
+    """Warn of a transport that becomes stale, or closes, between two polls."""
     if any(one.transport == spec.name for one in driver.messages.values()):
         return  # unsolicited messages come at an unknown rate
     periods = [poll.every_s for poll in driver.polls if poll.transport == spec.name and poll.reply]

@@ -1,7 +1,7 @@
-"""Checks that commands that seem to move the robot are marked, and that autonomous motion can end.
+"""Checks of unmarked motion commands, and of autonomous motion without an end.
 
-Signs of motion are the name of a command, the units and names of its arguments, and the type of its
-message. Only whole words match: ``moves_left`` is not ``move``.
+A command suggests motion by its name, by the units and names of its arguments, or by its message
+type. Only whole words match: ``moves_left`` does not match ``move``.
 """
 
 import re
@@ -23,20 +23,20 @@ _MOTION: Final = _words(
     "advance climb crawl dive dock drive fly follow goto hover jog jump launch move navigate orbit"
     " reverse roll rotate spin steer swim takeoff turn undock walk"
 )
-"""Words that mean motion at any place of a name."""
+"""Words that suggest motion at any position in a command's name."""
 _FIRST: Final = _words("back backward flip forward go home lift lower raise return")
-"""Words that mean motion at the start of a name."""
+"""Words that suggest motion at the start of a command's name."""
 _PAIRS: Final = frozenset(("go to", "set speed", "set velocity", "take off"))
-"""Pairs of words that mean motion at the start of a name."""
+"""Pairs of words that suggest motion at the start of a command's name."""
 _QUIET: Final = _words(
     "abort accept alarm arm brake calibrate cancel clear config configure disable disarm enable end"
     " error feedback finish get gain halt info init lamp led level light limit list load lock log"
     " max min mode name off offset on param pause ping query read reset save select show signal"
     " state status stop store subscribe test timeout trim tune unlock version volume zero"
 )
-"""Words that make a name harmless, such as ``drive_mode``."""
+"""Words that rule out motion, as in ``drive_mode``."""
 _BOUND: Final = _words("limit max maximum min minimum top")
-"""Words of arguments that limit a motion."""
+"""Words in the names of arguments that limit motion."""
 _MOVING_ARGUMENTS: Final = _words("omega rudder steering throttle thrust velocity vx vy vz")
 _MOVING_TYPES: Final = _words(
     "AckermannDrive AckermannDriveStamped JointJog JointTrajectory Twist TwistStamped"
@@ -53,7 +53,7 @@ _HINT_OF_STEPS: Final = (
 
 
 def check_unmarked(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn of each command and sequence that seems to move the robot and is not marked."""
+    """Warn of each command or sequence that suggests motion but is not marked as motion."""
     for key in ("commands", "sequences"):
         for name, inner in part.named(key).items():
             command = driver.commands[name]
@@ -72,9 +72,9 @@ def check_unmarked(part: Node, driver: Driver, problems: Problems) -> None:
 
 
 def check_unguarded(part: Node, driver: Driver, problems: Problems) -> None:
-    """Warn of autonomous motion that STOP cannot end and that needs no confirmation.
+    """Warn of autonomous motion without a stop command and without a confirmation.
 
-    A held command needs neither: its release ends it.
+    Held commands get no warning, because their release ends the motion.
     """
     if any(one.stops or one.hold is not None for one in driver.commands.values()):
         return
@@ -103,7 +103,7 @@ def _says_no(part: Node) -> bool:
 
 
 def why_it_moves(name: str, command: Command) -> str:
-    """Return why a command looks like motion, in words for people; "" when it does not."""
+    """Return the reason why a command suggests motion, in words, or "" without a reason."""
     if command.send.options.get("verb") == "cancel":
         return ""  # a cancel ends motion, whatever its name
     words = words_of(name)
@@ -123,7 +123,7 @@ def why_it_moves(name: str, command: Command) -> str:
 
 
 def words_of(name: str) -> tuple[str, ...]:
-    """Return the words of ``go_to``, ``GoTo`` or ``GO2``, in lower case."""
+    """Return the words of a name such as ``go_to``, ``GoTo`` or ``GO2``, in lower case."""
     return tuple(found[0].lower() for found in _WORD.finditer(name))
 
 
@@ -136,7 +136,7 @@ def _motion_word(words: tuple[str, ...]) -> str:
 
 
 def _type_of_motion(send: Mapping[str, object]) -> str:
-    """Return why the type of a message means motion; "" when it does not."""
+    """Return the reason why a message type suggests motion, or "" without a reason."""
     attributes = send.get("attributes")
     kind = attributes.get("type") if isinstance(attributes, Mapping) else None
     if not isinstance(kind, str):

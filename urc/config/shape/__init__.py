@@ -1,1 +1,1 @@
-"""The shape of a document: its schema, and the differences as problems."""
+"""Checks of documents against their schemas."""

@@ -1,7 +1,7 @@
-"""The shape pass: does a document fit the schema of its kind?
+"""The shape pass: a check of a document against the schema of its kind.
 
-The fast check of `urc.config.schemas` comes first. Other documents go to `jsonschema`, and
-`urc.config.shape.report` rewords its errors.
+The fast check of `urc.config.schemas` accepts valid documents. The library `jsonschema` checks all
+other documents, and `urc.config.shape.report` rewords its errors.
 """
 
 import math
@@ -18,7 +18,7 @@ __all__ = ["check_inline", "check_options", "check_shape", "check_source"]
 
 
 def check_shape(document: Document) -> list[Problem]:
-    """Return every difference between a document and the schema of its kind."""
+    """Return a problem for every difference between a document and the schema of its kind."""
     kind = kind_of(document)
     if not kind:
         return [_without_kind(document)]
@@ -40,11 +40,10 @@ def check_shape(document: Document) -> list[Problem]:
 
 
 def check_source(document: Document) -> list[Problem]:
-    """Return the problems of one source of a merged document.
+    """Check one source of a merged document for problems that the merge would hide.
 
-    These are unknown keys, and keys that only the source has. The merge may lose both, and with
-    them the problem. A missing key may come from another source, so the merged document is checked
-    too.
+    The merge may remove unknown keys, and keys that only the source may have. Missing keys are not
+    reported, because another source may add them. The shape pass also checks the merged document.
     """
     if not kind_of(document):
         return [_without_kind(document)]
@@ -65,7 +64,7 @@ def check_source(document: Document) -> list[Problem]:
 
 
 _OWN_KEYS: Final = ("urc", "extends", "include", "partial")
-"""Keys that are never merged into another document."""
+"""Keys that a merge never copies into another document."""
 
 
 @cache
@@ -80,7 +79,7 @@ def _source_schema(name: str) -> Mapping[str, Any]:
 
 
 def _optional(schema: Any) -> Any:
-    """Return a schema without required keys, except those that choose between kinds."""
+    """Return a schema without required keys, except keys that select a schema branch."""
     if isinstance(schema, list):
         return [_optional(item) for item in schema]
     if not isinstance(schema, dict):
@@ -93,7 +92,7 @@ def _optional(schema: Any) -> Any:
 
 
 def _without_nothing(value: object) -> object:
-    """Return data without null values, which remove something."""
+    """Return data without null values, which would remove keys in a merge."""
     if isinstance(value, dict):
         return {key: _without_nothing(item) for key, item in value.items() if item is not None}
     if isinstance(value, list):
@@ -104,9 +103,9 @@ def _without_nothing(value: object) -> object:
 def check_options(
     document: Document, path: Path, value: object, options: Mapping[str, object]
 ) -> list[Problem]:
-    """Return every difference between a slot's options and the widget's manifest.
+    """Return a problem for every difference between a slot's options and the widget's manifest.
 
-    `options` has the JSON Schema of each option.
+    `options` contains the JSON Schema of each option.
     """
     schema = {
         "title": "the options of this widget",
@@ -120,7 +119,7 @@ def check_options(
 def check_inline(
     document: Document, path: Path, value: object, schema: Mapping[str, Any]
 ) -> list[Problem]:
-    """Return every difference between a part of a document and a schema that refers to no file."""
+    """Return the problems of a part of a document; `schema` must not refer to a file."""
     if shipped_check().is_valid_inline(schema, value):
         return []
     from urc.config.shape.report import report

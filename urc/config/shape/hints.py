@@ -1,4 +1,4 @@
-"""Hints for a document of the wrong shape."""
+"""Hints for documents that do not match their schema."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -33,7 +33,7 @@ _OTHER_WORDS: Final = {
     "message": ("text",),
     "license": ("licence",),
 }
-"""Keys of other tools → keys here."""
+"""Key of another tool → key of URC."""
 _SAME_TYPES: Final = {
     "float": "number",
     "double": "number",
@@ -48,7 +48,7 @@ _SAME_TYPES: Final = {
     "picture": "image",
     "bytes": "blob",
 }
-"""Types of other tools → types here."""
+"""Type name of another tool → type name of URC."""
 _URL: Final = re.compile(r"[a-z]+://(?P<host>[^/:?#]+)(?::(?P<port>[0-9]+))?(?P<path>/[^?#]+)?")
 _FRAMING: Final = "framing: { type: delimiter, tx: LF, rx: LF }"
 _ELSEWHERE: Final = {
@@ -56,11 +56,11 @@ _ELSEWHERE: Final = {
     ("signal", "command"): "bind an input to the name of a signal, such as level: battery;"
     " only an output takes 'command'",
 }
-"""A misplaced key, and a key that identifies the place → the hint for it."""
+"""(Misplaced key, another valid key of the same mapping) → hint."""
 
 
 def key_hint(key: str, known: Mapping[str, Any], value: object = None, path: Path = ()) -> str:
-    """Return the known key that an unknown key probably means, with its value."""
+    """Return a hint with the known key that an unknown key probably means."""
     renamed = renamed_hint(path, key, known)
     if renamed:
         return renamed
@@ -79,7 +79,7 @@ def key_hint(key: str, known: Mapping[str, Any], value: object = None, path: Pat
 
 
 def _place_hint(value: object, known: Mapping[str, Any]) -> str:
-    """Return a URL in the keys of a transport."""
+    """Return a hint with the host and port of a URL, in the keys of a transport."""
     found = _URL.match(value) if isinstance(value, str) else None
     if found is None:
         return "write 'host' and 'port', such as host: robot.local, port: 9090"
@@ -91,7 +91,7 @@ def _place_hint(value: object, known: Mapping[str, Any]) -> str:
 
 
 def word_hint(word: str, words: Sequence[str]) -> str:
-    """Return the word of `words` that an unknown word probably means; "" when none is similar."""
+    """Return a hint with the known word that an unknown word probably means, or ""."""
     other = _SAME_TYPES.get(word.lower(), "")
     if other in words:
         return f"the word is '{other}' here"
@@ -100,7 +100,7 @@ def word_hint(word: str, words: Sequence[str]) -> str:
 
 
 def example_of(schema: Mapping[str, Any], key: str) -> str:
-    """Return an example of a missing key; "" where the schema has none."""
+    """Return the schema's example of a missing key, or ""."""
     inner = schema.get("properties", {}).get(key, {})
     examples = inner.get("examples") or ()
     if key == "framing":
@@ -112,7 +112,7 @@ def example_of(schema: Mapping[str, Any], key: str) -> str:
 
 
 def mapping_hint(document: Document, path: Path, value: object, schema: Mapping[str, Any]) -> str:
-    """Return the first example of a mapping, with `value` in it if it is a delimiter."""
+    """Return the schema's first example of a mapping; a delimiter in it is replaced by `value`."""
     if _is_filled_in(document, path):
         return ""
     example = next((one for one in schema.get("examples", ()) if isinstance(one, dict)), None)
@@ -141,7 +141,7 @@ def _quoted(value: object) -> str:
 def type_hint(
     document: Document, path: Path, value: object, types: Sequence[str], *, is_duration: bool
 ) -> str:
-    """Return how a value of a wrong type could become one of `types`, or ""."""
+    """Return a hint for the conversion of a value to one of `types`, or ""."""
     if value is None:
         return "give it a value, or remove the key"
     if is_duration and isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -163,7 +163,7 @@ def type_hint(
 
 
 def _written(document: Document, path: Path) -> str:
-    """Return a scalar as written in the text."""
+    """Return the source text of a scalar."""
     mark = document.at(path)
     if mark is None or mark.span.line != mark.span.end_line:
         return ""

@@ -1,6 +1,6 @@
-"""`jsonschema`'s errors as problems in plain words, exact at the key or value.
+"""Conversion of errors from `jsonschema` to problems with exact positions.
 
-Imported only for an invalid document: `jsonschema` costs 80 ms.
+URC imports this module only for invalid documents, because `jsonschema` takes 80 ms to import.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -28,16 +28,16 @@ __all__ = ["report"]
 
 
 class _Error(NamedTuple):
-    """One error of the library."""
+    """One error from `jsonschema`."""
 
     keyword: str
     limit: Any
-    """The value of the keyword in the schema."""
+    """Value of the keyword in the schema."""
     value: Any
-    """The value in the document."""
+    """Invalid value in the document."""
     schema: Mapping[str, Any]
     is_name: bool
-    """Whether the error is about the name of a key."""
+    """Whether the error concerns the name of a key."""
 
 
 _Read = Callable[[str], Mapping[str, Any]]
@@ -57,9 +57,9 @@ _EXPECTED: Final = {
 def report(
     document: Document, schema: Mapping[str, Any], read: _Read, path: Path = (), value: Any = None
 ) -> list[Problem]:
-    """Return the problems, deepest first.
+    """Return the problems of a document, with the deepest paths first.
 
-    The schema describes the part at `path`. `read` returns another schema by its file name.
+    The schema describes the part at `path`. `read` returns the schema with a given file name.
     """
     registry: Registry[Any] = Registry(  # type: ignore[call-arg]  # alias of attrs, unknown to mypy
         retrieve=lambda uri: Resource.from_contents(read(uri), DRAFT202012)
@@ -85,7 +85,7 @@ def report(
 def _branches(
     validator: Any, condition: Any, instance: Any, schema: Mapping[str, Any]
 ) -> Iterator[ValidationError]:
-    """Check ``then`` or ``else``; a key that is missing there is missing from the schema above."""
+    """Check ``then`` or ``else``; report their missing keys as missing in the outer schema."""
     branch = "then" if validator.evolve(schema=condition).is_valid(instance) else "else"
     for error in validator.descend(instance, schema.get(branch, True), schema_path=branch):
         if not error.path and "properties" in schema and "properties" not in error.schema:
@@ -151,7 +151,7 @@ def _missing_keys(document: Document, path: Path, error: _Error) -> list[Problem
 
 
 def _wrong_name(document: Document, path: Path, error: _Error) -> list[Problem]:
-    """Return a problem of an invalid name; the path of the error is the path of the mapping."""
+    """Return a problem with an invalid key name; `path` is the path of the mapping."""
     if not isinstance(error.value, str):
         return [_other_one(document, path, error)]
     message = f"{_cut(error.value)} is not a valid name here"
@@ -245,7 +245,7 @@ def _other_one(document: Document, path: Path, error: _Error) -> Problem:
 
 
 def _in_names(tell: _Report) -> _Report:
-    """Wrap a report, because an error about a key's name carries the path of the mapping."""
+    """Wrap a report function for errors about key names, which have the path of the mapping."""
 
     def choose(document: Document, path: Path, error: _Error) -> list[Problem]:
         return (_wrong_name if error.is_name else tell)(document, path, error)

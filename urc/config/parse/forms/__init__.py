@@ -1,1 +1,1 @@
-"""Forms of frames, one module each; `urc.config.parse.form` has the table."""
+"""Parsers of the forms of frames, with one module for each form."""

@@ -1,4 +1,4 @@
-"""Pieces of bytes with expressions between them, for the forms ``hex`` and ``bytes``."""
+"""Constant bytes and expressions in one frame, for the forms ``hex`` and ``bytes``."""
 
 from collections.abc import Sequence
 from typing import NamedTuple, cast
@@ -13,16 +13,16 @@ Piece = bytes | Template
 
 
 class Placed(NamedTuple):
-    """One piece, and its place under the form's key."""
+    """One piece of a frame, and its path under the form's key."""
 
     piece: Piece
     path: tuple[int, ...] = ()
     offset: int = 0
-    """Offset of the expression in its text."""
+    """Offset of the expression in its text, in characters."""
 
 
 def spec_of(form: str, pieces: Sequence[Placed]) -> WriteSpec:
-    """Return the form `form` of `pieces`."""
+    """Return the declaration of a frame in the form `form` from its pieces."""
     templates = [
         (path, _moved(one, offset)) for one, path, offset in pieces if isinstance(one, Template)
     ]
@@ -33,12 +33,12 @@ def spec_of(form: str, pieces: Sequence[Placed]) -> WriteSpec:
 
 
 def _moved(template: Template, offset: int) -> Template:
-    """Return the expression with leading blanks, so that its names keep their columns."""
+    """Return the expression with leading spaces, so that error positions stay correct."""
     source = " " * offset + template.source
     return Template(source, template.python, template.names, template.settings)
 
 
 def templates_at(part: Node, spec: WriteSpec) -> list[tuple[Node, Template]]:
-    """Return every expression with its place."""
+    """Return every expression with its position."""
     uses = cast("tuple[tuple[tuple[int, ...], Template], ...]", spec.options.get("uses", ()))
     return [(part.items()[path[0]] if path else part, template) for path, template in uses]

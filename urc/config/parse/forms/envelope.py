@@ -1,7 +1,8 @@
-"""The forms of message transports: publish, call, goal, request.
+"""The forms of message transports: `publish`, `call`, `goal` and `request`.
 
-An envelope has an address, whose values may be templates, and a body in one of the other forms.
-``stamped`` turns a ROS message into its stamped type here, so the engine needs no rule for it.
+An envelope has an address and a body. The address may contain templates, and the body has one of
+the other forms. With ``stamped``, the parser converts a ROS message to its stamped type, so the
+engine needs no special case.
 """
 
 from collections.abc import Iterable
@@ -31,11 +32,11 @@ _STAMPED: Final = {
     "Vector3": "vector",
     "Wrench": "wrench",
 }
-"""Type of geometry_msgs → its field in the stamped type (common_interfaces)."""
+"""Type of geometry_msgs → field name of its value in the stamped type (common_interfaces)."""
 
 
 def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
-    """Return the envelope at `part`, whose key is its verb."""
+    """Return the envelope at `part`; the key of `part` is the envelope's verb."""
     body = body_form(part)
     spec = body[1].parse_write(body[0], problems, context) if body else None
     before = len(problems.problems)
@@ -79,7 +80,7 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
 
 
 def _stamped_type(part: Node, kind: object, problems: Problems) -> str | None:
-    """Return the type at `part` if it has a stamped type; else report it."""
+    """Return the type at `part`; report a type without a known stamped type."""
     package, _, name = str(kind).replace("/msg/", "/").partition("/")
     if package == "geometry_msgs" and name in _STAMPED and "json" in part.data:
         return str(kind)
@@ -94,14 +95,14 @@ def _stamped_type(part: Node, kind: object, problems: Problems) -> str | None:
 
 
 def _stamped(kind: str, spec: WriteSpec) -> WriteSpec:
-    """Return the body in its stamped type; rosbridge replaces ``now`` with its own time."""
+    """Return the body in its stamped type; rosbridge replaces ``now`` with the current time."""
     header = {"stamp": "now", "frame_id": ""}
     tree = {"header": header, _STAMPED[kind.rpartition("/")[2]]: spec.options["tree"]}
     return spec._replace(options={"tree": tree})
 
 
 def _unstamped(part: Node, spec: WriteSpec) -> WriteSpec:
-    """Return the body as written in the document."""
+    """Return the body in the form of the document."""
     tree = spec.options.get("tree")
     if not part.data.get("stamped") or not isinstance(tree, dict):
         return spec
@@ -109,7 +110,7 @@ def _unstamped(part: Node, spec: WriteSpec) -> WriteSpec:
 
 
 def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
-    """Return every template of the envelope, with its place."""
+    """Return every template of the envelope, with its position."""
     attributes = spec.options.get("attributes")
     if isinstance(attributes, dict):
         for name, tree in attributes.items():

@@ -1,4 +1,4 @@
-"""The form ``equals``: the frame is exactly one text."""
+"""The form ``equals``: the frame is a constant text."""
 
 from typing import Any
 
@@ -22,5 +22,5 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
-    """Return the place of the text, which has no fields."""
+    """Return the position of the text, because the form has no fields."""
     return part, {}

@@ -1,4 +1,4 @@
-"""Several frames of one command: a list under ``send:``, each item in its own form."""
+"""Several frames of one command: a list under ``send:`` with a form for each item."""
 
 from collections.abc import Iterable
 
@@ -11,7 +11,7 @@ __all__ = ["parse_write", "templates"]
 
 
 def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
-    """Return the frames at `part`, in their order."""
+    """Return the frames at `part`, in the order of the list."""
     if context.framing is not None and context.framing.type == "datagram":
         problems.error(
             part,
@@ -43,7 +43,7 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
 
 
 def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
-    """Return every template in all frames, with its place."""
+    """Return every template of all frames, with its position."""
     for item, one in zip(part.items(), each_of(spec), strict=True):
         inner, form = write_form(item)
         yield from form.templates(inner, one)

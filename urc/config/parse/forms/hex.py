@@ -1,4 +1,4 @@
-"""The form ``hex``: bytes as pairs of hex digits, with expressions of a given width."""
+"""The form ``hex``: pairs of hex digits, and expressions with a given width."""
 
 import re
 from collections.abc import Iterable

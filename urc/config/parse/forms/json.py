@@ -1,6 +1,7 @@
-"""The form ``json``: fields from a JSON document, by JMESPath.
+"""The form ``json``: fields of a JSON document, addressed by JMESPath expressions.
 
-Plain paths (``a.b[0].c``) become tuples for the engine; only other paths need the library.
+Plain paths such as ``a.b[0].c`` become tuples for the engine. Only other paths need the JMESPath
+library.
 """
 
 import re
@@ -19,7 +20,7 @@ _STEP = re.compile(r'([A-Za-z_][A-Za-z0-9_]*)|"([^"\\]+)"|\[([0-9]+)\]')
 
 
 def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
-    """Return the path of each field: plain, or a compiled expression."""
+    """Return the path of each field, as a tuple or as a compiled expression."""
     paths: dict[str, object] = {}
     is_good = True
     for name, inner in part.entries().items():
@@ -30,7 +31,7 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
-    """Return the place of the field."""
+    """Return the position of the field."""
     return part.must(field), {"key": True}
 
 

@@ -1,4 +1,4 @@
-"""The form ``json`` of sent frames: any value, with templates in its leaves."""
+"""The form ``json`` of sent frames: any JSON value, with templates in its texts."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -12,7 +12,7 @@ __all__ = ["compiled_tree", "parse_write", "placed_templates", "templates", "tem
 
 
 def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
-    """Return the value at `part`, with compiled templates."""
+    """Return the value at `part` with compiled templates."""
     before = len(problems.problems)
     tree = compiled_tree(part, problems)
     if len(problems.problems) > before:
@@ -24,12 +24,12 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
 
 
 def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
-    """Return every template of the value, with its place."""
+    """Return every template of the value, with its position."""
     return placed_templates(part, spec.options.get("tree"))
 
 
 def compiled_tree(part: Node, problems: Problems) -> Any:
-    """Return the value at `part`, with each text in braces as a template."""
+    """Return the value at `part`, and compile each text with braces as a template."""
     if isinstance(part.data, dict):
         for name, inner in part.entries().items():
             if "{{" in name:
@@ -53,7 +53,7 @@ def templates_in(tree: Any) -> Iterator[Template]:
 
 
 def placed_templates(part: Node, tree: Any) -> Iterator[tuple[Node, Template]]:
-    """Yield every template in a tree, with its place."""
+    """Yield every template in a tree, with its position."""
     if isinstance(tree, Template):
         yield part, tree
     elif isinstance(tree, dict):

@@ -1,4 +1,4 @@
-"""The form ``pattern``: the frame as received, with {name:kind} at the places of fields."""
+"""The form ``pattern``: the text of a frame, with {name:kind} in place of each field."""
 
 import re
 from typing import Any, Final, cast, get_args
@@ -15,11 +15,11 @@ _KINDS: Final = get_args(FieldKind)
 _PIECE = re.compile(r"\{\{|\}\}|\{([^{}]*)\}|[{}]")
 _FIELD = re.compile(r"(_?[A-Za-z][A-Za-z0-9_]*)?:([a-z]+)(?::([1-9][0-9]{0,3}))?")
 _EATS: Final = {"integer": "0123456789", "number": "0123456789.eE", "hex": "0123456789abcdefABCDEF"}
-"""Possible last characters of a field; the text after it cannot start with one of them."""
+"""Kind of a field → characters that the text after the field must not start with."""
 
 
 class _Fault(Exception):
-    """A mistake in a pattern, and its place."""
+    """A mistake in a pattern, with its position."""
 
     def __init__(self, message: str, offset: int, length: int = 1, hint: str = "") -> None:
         super().__init__(message)
@@ -38,12 +38,12 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
-    """Return the place of the field in the pattern."""
+    """Return the position of the field in the pattern."""
     return part, {"offset": str(part.data).find("{" + field + ":") + 1, "length": len(field)}
 
 
 def _parse(text: str) -> tuple[tuple[PatternField, ...], str]:
-    """Return the fields with the literal before each, and the literal after the last."""
+    """Return the fields with the literal text before each field, and the text after all fields."""
     holes: list[PatternField] = []
     literal, position = "", 0
     last = (0, 0)

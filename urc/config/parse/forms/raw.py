@@ -1,4 +1,4 @@
-"""The form ``raw``: the whole frame is one field."""
+"""The form ``raw``: one field with the whole frame."""
 
 from typing import Any
 
@@ -15,5 +15,5 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
-    """Return the place of the field."""
+    """Return the position of the field."""
     return part, {}

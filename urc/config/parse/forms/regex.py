@@ -1,4 +1,4 @@
-"""The form ``regex``: named groups of a pattern are the fields."""
+"""The form ``regex``: a regular expression with a named group for each field."""
 
 from typing import Any
 
@@ -18,5 +18,5 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
-    """Return the place of the group `field` in the pattern."""
+    """Return the position of the group `field` in the pattern."""
     return part, {"offset": str(part.data).find(f"<{field}>") + 1, "length": len(field)}

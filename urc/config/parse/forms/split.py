@@ -1,4 +1,4 @@
-"""The form ``split``: parts of the frame between separators are the fields."""
+"""The form ``split``: fields between separators."""
 
 from typing import Any
 
@@ -42,7 +42,7 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
-    """Return the place of the field."""
+    """Return the position of the field."""
     for inner in part.listed("fields"):
         if inner.data in (field, field + _MORE):
             return inner, {}

@@ -26,7 +26,7 @@ Uses = tuple[tuple[tuple[str | int, ...], Template], ...]
 
 
 def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
-    """Return the items at `part`, with their ids as fields."""
+    """Return the items at `part`; their ids are the fields of the frame."""
     before = len(problems.problems)
     parser = ItemParser(problems, context.types, context.enums, "read", context.encoding)
     items = parser.items(part)
@@ -37,7 +37,7 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
 
 
 def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
-    """Return the items at `part`, with the ids as arguments unless they are computed."""
+    """Return the items at `part`; ids without a computed value are arguments."""
     before = len(problems.problems)
     parser = ItemParser(problems, context.types, context.enums, "send", context.encoding)
     items = parser.items(part)
@@ -63,7 +63,7 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
 def _check_size(
     part: Node, items: tuple[Item, ...], framing: FramingSpec | None, problems: Problems
 ) -> None:
-    """Report items that do not fit the frames of the transport."""
+    """Report items that are larger or smaller than the frames of the transport."""
     if framing is None:
         return
     layout = framing.options.get("layout")
@@ -82,7 +82,7 @@ def _check_size(
 
 
 def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
-    """Return every argument and expression with its place."""
+    """Return every argument and expression with its position."""
     for path, template in cast("Uses", spec.options.get("uses", ())):
         inner = part
         for step in path:
@@ -93,7 +93,7 @@ def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
 
 
 def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
-    """Return the place of the item that sets `field`."""
+    """Return the position of the item that sets `field`."""
     nearest = part
     for place, name in _named(part, ""):
         if name == field:
@@ -110,7 +110,7 @@ def _inside(place: Node, name: str) -> dict[str, Any]:
 
 
 def _named(part: Node, outer: str) -> Iterator[tuple[Node, str]]:
-    """Yield place and name of every named item, and of nameless types with ""."""
+    """Yield node and name of every item with a name or a type; the name may be ""."""
     for item in part.items():
         if isinstance(item.data, str):
             _, _, name = item.data.strip().partition(" ")

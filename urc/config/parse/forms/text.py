@@ -1,4 +1,4 @@
-"""The form ``text``: a template, as written under ``send:``."""
+"""The form ``text``: a template with text and expressions."""
 
 from collections.abc import Iterable
 from typing import cast
@@ -20,5 +20,5 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
 
 
 def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
-    """Return the one template."""
+    """Return the only template."""
     yield part, cast("Template", spec.options["template"])

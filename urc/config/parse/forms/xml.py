@@ -1,4 +1,4 @@
-"""The form ``xml``: fields from an XML document, by the path of their elements."""
+"""The form ``xml``: fields of an XML document, addressed by the paths of their elements."""
 
 import re
 from typing import Any
@@ -17,7 +17,7 @@ _STEP = re.compile(
 _TEST = re.compile(rf"""\[@({_NAME})=(?:'([^']*)'|"([^"]*)")\]""")
 _ATTRIBUTE = re.compile(r"@([A-Za-z_][\w.:-]*)")
 _PIECE = re.compile(r"(?:\[[^\]]*\]|[^/\[])*")
-"""Text up to the next slash outside of brackets."""
+"""Pattern of the text before the next slash outside brackets."""
 
 
 def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
@@ -40,7 +40,7 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
-    """Return the place of the field."""
+    """Return the position of the field."""
     return part.must(field), {"key": True}
 
 
@@ -72,7 +72,7 @@ def _path(part: Node, problems: Problems) -> XmlPath | None:
 
 
 def _piece(path: str, offset: int) -> str:
-    """Return the step at `offset`, with its brackets."""
+    """Return the path step at `offset`, including its brackets."""
     found = _PIECE.match(path, offset)
     end = found.end() if found else offset
     # An unclosed bracket takes the rest as one step, which is then reported.

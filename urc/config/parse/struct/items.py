@@ -1,7 +1,8 @@
-"""The items of a ``struct:``, or of an entry of ``types:``: list → `Item`s.
+"""Parser of the items of a struct or a reusable type: list → `Item` values.
 
-An `ItemParser` reads one scope: the ids that its expressions can name. `_KEYS` has the keys of each
-kind of item; `numbers` checks numbers, constants and enums.
+An `ItemParser` reads the items of one scope; expressions can refer to all ids of their scope. The
+table `_KEYS` contains the keys of each kind of item. The module `numbers` checks numbers, constants
+and enums.
 """
 
 from collections.abc import Mapping
@@ -29,9 +30,9 @@ Purpose = Literal["read", "send", "type"]
 Items = tuple[Item, ...]
 
 MOST_ITEMS: Final = 2000
-"""Maximum items of one frame, including those of its types."""
+"""Maximum number of items in one frame, including the items of its types."""
 DEEPEST: Final = 16
-"""Maximum nesting of types and switches."""
+"""Maximum nesting depth of types and switches."""
 _NUMBER: Final = ("id", "type", "count", "if", "enum", "const", "valid", "scale", "offset", "value")
 _KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "number": _NUMBER,
@@ -66,7 +67,7 @@ class ItemParser:
         self.leaves = LeafParser(problems, enums, self.scope)
 
     def items(self, part: Node) -> Items:
-        """Return the items of the list at `part`, without the invalid items."""
+        """Return the valid items of the list at `part`; report the invalid items."""
         found: list[Item | None] = []
         total = 0
         for inner in part.items():
@@ -81,7 +82,7 @@ class ItemParser:
         return tuple(item for item in found if item is not None)
 
     def _check_rest(self, part: Node, found: list[Item | None]) -> None:
-        """Report an item after another item that takes the rest of the frame."""
+        """Report an item after an item that takes the rest of the frame."""
         for place, item in enumerate(found[:-1]):
             extents = (item.size, item.times) if item is not None else ()
             if any(extent is not None and extent.kind == "rest" for extent in extents):
@@ -105,7 +106,7 @@ class ItemParser:
         return item
 
     def _short(self, part: Node) -> Item | None:
-        """Return an item such as ``u8 8``, ``i32be rpm`` or ``header``."""
+        """Return an item in short notation, such as ``u8 8``, ``i32be rpm`` or ``header``."""
         word, _, rest = part.data.strip().partition(" ")
         rest = rest.strip()
         items = self.types.get(word)
@@ -132,7 +133,7 @@ class ItemParser:
         return Item(kind_of(number), "", number, const=constant)
 
     def _long(self, part: Node) -> Item | None:
-        """Return an item from a mapping."""
+        """Return an item in the notation of a mapping."""
         kind = self._kind(part)
         if kind is None:
             return None
@@ -234,7 +235,7 @@ class ItemParser:
         return item
 
     def _extent(self, part: Node | None) -> Extent | None:
-        """Return a size or count: a number, ``rest``, a type before the item, or an expression."""
+        """Return a size or count: a number, ``rest``, a preceding type, or an expression."""
         if part is None:
             return None
         if not isinstance(part.data, str):
@@ -283,7 +284,7 @@ class ItemParser:
         return items
 
     def _check_case(self, part: Node, subject: Item | None) -> None:
-        """Report a case for a value that the item can never have."""
+        """Report a case for a value that the subject can never have."""
         key = case_key(part.name)
         if subject is None or subject.kind not in ("number", "coded"):
             return
@@ -300,7 +301,7 @@ class ItemParser:
             check_fits(part, subject.number, key, self.problems, key=True)
 
     def _check_sent(self, part: Node, item: Item) -> None:
-        """Report an item of a sent struct that has no value."""
+        """Report an item without a value in a sent struct."""
         if self.purpose == "send" and asks_for_the_end(item):
             self.problems.error(
                 part,
@@ -324,7 +325,7 @@ class ItemParser:
 
 
 def _without_rest(items: Items) -> Items:
-    """Return the items without padding at the end that takes the rest of a longer window."""
+    """Return the items without a final padding of the size ``rest``."""
     is_rest = bool(items) and items[-1].size is not None and items[-1].size.kind == "rest"
     return items[:-1] if is_rest and items[-1].kind == "padding" else items
 
@@ -350,7 +351,7 @@ def _inner(item: Item) -> list[Items]:
 
 
 def asks_for_the_end(item: Item) -> bool:
-    """Return whether the size or choice of an item depends on the size of the whole frame."""
+    """Return whether an item's size, count or switch depends on the size of the whole frame."""
     by = None if item.switch is None else item.switch.by
     extents = [extent.expression for extent in (item.size, item.times) if extent is not None]
     if any(one is not None and one.names & FRAME_NAMES for one in (by, *extents)):
@@ -359,7 +360,7 @@ def asks_for_the_end(item: Item) -> bool:
 
 
 def weight_of(item: Item | None) -> int:
-    """Return the number of items that an item expands to; its types were checked before."""
+    """Return the number of items after the expansion of an item."""
     if item is None:
         return 0
     return 1 + sum(weight_of(one) for items in _inner(item) for one in items)

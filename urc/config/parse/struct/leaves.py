@@ -1,4 +1,4 @@
-"""Items of a ``struct:`` without inner items: numbers, bits, packed arrays, text and bytes."""
+"""Parsers of items without inner items: numbers, bits, packed arrays, text and bytes."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -46,7 +46,7 @@ class LeafParser:
         )
 
     def packed(self, part: Node, name: str, times: Extent | None) -> Item | None:
-        """Return an array of numbers that take no whole bytes, such as ``u11``."""
+        """Return an array of numbers that are not whole bytes, such as ``u11``."""
         parser, number, count = (
             NumberParser(part, self.problems),
             width_of(part.text("type")),
@@ -112,7 +112,7 @@ class LeafParser:
 
 
 def parse_content(part: Node, item: Item, encoding: str, problems: Problems) -> Item | None:
-    """Return `item`, of text or bytes, with its constant, its padding and its end."""
+    """Return an item of text or bytes with its constant, padding and end."""
     own = part.text("encoding")
     until = _bytes(part.get("until"), own or encoding, problems)
     const = _bytes(part.get("const"), own or encoding, problems)

@@ -1,4 +1,4 @@
-"""Numbers of a ``struct:``: widths, constants, enums and ranges, checked against their types."""
+"""Parsers of a struct's numbers: widths, constants, enums and ranges."""
 
 from collections.abc import Iterable, Mapping
 from typing import Final
@@ -25,7 +25,7 @@ _WORDS: Final[Mapping[str, int | float | bool]] = {"true": True, "false": False}
 
 
 def written_constant(text: str) -> int | float | bool | None:
-    """Return the constant of a short item, or None when the text is a name."""
+    """Return the constant in a short item, or None when the text is a name."""
     if text in _WORDS:
         return _WORDS[text]
     try:
@@ -43,7 +43,7 @@ def written_constant(text: str) -> int | float | bool | None:
 def unknown_type(
     part: Node, word: str, types: Iterable[str], problems: Problems, *, only_types: bool = False
 ) -> None:
-    """Report a word that is not a type."""
+    """Report an unknown type, and suggest a known type."""
     if width_of(word) is not None and number_of(f"{word}be") is None:
         hint = f"only arrays may have numbers of {word[1:]} bits: {{ type: {word}, count: 16 }}"
     elif number_of(f"{word}be") is not None:
@@ -60,7 +60,7 @@ def unknown_type(
 def check_fits(
     part: Node, number: Number, value: object, problems: Problems, *, key: bool = False
 ) -> None:
-    """Report a constant that its type cannot hold."""
+    """Report a constant outside the range of its type."""
     if number.kind == "float":
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
         is_fine = is_number and abs(value) <= _LARGEST[number.bits]  # type: ignore[arg-type]
@@ -84,7 +84,7 @@ class NumberParser:
         self._problems = problems
 
     def width(self) -> Number:
-        """Return the number of one field of ``bits``."""
+        """Return the number type of one bit field."""
         return Number(
             "integer",
             self._part.integer("width") or 1,
@@ -92,7 +92,7 @@ class NumberParser:
         )
 
     def constant(self, number: Number) -> int | float | bool | None:
-        """Return ``const``."""
+        """Return the value under ``const``, or None."""
         inner = self._part.get("const")
         if inner is None:
             return None
@@ -105,7 +105,7 @@ class NumberParser:
         return inner.data if is_number else 0
 
     def scale(self) -> float:
-        """Return ``scale``; report 0, which would make every number the same."""
+        """Return the value under ``scale``; report a scale of 0 and return 1."""
         inner = self._part.get("scale")
         if inner is not None and isinstance(inner.data, str):
             return fraction_of(inner.data)
@@ -116,7 +116,7 @@ class NumberParser:
 
 
 def parse_valid(part: Node, problems: Problems) -> tuple[float, float] | None:
-    """Return ``valid``."""
+    """Return the valid range under ``valid``, or None."""
     inner = part.get("valid")
     if inner is None:
         return None
@@ -129,12 +129,12 @@ def parse_valid(part: Node, problems: Problems) -> tuple[float, float] | None:
 
 
 def parse_enums(part: Node, problems: Problems) -> dict[str, Enum]:
-    """Return the driver's ``enums:``."""
+    """Return the driver's enums by name."""
     return {name: _enum(inner, problems) for name, inner in part.named("enums").items()}
 
 
 def parse_enum(part: Node, number: Number, enums: Mapping[str, Enum], problems: Problems) -> Enum:
-    """Return ``enum`` of an item: an enum of the driver, or its own."""
+    """Return the enum of an item: an inline enum, or an enum of the driver."""
     inner = part.get("enum")
     if inner is None:
         return ()

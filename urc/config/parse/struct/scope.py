@@ -1,4 +1,4 @@
-"""The names for the expressions of one struct, each declared only once."""
+"""The scope of one struct: the unique names that its expressions may use."""
 
 from collections.abc import Iterator
 from typing import Literal
@@ -12,27 +12,27 @@ __all__ = ["Scope"]
 
 
 class Scope:
-    """The names known at one point of a struct, from the items before it."""
+    """The names of all items before the current position in a struct."""
 
     def __init__(self, problems: Problems, purpose: Literal["read", "send", "type"]) -> None:
         self.known: dict[str, Item | None] = {}
-        """Name → item; None for a name that is not an item of this struct."""
+        """Name → item; None for a name without an item in this struct."""
         self.uses: list[tuple[Node, Template]] = []
-        """Expressions over arguments and settings, with their places."""
+        """Expressions that use arguments or settings, with their nodes."""
         self._problems = problems
         self._purpose = purpose
 
     def get(self, name: str) -> Item | None:
-        """Return the item with this name."""
+        """Return the item with this name, or None."""
         return self.known.get(name.strip())
 
     @staticmethod
     def names(item: Item) -> Iterator[str]:
-        """Yield the names that an item adds."""
+        """Yield the names that an item adds to the scope."""
         yield from names_of((item,))
 
     def add(self, part: Node, item: Item) -> None:
-        """Add an item; report a second item of the same name at `part`."""
+        """Add an item to the scope; report a duplicate name at `part`."""
         own = {one.id: one for one in scope_of((item,)) if one.id}
         if item.switch is not None:
             return  # its cases were added one by one
@@ -44,7 +44,7 @@ class Scope:
             self.uses += [(part, one) for one in _outer_values(item.items)]
 
     def know(self, part: Node, name: str, item: Item | None) -> None:
-        """Add one name."""
+        """Add one name to the scope; report a duplicate name."""
         if name in self.known:
             at = "id" if isinstance(part.data, dict) and "id" in part.data else ""
             text = f"another item has the name {name!r}"
@@ -52,7 +52,7 @@ class Scope:
         self.known[name] = item
 
     def check_name(self, part: Node, name: str) -> None:
-        """Report an id that already has another meaning."""
+        """Report an id that is reserved, or not a valid name."""
         if name in FRAME_NAMES or number_of(name) is not None or name == "settings":
             self._problems.error(part, "bad-name", f"{name!r} has another meaning here")
         elif name and not (name.isidentifier() and name.isascii() and name == name.lower()):
@@ -61,7 +61,7 @@ class Scope:
             self._problems.error(part, "bad-name", text, hint=hint)
 
     def expression(self, part: Node) -> Template | None:
-        """Return the expression at `part`, over the items before it."""
+        """Return the expression at `part`; report names that are not in the scope."""
         return self._expression(part, frozenset())
 
     def _expression(self, part: Node, outer: frozenset[str]) -> Template | None:
@@ -69,7 +69,7 @@ class Scope:
         return None if expression is None else self._checked(part, expression, outer)
 
     def value(self, part: Node | None) -> Template | None:
-        """Return the value to send: an expression, or a plain number."""
+        """Return a sent value, which is an expression or a number."""
         if part is None:
             return None
         if isinstance(part.data, str):
@@ -107,7 +107,7 @@ class Scope:
 
 
 def _outer_values(items: tuple[Item, ...]) -> Iterator[Template]:
-    """Yield the outer names in the values of a type's items."""
+    """Yield the values of a type's items that use names outside the type."""
     for item in items:
         if item.value is not None and item.value.names & OUTER_NAMES:
             one = item.value
@@ -120,6 +120,6 @@ def _outer_values(items: tuple[Item, ...]) -> Iterator[Template]:
 
 
 def _argument(part: Node, name: str) -> Template:
-    """Return the use of an argument; its source is its text in the document."""
+    """Return an expression that reads an argument."""
     source = part.data if isinstance(part.data, str) else name
     return Template(source, f"ns[{name!r}]", frozenset((name,)), frozenset())
