@@ -1,1 +1,1 @@
-"""The transports, one module per type. All sockets of robots are in this package."""
+"""The transports, one module per type. Only this package opens connections to robots."""

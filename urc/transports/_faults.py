@@ -1,4 +1,4 @@
-"""Uniform error texts for all transports."""
+"""Uniform error messages for all transports."""
 
 import errno
 import socket
@@ -17,31 +17,31 @@ _SHOWN = 200
 
 
 def one_line(said: str, most: int = _SHOWN) -> str:
-    """Return a text of the other side on a single line, for a message.
+    """Return text from a remote host as a single line, for use in a message.
 
-    Control characters are escaped, and texts of more than `most` characters are cut.
+    Control characters are escaped, and text longer than `most` characters is truncated.
     """
     text = printable(" ".join(said[: 4 * most].split()))
     return text if len(text) <= most else f"{text[: most - 1]}…"
 
 
 def place_of(host: str, port: int) -> str:
-    """Return a host and port in their usual notation."""
+    """Return a host and port in the usual notation."""
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 def late(place: str, timeout_s: float) -> str:
-    """Return the text for a connection timeout."""
+    """Return the message for a connection timeout."""
     return f"no answer from {place} within {timeout_s:g} s"
 
 
 def broke(fault: BaseException) -> str:
-    """Return the text for a broken connection, with the reason."""
+    """Return the message for a broken connection, with the reason."""
     return f"the connection broke ({reason(fault)})"
 
 
 def explain(host: str, place: str, fault: OSError | UnicodeError) -> str:
-    """Return one line with the reason why a connection to `place` could not be opened."""
+    """Return the message about a failed connection to `place`, with the reason."""
     if isinstance(fault, OwnAddressError):
         return f"{place}: {fault.strerror}"
     if isinstance(fault, socket.gaierror | UnicodeError):
@@ -56,6 +56,6 @@ def explain(host: str, place: str, fault: OSError | UnicodeError) -> str:
 
 
 def reason(fault: BaseException) -> str:
-    """Return the system's text for an error, in lower case, without the error number."""
+    """Return the operating system's error text in lower case, without the error number."""
     text = getattr(fault, "strerror", None) or str(fault) or type(fault).__name__
     return one_line(str(text).lower())

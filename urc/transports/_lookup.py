@@ -1,4 +1,4 @@
-"""Address lookups that block neither the event loop nor the end of the program."""
+"""Address lookups that block neither the event loop nor the exit of the program."""
 
 import asyncio
 import errno
@@ -12,20 +12,20 @@ from urc._daemon import in_daemon
 __all__ = ["Address", "AddressLookup"]
 
 Address = tuple[socket.AddressFamily, tuple[str | int, ...] | tuple[int, bytes]]
-"""Address family and address, as for a socket."""
+"""Address family and socket address."""
 _Connected = TypeVar("_Connected")
 
 
 class AddressLookup:
-    """The address lookup of one host and port.
+    """A repeatable address lookup of one host and port.
 
-    The thread pool of the event loop delays the end of the program, and a resolver without a
-    network may take half a minute. Each lookup therefore has a thread of its own. Only one lookup
-    runs at a time: a retry joins it.
+    The thread pool of the event loop delays the exit of the program, and a resolver without a
+    network may take half a minute. Each lookup therefore runs in a separate thread. Only one lookup
+    runs at a time; a retry waits for the running lookup.
     """
 
     def __init__(self, host: str, port: int, kind: socket.SocketKind) -> None:
-        """Initialise for sockets of `kind`, without a lookup."""
+        """Prepare a lookup for sockets of `kind`, without starting the lookup."""
         self._host = host
         self._port = port
         self._kind = kind
@@ -35,7 +35,8 @@ class AddressLookup:
         """Return every address of the host.
 
         Raises:
-            OSError, UnicodeError: the lookup failed. The lookup has no timeout of its own.
+            OSError, UnicodeError: the lookup failed. A lookup has no timeout; the caller sets a
+            time limit.
         """
         if self._answer is None or self._answer.done():
             self._answer = _look_up(self._host, self._port, self._kind)
@@ -46,7 +47,7 @@ class AddressLookup:
     ) -> _Connected:
         """Return the result of `connect` for the first address that accepts a connection.
 
-        The addresses are tried in turn, each with an equal share of the remaining time.
+        The addresses are tried in sequence, each with an equal share of the remaining time.
 
         Raises:
             OSError, UnicodeError: the lookup failed, or no address accepts a connection.
@@ -81,7 +82,7 @@ def _look_up(host: str, port: int, kind: socket.SocketKind) -> asyncio.Future[li
 
 
 def _numeric(host: str, port: int, kind: socket.SocketKind) -> list[Address] | None:
-    """Return the addresses of a numeric host, which needs no thread."""
+    """Return the addresses of a numeric host, which requires no thread."""
     try:
         return _resolve(host, port, kind, socket.AI_NUMERICHOST)
     except (OSError, UnicodeError):

@@ -1,4 +1,4 @@
-"""Readers of transport options, with a one-line error for each invalid option."""
+"""Readers of transport options; each invalid option raises a one-line error."""
 
 from collections.abc import Mapping
 
@@ -32,7 +32,7 @@ def port(kind: str, options: Mapping[str, object], key: str = "port") -> int:
 
 
 def text(kind: str, options: Mapping[str, object], key: str, default: str = "") -> str:
-    """Return a text, or `default` for a missing or empty option.
+    """Return a text option, or `default` for a missing or empty option.
 
     Raises:
         TransportError: the option is not text.
@@ -46,7 +46,7 @@ def text(kind: str, options: Mapping[str, object], key: str, default: str = "") 
 
 
 def flag(kind: str, options: Mapping[str, object], key: str, *, default: bool) -> bool:
-    """Return a boolean, or `default` for a missing option.
+    """Return a boolean option, or `default` for a missing option.
 
     Raises:
         TransportError: the option is not a boolean.
@@ -62,10 +62,10 @@ def flag(kind: str, options: Mapping[str, object], key: str, *, default: bool) -
 def choice(
     kind: str, options: Mapping[str, object], key: str, among: tuple[str, ...], default: str
 ) -> str:
-    """Return one of the words in `among`, or `default` for a missing option.
+    """Return an option with one of the words in `among`, or `default` for a missing option.
 
     Raises:
-        TransportError: the option is another word.
+        TransportError: the value is not one of the words.
     """
     found = options.get(key)
     if found is None:

@@ -1,4 +1,4 @@
-"""An open serialx port as a byte stream. Imported only when a port is opened."""
+"""An open serialx port as a byte stream. This module is imported only when a port is opened."""
 
 import asyncio
 import socket
@@ -22,28 +22,29 @@ from urc.transports.base import PeerClosed
 __all__ = ["FAULTS", "SerialStream", "open_port"]
 
 FAULTS: tuple[type[Exception], ...] = (OSError, SerialException, ValueError, LookupError)
-"""Exceptions of the library; LookupError comes from servers without valid RFC 2217."""
+"""Exceptions raised by the library; `LookupError` indicates a server with invalid RFC 2217 data."""
 UNTAKEN_BYTES = 1_048_576
-"""Limit of unsent option replies to a server, in bytes."""
+"""Maximum number of unsent bytes of option replies to a server."""
 if sys.platform != "win32":
     import termios
 
     FAULTS = (*FAULTS, termios.error)
 _KEPT_OPTIONS, _AT_ONCE = 64, 4096
-"""Limits of pending unsolicited options, and of the bytes in one processing step."""
+"""Maximum number of pending unsolicited options, and maximum number of bytes processed in one step.
+"""
 _DRAIN_S, _LOOK_S = 0.3, 0.01
-"""Longest wait for unsent bytes when closing, and its polling interval, in seconds."""
+"""Maximum wait for unsent bytes when closing, and the interval between checks, in seconds."""
 
 
 async def open_port(
     port: str, arguments: Mapping[str, object], tune: Callable[[socket.socket], None]
 ) -> "SerialStream":
-    """Open and configure `port`; discard earlier input.
+    """Open and configure `port`; discard input that arrived earlier.
 
     Args:
-        port: a path or name, or ``rfc2217://HOST:PORT``.
-        arguments: settings, with the names of the library.
-        tune: configures the socket, if there is one.
+        port: a device path or name, or an address ``rfc2217://HOST:PORT``.
+        arguments: settings under the library's names.
+        tune: function that configures the socket of a network port.
 
     Raises:
         OSError, SerialException, termios.error, ValueError: the port cannot be opened or
@@ -66,14 +67,14 @@ async def open_port(
 
 
 class _Rfc2217(RFC2217SerialTransport):
-    """An RFC 2217 connection that needs no confirmation of unused notifications.
+    """An RFC 2217 connection that skips the confirmation of unused notifications.
 
-    The library would wait for a confirmation until its timeout; ser2net, the usual server, never
+    The library would wait for a confirmation until its timeout, but the common server ser2net never
     sends one.
     """
 
     def _data_received(self, data: bytes) -> None:
-        """Process received data; invalid data or too many unsent replies close the connection."""
+        """Process received data; invalid data or too many unsent replies end the connection."""
         for start in range(0, len(data), _AT_ONCE):
             line, serial = self._tcp_transport, self._serial
             if line is None or serial is None or line.is_closing():
@@ -102,9 +103,9 @@ class _Rfc2217(RFC2217SerialTransport):
 
 
 class SerialStream(asyncio.Protocol):
-    """A `ByteStream` with `unsent` and `reset`.
+    """A `ByteStream` of a serial port, with `unsent` and `reset`.
 
-    While no task reads the stream, the port is not read either.
+    The port is read only while a task reads the stream.
     """
 
     def __init__(self) -> None:
@@ -117,7 +118,7 @@ class SerialStream(asyncio.Protocol):
         self._gone = asyncio.Event()
         self._transport: BaseSerialTransport
         self.socket: socket.socket | None = None
-        """Socket of a port behind a server."""
+        """Socket of a port behind a server; None for a local port."""
 
     # -- called by the library
 
@@ -128,7 +129,7 @@ class SerialStream(asyncio.Protocol):
         transport.set_write_buffer_limits(high=0)
 
     def data_received(self, data: bytes) -> None:
-        """Buffer the received bytes."""
+        """Store received bytes in the buffer."""
         self._arrived_bytes += data
         if len(self._arrived_bytes) >= READ_AHEAD_BYTES and not self._is_paused:
             self._is_paused = True
@@ -136,7 +137,7 @@ class SerialStream(asyncio.Protocol):
         self._arrived.set()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Record that the port is closed or unplugged."""
+        """Record that the port was closed or unplugged."""
         self._end(broke(exc) if exc else HUNG_UP)
         self._gone.set()
 
@@ -151,7 +152,7 @@ class SerialStream(asyncio.Protocol):
     # -- a `ByteStream`
 
     async def read(self) -> bytes:
-        """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
+        """Return at least one received byte; raise `PeerClosed` at the end of the stream."""
         while not self._arrived_bytes:
             if self._ended is not None:
                 raise PeerClosed(self._ended)
@@ -165,7 +166,7 @@ class SerialStream(asyncio.Protocol):
         return data
 
     async def write(self, data: bytes) -> None:
-        """Pass `data` to the system, waiting for buffer space; raise `PeerClosed` on an error."""
+        """Pass `data` to the system after a wait for space; raise `PeerClosed` on an error."""
         await self._until_writable()
         try:
             self._transport.write(data)
@@ -174,7 +175,7 @@ class SerialStream(asyncio.Protocol):
         await self._until_writable()
 
     async def abort(self) -> None:
-        """Close after a short wait for unsent bytes; never raises."""
+        """Close the port after a short wait for unsent bytes; never raises."""
         with suppress(TimeoutError):
             async with asyncio.timeout(_DRAIN_S):
                 # The system does not report the transmission of the last byte.
@@ -186,12 +187,12 @@ class SerialStream(asyncio.Protocol):
         await self._close()
 
     async def reset(self) -> None:
-        """Close at once and discard the unsent bytes; never raises."""
+        """Close the port immediately and discard the unsent bytes; never raises."""
         self._forget_unsent()
         await self._close()
 
     def unsent(self) -> int:
-        """Return the number of bytes that have not been transmitted yet."""
+        """Return the number of bytes that are not transmitted yet."""
         waiting = self._transport.get_write_buffer_size()
         if self.socket is not None:
             return waiting + (unsent_in(self.socket) if self.socket.fileno() >= 0 else 0)
@@ -200,7 +201,7 @@ class SerialStream(asyncio.Protocol):
         return waiting
 
     def _forget_unsent(self) -> None:
-        """Empty the output buffer of the system, which would delay closing on a slow port."""
+        """Discard the system's output buffer, which would delay closing on a slow port."""
         if self.socket is not None:
             forget_unsent(self.socket)
         else:

@@ -1,8 +1,8 @@
-"""An open TCP connection, and a transport on top of a stream.
+"""An open TCP connection as a stream, and a base class for transports over a stream.
 
-Each connection receives into one fixed buffer. While the buffer is full, the socket is not read: a
-flooding robot fills the queue of its own kernel instead of our memory. `put` returns once the
-kernel has every byte, so a connection may be closed right after the last one.
+Each connection receives data into one fixed buffer. While the buffer is full, the socket is not
+read, so a flooding robot fills only its own send queue. `write` returns after the kernel has
+accepted every byte, so the connection may be closed directly after the last write.
 """
 
 import asyncio
@@ -45,20 +45,21 @@ READ_AHEAD_BYTES = 65536
 
 _KEEPALIVE_IDLE_S, _KEEPALIVE_EVERY_S, _KEEPALIVE_COUNT = 5, 2, 3
 _UNANSWERED_MS = 5000
-"""Timeout for TCP acknowledgements, in milliseconds (half-open connection, pulled cable)."""
+"""Timeout of TCP acknowledgements in milliseconds, which detects half-open connections and pulled
+cables."""
 _UNSENT_BYTES = 16384
-"""Limit of unsent data in the kernel, in bytes; more data would only become outdated there."""
+"""Maximum number of unsent bytes in the kernel; more data would only become outdated."""
 _UNSENT = array("i", [0])
-"""Output buffer of the system call."""
+"""Output buffer for the system call that returns the number of unsent bytes."""
 _CAN_WRITE = os.name == "posix"
-"""Whether a socket is a file descriptor."""
+"""Whether sockets are file descriptors on this system."""
 _LINGER_NOT = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
 
 
 class TcpStream(asyncio.BufferedProtocol):
     """One open connection.
 
-    The standard `asyncio.Protocol` would allocate 256 KiB for every read.
+    `asyncio.Protocol` is not used, because it would allocate 256 KiB for every read.
     """
 
     def __init__(self, read_ahead_bytes: int = READ_AHEAD_BYTES) -> None:
@@ -66,7 +67,7 @@ class TcpStream(asyncio.BufferedProtocol):
         self._buffer = memoryview(bytearray(read_ahead_bytes))
         self._filled = 0
         self._ended: str | None = None
-        """Reason of the end of the stream; None while the connection is open."""
+        """Reason why the stream ended; None while the connection is open."""
         self._arrived = asyncio.Event()
         self._writable = asyncio.Event()
         self._writable.set()
@@ -76,9 +77,10 @@ class TcpStream(asyncio.BufferedProtocol):
         self._transport: asyncio.Transport
         self._line: socket.socket | None = None
         self._number = -1
-        """File descriptor of the socket, until the connection ends."""
+        """File descriptor of the socket; -1 after the end of the connection."""
         self.sink: Callable[[bytes], bool] | None = None
-        """Receives data while the buffer is empty; returns whether it accepted the data."""
+        """Callback that receives data while the buffer is empty, and returns whether the data was
+        accepted."""
 
     # -- called by asyncio
 
@@ -91,11 +93,11 @@ class TcpStream(asyncio.BufferedProtocol):
         self._number = -1 if line is None else line.fileno()
 
     def get_buffer(self, sizehint: int) -> memoryview:
-        """Return the free part of the buffer."""
+        """Return the free part of the receive buffer."""
         return self._buffer[self._filled :] if self._filled else self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:
-        """Pass on the received bytes to the sink, or buffer them."""
+        """Pass the received bytes to the sink, or store them in the buffer."""
         if self.sink is not None and not self._filled and self.sink(bytes(self._buffer[:nbytes])):
             return
         self._filled += nbytes
@@ -104,7 +106,7 @@ class TcpStream(asyncio.BufferedProtocol):
         self._arrived.set()
 
     def eof_received(self) -> bool:
-        """Record the end of the stream, and close."""
+        """Record the end of the stream, and let the connection close."""
         self.end(HUNG_UP)
         return False
 
@@ -139,13 +141,13 @@ class TcpStream(asyncio.BufferedProtocol):
         return data
 
     async def write(self, data: bytes) -> None:
-        """Pass `data` to the kernel, waiting for buffer space; raise `PeerClosed` on an error."""
+        """Pass `data` to the kernel after a wait for space; raise `PeerClosed` on an error."""
         await self._until_writable()
         self._transport.write(data)
         await self._until_writable()
 
     async def abort(self) -> None:
-        """Close at once, discarding data that the kernel has not accepted."""
+        """Close the connection immediately, discarding data that the kernel has not accepted."""
         self.end(CLOSED)
         self._transport.abort()
         await self._gone.wait()  # one turn of the event loop, after which the socket is closed, too
@@ -153,7 +155,7 @@ class TcpStream(asyncio.BufferedProtocol):
     # -- further methods
 
     def offer(self, data: bytes) -> bool:
-        """Send `data` if no earlier data waits; return whether it was accepted."""
+        """Send `data` unless earlier data is waiting; return whether `data` was accepted."""
         if self._ended is not None or not self.is_writable:
             return False
         if _CAN_WRITE and not self._transport.get_write_buffer_size():
@@ -171,7 +173,7 @@ class TcpStream(asyncio.BufferedProtocol):
 
     @property
     def has_ended(self) -> bool:
-        """Whether the connection has ended in both directions."""
+        """Whether both directions of the connection have ended."""
         return self._ended is not None
 
     def unsent(self) -> int:
@@ -181,12 +183,12 @@ class TcpStream(asyncio.BufferedProtocol):
         return waiting if self._line is None else waiting + unsent_in(self._line)
 
     async def reset(self) -> None:
-        """Close at once and discard unsent data in the kernel, so that nothing arrives late."""
+        """Close immediately and discard unsent data in the kernel, so that no data arrives late."""
         self.drop()
         await self._gone.wait()
 
     def drop(self) -> None:
-        """Do the same as `reset`, without waiting until the socket is closed."""
+        """Close the connection like `reset`, without waiting until the socket is closed."""
         line: socket.socket | None = self._transport.get_extra_info("socket")
         if line is not None:
             forget_unsent(line)
@@ -194,7 +196,7 @@ class TcpStream(asyncio.BufferedProtocol):
         self._transport.abort()
 
     def end(self, why: str) -> None:
-        """Wake all waiting tasks with the end of the stream; the first reason stays."""
+        """Wake all waiting tasks with the reason of the stream's end; the first reason is kept."""
         if self._ended is None:
             self._ended = why
         self._arrived.set()
@@ -207,7 +209,7 @@ class TcpStream(asyncio.BufferedProtocol):
 
 
 class StreamTransport:
-    """The methods of a transport that need only an open stream."""
+    """The methods of a transport that only require an open stream."""
 
     def __init__(self) -> None:
         self._stream: ByteStream | None = None
@@ -233,7 +235,7 @@ class StreamTransport:
     def unsent(self) -> int:
         """Return the number of bytes that the other side has not acknowledged.
 
-        Unknown counts as 0: through a tunnel, or on a system without this information.
+        The result is 0 through a tunnel, and on systems without this information.
         """
         return unsent_of(self._stream)
 
@@ -248,14 +250,14 @@ class StreamTransport:
 
 
 async def adopt(line: socket.socket, read_ahead_bytes: int = READ_AHEAD_BYTES) -> TcpStream:
-    """Return a stream for a connected socket; the stream owns the socket from then on."""
+    """Return a stream for a connected socket; the stream becomes the owner of the socket."""
     loop = asyncio.get_running_loop()
     _, stream = await loop.create_connection(lambda: TcpStream(read_ahead_bytes), sock=line)
     return stream
 
 
 def tune(line: socket.socket) -> None:
-    """Disable delays, limit unsent data, and detect lost peers, if the system can."""
+    """Disable delays, limit unsent data, and detect lost peers, as far as the system permits."""
     line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     line.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for name, value in (
@@ -272,7 +274,7 @@ def tune(line: socket.socket) -> None:
 
 
 def as_bytes(payload: Payload) -> bytes:
-    """Return the payload for a connection that carries bytes.
+    """Return `payload` for a connection that carries bytes.
 
     Raises:
         TransportError: the payload is an envelope.
@@ -283,7 +285,7 @@ def as_bytes(payload: Payload) -> bytes:
 
 
 def forget_unsent(line: socket.socket) -> None:
-    """Make the close of `line` reset the connection, which discards unsent data."""
+    """Configure `line` so that closing resets the connection and discards unsent data."""
     with suppress(OSError):  # already closed
         line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _LINGER_NOT)
 
@@ -291,7 +293,8 @@ def forget_unsent(line: socket.socket) -> None:
 def unsent_in(line: socket.socket) -> int:
     """Return the number of bytes in the kernel that the other side has not acknowledged.
 
-    Unknown counts as 0. A closed socket counts as 1, because the fate of its data is unknown.
+    The result is 0 if the number is unknown. The result is 1 for a closed socket, because the fate
+    of its data is unknown.
     """
     if sys.platform != "linux":
         return 0

@@ -15,7 +15,7 @@ __all__ = ["StreamDialer"]
 
 
 class StreamDialer:
-    """A dialer for one host and port; `open` may be called repeatedly."""
+    """A dialer for one host and port; `open` may be called several times."""
 
     def __init__(
         self,
@@ -26,7 +26,7 @@ class StreamDialer:
         tls: Tls | None = None,
         read_ahead_bytes: int = READ_AHEAD_BYTES,
     ) -> None:
-        """Initialise for `host` (name or address) and `port` 1..65535, without connecting."""
+        """Prepare connections to `host` (name or address) and `port` (1 to 65535)."""
         self.host = host
         self.port = port
         self.place = place_of(host, port)
@@ -37,9 +37,10 @@ class StreamDialer:
         self._lookup = AddressLookup(host, port, socket.SOCK_STREAM)
 
     async def open(self, timeout_s: float) -> ByteStream:
-        """Return an open stream, or raise `ConnectFailed` within `timeout_s` seconds.
+        """Return an open stream; raise `ConnectFailed` on failure within `timeout_s` seconds.
 
-        The addresses of a name are tried in turn, each with an equal share of the remaining time.
+        The addresses of a host name are tried in sequence, each with an equal share of the
+        remaining time.
         """
         try:
             async with asyncio.timeout(timeout_s):
@@ -60,7 +61,7 @@ class StreamDialer:
 
 
 async def _dial(family: int, address: object, read_ahead_bytes: int) -> TcpStream:
-    """Connect one socket; close it on failure or cancellation."""
+    """Connect one socket; close the socket on failure or cancellation."""
     line = await connected(family, address)
     try:
         return await adopt(line, read_ahead_bytes)

@@ -1,7 +1,8 @@
 """TLS over any stream: a socket, or a tunnelled connection.
 
-The TLS of the standard library works on two buffers in memory, which the underlying stream fills
-and empties. The minimum is TLS 1.2, and the certificate is verified unless disabled.
+The TLS implementation of the standard library uses two memory buffers, which are connected to the
+underlying stream. The minimum version is TLS 1.2, and certificates are verified unless verification
+is disabled.
 """
 
 import asyncio
@@ -32,7 +33,7 @@ _PEM = "-----BEGIN"
 _EXPIRED, _NOT_YET = 10, 9
 _WRONG_NAME = (62, 64)
 _UNKNOWN = (2, 18, 19, 20, 21)
-"""OpenSSL error numbers (X509_V_ERR_…) of invalid certificates."""
+"""OpenSSL error numbers (``X509_V_ERR_…``) of invalid certificates."""
 
 
 class Tls:
@@ -41,20 +42,20 @@ class Tls:
     def __init__(
         self, context: ssl.SSLContext, server_name: str = "", *, is_server: bool = False
     ) -> None:
-        """Use `context`; the certificate must be for `server_name`, or for the host if ""."""
+        """Store the settings; certificates must match `server_name`, or for "" the host."""
         self._context = context
         self._server_name = server_name
         self._is_server = is_server
 
     @classmethod
     def of(cls, kind: str, option: object, *, is_server: bool = False) -> Self | None:
-        """Return the settings of the option, or None without TLS.
+        """Return the TLS settings of the option, or None without TLS.
 
         Args:
-            kind: type of the transport, for messages.
-            option: ``true``, ``false``, None, or a mapping with ``ca``, ``cert``, ``key`` (each a
-                file name or a text), ``server_name`` and ``verify``.
-            is_server: whether the robot connects to us, and we present our certificate.
+            kind: type of the transport, for error messages.
+            option: ``true``, ``false``, None, or a mapping with ``ca``, ``cert``, ``key``,
+                ``server_name`` and ``verify``. The first three are file names or PEM texts.
+            is_server: whether the robot connects to URC, so that URC presents its certificate.
 
         Raises:
             TransportError: an option or a file is invalid.
@@ -69,10 +70,10 @@ class Tls:
         return cls(context, _options.text(kind, option, "server_name"), is_server=is_server)
 
     async def secure(self, stream: ByteStream, host: str, place: str) -> ByteStream:
-        """Do the TLS handshake over `stream`; close it on failure or cancellation.
+        """Perform the TLS handshake over `stream`; close the stream on failure or cancellation.
 
         Raises:
-            ConnectFailed: the other side is not trusted, or does not speak TLS.
+            ConnectFailed: the peer is not trusted, or does not speak TLS.
         """
         name = None if self._is_server else self._server_name or host
         try:
@@ -91,7 +92,7 @@ class Tls:
 
 
 class _TlsStream:
-    """An encrypted `ByteStream` on top of another one."""
+    """An encrypted `ByteStream` over another stream."""
 
     def __init__(self, stream: ByteStream, context: ssl.SSLContext, name: str | None) -> None:
         self._stream = stream
@@ -101,7 +102,7 @@ class _TlsStream:
             self._arrived, self._leaving, server_side=name is None, server_hostname=name
         )
         self._turn = asyncio.Lock()
-        """Keeps the TLS records in the order of their encryption."""
+        """Lock that keeps TLS records in the order of their encryption."""
 
     async def shake_hands(self) -> None:
         while True:
@@ -149,7 +150,7 @@ class _TlsStream:
                 await self._stream.write(data)
 
     def _decrypted(self) -> bytes:
-        """Return the decrypted data so far, possibly b""."""
+        """Return the data decrypted so far, possibly b""."""
         parts: list[bytes] = []
         while True:
             try:
@@ -202,7 +203,7 @@ def _context_of(where: str, options: Mapping[str, object], *, is_server: bool) -
 def _load_own(
     where: str, context: ssl.SSLContext, options: Mapping[str, object], *, is_server: bool
 ) -> None:
-    """Load the own certificate, if there is one."""
+    """Load the client or server certificate from the options, if any."""
     certificate = _options.text(where, options, "cert")
     key = _options.text(where, options, "key")
     if not certificate:
@@ -226,12 +227,12 @@ def _no_password() -> str:
 
 
 def _pem(given: str) -> str:
-    """Return the text of a file, or the text given instead."""
+    """Return the contents of a file, or the text given in place of a file name."""
     return given if _PEM in given else Path(given).expanduser().read_text("ascii")
 
 
 def _explain(place: str, name: str, fault: ssl.SSLError) -> str:
-    """Return one line about the reason of a failed TLS handshake with `place`."""
+    """Return a one-line message about a failed TLS handshake with `place`."""
     if isinstance(fault, ssl.SSLCertVerificationError):
         code = fault.verify_code
         if code == _EXPIRED:
@@ -249,7 +250,7 @@ def _explain(place: str, name: str, fault: ssl.SSLError) -> str:
 
 
 def _words(fault: BaseException) -> str:
-    """Return the error text of OpenSSL without numbers and source lines."""
+    """Return OpenSSL's error text without numbers and source lines."""
     if isinstance(fault, ssl.SSLError) and fault.reason:
         return str(fault.reason).replace("_", " ").lower()
     return reason(fault)

@@ -1,10 +1,10 @@
-"""Interfaces of transports, and their errors.
+"""Interfaces of transports, and the errors that transports raise.
 
 A transport carries payloads without interpreting them: bytes for streams and datagrams, envelopes
-for messages (topics, requests, calls). A transport translates every exception of a library into one
-of the errors below.
+for messages (topics, requests, calls). A transport converts every exception of a library into one
+of the errors in this module.
 
-`urc.runtime.link` is the only user; it is independent of the process in which a transport runs.
+Only `urc.runtime.link` uses transports, without knowledge of the process in which a transport runs.
 """
 
 from collections.abc import Callable, Mapping
@@ -40,49 +40,49 @@ __all__ = [
 
 
 NOTICE: Final = "notice"
-"""Verb of envelopes that a transport itself creates. The body is a one-line text for people about
-an error that the robot does not report. The notice goes to the log of the robot and does not prove
-that the robot is alive."""
+"""Verb of messages that a transport itself creates. The body is a one-line text about an error that
+the robot does not report. Notices go to the robot's log and do not prove that the robot is alive.
+"""
 
 
 class TransportError(UrcError):
-    """The connection is unusable, or no longer usable.
+    """A transport error: the connection cannot be opened, or can no longer be used.
 
-    TransportError ├── ConnectFailed    opening failed: refused, no such host, timed out └──
-    PeerClosed       the robot closed the connection, in order or not
+    - `ConnectFailed`: the attempt was refused or timed out, or the host is unknown.
+    - `PeerClosed`: the robot closed the connection, or the connection broke.
     """
 
 
 class ConnectFailed(TransportError):
-    """The connection could not be opened."""
+    """An error because the connection could not be opened."""
 
 
 class PeerClosed(TransportError):
-    """The other side closed the connection, or it broke."""
+    """An error because the peer closed the connection, or the connection broke."""
 
 
 class Transport(Protocol):
     """One connection to a robot.
 
-    A transport may be opened again after `close`, but never twice at a time.
+    A transport may be reopened after `close`, but has at most one connection at a time.
     """
 
     @property
     def address(self) -> str:
-        """Target of the connection as text for people: ``tcp 192.168.1.5:6789``."""
+        """Target of the connection as text to display, such as ``tcp 192.168.1.5:6789``."""
 
     async def open(self, timeout_s: float) -> None:
         """Connect, or raise `ConnectFailed` within `timeout_s` seconds."""
 
     async def receive(self) -> Payload:
-        """Return the next bytes, at least one, or the next envelope.
+        """Return at least one received byte, or the next envelope.
 
         Raises:
             PeerClosed: the stream has ended.
         """
 
     async def send(self, data: Payload) -> None:
-        """Send `data`, waiting for buffer space; raise `TransportError` if the connection broke."""
+        """Send `data` after a wait for space; raise `TransportError` on a broken connection."""
 
     async def close(self) -> None:
         """Close at once. Never raises, may be called twice."""
@@ -102,37 +102,37 @@ class ByteStream(Protocol):
         """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
 
     async def write(self, data: bytes) -> None:
-        """Send `data`, waiting for buffer space; raise `PeerClosed` if the connection broke."""
+        """Send `data` after a wait for buffer space; raise `PeerClosed` on a broken connection."""
 
     async def abort(self) -> None:
         """Close at once. Never raises, may be called twice."""
 
 
 class Tunnel(Protocol):
-    """A transport that tunnels others, such as SSH port forwarding."""
+    """A transport that carries other connections, such as SSH port forwarding."""
 
     async def connect(self, host: str, port: int, timeout_s: float) -> ByteStream:
-        """Connect to `host` and `port` as seen from the far end; raise `ConnectFailed`."""
+        """Connect to `host` and `port` from the far end; raise `ConnectFailed` on failure."""
 
 
 class TopicSubscription(NamedTuple):
-    """A topic of a driver's messages, on a transport that carries messages."""
+    """A topic that a driver's messages need, on a transport that carries messages."""
 
     topic: str
     attributes: Mapping[str, Value] = NOTHING
-    """Options of the subscription: type, throttle, quality of service …"""
+    """Options of the subscription, such as type, throttle and quality of service."""
 
 
 class TransportSetup(NamedTuple):
-    """The input of a transport factory."""
+    """The arguments of a transport factory."""
 
     name: str
     """Name of the transport in the driver."""
     options: Mapping[str, object] = NOTHING
-    """Evaluated options: plain values, and lists and mappings of them."""
+    """Options with evaluated templates: plain values, and lists and mappings of values."""
     subscriptions: tuple[TopicSubscription, ...] = ()
     tunnel: Tunnel | None = None
-    """Tunnel of the connection; None: the network of this machine."""
+    """Tunnel that carries the connection; None for the network of this machine."""
 
 
 # Optional abilities. Users check them once with `isinstance`, and work without them.
@@ -140,12 +140,12 @@ class TransportSetup(NamedTuple):
 
 @runtime_checkable
 class SupportsSettle(Protocol):
-    """A transport whose sent messages may not have arrived yet."""
+    """A transport that can wait until its sent messages have arrived."""
 
     async def settle(self) -> str:
-        """Keep the connection until all sent data has arrived, as far as the system tells.
+        """Keep the connection open until all sent data has arrived, as far as the system can tell.
 
-        The wait is bounded to a few seconds.
+        The wait is limited to a few seconds.
 
         Returns:
             One line about data that has not arrived; "" if all arrived or the state is unknown.
@@ -157,7 +157,7 @@ class SupportsProbe(Protocol):
     """A transport that can probe the program at the other end."""
 
     async def probe(self) -> None:
-        """Return when that program has sent anything since the call.
+        """Return after the remote program has sent any data since the call.
 
         Raises:
             TransportError: the connection broke.
@@ -166,10 +166,10 @@ class SupportsProbe(Protocol):
 
 @runtime_checkable
 class SupportsUnsent(Protocol):
-    """A transport or stream that counts its unsent bytes."""
+    """A transport or stream that can count its unsent bytes."""
 
     def unsent(self) -> int:
-        """Return the number of unacknowledged bytes; 0 if it is unknown."""
+        """Return the number of unacknowledged bytes; 0 if the number is unknown."""
 
 
 @runtime_checkable
@@ -177,12 +177,12 @@ class SupportsForget(Protocol):
     """A transport that may reorder messages."""
 
     def forget(self) -> None:
-        """Discard unsent data, which could arrive after its stop."""
+        """Discard unsent data, which could otherwise arrive after a later stop."""
 
 
 @runtime_checkable
 class SupportsAbort(Protocol):
-    """A transport that can be closed without sending the rest."""
+    """A transport that can be closed without sending the remaining data."""
 
     async def abort(self) -> None:
         """Close at once and discard unsent data. Never raises."""
@@ -200,35 +200,36 @@ class SupportsOffer(Protocol):
 class Prompt(SupportsOffer, Protocol):
     """A byte transport that saves a task switch per message in both directions.
 
-    The order of bytes is kept. `offer` refuses data while earlier data waits, and a sink receives
-    nothing while `receive` has buffered data.
+    The order of all bytes is preserved. `offer` refuses data while earlier data is waiting, and the
+    sink receives nothing while `receive` has buffered data.
     """
 
     @property
     def is_clogged(self) -> bool:
-        """Whether some accepted data is still to be written; ``send(b"")`` waits for it."""
+        """Whether accepted data is still unwritten; ``send(b"")`` waits until all is written."""
 
     def divert(self, sink: Callable[[bytes], bool]) -> None:
         """Pass received data to `sink` until the connection is closed.
 
-        The sink returns whether it accepted the data; `receive` returns refused data.
+        The sink returns whether the data was accepted; `receive` returns data that the sink
+        refused.
         """
 
 
 @runtime_checkable
 class SupportsReset(Protocol):
-    """A stream that can be closed without sending the rest."""
+    """A stream that can be closed without sending the remaining data."""
 
     async def reset(self) -> None:
-        """Close at once, without sending the rest. Never raises."""
+        """Close the stream immediately, without sending the remaining data. Never raises."""
 
 
 @runtime_checkable
 class SupportsEnd(Protocol):
-    """A stream that this side can end with a reason for people."""
+    """A stream that URC can end with a reason to display."""
 
     def end(self, why: str) -> None:
-        """Make `take` and `put` raise `PeerClosed` with the reason `why` from now on."""
+        """Make `read` and `write` raise `PeerClosed` with the reason `why` from now on."""
 
 
 def unsent_of(stream: ByteStream | None) -> int:
@@ -239,5 +240,5 @@ def unsent_of(stream: ByteStream | None) -> int:
 
 
 async def reset(stream: ByteStream) -> None:
-    """Close a stream, discarding unsent data if the stream supports it."""
+    """Close a stream; discard unsent data if the stream supports discarding."""
     await (stream.reset() if isinstance(stream, SupportsReset) else stream.abort())

@@ -1,8 +1,8 @@
-"""Fast connecting to a robot that may come back at any moment.
+"""Fast connecting to a robot that may become reachable at any moment.
 
-The system repeats a failed connection attempt only after a second, and then after longer delays.
-With `HURRY` set, further attempts start at short intervals, while earlier ones continue, because
-the robot may also just be far away.
+The operating system repeats a failed connection attempt only after a second, and later at longer
+intervals. If `HURRY` is set, new attempts start at short intervals while earlier attempts continue,
+because a distant robot may need the time.
 """
 
 import asyncio
@@ -17,18 +17,18 @@ __all__ = ["HURRY", "ConnectRace", "connected"]
 
 
 class ConnectRace:
-    """The interval between connection attempts."""
+    """The interval between overlapping connection attempts."""
 
     __slots__ = ("every_s", "is_used")
 
     def __init__(self, every_s: float) -> None:
         self.every_s = every_s
         self.is_used = False
-        """Whether a connection was opened in this way; some transports use other ways."""
+        """Whether overlapping attempts were used; some transports connect in other ways."""
 
 
 HURRY: ContextVar[ConnectRace | None] = ContextVar("HURRY", default=None)
-"""Set by a caller that needs a fast connection."""
+"""Interval settings, set by a caller that needs a fast connection; None for a single attempt."""
 
 
 async def connected(family: int, address: object) -> socket.socket:

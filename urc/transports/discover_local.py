@@ -1,4 +1,4 @@
-"""Detection of listening ports: one connection to each, closed at once without sending data."""
+"""Detection of listening ports by one short connection to each port, without sending data."""
 
 import asyncio
 from collections.abc import Iterable
@@ -7,12 +7,12 @@ from contextlib import suppress
 __all__ = ["listening"]
 
 CONNECT_S = 1.0
-"""Timeout of one connection, in seconds; on this machine, a reply is immediate."""
+"""Timeout of one connection, in seconds; a reply from this machine is immediate."""
 _AT_ONCE = 16
 
 
 async def listening(places: Iterable[tuple[str, int]]) -> list[tuple[str, int]]:
-    """Return the `places` (host, port) that accept connections, in order."""
+    """Return the `places` (host and port) that accept connections, in the given order."""
     turns = asyncio.Semaphore(_AT_ONCE)
 
     async def is_there(place: tuple[str, int]) -> bool:

@@ -1,6 +1,6 @@
-"""Discovery of announced services over multicast DNS.
+"""Discovery of announced services with multicast DNS.
 
-The library (zeroconf, extra ``mdns``) is imported only on use.
+The library zeroconf (extra ``mdns``) is imported only when needed.
 """
 
 import asyncio
@@ -21,7 +21,7 @@ class ServiceAnnouncement(NamedTuple):
     """One announced service."""
 
     type: str
-    """Requested service type: ``_rosbridge._tcp``."""
+    """Requested service type, such as ``_rosbridge._tcp``."""
     name: str
     host: str
     """Address."""
@@ -31,12 +31,12 @@ class ServiceAnnouncement(NamedTuple):
 async def announced(
     types: Sequence[str], seconds: float, interfaces: Sequence[str] = ()
 ) -> list[ServiceAnnouncement]:
-    """Return the services announced within `seconds`, sorted by type and name.
+    """Return the services found within `seconds`, sorted by type and name.
 
     Args:
         types: service types, such as ``_rosbridge._tcp``; at least one.
         seconds: duration of the search.
-        interfaces: addresses of this machine to listen on; () for all.
+        interfaces: addresses of this machine to listen on; () for all interfaces.
 
     Raises:
         TransportError: the library is missing, or no network is available.
@@ -72,7 +72,7 @@ async def announced(
 
 
 async def _resolve(zeroconf: Any, kind: str, name: str) -> list[ServiceAnnouncement]:
-    """Return the addresses of a service; an announcement without an address gives none."""
+    """Return the addresses of a service; empty for an announcement without an address."""
     from zeroconf import IPVersion
     from zeroconf.asyncio import AsyncServiceInfo
 

@@ -13,16 +13,16 @@ class SerialPort(NamedTuple):
 
     device: str
     usb: str
-    """Vendor and product, ``2341:0043``; "" for other devices than USB."""
+    """USB vendor and product identifiers, such as ``2341:0043``; "" for non-USB devices."""
     product: str
     serial_number: str
 
 
 def serial_ports() -> list[SerialPort]:
-    """Return all serial ports of the system, USB devices first.
+    """Return all serial ports of the system, with USB devices first.
 
     Raises:
-        TransportError: the library is missing, or the system does not list its ports.
+        TransportError: the library is missing, or the system cannot list its ports.
     """
     if find_spec("serialx") is None:
         raise TransportError("serial ports need the package serialx: pip install 'urc[serial]'")

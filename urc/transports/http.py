@@ -1,8 +1,8 @@
-"""HTTP to a robot: requests and responses, and streams of pictures, events and lines.
+"""The HTTP transport: requests and responses, and streams of images, events and lines.
 
-A request counts as sent once its bytes are in the kernel; `receive` returns its response. The
-number of concurrent requests is limited. When a further request waits too long, the oldest one is
-dropped. A request on a lost connection fails at once.
+A request counts as sent when its bytes are in the kernel; `receive` returns the response. The
+number of concurrent requests is limited. If a new request waits too long, the oldest request is
+dropped. A request on a lost connection fails immediately.
 """
 
 import asyncio
@@ -30,11 +30,11 @@ MAX_BODY_BYTES = 8_388_608
 IN_FLIGHT = 4
 ANSWER_S = 10.0
 PATIENCE_S = 1.0
-"""Longest wait of a request for a free place, in seconds, before the oldest one is dropped."""
+"""Maximum wait of a new request before the oldest request is dropped, in seconds."""
 
 
 class HttpTransport:
-    """The web server of one robot; it may be opened repeatedly."""
+    """The web server of one robot; may be opened several times."""
 
     def __init__(self, setup: TransportSetup) -> None:
         """Read the options of `setup`, without connecting.
@@ -56,12 +56,12 @@ class HttpTransport:
 
     @property
     def address(self) -> str:
-        """Target of the transport as text for people: ``http http://192.168.4.1:80/``."""
+        """Target of the transport as text to display, such as ``http http://192.168.4.1:80/``."""
         place = self._place
         return f"http http{'s' * place.is_secure}://{place.authority}{place.path}"
 
     async def open(self, timeout_s: float) -> None:
-        """Check the connection, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Check that the server responds, or raise `ConnectFailed` within `timeout_s` seconds."""
         await self.close()
         client = HttpClient(
             self._place,
@@ -87,7 +87,7 @@ class HttpTransport:
         self._talk = talk
 
     async def receive(self) -> Envelope:
-        """Return the next response, picture or event.
+        """Return the next response, image or event.
 
         Raises:
             PeerClosed: the robot is no longer reachable.
@@ -97,11 +97,11 @@ class HttpTransport:
         return await self._talk.receive()
 
     async def send(self, data: Payload) -> None:
-        """Send a request; `receive` returns its response or its failure.
+        """Send a request; `receive` later returns the response or the failure.
 
         Raises:
             PeerClosed: the transport is closed.
-            TransportError: `data` is not a request.
+            TransportError: `data` is not a valid request.
         """
         if not isinstance(data, Envelope) or data.verb != "request":
             what = f"{data.verb} anything" if isinstance(data, Envelope) else "send bare bytes"
@@ -117,13 +117,14 @@ class HttpTransport:
     def forget(self) -> None:
         """Cancel every request with unsent bytes.
 
-        Each request has a connection of its own, so it could arrive after newer ones.
+        Each request uses a separate connection, so an unsent request could arrive after newer
+        requests.
         """
         if self._talk is not None:
             self._talk.forget()
 
     async def close(self) -> None:
-        """Close every connection at once and discard unsent data.
+        """Close every connection immediately and discard unsent data.
 
         Never raises, may be called twice.
         """
@@ -133,12 +134,12 @@ class HttpTransport:
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return a transport for the options of a document, or raise `TransportError`."""
+    """Return an HTTP transport for the options of a document, or raise `TransportError`."""
     return HttpTransport(setup)
 
 
 class _Talk:
-    """The state of one opening of the transport."""
+    """The state of the transport between `open` and `close`."""
 
     def __init__(self, client: HttpClient, most: int, answer_s: float, max_body_bytes: int) -> None:
         self.queue = HttpReceiveQueue()
@@ -151,10 +152,10 @@ class _Talk:
         self._number = 0
         self._is_looking = False
         self._requests: dict[int, asyncio.Task[None]] = {}
-        """Place → request, oldest first: in progress, or with an unread response."""
+        """Requests by number, oldest first: in progress, or with an unread response."""
         self._has_place = asyncio.Event()
         self._tasks: set[asyncio.Task[None]] = set()
-        """All running tasks, including those of dropped requests."""
+        """All running tasks, including the tasks of dropped requests."""
 
     def listen(self, stream: HttpStream) -> None:
         self._start(stream.run())
@@ -204,7 +205,7 @@ class _Talk:
         await self._client.close()
 
     async def _until_place(self) -> None:
-        """Wait for a free place; after a while, drop the oldest request."""
+        """Wait until another request may start; after a time limit, drop the oldest request."""
         try:
             async with asyncio.timeout(PATIENCE_S):
                 while len(self._requests) >= self._most:
@@ -217,7 +218,7 @@ class _Talk:
                 self.queue.forget(place)
 
     async def _request(self, place: int, data: Envelope, handed: asyncio.Event) -> None:
-        """Send one request, and put its response into the queue."""
+        """Send one request, and add its response to the queue."""
         fault: HttpFault | None = None
         # Read first: the robot may have closed idle connections, which must not be used.
         await asyncio.sleep(0)
@@ -238,7 +239,7 @@ class _Talk:
             await self._conclude(fault)
 
     async def _conclude(self, fault: HttpFault) -> None:
-        """Check whether an unresponsive robot is still reachable, and report it if not."""
+        """Check whether an unresponsive robot is still reachable; if not, end the queue."""
         if fault.is_unreachable:
             self.queue.end(str(fault))
         elif fault.is_unanswered and not self._is_looking:
@@ -269,7 +270,7 @@ class _Talk:
 
 
 class _Handed(httpx2.AsyncByteStream):
-    """A request body that records when all of it is in the kernel."""
+    """A request body that records when all its bytes are in the kernel."""
 
     def __init__(self, body: bytes, handed: asyncio.Event) -> None:
         self._body = body
@@ -282,7 +283,7 @@ class _Handed(httpx2.AsyncByteStream):
 
 
 def _request_of(client: HttpClient, data: Envelope) -> httpx2.Request:
-    """Return the library's request for an envelope."""
+    """Return the library's request object for an envelope."""
     attributes = data.attributes
     path, query = str(attributes.get("path", "/")), attributes.get("query")
     if isinstance(query, Mapping):

@@ -1,4 +1,4 @@
-"""Bounded reading of response bodies, and one-line texts for error responses."""
+"""Size-limited reading of response bodies, and one-line messages for error responses."""
 
 import zlib
 from http import HTTPStatus
@@ -13,15 +13,14 @@ __all__ = ["body_of", "complaint", "fault_of", "read_body"]
 
 _COMPLAINT_BYTES: Final = 65536
 _FORMATS: Final = {"gzip": 31, "x-gzip": 31, "deflate": 47}
-"""Content-Encoding → window bits of zlib: gzip, or automatic detection."""
+"""Content-Encoding → window bits for zlib, for gzip or for automatic detection."""
 
 
 async def read_body(response: httpx2.Response, max_bytes: int) -> bytes:
-    """Return the whole body, decompressed.
+    """Return the complete, decompressed body of a response.
 
     Raises:
-        HttpFault: the body is longer than `max_bytes`, compressed or not, or has an unknown
-            encoding.
+        HttpFault: the body exceeds `max_bytes`, compressed or not, or has an unknown encoding.
     """
     too_long = f"the answer is longer than {max_bytes} bytes"
     if int(response.headers.get("content-length") or 0) > max_bytes:
@@ -50,10 +49,10 @@ async def read_body(response: httpx2.Response, max_bytes: int) -> bytes:
 
 
 async def body_of(response: httpx2.Response, max_bytes: int) -> bytes:
-    """Return the body of any response; for an error response, at most 64 KiB of it.
+    """Return the body of any response; read at most 64 KiB of an error response.
 
     Raises:
-        HttpFault: as in `read_body`, for a successful response.
+        HttpFault: the body of a successful response cannot be read; see `read_body`.
     """
     if response.status_code < HTTPStatus.MULTIPLE_CHOICES:
         return await read_body(response, max_bytes)
@@ -64,14 +63,14 @@ async def body_of(response: httpx2.Response, max_bytes: int) -> bytes:
 
 
 async def fault_of(response: httpx2.Response) -> str:
-    """Return the failure of a stream request, or ""; the body of a success is not read."""
+    """Return the error of a stream request, or "" on success; a successful body is not read."""
     if response.status_code < HTTPStatus.MULTIPLE_CHOICES:
         return ""
     return complaint(response, await body_of(response, _COMPLAINT_BYTES))
 
 
 def complaint(response: httpx2.Response, body: bytes) -> str:
-    """Return the error text of a response, or "" for a success."""
+    """Return the error message for a response, or "" on success."""
     target = response.headers.get("location")
     if 300 <= response.status_code < 400 and target is not None:
         return f"robot redirected to {one_line(target)}; redirects are not followed"

@@ -1,8 +1,8 @@
-"""HTTP/1.1 to one server, with the library `httpx2`: connections, credentials, one-line errors.
+"""An HTTP/1.1 client for one server, with the library `httpx2`: connections, logins, errors.
 
-The library's own way of connecting is replaced. Every connection leads to the server of the
-document, even if a request names another host. Proxies of the environment and redirects are
-ignored. Address lookups use no thread that delays the end of the program.
+The client replaces the library's connection handling. Every connection is opened to the server of
+the document, even if a request names another host. Proxy settings of the environment and redirects
+are ignored. Address lookups do not delay the exit of the program.
 """
 
 import asyncio
@@ -24,14 +24,15 @@ from urc.transports.web_origin import Credentials, WebOrigin
 __all__ = ["HttpClient", "HttpFault", "leads_up"]
 
 KEPT_S = 3.0
-"""Reuse time of an idle connection, in seconds; small robots close theirs after five."""
+"""Lifetime of an idle connection, in seconds; small robots close idle connections after five
+seconds."""
 CONNECT_S = 3.0
-"""Longest wait for a connection, including TLS, in seconds."""
+"""Maximum time to open a connection, including TLS, in seconds."""
 MAX_COOKIES = 50
 
 
 class HttpFault(TransportError):
-    """A failed request, with a text for people."""
+    """A failed request, with a message to display."""
 
     def __init__(
         self, text: str, *, is_unreachable: bool = False, is_unanswered: bool = False
@@ -39,9 +40,9 @@ class HttpFault(TransportError):
         """Initialise the error.
 
         Args:
-            text: text for people.
+            text: message to display.
             is_unreachable: whether no connection could be opened.
-            is_unanswered: whether a connection was opened, but gave no usable response.
+            is_unanswered: whether a connection was opened, but no usable response arrived.
         """
         super().__init__(text)
         self.is_unreachable = is_unreachable
@@ -49,7 +50,7 @@ class HttpFault(TransportError):
 
 
 class HttpClient:
-    """All connections of one open transport."""
+    """All HTTP connections of one open transport."""
 
     def __init__(
         self,
@@ -82,20 +83,20 @@ class HttpClient:
 
     @property
     def where(self) -> str:
-        """Host and port as text for people."""
+        """Host and port as text to display."""
         return self._place.authority
 
     async def reach(self, timeout_s: float = CONNECT_S) -> None:
-        """Open one connection for the next request; raise `ConnectFailed`."""
+        """Open a connection that the next request will use; raise `ConnectFailed` on failure."""
         await self._backend.reach(timeout_s)
 
     def request(
         self, method: str, path: str, headers: Mapping[str, str], body: bytes | None
     ) -> httpx2.Request:
-        """Return a request for `path`, relative to the path of the document's URL.
+        """Return a request for `path`, relative to the path in the document's URL.
 
         Raises:
-            HttpFault: the request is not valid HTTP, or leaves the base path.
+            HttpFault: the request is not valid HTTP, or its path leaves the base path.
         """
         if leads_up(path):
             base = self._base.removeprefix(self._origin)
@@ -105,10 +106,10 @@ class HttpClient:
     def follow(
         self, method: str, reference: str, headers: Mapping[str, str], body: bytes | None
     ) -> httpx2.Request:
-        """Return a request for a URL from the robot: absolute, or relative to its root.
+        """Return a request for a URL from the robot, absolute or relative to the robot's root.
 
         Raises:
-            HttpFault: the request is not valid HTTP, or leads to another host, port or protocol.
+            HttpFault: the request is not valid HTTP, or names another host, port or protocol.
         """
         try:
             base = httpx2.URL(f"{self._base}/")
@@ -145,13 +146,13 @@ class HttpClient:
     async def answer(
         self, request: httpx2.Request, silence_s: float | None = None
     ) -> AsyncIterator[httpx2.Response]:
-        """Send `request`, and yield its response with an unread body, for the context.
+        """Send `request`, and yield its response for the context; the body is not read yet.
 
-        All errors inside the context are raised as `HttpFault`, too.
+        Every error inside the context is raised as `HttpFault`.
 
         Args:
-            request: a result of `request`.
-            silence_s: longest wait between two pieces of the response, in seconds; None: unlimited.
+            request: a request returned by one of the request methods.
+            silence_s: maximum time between two parts of the response, in seconds; None: unlimited.
         """
         if silence_s is not None:
             request.extensions["timeout"] = {**request.extensions["timeout"], "read": silence_s}
@@ -185,7 +186,7 @@ class HttpClient:
         return self._backend.unsent()
 
     def forget(self) -> None:
-        """Close the connections with unsent bytes, and discard the bytes."""
+        """Close all connections with unsent bytes, and discard the bytes."""
         self._backend.forget()
 
     async def close(self) -> None:
@@ -213,7 +214,7 @@ class HttpClient:
 
 
 def leads_up(path: str) -> bool:
-    """Return whether a path contains "." or ".." in any encoding."""
+    """Return whether a path contains the segment "." or ".." in any encoding."""
     plain = path.partition("?")[0].partition("#")[0]
     for _ in range(_UNPACKED):  # some servers decode twice
         plain = unquote(plain)
@@ -229,7 +230,7 @@ _FAULTS = (
     NotImplementedError,  # Digest with auth-int only
 )
 _NO_TLS = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-"""An empty context for the pool, which would otherwise read the certificates of the system."""
+"""An empty TLS context for the pool, which would otherwise load the certificates of the system."""
 
 
 def _short(fault: Exception) -> str:
@@ -256,13 +257,16 @@ class _Bearer(httpx2.Auth):
 
 
 class _Backend(httpcore2.AsyncNetworkBackend):
-    """Connects to one server. The first request uses the connection of `reach`."""
+    """A network backend that only connects to one server.
+
+    The first request uses the connection opened by `reach`.
+    """
 
     def __init__(self, dialer: Dialer) -> None:
         self._dialer = dialer
         self._spare: ByteStream | None = None
         self._connections: set[_Connection] = set()
-        """All open connections in use by the library."""
+        """Open connections in use by the library."""
 
     def unsent(self) -> int:
         return sum(one.unsent() for one in self._connections)
@@ -310,7 +314,7 @@ class _Backend(httpcore2.AsyncNetworkBackend):
 
 
 class _Connection(httpcore2.AsyncNetworkStream):
-    """A stream with the interface of the library's pool."""
+    """A stream with the interface that the library's pool requires."""
 
     def __init__(self, stream: ByteStream, ended: Callable[["_Connection"], None]) -> None:
         self._stream = stream
@@ -345,15 +349,16 @@ class _Connection(httpcore2.AsyncNetworkStream):
     def unsent(self) -> int:
         """Return the number of unacknowledged bytes; 0 if unknown.
 
-        A connection that the robot has closed counts as 0, even while the library keeps it.
+        The result is 0 for a connection that the robot has closed, even while the library keeps the
+        connection.
         """
         stream = self._stream
         return 0 if isinstance(stream, TcpStream) and stream.has_ended else unsent_of(stream)
 
     def drop(self) -> None:
-        """Close now and discard unsent data; waiting tasks get an error.
+        """Close the connection and discard unsent data; waiting tasks receive an error.
 
-        A tunnelled connection keeps its order, and stays open.
+        A tunnelled connection stays open, because a tunnel preserves the order of data.
         """
         if isinstance(self._stream, TcpStream):
             self._ended(self)
@@ -377,9 +382,9 @@ class _Connection(httpcore2.AsyncNetworkStream):
         return self.is_readable() if info == "is_readable" else None
 
     def is_readable(self) -> bool:
-        """Return whether `read` would return at once; an idle connection is then closed.
+        """Return whether `read` would return immediately; an idle connection is then closed.
 
-        The only test of a stream is a call of `take`, which is cancelled if it waits.
+        A stream can be tested only by a call of `read`, which is cancelled if it waits.
         """
         if self._early:
             return True
@@ -396,7 +401,7 @@ class _Connection(httpcore2.AsyncNetworkStream):
 
 
 class _Wire(httpx2.AsyncBaseTransport):
-    """Passes the library's requests to our connection pool, and errors unchanged."""
+    """A library transport that uses URC's connection pool and raises errors unchanged."""
 
     def __init__(self, pool: httpcore2.AsyncConnectionPool) -> None:
         self._pool = pool

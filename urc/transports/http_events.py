@@ -1,8 +1,8 @@
-"""Parsers for ``text/event-stream`` and plain lines. Pure: bytes in, messages out.
+"""Parsers for ``text/event-stream`` and plain lines. The parsers are pure: bytes in, messages out.
 
 Server-sent events follow the HTML standard (section 9.2.6, "Interpreting an event stream"), except
-that data stays bytes. Sizes are bounded: an event or line that is too long is skipped and counted,
-and parsing continues after it.
+that data is not decoded to text. Sizes are limited: an event or line that is too long is skipped
+and counted, and parsing continues.
 """
 
 from typing import Final, NamedTuple
@@ -11,37 +11,37 @@ __all__ = ["Event", "EventStreamParser", "LineSplitter"]
 
 _BOM: Final = b"\xef\xbb\xbf"
 _MAX_NAME: Final = 200
-"""Longest kept event name or id, in characters."""
+"""Maximum length of a stored event name or id, in characters."""
 _TOO_LONG: Final = b"\0 too long"
-"""Placeholder of a line that is too long; compared by identity."""
+"""Placeholder for a line that is too long, compared by identity."""
 
 
 class Event(NamedTuple):
-    """One event of a stream."""
+    """One server-sent event."""
 
     name: str
-    """Name of the event; "" for the default (``message`` in the standard)."""
+    """Event name; "" for the default, which is called ``message`` in the standard."""
     data: bytes
-    """Data lines, joined by LF."""
+    """Data lines, joined by LF characters."""
     id: str
-    """Newest id of the stream, from which a new connection continues."""
+    """Newest event id of the stream, from which a new connection resumes."""
 
 
 class LineSplitter:
-    """Splits a body, received in any pieces, into lines without their ends (CR LF, LF or CR)."""
+    """An incremental splitter of a response body into lines without line ends (CR LF, LF or CR)."""
 
     def __init__(self, max_bytes: int, instead: bytes | None = None) -> None:
-        """Skip lines of more than `max_bytes`, or replace them by `instead`."""
+        """Skip lines longer than `max_bytes`, or replace such lines by `instead`."""
         self._most = max_bytes
         self._instead = instead
         self._buffer = bytearray()
         self._is_skipping = False
         self._was_cr = False
         self.left_out = 0
-        """Number of skipped lines."""
+        """Number of skipped lines so far."""
 
     def feed(self, data: bytes) -> list[bytes]:
-        """Process the next piece of the body and return the completed lines."""
+        """Process the next part of the body and return the completed lines."""
         if self._was_cr and data.startswith(b"\n"):
             data = data[1:]
             self._was_cr = False
@@ -64,7 +64,7 @@ class LineSplitter:
         return lines
 
     def end(self) -> bytes:
-        """Return the incomplete last line at the end of the body."""
+        """Return the incomplete last line after the end of the body."""
         rest = b"" if self._is_skipping else bytes(self._buffer)
         self._buffer.clear()
         return rest
@@ -88,10 +88,10 @@ class LineSplitter:
 
 
 class EventStreamParser:
-    """Parses an event stream, received in any pieces."""
+    """An incremental parser of an event stream."""
 
     def __init__(self, max_bytes: int, last_id: str = "") -> None:
-        """Skip events of more than `max_bytes`; `last_id` is that of the previous connection."""
+        """Skip events longer than `max_bytes`; `last_id` is the previous connection's last id."""
         self._most = max_bytes
         self._lines = LineSplitter(max_bytes + _MAX_NAME, _TOO_LONG)
         self._is_start = True
@@ -101,14 +101,14 @@ class EventStreamParser:
         self._is_too_long = False
         self._next_id = last_id
         self.last_id = last_id
-        """Id of the newest event, for the header Last-Event-ID."""
+        """Id of the newest event, sent as the header Last-Event-ID."""
         self.left_out = 0
-        """Number of skipped events."""
+        """Number of skipped events so far."""
         self.retry_s: float | None = None
-        """Retry delay requested by the robot, in seconds; None without a request."""
+        """Retry delay requested by the robot, in seconds; None if the robot has requested none."""
 
     def feed(self, data: bytes) -> list[Event]:
-        """Process the next piece of the stream and return the completed events."""
+        """Process the next part of the stream and return the completed events."""
         events: list[Event] = []
         for line in self._lines.feed(data):
             text = line.removeprefix(_BOM) if self._is_start else line

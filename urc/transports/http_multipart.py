@@ -1,9 +1,11 @@
-"""Parser for ``multipart/x-mixed-replace`` bodies (MJPEG). Pure: bytes in, parts out.
+"""A parser of ``multipart/x-mixed-replace`` bodies (MJPEG).
 
-Many cameras violate the format (RFC 2046, section 5.1). The parser accepts quoted and plain
-boundaries, and a header with the two dashes of the body. It also accepts parts without
-Content-Length, and lines that end in LF alone. Every piece has a bound; beyond it, the stream is
-invalid.
+The parser is pure: bytes in, parts out.
+
+Many cameras violate the multipart format (RFC 2046, section 5.1). The parser accepts quoted and
+plain boundaries, and boundaries whose header includes the two dashes of the body. Parts without
+Content-Length and lines that end in LF alone are also accepted. Every part and header has a maximum
+size; a larger one makes the stream invalid.
 """
 
 import re
@@ -13,19 +15,19 @@ from typing import Final, Literal
 __all__ = ["MAX_BOUNDARY", "MAX_HEADER_BYTES", "MultipartParser", "MultipartFault", "boundary_of"]
 
 MAX_BOUNDARY: Final = 200
-"""Longest boundary in characters; RFC 2046 allows 70, but not all cameras comply."""
+"""Maximum length of a boundary, in characters; RFC 2046 permits 70, but some cameras use more."""
 MAX_HEADER_BYTES: Final = 8192
-"""Limit for the headers of one part, and for the bytes between two parts."""
+"""Maximum number of bytes in the headers of one part, and between two parts."""
 
 _LENGTH: Final = re.compile(rb"^content-length[ \t]*:[ \t]*(\d{1,15})[ \t]*$", re.I | re.M)
 
 
 class MultipartFault(ValueError):
-    """An invalid multipart stream, or one that exceeds a bound."""
+    """An error for an invalid multipart stream, or for one that exceeds a limit."""
 
 
 def boundary_of(content_type: str) -> bytes:
-    """Return the boundary in a Content-Type, without the leading dashes.
+    """Return the boundary of a Content-Type header, without leading dashes.
 
     Raises:
         MultipartFault: the type is not multipart, or the boundary is missing or too long.
@@ -47,16 +49,16 @@ def boundary_of(content_type: str) -> bytes:
 
 
 class MultipartParser:
-    """Splits a body, received in any pieces, into parts without their headers."""
+    """An incremental splitter of a multipart body into parts without their headers."""
 
     def __init__(self, boundary: bytes, max_part_bytes: int) -> None:
-        """Split at `boundary`, a result of `boundary_of`; a part has at most `max_part_bytes`."""
+        """Split at `boundary`, a result of `boundary_of`, into parts of up to `max_part_bytes`."""
         # Between parts, the preceding line break and the dashes may be missing. Inside a part, they
         # distinguish a delimiter from the picture.
         self._loose = re.compile(rb"(?:\A|\r?\n)-*" + re.escape(boundary))
         self._strict = re.compile(rb"\r?\n-+" + re.escape(boundary))
         self._keep = len(boundary) + 80
-        """Number of last bytes to search again: they may contain an incomplete delimiter."""
+        """Number of trailing bytes to search again, because a delimiter may be incomplete."""
         self._most = max_part_bytes
         self._buffer = bytearray()
         self._state: Literal["seek", "rest", "head", "counted", "open", "ended"] = "seek"
@@ -91,7 +93,7 @@ class MultipartParser:
         return True
 
     def _rest(self, parts: list[bytes]) -> bool:
-        """Skip the rest of the delimiter's line; two dashes there mean the end."""
+        """Skip the rest of the delimiter line; two dashes in this line end the stream."""
         if len(self._buffer) < 2:
             return False
         if self._buffer.startswith(b"--"):

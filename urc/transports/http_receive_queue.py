@@ -1,4 +1,4 @@
-"""The bounded queue of received HTTP responses, pictures and events."""
+"""The bounded queue of received HTTP responses, images and events."""
 
 import asyncio
 from collections.abc import Mapping
@@ -9,16 +9,19 @@ from urc.transports.base import PeerClosed
 __all__ = ["HttpReceiveQueue"]
 
 EVENTS_BYTES = 1_048_576
-"""Limit of queued events and lines, in bytes; beyond it, the robot is not read."""
+"""Maximum size of queued events and lines, in bytes; a full queue pauses reading from the robot."""
 EVENTS = 64
 
 
 class HttpReceiveQueue:
-    """A bounded queue in the order of arrival. A newer picture replaces the queued one."""
+    """A bounded queue in order of arrival.
+
+    A newer image replaces the queued image of the same topic.
+    """
 
     def __init__(self) -> None:
         self._waiting: dict[object, Envelope] = {}
-        """Place → envelope; the place of a picture is its topic, all others have a number."""
+        """Key → envelope; the key is the topic of an image, or a number for other envelopes."""
         self._number = 0
         self._events = 0
         self._events_bytes = 0
@@ -27,25 +30,25 @@ class HttpReceiveQueue:
         self._has_room.set()
         self._ended: str | None = None
         self.dropped = 0
-        """Number of pictures that were replaced by newer ones."""
+        """Number of images that were replaced by newer images."""
 
     def answer(self, place: int, envelope: Envelope) -> None:
-        """Add the response to a request; the number of requests bounds the responses."""
+        """Add the response to a request; the limit of requests also limits the responses."""
         self._waiting["answer", place] = envelope
         self._arrived.set()
 
     def forget(self, place: int) -> None:
-        """Remove an unread response."""
+        """Remove the unread response of a request."""
         self._waiting.pop(("answer", place), None)
 
     def picture(self, topic: str, body: bytes) -> None:
-        """Add a picture, replacing the queued one of the same topic."""
+        """Add an image, which replaces a queued image of the same topic."""
         self.dropped += topic in self._waiting
         self._waiting[topic] = Envelope("message", {"topic": topic, "dropped": self.dropped}, body)
         self._arrived.set()
 
     async def event(self, attributes: Mapping[str, object], body: bytes) -> None:
-        """Add an event or a line, waiting while the queue is full."""
+        """Add an event or a line; wait while the queue is full."""
         while self._events >= EVENTS or self._events_bytes >= EVENTS_BYTES:
             self._has_room.clear()
             await self._has_room.wait()
@@ -56,7 +59,7 @@ class HttpReceiveQueue:
         self._arrived.set()
 
     def end(self, reason: str) -> None:
-        """End the queue; queued envelopes can still be read."""
+        """End the queue; envelopes in the queue can still be read."""
         if self._ended is None:
             self._ended = reason
         self._arrived.set()
@@ -64,11 +67,11 @@ class HttpReceiveQueue:
 
     @property
     def ended(self) -> str | None:
-        """Reason of the end; None while the connection is open."""
+        """Reason why the queue ended; None while the connection is open."""
         return self._ended
 
     async def pop(self) -> tuple[Envelope, int | None]:
-        """Return the next envelope, and the place of the request if it is a response.
+        """Return the next envelope, and its request's number if the envelope is a response.
 
         Raises:
             PeerClosed: the queue is empty and has ended.

@@ -1,8 +1,8 @@
-"""Streams from a robot over HTTP: pictures, events, lines. Each stream is a task.
+"""Streams from a robot over HTTP: images, events and lines. Each stream runs as a task.
 
-A failed stream is requested again after growing delays, while the transport stays open. The first
-failure and the recovery are logged, but not the failures between them. The transport ends only when
-the robot refuses connections and has sent nothing else for a while.
+A failed stream is requested again after growing delays, as long as the transport is open. Only the
+first failure and the recovery are logged. The transport ends only if the robot refuses connections
+and has been silent on all streams for a while.
 """
 
 import asyncio
@@ -28,34 +28,35 @@ KINDS: Final = ("mjpeg", "stills", "sse", "lines")
 MAX_STREAMS: Final = 16
 MAX_EVENT_BYTES: Final = 262_144
 SILENCE_S: Final = 5.0
-"""Timeout for pictures, in seconds, after which the stream is requested again."""
+"""Timeout for the next image, in seconds; afterwards, the stream is requested again."""
 _FIRST_WAIT_S: Final = 0.5
 _LONGEST_WAIT_S: Final = 5.0
 SHORTEST_RETRY_S: Final = 0.2
-"""Shortest delay before a retry in seconds, even if the robot requests less."""
+"""Minimum delay before a retry, in seconds, even if the robot requests a shorter delay."""
 _LONGEST_RETRY_S: Final = 60.0
 _NO_MORE: Final = 204
 _GONE_S: Final = 2.0
-"""Silence after which a refused connection means that the robot is gone, in seconds."""
+"""Silence after which a refused connection means that the robot is unreachable, in seconds."""
 
 log = logging.getLogger(__name__)
 
 
 class StreamSpec(NamedTuple):
-    """One stream that the messages of the driver need."""
+    """One stream that the driver's messages require."""
 
     kind: str
     path: str
     every_s: float
     topics: frozenset[str]
-    """All topics of that path; for events, a topic with ``#NAME`` has only events of that name."""
+    """All topics of the stream's path; for events, a topic with ``#NAME`` receives only events of
+    that name."""
 
 
 def streams_of(subscriptions: Sequence[TopicSubscription]) -> list[StreamSpec]:
-    """Return the streams of all subscriptions; several topics may share one.
+    """Return the streams for all subscriptions; several topics may share one stream.
 
     Raises:
-        TransportError: HTTP cannot serve a subscription.
+        TransportError: a subscription is impossible over HTTP.
     """
     found: dict[str, StreamSpec] = {}
     for topic, how in subscriptions:
@@ -79,7 +80,7 @@ def streams_of(subscriptions: Sequence[TopicSubscription]) -> list[StreamSpec]:
 
 
 class LastActivity:
-    """Time of the last data from the robot, on any connection."""
+    """Time of the last data from the robot on any connection."""
 
     def __init__(self) -> None:
         self._clock = asyncio.get_running_loop().time
@@ -91,12 +92,12 @@ class LastActivity:
 
     @property
     def silence_s(self) -> float:
-        """Seconds since the last data."""
+        """Time since the last data, in seconds."""
         return self._clock() - self._beat_s
 
 
 class HttpStream:
-    """One stream of an open transport; `run` works until it is cancelled."""
+    """One stream of an open transport; `run` continues until cancelled."""
 
     def __init__(
         self,
@@ -109,11 +110,11 @@ class HttpStream:
         """Initialise the stream.
 
         Args:
-            spec: the requested stream.
-            client: makes the requests.
-            queue: receives the data.
-            pulse: last activity of the transport.
-            max_body_bytes: size limit of one picture.
+            spec: description of the stream.
+            client: HTTP client that makes the requests.
+            queue: destination of the data.
+            pulse: time of the transport's last activity.
+            max_body_bytes: maximum size of one image, in bytes.
         """
         self._spec = spec
         self._client = client
@@ -127,7 +128,7 @@ class HttpStream:
         self._is_over = False
 
     async def run(self) -> None:
-        """Request the stream repeatedly, until the robot ends it for good."""
+        """Request the stream repeatedly, until the robot ends the stream permanently."""
         once = {"mjpeg": self._mjpeg, "stills": self._still, "sse": self._sse, "lines": self._lines}
         clock = asyncio.get_running_loop().time
         while not self._is_over:
@@ -198,7 +199,7 @@ class HttpStream:
             await self._queue.event({"topic": self._topic}, line)
 
     async def _deliver(self, event: Event) -> None:
-        """Pass an event to the topic of its name, or else to the topic of the path."""
+        """Pass an event to the topic with its name, or otherwise to the topic of the path."""
         named = f"{self._spec.path}#{event.name}"
         topic = named if named in self._spec.topics else self._spec.path
         if topic in self._spec.topics:
@@ -225,18 +226,18 @@ class HttpStream:
 
     @property
     def _shown(self) -> str:
-        """Name of the stream as text for people."""
+        """Name of the stream as text to display."""
         return f"http {self._client.where} {self._spec.path}"
 
     def _pause_s(self) -> float:
-        """Return the delay before the next attempt: growing, with random jitter."""
+        """Return the delay before the next attempt, which grows and has random jitter."""
         if self._retry_s is not None and not self._failures:
             return self._retry_s
         wait_s, self._wait_s = self._wait_s, min(2 * self._wait_s, _LONGEST_WAIT_S)
         return wait_s * (1 - 0.25 * random.random())  # noqa: S311 - spreads attempts, no secret
 
     def _came(self) -> None:
-        """Record valid data of the stream."""
+        """Record the arrival of valid data on this stream."""
         self._pulse.heartbeat()
         self._wait_s = _FIRST_WAIT_S
         if self._failures:
@@ -253,7 +254,7 @@ class HttpStream:
 
 
 class _Bound:
-    """An extensible timeout that raises `HttpFault`."""
+    """A timeout that can be extended, and raises `HttpFault`."""
 
     def __init__(self, limit_s: float, lack: str) -> None:
         self._limit_s = limit_s

@@ -1,7 +1,7 @@
-"""Trusted SSH host keys: those of URC's own file, and those in the options.
+"""Trusted SSH host keys from URC's own file and from the transport options.
 
-The file has the format of OpenSSH's ``known_hosts``. Only `remember` adds keys, after a
-confirmation by a person (``urc trust``).
+URC's file has the format of OpenSSH's ``known_hosts``. Only `remember` adds keys, after
+confirmation by a person with ``urc trust``.
 """
 
 from pathlib import Path
@@ -19,21 +19,21 @@ DEFAULT_PORT = 22
 
 
 class HostKeyStatus(NamedTuple):
-    """The known keys of one server."""
+    """The known host keys of one server."""
 
     trusted: tuple[asyncssh.SSHKey, ...] = ()
     authorities: tuple[asyncssh.SSHKey, ...] = ()
-    """Keys that sign host keys."""
+    """Certificate authority keys that sign host keys."""
     revoked: tuple[asyncssh.SSHKey, ...] = ()
 
 
 def own_file() -> Path:
-    """Return URC's own file of confirmed host keys."""
+    """Return the path of URC's file of confirmed host keys."""
     return data_folder() / "known_hosts"
 
 
 def fingerprint(key: asyncssh.SSHKey) -> str:
-    """Return the fingerprint ``SHA256:…`` of the key, as ``ssh-keygen -l`` prints it."""
+    """Return the fingerprint ``SHA256:…`` of a key, as printed by ``ssh-keygen -l``."""
     return str(key.get_fingerprint("sha256"))
 
 
@@ -41,18 +41,18 @@ class HostKeys:
     """The trusted host keys of one transport."""
 
     def __init__(self, pinned: str = "", file: str = "") -> None:
-        """Trust a single fingerprint, or URC's own file and an additional one.
+        """Trust a single fingerprint, or the keys in URC's own file and in an additional file.
 
         Args:
-            pinned: ``SHA256:…``; "" to use the files.
-            file: an additional ``known_hosts`` file; "" for none.
+            pinned: fingerprint ``SHA256:…``; "" to use the files.
+            file: path of an additional ``known_hosts`` file; "" for none.
         """
         self._pinned = pinned.rstrip("=")
         self._file = file
 
     @property
     def is_pinned(self) -> bool:
-        """Whether the document itself pins the host key."""
+        """Whether the document itself contains the trusted fingerprint."""
         return bool(self._pinned)
 
     def known(self, host: str, port: int) -> HostKeyStatus:
@@ -72,7 +72,7 @@ class HostKeys:
         return found
 
     def judge(self, key: asyncssh.SSHKey, known: HostKeyStatus) -> str:
-        """Return "" for a trusted `key`, else a fingerprint, ``revoked`` or ``unknown``."""
+        """Return "" for a trusted `key`; otherwise a fingerprint, ``revoked`` or ``unknown``."""
         if self._pinned:
             return "" if fingerprint(key) == self._pinned else self._pinned
         if key in known.revoked:
@@ -83,7 +83,7 @@ class HostKeys:
 
 
 def remember(host: str, port: int, key: asyncssh.SSHKey) -> Path:
-    """Write `key` into URC's own file as the only key of that server; return the file.
+    """Store `key` in URC's own file as the only key of a server; return the path of the file.
 
     Raises:
         TransportError: the file cannot be written.
@@ -125,7 +125,7 @@ def _read(file: Path, host: str, port: int, *, is_asked_for: bool) -> HostKeySta
 
 
 def _write(file: Path, text: str) -> None:
-    """Replace the whole file; only its owner can read it."""
+    """Replace the whole file, readable only by its owner."""
     put_private(file, text.encode())
 
 
