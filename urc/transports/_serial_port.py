@@ -142,11 +142,11 @@ class SerialStream(asyncio.Protocol):
         self._gone.set()
 
     def pause_writing(self) -> None:
-        """Block `put`."""
+        """Block `write`."""
         self._writable.clear()
 
     def resume_writing(self) -> None:
-        """Let `put` continue."""
+        """Let `write` continue."""
         self._writable.set()
 
     # -- a `ByteStream`

@@ -116,12 +116,12 @@ class TcpStream(asyncio.BufferedProtocol):
         self._gone.set()
 
     def pause_writing(self) -> None:
-        """Block `put`."""
+        """Block `write`."""
         self.is_writable = False
         self._writable.clear()
 
     def resume_writing(self) -> None:
-        """Let `put` continue."""
+        """Let `write` continue."""
         self.is_writable = True
         self._writable.set()
 

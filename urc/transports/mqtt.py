@@ -1,6 +1,6 @@
-"""Factory of the MQTT transport, for robots behind a broker.
+"""The factory of the MQTT transport, for robots behind an MQTT broker.
 
-The module needs no MQTT library, so that it can report a missing one.
+This module imports no MQTT library, so that it can report a missing library.
 """
 
 from importlib.util import find_spec
@@ -14,7 +14,7 @@ __all__ = ["from_setup"]
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return a transport for the options of a document; see docs/transports/mqtt.md.
+    """Return an MQTT transport for the options of a document; see docs/transports/mqtt.md.
 
     Raises:
         TransportError: an option is missing or invalid, or the library is missing.

@@ -1,12 +1,12 @@
-"""Robots behind an MQTT broker, version 5 or 3.1.1.
+"""A transport for robots behind an MQTT broker, with version 5 or 3.1.1 of MQTT.
 
-Theory of operation. The library paho implements the protocol; the connection is our own. Each
-`open` dials a socket and passes it to a new paho client, which lives as long as the connection. No
-message of an earlier connection can thus be sent late. A paho client alone would keep
-unacknowledged messages and send them again. No thread is involved.
+Theory of operation. The library paho implements the protocol, but URC opens the network connection.
+Each `open` connects a socket and passes it to a new paho client, which is dropped with the
+connection. No message of an earlier connection can therefore be sent late. A reused paho client
+would keep unacknowledged messages and send them again. The transport starts no thread.
 
-The session is always clean. The broker publishes a last will whenever the connection ends, also
-when URC closes it: an extra stop is harmless.
+Every MQTT session is clean. The broker publishes the last will after every end of the connection,
+even if URC closes it; an extra stop is harmless.
 """
 
 import asyncio
@@ -31,36 +31,36 @@ from urc.transports.web_dial import Dialer
 __all__ = ["MqttTransport"]
 
 KEEPALIVE_S = 5
-"""Keepalive interval in seconds; a broker is lost after twice this silence."""
+"""Keepalive interval in seconds; the broker counts as lost after twice this time without data."""
 MAX_BYTES = 16 * 1024 * 1024
-"""Largest accepted message, in bytes."""
+"""Maximum size of a received message, in bytes."""
 MAX_UNACKNOWLEDGED = 256
-"""Largest number of unacknowledged messages."""
+"""Maximum number of unacknowledged messages."""
 MAX_HALF = 64
-"""Largest number of incomplete deliveries with quality of service 2."""
+"""Maximum number of incomplete deliveries with quality of service 2."""
 MAX_UNTAKEN = 4096
-"""Largest number of packets that wait for the kernel, acknowledgements included."""
+"""Maximum number of unsent packets, including acknowledgements."""
 _CHECK_S = 1.0
 _READ_BYTES = 65536
 _PACKETS_A_TURN = 64
-"""Packets per turn of the event loop."""
+"""Maximum number of packets handled in one turn of the event loop."""
 _WITH_WILL = "Disconnect with will message"
 
 log = logging.getLogger(__name__)
 
 
 class MqttTransport:
-    """One connection to a broker; it may be opened repeatedly."""
+    """A transport to one broker; may be opened several times."""
 
     def __init__(self, options: MqttOptions, dialer: Dialer) -> None:
-        """Initialise for the broker of `dialer`, without connecting."""
+        """Store the options and the dialer of a broker, without connecting."""
         self._options = options
         self._dialer = dialer
         self._session: _Session | None = None
 
     @property
     def address(self) -> str:
-        """Target of the transport as text for people: ``mqtt 192.168.1.5:1883``."""
+        """Target of the transport as text to display, such as ``mqtt 192.168.1.5:1883``."""
         return f"mqtt {self._options.where}"
 
     async def open(self, timeout_s: float) -> None:
@@ -85,7 +85,7 @@ class MqttTransport:
         return await self._session.queue.pop()
 
     async def send(self, data: Payload) -> None:
-        """Publish a message; return once the kernel has it.
+        """Publish a message; return after the kernel has accepted the message.
 
         Raises:
             PeerClosed: the connection broke.
@@ -134,7 +134,7 @@ class MqttTransport:
 
 
 class _Session:
-    """One open connection and its paho client."""
+    """One open connection with its paho client."""
 
     def __init__(self, options: MqttOptions, line: socket.socket) -> None:
         self.queue = TopicReceiveQueue()
@@ -142,11 +142,11 @@ class _Session:
         self.line = line
         self._loop = asyncio.get_running_loop()
         self._answered: asyncio.Future[str] = self._loop.create_future()
-        """Result of the login: "" or the reason of a refusal."""
+        """Result of the login: "" for success, or the reason of a refusal."""
         self._granted: dict[int | None, asyncio.Future[list[ReasonCode]]] = {}
         self._seen = 0
         self._writable: asyncio.Future[None] | None = None
-        """Done when the kernel accepts more data; None while no task waits."""
+        """Future that ends when the kernel accepts more data; None if no task is waiting."""
         self._check: asyncio.TimerHandle | None = None
         self._client = self._make()
 
@@ -168,7 +168,7 @@ class _Session:
         return client
 
     async def start(self) -> None:
-        """Log in and subscribe; raise `ConnectFailed` with the broker's own reason."""
+        """Log in and subscribe; raise `ConnectFailed` with the broker's reason."""
         options = self._options
         self._client.start()
         self._loop.add_reader(self.line, self._readable)
@@ -188,7 +188,7 @@ class _Session:
                 )
 
     async def publish(self, envelope: Envelope) -> None:
-        """Pass one message to the kernel."""
+        """Pass one message to the kernel, or raise `TransportError`."""
         self._raise_if_ended()
         attributes = envelope.attributes
         topic, qos = attributes.get("topic"), attributes.get("qos") or 0
@@ -210,10 +210,10 @@ class _Session:
         self._raise_if_ended()
 
     def end(self, *, has_farewell: bool = True) -> None:
-        """Close at once. The broker publishes the will, if there is one.
+        """Close at once. The broker publishes the last will, if one is declared.
 
         Args:
-            has_farewell: whether to send DISCONNECT, which also sends all earlier data.
+            has_farewell: whether to send DISCONNECT, which also flushes earlier data.
         """
         is_open = self.queue.ended is None
         self.queue.end(CLOSED)
@@ -235,14 +235,14 @@ class _Session:
             raise PeerClosed(self.queue.ended)
 
     def _forget(self, line: Any) -> None:
-        """Stop watching a socket that is about to be closed."""
+        """Stop watching a socket that will be closed next."""
         if line.fileno() >= 0:
             self._loop.remove_reader(line)
             self._loop.remove_writer(line)
         self._release()
 
     async def _until_writable(self) -> None:
-        """Wait until the kernel accepts more data, or the connection has ended."""
+        """Wait until the kernel accepts more data, or the connection ends."""
         if self._writable is None:
             self._writable = self._loop.create_future()
             self._loop.add_writer(self.line, self._drained)
@@ -260,7 +260,7 @@ class _Session:
             writable.set_result(None)
 
     def _readable(self) -> None:
-        """Let paho read all received packets; it reads one per call, without reporting it."""
+        """Let paho read all received packets; one paho call reads at most one packet."""
         try:
             for _ in range(_PACKETS_A_TURN):
                 before = self._seen
@@ -274,7 +274,7 @@ class _Session:
             self._lose(f"the broker sent an invalid packet ({reason(fault)})")
 
     def _tick(self) -> None:
-        """Send keepalives, and close a connection without replies."""
+        """Send keepalives, and close the connection if the broker does not reply."""
         self._check = self._loop.call_later(_CHECK_S, self._tick)
         self._client.loop_misc()
 
@@ -313,7 +313,7 @@ class _Session:
             self._lose(HUNG_UP)
 
     def _lose(self, reason: str) -> None:
-        """Wake all waiting tasks with the end of the connection."""
+        """Wake all waiting tasks with the reason why the connection ended."""
         self.queue.end(reason)
         self._forget(self.line)
         if not self._answered.done():
@@ -325,7 +325,7 @@ class _Session:
 
 
 class _Client(Client):
-    """A paho client on a given socket, instead of one of its own."""
+    """A paho client that uses a given socket."""
 
     def __init__(self, options: MqttOptions, line: socket.socket) -> None:
         version = MQTTProtocolVersion.MQTTv5 if options.is_v5 else MQTTProtocolVersion.MQTTv311
@@ -357,12 +357,12 @@ class _Client(Client):
         self.reconnect()
 
     def drop(self) -> None:
-        """Close the socket in any state of paho."""
+        """Close the socket in every state of paho."""
         self._sock_close()
         self._given.close()
 
     def excess(self) -> str:
-        """Return the exceeded limit as text, or ""; paho itself has no limits."""
+        """Return a message about an exceeded limit, or ""; paho itself enforces no limits."""
         if self._in_packet["remaining_length"] > MAX_BYTES:
             return f"the broker sent a message of more than {MAX_BYTES} bytes"
         if len(self._out_packet) > MAX_UNTAKEN:
@@ -378,10 +378,10 @@ class _Client(Client):
         return self._given
 
     def _sock_recv(self, bufsize: int) -> bytes:
-        """Read a part of a message: paho would allocate memory for the whole claimed size.
+        """Read part of a message, because paho would allocate memory for the whole declared size.
 
         Raises:
-            BlockingIOError: the message claims more than the limit, see `excess`; nothing is read.
+            BlockingIOError: the declared size exceeds the limit, see `excess`; nothing is read.
         """
         if bufsize > MAX_BYTES:
             raise BlockingIOError

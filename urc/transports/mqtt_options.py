@@ -1,4 +1,7 @@
-"""Options of an MQTT transport, and the encoding of bodies. Needs no MQTT library."""
+"""Options of an MQTT transport, and the encoding of message bodies.
+
+This module needs no MQTT library.
+"""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -25,7 +28,7 @@ class MqttTopic(NamedTuple):
 
 
 class WillMessage(NamedTuple):
-    """The message that the broker publishes when the connection ends."""
+    """The last will: a message that the broker publishes when the connection ends."""
 
     topic: str
     payload: bytes
@@ -39,9 +42,9 @@ class MqttOptions(NamedTuple):
     host: str
     port: int
     is_v5: bool = True
-    """Whether the protocol is MQTT 5; otherwise 3.1.1."""
+    """Whether to use MQTT 5 instead of 3.1.1."""
     client_id: str = ""
-    """Client id; "" for one that the library generates."""
+    """Client ID; "" to let the library generate one."""
     username: str = ""
     password: str | None = None
     tls: Tls | None = None
@@ -55,7 +58,7 @@ class MqttOptions(NamedTuple):
 
 
 def read_options(setup: TransportSetup) -> MqttOptions:
-    """Return the options of `setup`; raise `TransportError` with one line for an invalid one."""
+    """Return the options of `setup`; raise `TransportError` for an invalid option."""
     given: Mapping[str, object] = setup.options
     tls = Tls.of("mqtt", given.get("tls"))
     port = DEFAULT_TLS_PORT if tls is not None else DEFAULT_PORT
@@ -80,7 +83,7 @@ def read_options(setup: TransportSetup) -> MqttOptions:
 
 
 def body_bytes(body: object) -> bytes:
-    """Return the bytes of a message: bytes unchanged, all other values as JSON.
+    """Encode a message body: bytes stay unchanged, all other values become JSON.
 
     Raises:
         TransportError: the value cannot be written as JSON.

@@ -1,8 +1,8 @@
-"""The listeners of URC's own dashboard, which no transport may connect to.
+"""The listening addresses of URC's own dashboard, which no transport may connect to.
 
-A document that connects to the dashboard would act as a local program. Each new connection is
-checked, so host names, redirects and address notations make no difference. Forwarding by a router,
-a proxy or another machine is not detected.
+A document that connects to the dashboard would have the rights of a local program. The address of
+each new connection is checked, so host names, redirects and address notations make no difference.
+Connections forwarded by a router, a proxy or another machine are not detected.
 """
 
 import ipaddress
@@ -16,7 +16,7 @@ __all__ = ["OWN_DOORS", "OwnAddressError", "OwnListeners"]
 
 
 class OwnAddressError(OSError):
-    """A connection leads to URC's own dashboard."""
+    """An error because a connection leads to URC's own dashboard."""
 
     def __init__(self) -> None:
         super().__init__(None, "this address is the dashboard itself; it cannot be a robot")
@@ -31,7 +31,7 @@ class OwnListeners:
 
     @contextmanager
     def kept(self, listener: socket.socket) -> Iterator[None]:
-        """Reject connections to `listener` during the context."""
+        """Reject connections to `listener` while the context is open."""
         place = listener.getsockname()
         door = (_address(place[0]), int(place[1]))
         self._doors.append(door)
@@ -41,11 +41,11 @@ class OwnListeners:
             self._doors.remove(door)
 
     def words(self) -> list[str]:
-        """Return the addresses as words for `learn`, in another process of this program."""
+        """Return the addresses as words, the input of `learn` in a related process."""
         return [f"{address}#{port}" for address, port in self._doors]
 
     def learn(self, words: Iterable[str]) -> None:
-        """Add the listeners of another process of this program, until this process ends."""
+        """Add the listening addresses of a related process, until this process ends."""
         for word in words:
             address, _, port = word.partition("#")
             self._doors.append((_address(address), int(port)))
@@ -57,12 +57,12 @@ class OwnListeners:
             self.check_place(_address(peer[0]), peer[1])
 
     def check_place(self, address: Address, port: int, *, is_near: bool = True) -> None:
-        """Raise `OwnAddressError` if a connection to that address would lead to an own listener.
+        """Raise `OwnAddressError` if a connection to that address would reach an own listener.
 
         Args:
             address: target address.
             port: target port.
-            is_near: whether the connection starts on this machine; elsewhere, loopback means
+            is_near: whether the connection starts on this machine; if not, a loopback address means
                 another machine.
         """
         wanted = unmapped(address)
@@ -82,4 +82,4 @@ def _address(text: str) -> Address:
 
 
 OWN_DOORS = OwnListeners()
-"""Listeners of this process; they belong to the program as a whole."""
+"""Listening addresses of this process, shared by the whole program."""

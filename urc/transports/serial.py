@@ -1,7 +1,7 @@
-"""A serial port: on this machine, or behind a server (``socket://``, ``rfc2217://``).
+"""A serial port of this machine, or of a server (``socket://``, ``rfc2217://``).
 
-The library is serialx, of the extra ``serial``. A ``socket://`` address is a plain TCP connection:
-its server has already configured the port.
+The transport uses the library serialx from the extra ``serial``. A ``socket://`` address is a plain
+TCP connection to a server that has already configured the port.
 """
 
 import asyncio
@@ -37,17 +37,17 @@ class SerialSettings(NamedTuple):
     stop_bits: float = 1
     flow_control: str = "none"
     rts: bool | None = None
-    """Initial level of the RTS pin; None: the default, which is high."""
+    """Initial level of the RTS pin; None for the default level, high."""
     dtr: bool | None = None
     is_exclusive: bool = True
-    """Whether other programs are locked out."""
+    """Whether to lock other programs out of the port."""
 
 
 class SerialTransport(StreamTransport):
-    """One serial port; it may be opened repeatedly."""
+    """A transport over one serial port; may be opened several times."""
 
     def __init__(self, port: str, settings: SerialSettings) -> None:
-        """Initialise; `port` is a path or name, or an address with its scheme."""
+        """Store the settings; `port` is a device path, a port name, or an address with scheme."""
         super().__init__()
         self._port = port
         self._settings = settings
@@ -58,7 +58,7 @@ class SerialTransport(StreamTransport):
 
     @property
     def address(self) -> str:
-        """Target of the transport as text for people: ``serial /dev/ttyUSB0``."""
+        """Target of the transport as text to display, such as ``serial /dev/ttyUSB0``."""
         return f"serial {self._port}"
 
     async def open(self, timeout_s: float) -> None:
@@ -103,7 +103,7 @@ def from_setup(setup: TransportSetup) -> Transport:
 
 
 def explain(port: str, shown: str, fault: BaseException) -> str:
-    """Return one line with the reason why a port could not be opened."""
+    """Return a one-line message about a port that could not be opened."""
     code = getattr(fault, "errno", None) or (fault.args[0] if fault.args else None)
     if isinstance(fault, ConnectionRefusedError):
         return f"nothing listens on {shown} (connection refused)"
@@ -122,7 +122,7 @@ def explain(port: str, shown: str, fault: BaseException) -> str:
 
 
 def _remedy(port: str) -> str:
-    """Return a hint with the group of the port, on systems with groups."""
+    """Return a hint about the port's user group, on systems with groups."""
     if sys.platform == "win32":
         return ""
     import grp
@@ -174,7 +174,7 @@ def _pin(options: Mapping[str, object], key: str) -> bool | None:
 
 
 def _arguments_of(settings: SerialSettings) -> dict[str, object]:
-    """Return the settings with the names of the library."""
+    """Return the settings under the library's names."""
     from serialx import PinState
 
     arguments: dict[str, object] = {

@@ -1,8 +1,8 @@
-"""SSH to a robot: a shell, a program, or only a tunnel for other transports.
+"""The SSH transport: a shell, a program, or only a tunnel for other transports.
 
-All users share one connection: the transport's own channel, if its mode has one, and the transports
-that name it in ``tunnel``. The first user opens the connection, the last one closes it, and a loss
-ends all of them.
+All users share one connection: the transport's own channel, and the transports that name this
+transport in ``tunnel``. The first user opens the connection, the last user closes it, and a lost
+connection ends all users.
 """
 
 import asyncio
@@ -44,18 +44,19 @@ _ALIVE_S: Final = (0.2, 60.0)
 
 
 class RemoteProgram(NamedTuple):
-    """The program at the far end."""
+    """The remote program that an SSH transport runs."""
 
     mode: Mode = "shell"
     command: str = ""
-    """Command of the mode ``exec``."""
+    """Command for the mode ``exec``."""
     has_pty: bool = True
-    """Whether it runs on a pseudo-terminal, and so prompts and echoes."""
+    """Whether the program runs on a pseudo-terminal, and therefore shows prompts and echoes input.
+    """
     environment: tuple[tuple[str, str], ...] = ()
 
 
 def read_target(setup: TransportSetup) -> SshTarget:
-    """Return the server and login of the options; raise `TransportError`."""
+    """Return the server and the login from the options; raise `TransportError` if invalid."""
     options = setup.options
     username = _text(options, "username")
     if not username:
@@ -82,7 +83,7 @@ def read_target(setup: TransportSetup) -> SshTarget:
 
 
 def read_program(setup: TransportSetup) -> RemoteProgram:
-    """Return the remote program of the options; raise `TransportError`."""
+    """Return the remote program from the options; raise `TransportError` if invalid."""
     options = setup.options
     mode = _options.choice("ssh", options, "mode", ("shell", "exec", "forward"), "shell")
     command = _options.text("ssh", options, "command")
@@ -104,7 +105,7 @@ def _address(options: Mapping[str, object]) -> Address:
 
 
 def _text(options: Mapping[str, object], name: str) -> str:
-    """Return a text; errors don't repeat the value, which may be a secret."""
+    """Return a text option; error messages omit the value, which may be a secret."""
     value = options.get(name)
     if value is None:
         return ""
@@ -137,27 +138,27 @@ def _environment(value: object) -> tuple[tuple[str, str], ...]:
 
 
 _COLUMNS, _ROWS = 240, 24
-"""Size of the pseudo-terminal, wide enough that shells do not wrap the lines of a robot."""
+"""Size of the pseudo-terminal, wide enough to prevent shells from wrapping long lines."""
 
 
 class SshTransport:
-    """One SSH server; a `Transport`, and a `Tunnel` of others."""
+    """A transport over one SSH server, also usable as a `Tunnel` of other transports."""
 
     def __init__(
         self, target: SshTarget, program: RemoteProgram, outer: "SshTransport | None" = None
     ) -> None:
-        """Initialise for `target`, tunnelled through `outer` if given, without connecting."""
+        """Store the server and the program; `outer` is the SSH transport of the tunnel, or None."""
         self.target = target
         self._program = program
         self._outer = outer
         self._shared = SharedConnection(self._dial)
         self._connection: SshConnection | None = None
-        """Connection while open, of which this transport is a user."""
+        """The shared connection while this transport is open; otherwise None."""
         self._channel: SshChannel | None = None
 
     @property
     def address(self) -> str:
-        """Target of the transport as text for people: ``ssh 192.168.1.5:22``."""
+        """Target of the transport as text to display, such as ``ssh 192.168.1.5:22``."""
         return f"ssh {self.target.address.text}"
 
     async def open(self, timeout_s: float) -> None:
@@ -189,7 +190,7 @@ class SshTransport:
         await self._channel.write(bytes_of(data))
 
     async def close(self) -> None:
-        """Close at once, without affecting tunnelled transports.
+        """Close the transport immediately, without affecting tunnelled transports.
 
         Never raises, may be called twice.
         """
@@ -205,7 +206,7 @@ class SshTransport:
         return 0 if self._channel is None else self._channel.unsent()
 
     async def abort(self) -> None:
-        """Close at once, including all tunnelled transports; discard unsent data."""
+        """Close the transport and all tunnelled transports immediately; discard unsent data."""
         self.break_off()
         await self.close()
 
@@ -216,10 +217,10 @@ class SshTransport:
             self._outer.break_off()
 
     async def connect(self, host: str, port: int, timeout_s: float) -> ByteStream:
-        """Return a connection to `host` and `port` as seen from the server.
+        """Return a connection to `host` and `port`, opened by the SSH server.
 
         Raises:
-            ConnectFailed: within `timeout_s` seconds.
+            ConnectFailed: no connection was possible within `timeout_s` seconds.
         """
         async with _within(timeout_s, f"{Address(host, port).text} through {self.address}"):
             connection = await self._shared.join(timeout_s)
@@ -246,11 +247,11 @@ class SshTransport:
                 await self._outer.leave()
 
     async def join(self, timeout_s: float) -> asyncssh.SSHClientConnection:
-        """Return the asyncssh connection for an inner SSH connection; call `leave` afterwards."""
+        """Return the asyncssh connection for a tunnelled connection; call `leave` afterwards."""
         return (await self._shared.join(timeout_s)).ssh
 
     async def leave(self) -> None:
-        """Give up a connection of `join`."""
+        """Release a connection that `join` returned."""
         await self._shared.leave()
 
     async def _dial(self, timeout_s: float) -> SshConnection:
@@ -280,7 +281,7 @@ class SshTransport:
 
 
 class _Carried:
-    """A forwarded connection, which keeps the SSH connection open."""
+    """A forwarded connection, which keeps its SSH connection open."""
 
     def __init__(
         self, channel: SshChannel, shared: SharedConnection, break_off: Callable[[], None]
@@ -311,7 +312,7 @@ class _Carried:
 
 
 def from_setup(setup: TransportSetup) -> SshTransport:
-    """Return a transport for the options of a document; see docs/transports/ssh.md.
+    """Return an SSH transport for the options of a document; see docs/transports/ssh.md.
 
     Raises:
         TransportError: an option is missing or invalid.

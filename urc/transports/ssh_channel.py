@@ -1,7 +1,7 @@
-"""A channel of an SSH connection, as a stream of bytes.
+"""A channel of an SSH connection as a byte stream.
 
-Received data is buffered up to `READ_AHEAD_BYTES`. Beyond that, the channel is not read, and the
-window of the protocol stops the sender. `put` returns once the kernel has every byte.
+Received data is buffered up to `READ_AHEAD_BYTES`. If the buffer is full, the channel is not read,
+and SSH flow control stops the sender. `write` returns after the kernel has accepted every byte.
 """
 
 import asyncio
@@ -19,23 +19,24 @@ __all__ = ["MAX_PACKET", "WINDOW", "SshChannel"]
 READ_AHEAD_BYTES = 65536
 """Size of the receive buffer, in bytes."""
 WINDOW = 262_144
-"""Window of the channel, in bytes beyond that buffer."""
+"""SSH window size of the channel in bytes, in addition to the receive buffer."""
 MAX_PACKET = 32768
 _CLOSES_WITHIN_S = 1.0
-"""Timeout for the exit of a program that has closed its output, in seconds."""
+"""Maximum wait for the exit of a program that has closed its output, in seconds."""
 _LAST_WORDS = 200
-"""Largest part of standard error in the message about the end of a program, in bytes."""
+"""Maximum amount of standard error output quoted in the message about a program's end, in bytes."""
 
 
 class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
-    """A shell, a program, or a forwarded connection."""
+    """A channel for a shell, a program, or a forwarded connection."""
 
     def __init__(self, wire: SshSocket, program: str = "") -> None:
         """Initialise a channel.
 
         Args:
-            wire: socket of the SSH connection; full when the kernel accepts no more data.
-            program: name of the program in messages, ``the shell``; "" for a forwarded connection.
+            wire: socket of the SSH connection, which is full when the kernel accepts no more data.
+            program: name of the program in messages, such as ``the shell``; "" for a forwarded
+                connection.
         """
         self._wire = wire
         self._program = program
@@ -45,7 +46,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
         self._last_words = b""
         self._outcome = ""
         self._ended: str | None = None
-        """Reason of the end; None while the channel is open."""
+        """Reason why the channel ended; None while the channel is open."""
         self._late: asyncio.TimerHandle | None = None
         self._arrived = asyncio.Event()
         self._writable = asyncio.Event()
@@ -60,7 +61,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
         self._channel.set_write_buffer_limits(high=0)
 
     def data_received(self, data: bytes, datatype: int | None) -> None:
-        """Buffer received data, except for standard error."""
+        """Store received data in the buffer, except for standard error."""
         if datatype == EXTENDED_DATA_STDERR:
             self._last_words = (self._last_words + data)[-_LAST_WORDS:]
             return
@@ -80,7 +81,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
         self._outcome = f"{self._program} was ended by signal {one_line(signal, 20)}"
 
     def eof_received(self) -> bool:
-        """Handle the end of the output; for a program, wait for its exit."""
+        """Handle the end of the output; for a program, wait for its exit status."""
         if not self._program:
             self._end(HUNG_UP)
         elif self._late is None:
@@ -89,17 +90,17 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
         return False
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Record the loss of the channel or of its connection."""
+        """Record the end of the channel or of its connection."""
         if exc is not None:
             self._wire.end(why_lost(exc))
         self._end(self._wire.fault or self._farewell())
 
     def pause_writing(self) -> None:
-        """Block `put` while the other side accepts no data."""
+        """Block `write` while the other side accepts no data."""
         self._writable.clear()
 
     def resume_writing(self) -> None:
-        """Unblock `put`."""
+        """Unblock `write`."""
         self._writable.set()
 
     # -- a `ByteStream`
@@ -120,7 +121,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
         return data
 
     async def write(self, data: bytes) -> None:
-        """Send `data`, waiting for buffer space; raise `PeerClosed` on an error."""
+        """Send `data` after a wait for buffer space; raise `PeerClosed` on an error."""
         await self._until_writable()
         try:
             self._channel.write(data)
@@ -140,7 +141,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
     def unsent(self) -> int:
         """Return the number of bytes that the server has not acknowledged.
 
-        The number includes the bytes of the SSH connection itself and of its other channels.
+        The number includes all unacknowledged bytes of the SSH connection, also of other channels.
         """
         return self._channel.get_write_buffer_size() + self._wire.unsent()
 

@@ -1,4 +1,4 @@
-"""One SSH connection, and its sharing by several users."""
+"""One SSH connection, which several users can share."""
 
 import asyncio
 import ipaddress
@@ -21,41 +21,41 @@ from urc.transports.topic_socket import Address
 __all__ = ["SshConnection", "SharedConnection"]
 
 _GONE_WITHIN_S = 0.5
-"""Timeout for the close of a connection, in seconds."""
+"""Maximum wait for the end of a connection after its close, in seconds."""
 _LOOK_UP_S = 2.0
 
 
 class SshConnection:
-    """An SSH connection after its login."""
+    """An open SSH connection after the login."""
 
     def __init__(
         self, ssh: asyncssh.SSHClientConnection, wire: SshSocket, address: Address
     ) -> None:
-        """Take over an SSH connection and its socket."""
+        """Store an open SSH connection and its socket."""
         self.ssh = ssh
         self._wire = wire
         self._address = address
         self._strays: set[asyncio.Task[Any]] = set()
         self.when_closed: Callable[[], Awaitable[None]] | None = None
-        """Called once after `close`, to release the outer tunnel."""
+        """Callback after `close` that releases the outer tunnel; called once."""
 
     @property
     def is_up(self) -> bool:
-        """Whether channels can be opened."""
+        """Whether new channels can be opened."""
         return not self._wire.fault and not self.ssh.is_closed()
 
     @property
     def fault(self) -> str:
-        """Reason of the end; "" while the connection is open."""
+        """Reason why the connection ended; "" while the connection is open."""
         return self._wire.fault
 
     async def ended(self) -> NoReturn:
-        """Wait for the end of the connection; raise `PeerClosed` then."""
+        """Wait for the end of the connection, then raise `PeerClosed`."""
         await self.ssh.wait_closed()
         raise PeerClosed(self._wire.fault or HUNG_UP)
 
     async def program(self, command: str | None, **options: Any) -> SshChannel:
-        """Start `command`, or a shell for None, and return its standard input and output."""
+        """Start `command`, or a shell for None; return a channel to the program."""
         what = "the shell" if command is None else "the command"
         return await self._opened(
             lambda channel: self.ssh.create_session(
@@ -82,10 +82,11 @@ class SshConnection:
         )
 
     async def _checked(self, host: str, port: int) -> str:
-        """Return the target address for `host`; raise `OwnAddressError` for the own dashboard.
+        """Return the target address for `host`; raise `OwnAddressError` for URC's own dashboard.
 
-        An SSH server on this machine can reach all its listeners. For such a server, a name is
-        looked up here, once, so that the server cannot find another address.
+        An SSH server on this machine could reach the dashboard. For an SSH server on this machine,
+        a host name is looked up once in this method, so that the server cannot resolve it
+        differently.
         """
         is_near = self._is_on_this_machine()
         addresses = [host]
@@ -112,7 +113,7 @@ class SshConnection:
             return False
 
     async def close(self) -> None:
-        """Close at once, with every channel."""
+        """Close the connection immediately, with every channel."""
         self._wire.end(CLOSED)
         self.ssh.abort()
         with suppress(TimeoutError):
@@ -126,15 +127,16 @@ class SshConnection:
             await when_closed()
 
     def reset(self) -> None:
-        """Reset the connection without a close message, which would also send unsent data."""
+        """Reset the connection; do not send a close message, which would also flush unsent data."""
         self._wire.reset()
 
     async def _opened(
         self, begin: Callable[[SshChannel], Awaitable[Any]], channel: SshChannel, failure: str
     ) -> SshChannel:
-        """Open `channel`; after a cancellation, close it as soon as it is open.
+        """Open `channel`; if cancelled, close the channel as soon as it is open.
 
-        asyncssh would forget a channel whose opening is cancelled, but the server would not.
+        After a cancelled opening, asyncssh would forget the channel, but the server would keep it
+        open.
         """
         task = asyncio.ensure_future(begin(channel))
         try:
@@ -161,26 +163,27 @@ class SshConnection:
 
 
 class SharedConnection:
-    """The shared connection of a transport: opened by the first user, closed by the last."""
+    """A shared SSH connection, opened by the first user and closed by the last user."""
 
     def __init__(self, dial: Callable[[float], Awaitable[SshConnection]]) -> None:
         """Initialise.
 
         Args:
-            dial: opens a connection within the given seconds; leaves nothing behind when cancelled.
+            dial: opens a connection within the given number of seconds; frees all resources if
+                cancelled.
         """
         self._dial = dial
         self._users = 0
         self._attempt: asyncio.Task[SshConnection] | None = None
-        """Task that opens the connection, and then holds it."""
+        """Task that opens the connection; its result is the connection."""
 
     async def join(self, timeout_s: float) -> SshConnection:
-        """Return the connection, opened if necessary; call `leave` afterwards.
+        """Return the shared connection, and open it if necessary; call `leave` afterwards.
 
-        The caller sets the timeout; other callers that wait for the same attempt continue.
+        The caller sets the timeout; a cancelled caller does not affect other callers.
 
         Raises:
-            ConnectFailed: opening failed. No `leave` is needed then.
+            ConnectFailed: opening failed. After this error, `leave` must not be called.
         """
         self._users += 1
         try:
@@ -192,7 +195,7 @@ class SharedConnection:
             raise
 
     async def leave(self) -> None:
-        """Release the connection; the last user closes it."""
+        """Release the shared connection; the last user closes it."""
         self._users -= 1
         if self._users:
             return
@@ -205,7 +208,7 @@ class SharedConnection:
             await attempt.result().close()
 
     def break_off(self) -> None:
-        """Reset the connection for all users; discard unsent data."""
+        """Reset the connection for all users, and discard unsent data."""
         if self._attempt is not None and self._attempt.done() and self._is_good(self._attempt):
             self._attempt.result().reset()
 

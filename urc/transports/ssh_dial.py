@@ -1,4 +1,4 @@
-"""Opening of an SSH connection: socket, host key, login, and error texts."""
+"""Opening of SSH connections: socket, host key, login, and error messages."""
 
 from typing import Any, NamedTuple
 
@@ -15,16 +15,16 @@ from urc.transports.topic_socket import Address
 __all__ = ["OfferedHostKey", "SshTarget", "dial", "look_at_key"]
 
 ALIVE_COUNT = 2
-"""Largest number of unanswered keepalives."""
+"""Maximum number of unanswered keepalives."""
 
 
 class OfferedHostKey(NamedTuple):
-    """The host key of a server."""
+    """The host key that a server has offered."""
 
     key: asyncssh.SSHKey
     expected: str = ""
-    """Expected key: fingerprints, ``revoked``, or ``unknown`` for an unknown server; "" when the
-    key is trusted."""
+    """Fingerprints of the expected keys, ``revoked``, or ``unknown`` for an unknown server; "" if
+    the offered key is trusted."""
 
     @property
     def fingerprint(self) -> str:
@@ -38,19 +38,19 @@ class OfferedHostKey(NamedTuple):
 
 
 class SshTarget(NamedTuple):
-    """One server, with its login and trusted keys."""
+    """One SSH server, with its login and trusted keys."""
 
     address: Address
     login: Login
     keys: HostKeys
     keepalive_s: float = 2.0
-    """Silence after which a keepalive is sent, in seconds."""
+    """Silence before a keepalive is sent, in seconds."""
     name: str = ""
-    """Name of the transport, for the command that trusts a key."""
+    """Name of the transport, for the hint about the command ``urc trust``."""
 
 
 class _Client(asyncssh.SSHClient):
-    """Checks the host key, and records the reason of the end."""
+    """An asyncssh client that checks the host key and records why the connection ended."""
 
     def __init__(self, target: SshTarget, known: HostKeyStatus, *, only_looks: bool) -> None:
         self._keys = target.keys
@@ -73,15 +73,16 @@ class _Client(asyncssh.SSHClient):
 async def dial(
     target: SshTarget, outer: asyncssh.SSHClientConnection | None, timeout_s: float
 ) -> SshConnection:
-    """Connect and log in.
+    """Connect to `target` and log in.
 
     Args:
         target: the server.
-        outer: another SSH connection as a tunnel; None: the network of this machine.
-        timeout_s: total time for all addresses of the server; the caller sets the timeout.
+        outer: SSH connection that tunnels the new connection; None for the network of this machine.
+        timeout_s: total time for all addresses of the server, in seconds; the caller enforces the
+            limit.
 
     Raises:
-        ConnectFailed: with one line that includes a hint, if there is one.
+        ConnectFailed: connecting or the login failed; the message may include a hint.
     """
     client = _Client(target, _known(target), only_looks=False)
     async with credentials(target.login) as secrets:
@@ -91,7 +92,7 @@ async def dial(
 async def look_at_key(
     target: SshTarget, outer: asyncssh.SSHClientConnection | None, timeout_s: float
 ) -> OfferedHostKey:
-    """Return the host key of the server, without logging in; see `dial`."""
+    """Return the host key of the server without logging in; for the parameters, see `dial`."""
     client = _Client(target, _known(target), only_looks=True)
     try:
         connection = await _connect(target, client, outer, timeout_s, {"client_keys": None})
@@ -151,7 +152,7 @@ def _known(target: SshTarget) -> HostKeyStatus:
 
 
 def _explain(target: SshTarget, client: _Client, fault: Exception) -> str:
-    """Return one line for people with the reason of a failed connection."""
+    """Return a one-line message with the reason of a failed connection."""
     place, login = target.address.text, target.login
     if client.offer is not None and client.offer.expected:
         return _explain_key(target, client.offer)

@@ -1,4 +1,4 @@
-"""Login to an SSH server: user, credentials, and accepted algorithms."""
+"""The login to an SSH server: user, credentials, and accepted algorithms."""
 
 import asyncio
 import os
@@ -33,25 +33,25 @@ _LEGACY = {
 
 
 class Login(NamedTuple):
-    """The user and credentials for a server."""
+    """The user and the credentials for an SSH server."""
 
     username: str
     password: str = ""
     key: str = ""
-    """Path of a private key file, or the key itself."""
+    """Path of a private key file, or the text of the key."""
     passphrase: str = ""
     agent: bool = False
-    """Whether to use the keys of the agent at ``SSH_AUTH_SOCK``."""
+    """Whether to use keys from the SSH agent at ``SSH_AUTH_SOCK``."""
     legacy: bool = False
-    """Whether to accept algorithms that are no longer secure."""
+    """Whether to accept legacy algorithms that are no longer secure."""
 
     def __repr__(self) -> str:
-        """Return the user name alone, so that no secret enters a log."""
+        """Return only the user name, so that no secret enters a log."""
         return f"Login({self.username!r})"
 
 
 def algorithms(login: Login) -> dict[str, Any]:
-    """Return asyncssh's options for the accepted algorithms, except for host keys."""
+    """Return asyncssh options for the accepted algorithms, except for host key algorithms."""
     if not login.legacy:
         return {}
     # 'legacy: true' is a deliberate choice; the warning would disturb other output.
@@ -62,7 +62,7 @@ def algorithms(login: Login) -> dict[str, Any]:
 def host_key_algorithms(
     known: Sequence[asyncssh.SSHKey], *, has_authorities: bool, legacy: bool
 ) -> list[str]:
-    """Return the accepted types of host keys, known ones first: servers have several."""
+    """Return the accepted types of host keys; known types first, as servers have several keys."""
     familiar = [
         name.decode("ascii")
         for key in known
@@ -76,10 +76,10 @@ def host_key_algorithms(
 
 @asynccontextmanager
 async def credentials(login: Login):  # type: ignore[no-untyped-def]
-    """Yield asyncssh's options for the login; the agent is available during the context.
+    """Yield asyncssh options for the login; the SSH agent is available while the context is open.
 
     Raises:
-        ConnectFailed: the key is unusable, or the agent is missing.
+        ConnectFailed: the key is unusable, or the SSH agent is missing.
     """
     keys: list[Any] = []
     agent: asyncssh.SSHAgentClient | None = None
@@ -106,7 +106,7 @@ async def credentials(login: Login):  # type: ignore[no-untyped-def]
 
 
 async def _private_key(login: Login) -> asyncssh.SSHKey:
-    """Read the key in a thread: a passphrase takes up to a second of computation."""
+    """Read the key in a thread, because decryption with a passphrase takes up to a second."""
     try:
         return await asyncio.to_thread(_read_key, login)
     except asyncssh.KeyEncryptionError as fault:

@@ -1,7 +1,7 @@
-"""The socket below an SSH connection.
+"""The socket below an SSH connection, with flow control.
 
-asyncssh writes without checking for buffer space, so a stalled robot would fill our memory. This
-protocol is between asyncssh and the socket, and knows when the kernel is full.
+asyncssh writes without checking for buffer space, so a stalled robot would fill URC's memory. The
+protocol in this module connects asyncssh with the socket and detects a full kernel buffer.
 """
 
 import asyncio
@@ -18,15 +18,15 @@ __all__ = ["TunnelAdapter", "SshSocket", "why_lost"]
 
 _READ_BYTES = 65536
 UNTAKEN_BYTES = 8_388_608
-"""Limit of unsent replies to a server, in bytes; larger than the window of a channel."""
+"""Maximum number of unsent bytes of replies to a server; larger than the window of a channel."""
 _LAST_TURNS = 10
-"""Turns of the event loop for the last bytes, before asyncssh learns of the end of the stream.
-asyncssh reads some packets in tasks. A refusing server often closes right after the packet with the
-reason: without these turns, the reason would be lost."""
+"""Number of event loop turns between the last bytes and the end of the stream, because asyncssh
+reads some packets in tasks. Servers often close directly after a refusal; the delay lets asyncssh
+read the reason."""
 
 
 def why_lost(exc: Exception | None) -> str:
-    """Return one line about the end of a connection, in the texts of all transports."""
+    """Return a one-line message about the end of a connection, as in other transports."""
     if exc is None or isinstance(exc, asyncssh.ConnectionLost):
         if "keepalive" in str(exc):
             return "the connection broke (the robot does not answer any more)"
@@ -37,7 +37,7 @@ def why_lost(exc: Exception | None) -> str:
 
 
 class SshSocket(asyncio.BufferedProtocol):
-    """Passes bytes between asyncssh and the socket; see `is_full` and `fault`."""
+    """A protocol that passes bytes between asyncssh and the socket; see `is_full` and `fault`."""
 
     def __init__(self, inner: asyncio.Protocol) -> None:
         """Initialise below `inner`."""
@@ -49,7 +49,7 @@ class SshSocket(asyncio.BufferedProtocol):
         self._transport: Any
         self._untaken = 0
         self.fault = ""
-        """Reason of the end of the whole connection; "" while it is open."""
+        """Reason why the whole connection ended; "" while the connection is open."""
 
     def unsent(self) -> int:
         """Return the number of bytes that the server has not acknowledged."""
@@ -59,11 +59,11 @@ class SshSocket(asyncio.BufferedProtocol):
 
     @property
     def is_full(self) -> bool:
-        """Whether some data still waits for the kernel."""
+        """Whether some data has not been passed to the kernel yet."""
         return not self._room.is_set()
 
     async def drained(self) -> None:
-        """Wait until the kernel has all data, or the connection has ended."""
+        """Wait until the kernel has accepted all data, or the connection has ended."""
         await self._room.wait()
 
     async def gone(self) -> None:
@@ -71,7 +71,7 @@ class SshSocket(asyncio.BufferedProtocol):
         await self._gone.wait()
 
     def end(self, reason: str) -> None:
-        """Record the reason of the end; the first reason counts."""
+        """Record the reason of the connection's end; keep the first reason."""
         self.fault = self.fault or reason
         self._room.set()
 
@@ -110,16 +110,16 @@ class SshSocket(asyncio.BufferedProtocol):
             self._transport.abort()
 
     def eof_received(self) -> bool:
-        """Pass on the end of the stream after all earlier data; then close the socket."""
+        """Pass on the end of the stream after all earlier data, then close the socket."""
         self._at_last(self._no_more_comes)
         return True  # stay open until then
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Pass on the loss of the connection after all earlier data, and wake waiting tasks."""
+        """Pass on the loss of the connection after all earlier data; wake waiting tasks."""
         self._at_last(self._lost, exc)
 
     def pause_writing(self) -> None:
-        """Block writers while the kernel is full."""
+        """Block writers while the kernel accepts no more data."""
         self._room.clear()
 
     def resume_writing(self) -> None:
@@ -129,7 +129,7 @@ class SshSocket(asyncio.BufferedProtocol):
     # -- the end
 
     def _at_last(self, act: Callable[..., None], *words: Any, turns: int = _LAST_TURNS) -> None:
-        """Call `act` after some turns of the event loop, in the order of the calls."""
+        """Call `act` after some turns of the event loop, in the order of calls."""
         loop = asyncio.get_running_loop()
         if turns:
             loop.call_soon(lambda: self._at_last(act, *words, turns=turns - 1))
@@ -148,10 +148,10 @@ class SshSocket(asyncio.BufferedProtocol):
 
 
 class TunnelAdapter:
-    """A tunnel for asyncssh: provides the connection below the SSH connection."""
+    """An asyncssh tunnel that provides the connection below the SSH connection."""
 
     def __init__(self, line: socket.socket | asyncssh.SSHClientConnection) -> None:
-        """Use a connected socket, or another SSH connection that forwards."""
+        """Use a connected socket, or another SSH connection that forwards data."""
         self._line = line
         self._is_used = False
         self.wire: SshSocket
@@ -159,7 +159,7 @@ class TunnelAdapter:
     async def create_connection(
         self, factory: Callable[[], Any], host: str, port: int
     ) -> tuple[object, object]:
-        """Return the transport and the protocol that `factory` makes, connected."""
+        """Return a connected transport and the protocol created by `factory`."""
         inner = factory()
         self.wire = SshSocket(inner)
         if isinstance(self._line, socket.socket):
@@ -173,13 +173,13 @@ class TunnelAdapter:
         return channel, inner
 
     def give_up_unused(self) -> None:
-        """Close the socket, unless a connection uses it."""
+        """Close the socket, unless a connection owns the socket."""
         if isinstance(self._line, socket.socket) and not self._is_used:
             self._line.close()
 
 
 class _Nested(asyncssh.SSHTCPSession[bytes]):
-    """A channel of another SSH connection, as the socket of this one."""
+    """A channel of another SSH connection that serves as a socket."""
 
     def __init__(self, wire: SshSocket) -> None:
         self._wire = wire

@@ -1,4 +1,4 @@
-"""The types of transports in documents, imported only on use."""
+"""The table of transport types in documents; each type is imported only when used."""
 
 from urc.registry import Table
 
@@ -18,4 +18,5 @@ TRANSPORTS = Table(
         "mqtt": "urc.transports.mqtt:from_setup",
     },
 )
-"""Type → factory, which takes a `urc.transports.base.TransportSetup` and returns a `Transport`."""
+"""Transport type → factory that returns a `Transport` for a `urc.transports.base.TransportSetup`.
+"""

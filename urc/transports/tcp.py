@@ -1,4 +1,4 @@
-"""TCP to a robot, or from one (``mode: listen``), with optional TLS."""
+"""The TCP transport, which connects or listens (``mode: listen``), with optional TLS."""
 
 import asyncio
 import errno
@@ -26,31 +26,31 @@ __all__ = ["READ_AHEAD_BYTES", "TcpListener", "TcpTransport", "from_setup"]
 
 
 HANDOVER_S = 6.0
-"""Lifetime of a robot's connection that has replaced another one, in seconds, until the next
-`open`. The lifetime is slightly longer than the backoff between attempts."""
+"""Lifetime of a connection that replaced an older one, in seconds, until the next `open`. The
+lifetime is slightly longer than the backoff between connection attempts."""
 _WAITING = 8
 _AGAIN_S = 0.1
-"""Delay after a failed accept, in seconds."""
+"""Delay after a failed accept call, in seconds."""
 
 _Caller = tuple[socket.socket, str]
-"""A connection, and its remote address."""
+"""A connected socket, and the remote address."""
 
 
 class TcpListener(StreamTransport):
-    """Listens on a port for one robot at a time; a newer robot replaces the older one.
+    """A transport that listens for one robot at a time; a newer connection replaces the older one.
 
-    A failed `open` keeps listening, so that a robot between two attempts is not refused. The first
-    `close` after a replacement keeps listening, too: the next `open` gets the newer robot, within
-    `HANDOVER_S`. Any other `close` stops listening.
+    After a failed `open`, the port keeps listening, so that a robot is not refused between two
+    attempts. After a replacement, the first `close` also keeps listening: the next `open` receives
+    the newer connection, within `HANDOVER_S`. Any other `close` stops listening on the port.
     """
 
     def __init__(self, bind: str, port: int, *, only: str = "", tls: Tls | None = None) -> None:
         """Initialise without listening.
 
         Args:
-            bind: own address; "" for all.
-            port: own port, 0..65535; 0 lets the system choose.
-            only: host that may connect; "" for any.
+            bind: local address; "" for all addresses of this machine.
+            port: local port, 0 to 65535; 0 lets the system choose.
+            only: host that may connect; "" for any host.
             tls: TLS settings.
         """
         super().__init__()
@@ -62,21 +62,21 @@ class TcpListener(StreamTransport):
         self._listener: socket.socket | None = None
         self._newer: _Caller | None = None
         self._door: asyncio.Task[None] | None = None
-        """Accepts connections if the event loop cannot watch sockets."""
+        """Task that accepts connections if the event loop cannot watch sockets; otherwise None."""
         self._allowed_now: tuple[frozenset[str] | None] | None = None
-        """Addresses that may connect; None while no connection is accepted."""
+        """Addresses that may connect; None while connections are not accepted."""
         self._again: asyncio.TimerHandle | None = None
         self._came = asyncio.Event()
         self._shut: asyncio.TimerHandle | None = None
 
     @property
     def address(self) -> str:
-        """Listening address as text for people: ``tcp 0.0.0.0:6789 (listening)``."""
+        """Listening address as text to display, such as ``tcp 0.0.0.0:6789 (listening)``."""
         return f"tcp {self._place} (listening)"
 
     @property
     def port(self) -> int:
-        """Own port, known while listening."""
+        """Local port number, known while listening."""
         return self._port if self._listener is None else int(self._listener.getsockname()[1])
 
     @property
@@ -84,7 +84,7 @@ class TcpListener(StreamTransport):
         return place_of(self._bind or "*", self.port)
 
     async def open(self, timeout_s: float) -> None:
-        """Wait for a robot, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Wait for a connection, or raise `ConnectFailed` within `timeout_s` seconds."""
         await super().close()
         self._stay_open()
         try:
@@ -128,7 +128,7 @@ class TcpListener(StreamTransport):
         return await self._tls.secure(stream, "", place)
 
     async def _allowed(self) -> frozenset[str] | None:
-        """Return the addresses that may connect; None: all."""
+        """Return the addresses that may connect; None for all addresses."""
         if self._lookup is None:
             return None
         try:
@@ -162,9 +162,9 @@ class TcpListener(StreamTransport):
             asyncio.get_running_loop().add_reader(self._listener, self._knock, self._listener)
 
     def _knock(self, listener: socket.socket) -> None:
-        """Accept a connection; called by the event loop.
+        """Accept a connection when the event loop reports one.
 
-        The loop's own accept may lose a new connection when it is cancelled.
+        The event loop's own accept function may lose a new connection when cancelled.
         """
         try:
             line, address = listener.accept()
@@ -192,7 +192,7 @@ class TcpListener(StreamTransport):
             self._meet(line, address)
 
     def _meet(self, line: socket.socket, address: tuple[str, int]) -> None:
-        """Keep the newest connection for `open`, and end the present one."""
+        """Keep the newest connection for `open`, and end the present connection."""
         allowed = self._allowed_now[0] if self._allowed_now is not None else None
         if allowed is not None and _plain(address[0]) not in allowed:
             line.close()
@@ -204,7 +204,7 @@ class TcpListener(StreamTransport):
         self._replace()
 
     def _replace(self) -> None:
-        """Inform the present connection of its end."""
+        """Inform the present connection that it was replaced."""
         stream = self._stream
         if stream is None or self._newer is None:
             return
@@ -243,7 +243,7 @@ class TcpListener(StreamTransport):
 
 
 def _plain(address: str) -> str:
-    """Return an IPv4-mapped address in IPv4 notation, without a zone."""
+    """Return an IPv4-mapped IPv6 address in IPv4 notation, without the zone."""
     return address.removeprefix("::ffff:").partition("%")[0]
 
 
@@ -251,7 +251,7 @@ _LOOPBACK = "127.0.0.1"
 
 
 class TcpTransport(StreamTransport):
-    """One TCP connection; it may be opened repeatedly."""
+    """A transport over one TCP connection; may be opened several times."""
 
     def __init__(
         self,
@@ -270,7 +270,7 @@ class TcpTransport(StreamTransport):
 
     @property
     def address(self) -> str:
-        """Target of the transport as text for people: ``tcp 192.168.1.5:6789``."""
+        """Target of the transport as text to display, such as ``tcp 192.168.1.5:6789``."""
         return f"tcp {self._reach.place}"
 
     async def open(self, timeout_s: float) -> None:
@@ -290,12 +290,12 @@ class TcpTransport(StreamTransport):
 
     @property
     def is_clogged(self) -> bool:
-        """Whether accepted data waits for the kernel; `send` waits for it."""
+        """Whether accepted data still waits for the kernel; `send` waits until all is accepted."""
         stream = self._stream
         return type(stream) is TcpStream and not stream.is_writable
 
     def divert(self, sink: Callable[[bytes], bool]) -> None:
-        """Pass received data to `sink`, before `receive`, until the connection is closed."""
+        """Pass received data to `sink` instead of `receive`, until the connection is closed."""
         if isinstance(self._stream, TcpStream):
             self._stream.sink = sink
 
@@ -303,9 +303,9 @@ class TcpTransport(StreamTransport):
 def from_setup(setup: TransportSetup) -> Transport:
     """Return a transport for the options of a document.
 
-    ``host`` and ``port`` are the address of the robot. With ``mode: listen`` the robot connects to
-    ``bind`` (loopback by default) and ``port``, and only ``host`` may connect, unless ``from:
-    any``.
+    ``host`` and ``port`` specify the address of the robot. With ``mode: listen``, the robot
+    connects to ``bind`` (loopback by default) and ``port``. Only ``host`` may connect, unless the
+    options include ``from: any``.
 
     Raises:
         TransportError: an option is missing or invalid.

@@ -1,6 +1,6 @@
-"""Telnet to a robot: a stream of bytes with a negotiation of options.
+"""The Telnet transport: a byte stream with option negotiation.
 
-The connection below is a TCP connection of this machine, or a tunnelled one.
+The underlying connection is a TCP connection of this machine, or a tunnelled connection.
 """
 
 import asyncio
@@ -30,32 +30,33 @@ __all__ = ["TelnetTransport", "TelnetOptions", "from_setup"]
 DEFAULT_PORT: Final = 23
 _QUICKACK: Final = getattr(socket, "TCP_QUICKACK", None)
 _COLUMNS: Final = 240
-"""Width of our terminal, large enough that shells do not wrap the lines of a robot."""
+"""Width of the terminal that URC reports, in characters, large enough to prevent shells from
+wrapping long lines."""
 _LONGEST_NAME: Final = 40
 _SMALL_BYTES: Final = 1024
-"""Limit in bytes below which an immediate acknowledgement pays off."""
+"""Maximum size of received data that is acknowledged immediately, in bytes."""
 
 
 class TelnetOptions(NamedTuple):
     """The Telnet options that URC requests or allows."""
 
     is_first: bool = False
-    """Whether URC starts the negotiation; otherwise it only replies."""
+    """Whether URC starts the negotiation; if false, URC only replies."""
     echo: bool = False
-    """Whether the robot may echo its input."""
+    """Whether the robot may echo received input."""
     binary: bool = False
-    """Whether bytes are transparent in both directions."""
+    """Whether all byte values are transmitted unchanged in both directions."""
     terminal: str = "VT100"
-    """Terminal type in replies."""
+    """Terminal type that URC reports on request."""
 
 
 class TelnetTransport(StreamTransport):
-    """One Telnet connection; it may be opened repeatedly."""
+    """A transport over one Telnet connection; may be opened several times."""
 
     def __init__(
         self, host: str, port: int, wishes: TelnetOptions, tunnel: Tunnel | None = None
     ) -> None:
-        """Initialise for `host`, tunnelled through `tunnel` if given, without connecting."""
+        """Store the address, the options, and the tunnel of the connection or None."""
         super().__init__()
         self._address = Address(host, port)
         self._wishes = wishes
@@ -63,7 +64,7 @@ class TelnetTransport(StreamTransport):
 
     @property
     def address(self) -> str:
-        """Target of the transport as text for people: ``telnet 192.168.1.5:23``."""
+        """Target of the transport as text to display, such as ``telnet 192.168.1.5:23``."""
         return f"telnet {self._address.text}"
 
     async def open(self, timeout_s: float) -> None:
@@ -103,12 +104,12 @@ class TelnetTransport(StreamTransport):
 
 
 class _TelnetStream:
-    """The text of a Telnet connection."""
+    """The text stream of a Telnet connection, without the negotiation."""
 
     def __init__(
         self, inner: ByteStream, talk: TelnetNegotiation, line: socket.socket | None
     ) -> None:
-        """Use Telnet over `inner`; `line` is its socket, if it has one here."""
+        """Run Telnet over the stream `inner`; `line` is the local socket of the stream, or None."""
         self._inner = inner
         self._talk = talk
         self._line = line
@@ -140,10 +141,11 @@ class _TelnetStream:
 
 
 def _acknowledge(line: socket.socket) -> None:
-    """Acknowledge the received bytes at once.
+    """Acknowledge received bytes immediately.
 
-    Telnet servers send small segments and wait for each acknowledgement. A delayed acknowledgement
-    costs 40 ms per command. The system resets this option with every read.
+    Many Telnet servers send small segments and wait for each acknowledgement. Delayed
+    acknowledgements would cost 40 ms per command. The system resets this socket option with every
+    read.
     """
     if _QUICKACK is not None:
         with suppress(OSError):  # the connection is closing
@@ -151,7 +153,7 @@ def _acknowledge(line: socket.socket) -> None:
 
 
 def from_setup(setup: TransportSetup) -> TelnetTransport:
-    """Return a transport for the options of a document; see docs/transports/telnet.md.
+    """Return a Telnet transport for the options of a document; see docs/transports/telnet.md.
 
     Raises:
         TransportError: an option is missing or invalid.
@@ -174,7 +176,7 @@ def from_setup(setup: TransportSetup) -> TelnetTransport:
 
 
 def _begin(wishes: TelnetOptions) -> tuple[TelnetNegotiation, bytes]:
-    """Return a new negotiation and its first bytes to send."""
+    """Return a new negotiation, and the first bytes to send."""
     binary = (BINARY,) if wishes.binary else ()
     echo = (ECHO,) if wishes.echo else ()
     talk = TelnetNegotiation(

@@ -1,9 +1,9 @@
-"""The Telnet protocol without a socket: separation of text and negotiation, and replies.
+"""The Telnet protocol without a socket: separates text from negotiation, and creates replies.
 
-Pure. Options are negotiated by the Q method (RFC 1143), which cannot loop: a reply is sent only for
-a change. Neither side here withdraws an agreed option, so its six states reduce to the three of
-`_Side`. Options outside the tables are refused at every request: servers negotiate in several
-rounds and wait for the last reply.
+Pure. Options are negotiated with the Q method (RFC 1143), which prevents loops: replies are sent
+only for changes. URC never withdraws an agreed option, so the six states of the Q method reduce to
+the three of `_Side`. Options outside the tables are refused at every request, because servers
+negotiate in several rounds and wait for the last reply.
 """
 
 import re
@@ -13,11 +13,11 @@ from typing import Final
 __all__ = ["BINARY", "ECHO", "NAWS", "SGA", "TTYPE", "TelnetNegotiation"]
 
 BINARY: Final = 0
-"""Transparent bytes, NUL and CR included (RFC 856)."""
+"""Transmission of all byte values unchanged, including NUL and CR (RFC 856)."""
 ECHO: Final = 1
-"""Echo by the side that offers it (RFC 857)."""
+"""Echo by the side that offers the option (RFC 857)."""
 SGA: Final = 3
-"""Suppress Go Ahead: full-duplex operation (RFC 858)."""
+"""Suppress Go Ahead, which enables full-duplex operation (RFC 858)."""
 TTYPE: Final = 24
 """Terminal type on request (RFC 1091)."""
 NAWS: Final = 31
@@ -28,14 +28,15 @@ _CR: Final = 13
 _SEND, _IS = b"\x01", b"\x00"
 _IAC_BYTE: Final = b"\xff"
 _LONGEST_DETAIL: Final = 256
-"""Longest kept subnegotiation in bytes; all supported ones are shorter."""
+"""Maximum stored length of a subnegotiation, in bytes; all supported subnegotiations are shorter.
+"""
 _BARE_CR: Final = re.compile(rb"\r(?![\n\0])")
 
 _Step = Callable[[bytes, int], int]
 
 
 class _Side:
-    """The options of one side: ours (requested by DO) or the other's (offered by WILL)."""
+    """The options of one side: local (requested by DO) or remote (offered by WILL)."""
 
     def __init__(self, agree: int, refuse: int, allowed: frozenset[int]) -> None:
         self._agree, self._refuse, self._allowed = agree, refuse, allowed
@@ -50,7 +51,7 @@ class _Side:
         return bytes((_IAC, self._agree, option))
 
     def told_on(self, option: int) -> bytes:
-        """Return the reply to a request or offer to enable `option`."""
+        """Return the reply to a request or offer that enables `option`."""
         if option in self.active:
             return b""
         if option in self._asked:
@@ -63,7 +64,7 @@ class _Side:
         return bytes((_IAC, self._refuse, option))
 
     def told_off(self, option: int) -> bytes:
-        """Return the reply to a request or announcement to disable `option`."""
+        """Return the reply to a request or announcement that disables `option`."""
         self._asked.discard(option)
         if option not in self.active:
             return b""
@@ -83,14 +84,14 @@ class TelnetNegotiation:
         columns: int = 80,
         rows: int = 24,
     ) -> None:
-        """Initialise without any agreed option.
+        """Begin without any agreed option.
 
         Args:
-            ours: options that we accept on request.
-            theirs: options that the other side may use.
-            terminal: terminal type for replies.
-            columns: width in characters, 1..65535.
-            rows: height in characters.
+            ours: local options that URC enables on request.
+            theirs: remote options that URC permits.
+            terminal: terminal type to report on request.
+            columns: width of the terminal in characters, 1 to 65535.
+            rows: height of the terminal in characters.
         """
         self._ours = _Side(_WILL, _WONT, ours)
         self._theirs = _Side(_DO, _DONT, theirs)
@@ -104,24 +105,24 @@ class TelnetNegotiation:
 
     @property
     def ours(self) -> frozenset[int]:
-        """Enabled options of this end."""
+        """Enabled options of the local side."""
         return frozenset(self._ours.active)
 
     @property
     def theirs(self) -> frozenset[int]:
-        """Enabled options of the other end."""
+        """Enabled options of the remote side."""
         return frozenset(self._theirs.active)
 
     def requests(self, *, ours: tuple[int, ...] = (), theirs: tuple[int, ...] = ()) -> bytes:
-        """Return the bytes that request these options."""
+        """Return the bytes that request `options`."""
         wishes = [self._ours.request(option) for option in ours]
         return b"".join(wishes + [self._theirs.request(option) for option in theirs])
 
     def receive(self, data: bytes) -> tuple[bytes, bytes]:
-        """Return the text in `data`, and the bytes of the replies to the rest.
+        """Return the text in `data`, and the replies to the commands in `data`.
 
-        A sequence may be split anywhere between two calls. Commands (interrupt, Synch …) are
-        irrelevant to drivers and dropped.
+        A command may be split at any byte between two calls. Commands such as Interrupt Process or
+        Synch are irrelevant to drivers and are dropped.
         """
         if self._step == self._text and _IAC not in data:
             return self._as_meant(data), b""
@@ -134,14 +135,14 @@ class TelnetNegotiation:
         return found, answers
 
     def encode(self, data: bytes) -> bytes:
-        """Return `data` in its wire form: a single CR becomes CR NUL, and 255 is doubled."""
+        """Return `data` in encoded form: a single CR becomes CR NUL, and byte 255 is doubled."""
         # Searching for a number is ten times as fast as for a byte string.
         if _CR in data and BINARY not in self._ours.active:
             data = _BARE_CR.sub(b"\r\0", data)
         return data.replace(_IAC_BYTE, b"\xff\xff") if _IAC in data else data
 
     def _as_meant(self, text: bytes) -> bytes:
-        """Return text without NUL, which only follows a CR or serves as padding."""
+        """Return text without NUL characters, which only follow a CR or serve as padding."""
         return text if BINARY in self._theirs.active else text.translate(None, b"\0")
 
     # -- states of the parser; each consumes bytes from `at` and returns the next offset

@@ -1,8 +1,8 @@
 """The bounded queue of received topic messages.
 
-A fast publisher must neither be blocked nor fill our memory: one stalled reader would freeze a
-topic for all clients. Each topic therefore keeps its newest messages. Responses are kept
-separately, since they are not repeated.
+A fast publisher must neither be blocked nor fill URC's memory: one stalled reader would freeze a
+topic for all clients of the bridge. Each topic therefore keeps only its newest messages. Responses
+are queued separately, because they are never repeated.
 """
 
 import asyncio
@@ -14,41 +14,43 @@ from urc.transports.base import PeerClosed
 __all__ = ["TopicReceiveQueue"]
 
 TOPIC_MESSAGES = 256
-"""Limit of queued messages per topic."""
+"""Maximum number of queued messages per topic."""
 TOPIC_BYTES = 524_288
-"""Limit of queued bytes per topic; a single larger message (an image) is queued alone."""
+"""Maximum number of queued bytes per topic; one larger message, such as an image, is queued alone.
+"""
 MESSAGES = 4096
-"""Limit of queued messages of all topics; a wildcard may match any number of them."""
+"""Maximum number of queued messages of all topics, because a wildcard may match any number of
+topics."""
 ALL_BYTES = 33_554_432
-"""Limit of queued bytes of all topics."""
+"""Maximum number of queued bytes of all topics."""
 A_TURN = 32
-"""Envelopes per turn of the event loop."""
+"""Maximum number of envelopes handled in one turn of the event loop."""
 ANSWERS = 1024
-"""Limit of queued responses and feedback; `ALL_BYTES` bounds their size, too."""
+"""Maximum number of queued responses and feedback messages; `ALL_BYTES` limits their size."""
 
 
 class TopicReceiveQueue:
-    """A bounded queue of envelopes in the order of arrival; each topic keeps its newest ones."""
+    """A bounded queue of envelopes in order of arrival; topics keep only their newest messages."""
 
     def __init__(self) -> None:
         self._waiting: dict[int, Envelope] = {}
-        """Number → envelope, in the order of arrival."""
+        """Sequence number → envelope, in order of arrival."""
         self._topics: dict[str, deque[tuple[int, int]]] = {}
-        """Topic → number and size of each of its messages."""
+        """Topic → sequence number and size of each queued message."""
         self._sizes: dict[str, int] = {}
         self._bytes = 0
         self._messages = 0
         self._answers: dict[int, int] = {}
-        """Number → size of each queued response."""
+        """Sequence number → size of each queued response."""
         self._answers_bytes = 0
         self._number = 0
         self._arrived = asyncio.Event()
         self._ended: str | None = None
         self.dropped = 0
-        """Number of dropped envelopes."""
+        """Number of dropped envelopes so far."""
 
     def message(self, topic: str, envelope: Envelope, size_bytes: int) -> None:
-        """Add a message of `topic`, dropping old ones as necessary."""
+        """Add a message of `topic`; drop old messages if necessary."""
         queue = self._topics.get(topic)
         if queue is None:
             queue = self._topics[topic] = deque()
@@ -67,7 +69,7 @@ class TopicReceiveQueue:
             self._drop_oldest()
 
     def answer(self, envelope: Envelope, size_bytes: int = 0) -> None:
-        """Add a response or feedback; it is dropped if the queue is full."""
+        """Add a response or feedback message; if the queue is full, drop the new message."""
         is_full = self._answers and self._answers_bytes + size_bytes > ALL_BYTES
         if len(self._answers) >= ANSWERS or is_full:
             self.dropped += 1
@@ -88,11 +90,11 @@ class TopicReceiveQueue:
 
     @property
     def is_filling(self) -> bool:
-        """Whether the reader should yield to the consumer."""
+        """Whether the reader should pause to let the consumer run."""
         return len(self._waiting) >= A_TURN
 
     async def pop(self) -> Envelope:
-        """Return the next envelope; raise `PeerClosed` at the end."""
+        """Return the next envelope; raise `PeerClosed` when the queue has ended."""
         while not self._waiting:
             if self._ended is not None:
                 raise PeerClosed(self._ended)
@@ -113,7 +115,7 @@ class TopicReceiveQueue:
         return self._number
 
     def _drop(self, topic: str, number: int) -> None:
-        """Drop the oldest message of `topic`, which has that number."""
+        """Drop the oldest message of `topic`, with the sequence number `number`."""
         del self._waiting[number]
         self._forget(topic)
         self.dropped += 1
@@ -125,7 +127,7 @@ class TopicReceiveQueue:
                 return
 
     def _forget(self, topic: str) -> None:
-        """Update the counts after the removal of the oldest message of `topic`."""
+        """Update the counters after the removal of the oldest message of `topic`."""
         queue = self._topics[topic]
         _, size = queue.popleft()
         self._bytes -= size

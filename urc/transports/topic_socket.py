@@ -1,7 +1,7 @@
-"""Connected sockets for libraries with their own protocol, and one-line error texts.
+"""Connected sockets for third-party protocol libraries, and one-line error messages.
 
-The libraries would look up names in threads that delay the end of the program. This module connects
-like the TCP transport, with the same error texts.
+The libraries themselves would look up host names in threads that delay the exit of the program.
+This module connects in the same way as the TCP transport, with the same error messages.
 """
 
 import socket
@@ -14,25 +14,24 @@ __all__ = ["Address", "reason"]
 
 
 class Address:
-    """The host and port of a connection, with their usual notation."""
+    """The host and port of a connection."""
 
     def __init__(self, host: str, port: int) -> None:
-        """Initialise without a lookup."""
+        """Store the host and the port, without an address lookup."""
         self.host = host
         self.port = port
         self.text = place_of(host, port)
         self._lookup = AddressLookup(host, port, socket.SOCK_STREAM)
 
     async def dial(self, timeout_s: float) -> socket.socket:
-        """Return a connected non-blocking socket; each address gets an equal share of the time.
+        """Return a connected non-blocking socket; every address has an equal share of the time.
 
-        Raises:
-            OSError, UnicodeError: an error for `explain`.
+        OSError, UnicodeError: connecting failed; `explain` returns a message.
         """
         return await self._lookup.first(connected, timeout_s)
 
     def explain(self, fault: Exception) -> str:
-        """Return one line for people with the reason of a failed `dial`."""
+        """Return a one-line message with the reason of a failed `dial`."""
         if isinstance(fault, OSError | UnicodeError):
             return explain(self.host, self.text, fault)
         return f"cannot connect to {self.text} ({reason(fault)})"

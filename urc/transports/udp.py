@@ -1,10 +1,11 @@
-"""UDP to a robot: one payload is one datagram, and one datagram is one frame.
+"""The UDP transport, in which every payload is one datagram and every datagram is one frame.
 
-UDP has no connections, so opening sends nothing, and a lost robot is only silent. Detectable errors
-are reported: a closed port of the robot, and a missing route. Without a declared address, the first
-sender becomes the robot, and opening waits for it.
+UDP has no connections, so opening sends nothing, and a lost robot is noticed only by its silence.
+The transport reports errors that UDP can detect: a closed port of the robot, and a missing route.
+If the options contain no address, the first sender becomes the robot, and opening waits for this
+sender.
 
-When the receive queue is full, the oldest datagrams are dropped and counted in `dropped`.
+If the receive queue is full, the oldest datagrams are dropped and counted in `dropped`.
 """
 
 import asyncio
@@ -25,24 +26,24 @@ from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportE
 __all__ = ["UdpTransport", "from_setup"]
 
 READ_AHEAD = 512
-"""Limit of queued datagrams."""
+"""Maximum number of queued datagrams."""
 READ_AHEAD_BYTES = 1_048_576
-"""Limit of queued bytes."""
+"""Maximum number of queued bytes."""
 _AT_ONCE = 64
-"""Datagrams per turn of the event loop."""
+"""Maximum number of datagrams read in one turn of the event loop."""
 _LONGEST = 65_536
 _RECVERR = {socket.AF_INET: (socket.IPPROTO_IP, 11), socket.AF_INET6: (socket.IPPROTO_IPV6, 25)}
-"""IP_RECVERR of Linux, missing in Python. The option reports refusals on unconnected sockets,
-too."""
+"""Linux socket option IP_RECVERR, which Python does not define. This option also reports refusals
+on unconnected sockets."""
 _LOST_HERE = (errno.ENOBUFS, errno.EAGAIN, errno.ENOMEM)
-"""Errors that mean the loss of a datagram on this machine, which UDP permits."""
+"""Errors that mean the local loss of a datagram, which UDP permits."""
 _NO_WAY = (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENETDOWN, errno.EADDRNOTAVAIL)
 
 _Address = tuple[str | int, ...]
 
 
 class UdpTransport:
-    """One socket for one robot, or for all receivers of a broadcast."""
+    """A transport over one socket, for one robot or for all receivers of a broadcast."""
 
     def __init__(
         self,
@@ -54,14 +55,14 @@ class UdpTransport:
         accepts_any: bool = False,
         is_broadcast: bool = False,
     ) -> None:
-        """Initialise without opening the socket.
+        """Store the addresses, without opening the socket.
 
         Args:
-            host: name or address of the robot; "" for the first sender.
-            port: port of the robot, 1..65535; 0 for the source port of its datagrams.
-            listen: own port; 0 lets the system choose.
+            host: name or address of the robot; "" to accept the first sender.
+            port: port of the robot, 1 to 65535; 0 for the source port of its datagrams.
+            listen: local port; 0 lets the system choose.
             bind: own address; "" for all.
-            accepts_any: whether to accept datagrams from all senders, not only from `host`.
+            accepts_any: whether to accept datagrams from any sender, instead of only from `host`.
             is_broadcast: whether `host` is a broadcast address.
         """
         self._host = host
@@ -73,30 +74,31 @@ class UdpTransport:
         self._lookup = AddressLookup(host, port, socket.SOCK_DGRAM) if host else None
         self._allowed: frozenset[str] = frozenset()
         self._robot: _Address | None = None
-        """Destination address; None until a robot has sent a datagram."""
+        """Destination address; None before the first datagram from an unknown robot."""
         self._line: socket.socket | None = None
         self._endpoint: asyncio.DatagramTransport | None = None
-        """Reads `_line` if the event loop cannot watch sockets."""
+        """Transport that reads `_line` if the event loop cannot watch sockets; otherwise None."""
         self._buffer = memoryview(bytearray(_LONGEST))
         self._arrived: deque[bytes] = deque()
         self._arrived_bytes = 0
         self._ended = CLOSED
         self._changed = asyncio.Event()
         self.dropped = 0
-        """Number of dropped datagrams since the creation of the transport."""
+        """Number of dropped datagrams since the transport was created."""
 
     @property
     def address(self) -> str:
-        """Target as text for people: ``udp 192.168.10.1:8889``, ``udp *:14550 (listening)``."""
+        """Target as text: ``udp 192.168.10.1:8889``, or ``udp *:14550 (listening)``."""
         if self._host and self._port:
             return f"udp {place_of(self._host, self._port)}"
         sender = f" for {self._host}" if self._host else ""
         return f"udp {place_of(self._bind or '*', self._listen)} (listening{sender})"
 
     async def open(self, timeout_s: float) -> None:
-        """Bind the own port, and return at once if the address of the robot is known.
+        """Bind the local port, and return immediately if the address of the robot is known.
 
-        Otherwise wait for the first datagram, or raise `ConnectFailed` within `timeout_s` seconds.
+        Otherwise, wait for the first datagram; raise `ConnectFailed` without one within `timeout_s`
+        seconds.
         """
         await self.close()
         try:
@@ -115,7 +117,7 @@ class UdpTransport:
             raise
 
     async def receive(self) -> bytes:
-        """Return the next datagram; raise `PeerClosed` when the socket is closed or refused."""
+        """Return the next datagram; raise `PeerClosed` for a closed socket or refused data."""
         while not self._arrived:
             if self._ended:
                 raise PeerClosed(self._ended)
@@ -137,7 +139,7 @@ class UdpTransport:
                 self._take_fault(fault, len(payload))
 
     def offer(self, data: bytes) -> bool:
-        """Send `data` without a turn of the event loop; return whether it succeeded.
+        """Send `data` without waiting; return whether the data was sent.
 
         Never waits.
         """
@@ -203,7 +205,7 @@ class UdpTransport:
         return line
 
     def _read(self) -> None:
-        """Read the received datagrams; called by the event loop."""
+        """Read received datagrams when the event loop reports data."""
         line = self._line
         for index in range(_AT_ONCE):
             if line is None:
@@ -221,7 +223,7 @@ class UdpTransport:
             self._receive(bytes(self._buffer[:count]), sender)
 
     def _receive(self, datagram: bytes, sender: _Address) -> None:
-        """Queue a datagram of the robot."""
+        """Add a datagram from the robot to the queue."""
         host = str(sender[0]).partition("%")[0]
         if not datagram or not (self._accepts_any or host in self._allowed):
             return
@@ -239,7 +241,7 @@ class UdpTransport:
             self._take_fault(fault, 0)
 
     def _take_fault(self, fault: OSError, length: int) -> None:
-        """End the connection because of an error, and raise it.
+        """End the connection because of an error, and raise the error.
 
         Raises:
             TransportError: always.
@@ -262,7 +264,7 @@ class UdpTransport:
 
 
 class _Endpoint(asyncio.DatagramProtocol):
-    """Passes on the datagrams that the event loop reads."""
+    """A protocol that passes on the datagrams read by the event loop."""
 
     def __init__(
         self, heard: Callable[[bytes, _Address], None], note: Callable[[OSError], None]
@@ -308,7 +310,7 @@ def from_setup(setup: TransportSetup) -> Transport:
 
 
 def _forget_faults(line: socket.socket) -> None:
-    """Empty the Linux error queue of earlier datagrams."""
+    """Discard errors of earlier datagrams from the Linux error queue."""
     if sys.platform == "linux":
         with suppress(OSError):
             while True:

@@ -1,7 +1,8 @@
-"""Connections to the server of a web transport: direct or tunnelled, with or without TLS.
+"""Connections for web transports: direct or tunnelled, with or without TLS.
 
-`StreamDialer` returns our own streams. A library with its own protocol needs a socket. Such a
-library gets the socket of a plain connection, or one end of a socket pair with a relay.
+For URC's own protocols, `StreamDialer` returns streams. A third-party protocol library needs a
+socket instead. The library receives the socket of a plain connection, or one end of a socket pair
+whose other end is relayed.
 """
 
 import asyncio
@@ -30,20 +31,20 @@ _PIECE_BYTES = 65536
 
 
 class Dialer:
-    """Connects to one server, repeatedly."""
+    """A dialer for one web server; may be used several times."""
 
     def __init__(self, place: WebOrigin, *, tls: Tls | None, tunnel: Tunnel | None) -> None:
-        """Initialise for `place`, with `tls` and through `tunnel` if given."""
+        """Store the origin `place`, the TLS settings, and the tunnel of future connections."""
         self._reach = StreamDialer(place.host, place.port, tunnel=tunnel, tls=tls)
         is_plain = tls is None and tunnel is None
         self._address = Address(place.host, place.port) if is_plain else None
         self._bridges: set[asyncio.Task[None]] = set()
         self._carried: ByteStream | None = None
-        """Stream of the newest relay."""
+        """Stream of the newest relay, or None."""
 
     @property
     def place(self) -> str:
-        """Target as text for people."""
+        """Target of the connection as text to display."""
         return self._reach.place
 
     async def stream(self, timeout_s: float) -> ByteStream:
@@ -63,11 +64,11 @@ class Dialer:
             raise ConnectFailed(self._address.explain(fault)) from fault
 
     def unsent(self, line: socket.socket) -> int:
-        """Return the number of unacknowledged bytes of `line`, a result of `plug`."""
+        """Return the number of unacknowledged bytes of `line`, a socket returned by `plug`."""
         return unsent_in(line) + (unsent_of(self._carried) if self._bridges else 0)
 
     async def reset(self, line: socket.socket) -> None:
-        """Close `line` and its stream; discard unsent data."""
+        """Close `line` and its stream immediately; discard unsent data."""
         forget_unsent(line)
         carried = self._carried if self._bridges else None
         if carried is not None and isinstance(carried, SupportsReset):
@@ -92,7 +93,7 @@ class Dialer:
 
 
 async def _pump(stream: ByteStream, end: socket.socket) -> None:
-    """Copy bytes in both directions until either side ends, then end the other."""
+    """Copy bytes in both directions until either side ends, then end the other side."""
     loop = asyncio.get_running_loop()
 
     async def out() -> None:

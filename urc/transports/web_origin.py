@@ -1,6 +1,7 @@
-"""Shared options of `http` and `websocket`: URL, TLS, credentials, headers.
+"""Options shared by `http` and `websocket`: URL, TLS, credentials, headers.
 
-The server is fixed when the transport is made: no response of a robot can lead elsewhere.
+The server is fixed when the transport is created, so no response of a robot can redirect requests
+elsewhere.
 """
 
 import re
@@ -17,34 +18,34 @@ from urc.transports.base import TransportError
 __all__ = ["Credentials", "OptionReader", "WebOrigin"]
 
 MAX_HEADERS = 32
-"""Limit of headers that a document may add to each request."""
+"""Maximum number of headers that a document may add to each request."""
 
 
 class WebOrigin(NamedTuple):
-    """The target of a URL."""
+    """The scheme, host, port and path of a URL."""
 
     is_secure: bool
     host: str
     port: int
     path: str
-    """Path with the leading slash, and the query if there is one."""
+    """Path with a leading slash, followed by the query if present."""
 
     @property
     def authority(self) -> str:
-        """Host and port in their usual notation, as in the header Host."""
+        """Host and port in the notation of the header Host."""
         return place_of(self.host, self.port)
 
 
 class OptionReader:
-    """A reader of the options of one transport, with one-line errors for invalid ones."""
+    """A reader of the options of one transport; each invalid option raises a one-line error."""
 
     def __init__(self, kind: str, options: Mapping[str, object]) -> None:
-        """Initialise for the `options` of a transport of type `kind`."""
+        """Read the `options` of a transport of type `kind`."""
         self.kind = kind
         self._options = options
 
     def part(self, name: str) -> "OptionReader":
-        """Return the options inside the option `name`; empty when it is missing."""
+        """Return the options inside the mapping option `name`; empty for a missing option."""
         found = self._options.get(name)
         if found is None:
             return OptionReader(self.kind, {})
@@ -53,11 +54,11 @@ class OptionReader:
         return OptionReader(self.kind, found)
 
     def entries(self) -> Iterable[tuple[str, object]]:
-        """Return every option with its name."""
+        """Return all options as a mapping."""
         return self._options.items()
 
     def tokens(self, name: str) -> list[str]:
-        """Return a list of HTTP tokens."""
+        """Return an option that is a list of HTTP tokens."""
         found = self._options.get(name) or []
         if not isinstance(found, list | tuple) or not all(
             isinstance(one, str) and _TOKEN.fullmatch(one) for one in found
@@ -66,7 +67,7 @@ class OptionReader:
         return list(found)
 
     def text(self, name: str, default: str = "") -> str:
-        """Return a text without surrounding spaces."""
+        """Return a text option without surrounding spaces."""
         found = self._options.get(name, default)
         if found is None:
             return default
@@ -75,7 +76,7 @@ class OptionReader:
         return found.strip()
 
     def choice(self, name: str, choices: tuple[str, ...], default: str) -> str:
-        """Return one of `choices`."""
+        """Return an option whose value is one of `choices`."""
         found = self.text(name, default)
         if found not in choices:
             words = f"{', '.join(choices[:-1])} or {choices[-1]}"
@@ -90,7 +91,7 @@ class OptionReader:
         return found
 
     def number(self, name: str, default: float, least: float, most: float) -> float:
-        """Return a number between `least` and `most`."""
+        """Return a number option from `least` to `most`."""
         found = self._options.get(name, default)
         if isinstance(found, bool) or not isinstance(found, int | float):
             raise TransportError(f"{self.kind} needs a number as {name}, not {found!r}")
@@ -100,7 +101,7 @@ class OptionReader:
         return found
 
     def duration(self, name: str, default_s: float, least_s: float, most_s: float) -> float:
-        """Return a duration in seconds, written with its unit: ``250ms``, ``5s``."""
+        """Return a duration option in seconds; the value includes a unit: ``250ms``, ``5s``."""
         given = self._options.get(name)
         if given is None:
             return default_s
@@ -112,7 +113,8 @@ class OptionReader:
         return seconds
 
     def place(self, plain: str) -> WebOrigin:
-        """Return the target of the option `url`, with the scheme `plain` or `plain` + ``s``."""
+        """Return the target of the option `url`, with scheme `plain`, or `plain` + ``s`` for TLS.
+        """
         url = self.text("url")
         wanted = f"{self.kind} needs a url such as {plain}://192.168.4.1/, not {url!r}"
         try:
@@ -132,7 +134,7 @@ class OptionReader:
         return WebOrigin(is_secure, host, port or (443 if is_secure else 80), path)
 
     def headers(self) -> dict[str, str]:
-        """Return the option `headers`: name → value."""
+        """Return the option `headers` as a mapping of name → value."""
         found: dict[str, str] = {}
         for name, value in self.part("headers").entries():
             text = str(value).strip()
@@ -147,10 +149,10 @@ class OptionReader:
         return found
 
     def credentials(self, kinds: tuple[str, ...]) -> "Credentials | None":
-        """Return the option `auth`, of one of `kinds`; None when it is missing.
+        """Return the option `auth` with a type from `kinds`, or None for a missing option.
 
         Raises:
-            TransportError: a required value is missing.
+            TransportError: a required value of `auth` is missing.
         """
         if self._options.get("auth") is None:
             return None
@@ -165,7 +167,7 @@ class OptionReader:
         return Credentials(kind, user, auth.text("password"))
 
     def tls(self, place: WebOrigin) -> Tls | None:
-        """Return the TLS settings for `place`, whose scheme decides."""
+        """Return the TLS settings for `place`, or None if its scheme has no TLS."""
         option = self._options.get("tls")
         if place.is_secure:
             return Tls.of(self.kind, option or True)
@@ -175,7 +177,7 @@ class OptionReader:
 
 
 class Credentials(NamedTuple):
-    """The credentials of URC for a server."""
+    """The credentials for a web server."""
 
     kind: str
     user: str
@@ -184,7 +186,7 @@ class Credentials(NamedTuple):
 
     @property
     def header(self) -> str:
-        """Value of the header Authorization for ``basic`` or ``bearer``."""
+        """Value of the header Authorization for the types ``basic`` and ``bearer``."""
         if self.kind == "bearer":
             return f"Bearer {self.secret}"
         return "Basic " + b64encode(f"{self.user}:{self.secret}".encode()).decode()

@@ -1,8 +1,9 @@
-"""WebSocket to a robot (RFC 6455), with the library `websockets`.
+"""The WebSocket transport (RFC 6455), with the library `websockets`.
 
-Each message is one payload. A few messages are read ahead, all others stay in the queue of the
-kernel, so a flooding robot must wait. `send` returns once the kernel has every byte. Missing
-replies to pings reveal a lost robot. No data is kept without a connection.
+Each WebSocket message is one payload. Only a few messages are read ahead, and further messages stay
+in the kernel's queue, so a flooding robot must wait. `send` returns after the kernel has accepted
+every byte. A lost robot is detected by missing replies to pings. Unsent data is never kept after
+the end of a connection.
 """
 
 import asyncio
@@ -29,17 +30,17 @@ from urc.transports.web_origin import OptionReader
 __all__ = ["WebSocketTransport", "from_setup"]
 
 READ_AHEAD_MESSAGES = 4
-"""Limit of messages that are read ahead."""
+"""Maximum number of messages that are read ahead."""
 MAX_MESSAGE_BYTES = 1_048_576
 UNTAKEN_BYTES = 1_048_576
-"""Limit of unsent ping replies, in bytes."""
+"""Maximum number of bytes of unsent ping replies."""
 _NORMAL = CloseCode.NORMAL_CLOSURE
 _CLOSE_S = 0.2
-"""Timeout for an orderly close, in seconds; then the connection is reset."""
+"""Timeout of an orderly close, in seconds; afterwards, the connection is reset."""
 
 
 class WebSocketTransport:
-    """One WebSocket; it may be opened repeatedly."""
+    """A transport over one WebSocket; may be opened several times."""
 
     def __init__(self, setup: TransportSetup) -> None:
         """Read the options of `setup`, without connecting.
@@ -64,12 +65,12 @@ class WebSocketTransport:
 
     @property
     def address(self) -> str:
-        """Target of the transport as text for people: ``websocket ws://192.168.4.1:80/control``."""
+        """Target of the transport as text: ``websocket ws://192.168.4.1:80/control``."""
         place = self._place
         return f"websocket ws{'s' * place.is_secure}://{place.authority}{place.path}"
 
     async def open(self, timeout_s: float) -> None:
-        """Connect and do the handshake, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Connect and shake hands, or raise `ConnectFailed` within `timeout_s` seconds."""
         await self.close()
         where = self._place.authority
         try:
@@ -96,11 +97,11 @@ class WebSocketTransport:
             raise PeerClosed(_end(ended)) from ended
 
     async def send(self, data: Payload) -> None:
-        """Pass one message to the kernel, waiting for buffer space.
+        """Pass one message to the kernel after a wait for buffer space.
 
         Raises:
             PeerClosed: the connection broke.
-            TransportError: `data` is not text, on a connection that sends text.
+            TransportError: the connection sends text, but `data` is not valid UTF-8.
         """
         message = as_bytes(data)
         if self._socket is None:
@@ -117,7 +118,10 @@ class WebSocketTransport:
             raise PeerClosed(_end(ended)) from ended
 
     async def close(self) -> None:
-        """Send a close message and close, after a short wait. Never raises, may be called twice."""
+        """Send a close message, wait briefly, and close the connection.
+
+        Never raises, may be called twice.
+        """
         connection, self._socket = self._socket, None
         try:
             if connection is not None:
@@ -126,7 +130,7 @@ class WebSocketTransport:
             await self._dialer.close()
 
     async def probe(self) -> None:
-        """Send a ping, and return when any data has arrived since."""
+        """Send a ping; return after any data has arrived since the call."""
         connection = self._socket
         if not isinstance(connection, _Connection):
             raise PeerClosed(CLOSED)
@@ -185,16 +189,16 @@ class WebSocketTransport:
 
 
 class _Connection(ClientConnection):
-    """A connection with a limit of unsent ping replies.
+    """A WebSocket connection with a limit on unsent ping replies.
 
-    The library writes ping replies without checking for buffer space.
+    The library writes ping replies without a check of buffer space.
     """
 
     _untaken = 0
     _sign: asyncio.Future[None] | None = None
 
     def next_sign(self) -> asyncio.Future[None]:
-        """Return a future that is done after any further data, or at the end."""
+        """Return a future that ends after further data, or at the end of the connection."""
         if self._sign is None or self._sign.done():
             self._sign = asyncio.get_running_loop().create_future()
         return self._sign
@@ -209,7 +213,7 @@ class _Connection(ClientConnection):
             self._sign.set_result(None)
 
     def data_received(self, data: bytes) -> None:
-        """Process received data; too many unsent replies close the connection."""
+        """Process received data; too many unsent ping replies end the connection."""
         self._give_sign()
         before = self.transport.get_write_buffer_size()
         super().data_received(data)
@@ -221,7 +225,7 @@ class _Connection(ClientConnection):
 
 
 class _Connect(connect):
-    """A connection without redirects: a robot must not lead elsewhere."""
+    """A WebSocket connector that follows no redirects, because a robot must not lead URC elsewhere."""
 
     def process_redirect(self, exc: Exception) -> Exception | str:
         return exc
@@ -233,7 +237,7 @@ def from_setup(setup: TransportSetup) -> Transport:
 
 
 async def _hang_up(connection: ClientConnection) -> None:
-    """Close in order; reset the connection after a timeout or a cancellation."""
+    """Close the connection in order; after a timeout or a cancellation, reset the connection."""
     try:
         with suppress(TimeoutError):
             async with asyncio.timeout(2 * _CLOSE_S):
@@ -246,7 +250,7 @@ async def _hang_up(connection: ClientConnection) -> None:
 
 
 def _refusal(fault: Exception, where: str) -> str:
-    """Return one line for people with the reason of a failed handshake."""
+    """Return a one-line message with the reason of a failed handshake."""
     if isinstance(fault, InvalidStatus):
         response = fault.response
         target = response.headers.get("Location")
@@ -262,7 +266,7 @@ def _refusal(fault: Exception, where: str) -> str:
 
 
 def _end(ended: ConnectionClosed) -> str:
-    """Return one line for people with the reason of the end."""
+    """Return a one-line message with the reason why the connection ended."""
     theirs, ours, cause = ended.rcvd, ended.sent, ended.__cause__
     if theirs is not None and ended.rcvd_then_sent is not False:
         said = f" ({theirs.code} {one_line(theirs.reason)})" if theirs.code != _NORMAL else ""

@@ -1,8 +1,8 @@
-"""Checks of topics against the ROS graph.
+"""Checks of topics against the graph of a ROS system.
 
-A ROS connection gives no reply for a topic that does not exist, has another type, or has no
-subscriber. A connection with access to the graph (such as rosapi) passes the answers to its
-`TopicGraph`, which reports each mistake once, in one line. No I/O.
+A ROS connection reports no error for a topic that does not exist, has a different type, or has no
+subscribers. A connection with access to the graph, such as rosapi, passes its data to a
+`TopicGraph`, which reports each mistake once. No I/O.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -11,18 +11,18 @@ from typing import Final
 __all__ = ["TopicGraph", "version_of"]
 
 MAX_TOLD: Final = 256
-"""Limit of remembered reports; beyond it, no further mistake is reported."""
+"""Maximum number of remembered reports; beyond this limit, further mistakes are not reported."""
 
 
 class TopicGraph:
-    """The topics of one ROS system, and the reported mistakes."""
+    """The topics of one ROS system, and the mistakes reported so far."""
 
     def __init__(self, tell: Callable[[str], None], ros: int | None) -> None:
         """Initialise without topics.
 
         Args:
-            tell: receives one line for each mistake.
-            ros: ROS version in the document; None if undeclared.
+            tell: callback with one line for each mistake.
+            ros: ROS version declared in the document; None if undeclared.
         """
         self._tell = tell
         self._declared = ros
@@ -31,7 +31,7 @@ class TopicGraph:
         self._looked: set[str] = set()
 
     def learn(self, types: Mapping[str, str]) -> None:
-        """Set the existing topics, each with its type ("" if unknown)."""
+        """Set the existing topics with their types; "" for an unknown type."""
         self._types = types
         self._looked.clear()
         found = version_of(types.values())
@@ -39,7 +39,7 @@ class TopicGraph:
             self._log(f"this bridge is ROS {found}: write 'version: {found}' or 'version: auto'")
 
     def subscribed(self, wanted: Mapping[str, str]) -> None:
-        """Check the subscribed topics and their types against the existing ones."""
+        """Check the subscribed topics and their types against the existing topics."""
         for topic, kind in sorted(wanted.items()):
             # In ROS 2, the feedback of an action is not an ordinary topic.
             if topic not in self._types and not topic.endswith("/feedback"):
@@ -48,7 +48,7 @@ class TopicGraph:
                 self._compare(topic, kind, "carries")
 
     def publishes(self, topic: str, kind: str) -> bool:
-        """Check the type of a published topic; return whether to query its subscribers."""
+        """Check the type of a published topic; return whether to query the topic's subscribers."""
         if topic in self._looked:
             return False
         self._looked.add(topic)
@@ -56,7 +56,7 @@ class TopicGraph:
         return True
 
     def subscribers(self, topic: str, nodes: Iterable[object]) -> None:
-        """Check the subscribers of a published topic."""
+        """Check that a published topic has subscribers."""
         if not list(nodes):
             self._log(f"nothing subscribes to {topic}: its messages have no effect")
 
@@ -72,7 +72,7 @@ class TopicGraph:
 
 
 def version_of(types: Iterable[str]) -> int | None:
-    """Return the ROS version whose type names these are; None if unknown."""
+    """Return the ROS version that matches the form of the type names; None if unknown."""
     words = [len(name.split("/")) for name in types if name]
     if not words:
         return None
@@ -80,6 +80,6 @@ def version_of(types: Iterable[str]) -> int | None:
 
 
 def _plain(kind: str) -> str:
-    """Return a type name in the form ``pkg/Type``."""
+    """Return a type name in the short form ``pkg/Type``."""
     words = kind.split("/")
     return f"{words[0]}/{words[-1]}"

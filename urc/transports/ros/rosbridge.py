@@ -1,19 +1,21 @@
-"""ROS 1 and ROS 2 robots behind a rosbridge server: topics, services and actions.
+"""A transport for ROS 1 and ROS 2 robots behind a rosbridge server: topics, services and actions.
 
-Theory of operation. Each connection is one WebSocket of URC's own transport, with pings. The
-protocol on it is that of roslibpy (`urc.transports.ros.rosbridge_client`). The state of roslibpy
-ends with the connection, so nothing can be sent late. A task always reads, however slowly the
-messages are consumed: one stalled reader freezes the topic for every client of the bridge.
+Theory of operation. Each connection is one WebSocket of URC's WebSocket transport, with pings. The
+protocol over the WebSocket is implemented by roslibpy (`urc.transports.ros.rosbridge_client`). The
+state of roslibpy ends with the connection, so no data can be sent late. A task reads continuously,
+however slowly messages are consumed: one stalled reader would freeze the topic for every client of
+the bridge.
 
-A bridge delivers a first message only after its publisher has connected to the subscribers, and
-drops it when its client leaves before that. `settle` is for leaving clients: it queries rosapi,
-whose reply also shows that the bridge has processed all earlier data, and waits for such
-connections.
+A bridge delivers the first message of a topic only after its publisher has connected to the
+subscribers. If the client leaves earlier, the message is dropped. Clients therefore call `settle`
+before leaving: the method queries rosapi and waits for the subscribers. The reply also shows that
+the bridge has processed all earlier data.
 
-The bridge reports no errors: a topic without a publisher, a wrong type and an access list all cause
-silence. The transport therefore asks rosapi for the topics at the start, and for the subscribers of
-a topic at its first message. `urc.transports.ros.graph` reports mistakes. With ``version: auto``,
-subscriptions wait for that reply, which decides the form of type names.
+The bridge reports no errors: a topic without a publisher, a wrong type and an access restriction
+all cause silence. The transport therefore asks rosapi for the list of topics at the start, and for
+a topic's subscribers at its first message. `urc.transports.ros.graph` reports mistakes. With
+``version: auto``, subscriptions wait for the list of topics, which determines the form of type
+names.
 """
 
 import asyncio
@@ -44,22 +46,22 @@ __all__ = ["RosbridgeTransport", "from_setup"]
 DEFAULT_PORT = 9090
 AUTO: Final = "auto"
 _WEBSOCKET = ("auth", "headers")
-"""Options of the WebSocket itself."""
+"""Options that are passed to the WebSocket transport."""
 
 _ANSWER_S = 3.0
-"""Timeout for rosapi in seconds, after which it counts as missing."""
+"""Timeout of rosapi, in seconds; afterwards, rosapi counts as missing."""
 _CONNECTS_S = 1.0
 """Time for which a bridge keeps a message for new subscribers, in seconds."""
 _LOOK_S = 0.2
 
 _TURN_S = 0.005
-"""Time for reading frames per turn of the event loop, in seconds."""
+"""Maximum time for reading frames in one turn of the event loop, in seconds."""
 
 log = logging.getLogger(__name__)
 
 
 class RosbridgeTransport:
-    """One connection to a rosbridge server; it may be opened repeatedly."""
+    """A transport to one rosbridge server; may be opened several times."""
 
     def __init__(
         self,
@@ -71,10 +73,11 @@ class RosbridgeTransport:
         """Initialise without connecting.
 
         Args:
-            wire: WebSocket to the bridge, owned by this transport.
-            where: target as text for people: ``192.168.1.5:9090``.
-            subscriptions: subscriptions on each opening, one per topic.
-            ros: 1 or 2: form of type names; "auto": that of the bridge; None: as written.
+            wire: WebSocket transport to the bridge, owned by this transport.
+            where: target as text to display, such as ``192.168.1.5:9090``.
+            subscriptions: subscriptions made at each opening, one per topic.
+            ros: ROS version 1 or 2 that determines the form of type names; "auto": the bridge's
+                version; None: names stay as written.
         """
         self._wire = wire
         self._where = where
@@ -85,11 +88,11 @@ class RosbridgeTransport:
 
     @property
     def address(self) -> str:
-        """Target of the transport as text for people: ``rosbridge 192.168.1.5:9090``."""
+        """Target of the transport as text to display, such as ``rosbridge 192.168.1.5:9090``."""
         return f"ros {self._where}"
 
     async def open(self, timeout_s: float) -> None:
-        """Connect and subscribe, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Connect and subscribe; raise `ConnectFailed` on failure within `timeout_s` seconds."""
         await self.close()
         await self._wire.open(timeout_s)
         session = self._session = _Session(self._wire, self._ros, self._graph)
@@ -113,7 +116,7 @@ class RosbridgeTransport:
         return await self._session.queue.pop()
 
     async def send(self, data: Payload) -> None:
-        """Publish, call a service, start or cancel a goal; return once the kernel has the data.
+        """Publish, call a service, or start or cancel a goal; return once the kernel has the data.
 
         Raises:
             PeerClosed: the connection broke.
@@ -135,15 +138,15 @@ class RosbridgeTransport:
             await self._wire.close()
 
     async def settle(self) -> str:
-        """Wait until the first messages of all topics have reached their subscribers.
+        """Wait until the first message of every topic has reached its subscribers.
 
         Returns:
-            The topics without subscribers in one line, or "".
+            A line with the topics without subscribers, or "".
         """
         return "" if self._session is None else await self._session.settle()
 
     async def probe(self) -> None:
-        """Probe the bridge, and return when it has sent anything since."""
+        """Probe the bridge; return after the bridge has sent any data since the call."""
         await self._wire.probe()
 
     def unsent(self) -> int:
@@ -165,7 +168,7 @@ class RosbridgeTransport:
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return a transport for the options of a document; see docs/transports/rosbridge.md.
+    """Return a rosbridge transport for the options of a document; see docs/transports/rosbridge.md.
 
     Raises:
         TransportError: an option is missing or invalid.
@@ -217,7 +220,7 @@ def _listening(topic: str, attributes: Mapping[str, Value]) -> RosSubscription:
 
 
 def _merged(wanted: list[RosSubscription]) -> tuple[RosSubscription, ...]:
-    """Return one subscription per topic: a second one would cancel the throttle of the first."""
+    """Return one subscription per topic, because a second one would cancel the first throttle."""
     found: dict[str, RosSubscription] = {}
     for one in wanted:
         other = found.setdefault(one.topic, one)
@@ -232,7 +235,7 @@ def _merged(wanted: list[RosSubscription]) -> tuple[RosSubscription, ...]:
 
 
 class _Session:
-    """The state of one open connection."""
+    """The state of one open rosbridge connection."""
 
     def __init__(
         self, wire: WebSocketTransport, ros: int | Literal["auto"] | None, graph: TopicGraph
@@ -244,14 +247,14 @@ class _Session:
         self._frames = OperationReader()
         self._graph = graph
         self._learnt = asyncio.Event()
-        """Set after rosapi has listed the topics, or has failed."""
+        """Event that is set after rosapi has listed the topics, or has failed."""
         self._bad = 0
         self._reader: asyncio.Task[None] | None = None
         self._fresh: dict[str, None] = {}
-        """Topics with a first message that may not have arrived yet, in order."""
+        """Topics whose first message may not have arrived yet, in order of publication."""
 
     async def start(self, subscriptions: tuple[RosSubscription, ...]) -> None:
-        """Query the topics, subscribe, and start reading."""
+        """Query the list of topics, subscribe, and start reading."""
         self._reader = asyncio.create_task(self._read())
         # Query first: later, ROS 1 would include our own subscriptions.
         asked = self._client.call_service(
@@ -266,7 +269,7 @@ class _Session:
             await self._write(self._client.listen(one))
 
     async def perform(self, envelope: Envelope) -> None:
-        """Send the operation of an envelope."""
+        """Send the rosbridge operation that corresponds to an envelope."""
         frames = self._client.perform(envelope)
         if envelope.verb == "publish":
             topic = str(envelope.attributes.get("topic"))
@@ -277,7 +280,7 @@ class _Session:
         await self._write(frames)
 
     def _look_at(self, topic: str, kind: str) -> list[bytes]:
-        """Return the query for the subscribers of a topic, at its first message."""
+        """Return a query for the topic's subscribers, to send with the topic's first message."""
         if not self._graph.publishes(topic, kind):
             return []
 
@@ -289,7 +292,7 @@ class _Session:
         return self._client.call_service("/rosapi/subscribers", told, {"topic": topic})
 
     async def settle(self) -> str:
-        """Wait until the published messages have arrived; return the undelivered topics."""
+        """Wait until published messages have arrived; return a line about undelivered topics."""
         topics = list(self._fresh)
         self._fresh.clear()
         heard = await asyncio.gather(*map(self._is_heard, topics))
@@ -310,7 +313,7 @@ class _Session:
         return True
 
     async def _subscribers(self, topic: str) -> list[object] | None:
-        """Return the subscribing nodes of a topic; None if rosapi does not reply."""
+        """Return the nodes that subscribe to a topic; None if rosapi does not reply."""
         said: asyncio.Future[Mapping[str, Any]] = asyncio.get_running_loop().create_future()
 
         def told(values: Mapping[str, Any]) -> None:
@@ -341,7 +344,7 @@ class _Session:
             await self._wire.send(frame)
 
     async def _read(self) -> None:
-        """Process every received frame until the connection ends."""
+        """Process received frames until the connection ends."""
         clock = asyncio.get_running_loop().time
         began_s = clock()
         try:
@@ -365,7 +368,7 @@ class _Session:
                 log.warning("rosbridge: %s (%d such frames)", problem, self._bad)
 
     def _learn(self, subscriptions: tuple[RosSubscription, ...], said: Mapping[str, Any]) -> None:
-        """Process the topics and types from rosapi."""
+        """Process the list of topics and types from rosapi."""
         names, types = said.get("topics"), said.get("types")
         if isinstance(names, list):
             kinds = types if isinstance(types, list) and len(types) == len(names) else []

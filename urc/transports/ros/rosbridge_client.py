@@ -1,10 +1,11 @@
-"""roslibpy's part of a rosbridge connection, without its network connection.
+"""The roslibpy protocol of a rosbridge connection, without roslibpy's network connection.
 
-roslibpy implements the operations, their ids and pending requests. The network connections of
-roslibpy are not used: they replay old messages after a reconnection, fail on binary frames, and
-never probe the other side. The figures are in docs/decisions. Here, roslibpy's protocol writes into
-a list, which the transport sends over its own socket. The transport passes received data to the
-protocol. One object serves one connection, so nothing remains for the next one.
+roslibpy implements the rosbridge operations, their ids, and pending requests. The network
+connections of roslibpy are not used. Reasons: roslibpy's connections replay old messages after a
+reconnection, fail on binary frames, and never probe the other side. The measurements are in
+docs/decisions. In this module, roslibpy's protocol writes into a list, and the transport sends the
+list over URC's socket. The transport passes received data to the protocol. Each object serves only
+one connection, so no state is carried over to the next connection.
 
 The client has no I/O, task or thread.
 """
@@ -27,14 +28,14 @@ from urc.transports.topic_queue import TopicReceiveQueue
 __all__ = ["RosSubscription", "RosClient"]
 
 MAX_PENDING = 256
-"""Limit of pending calls and goals; beyond it, the oldest is dropped."""
+"""Maximum number of pending calls and goals; beyond this limit, the oldest is dropped."""
 _NAME_SHOWN = 80
 KNOWN_TOPICS = 256
-"""Limit of remembered topics, services and actions."""
+"""Maximum number of remembered topics, services and actions."""
 
 
 class RosSubscription(NamedTuple):
-    """One subscription, as sent to the bridge."""
+    """One subscription in the form that is sent to the bridge."""
 
     topic: str
     type: str = ""
@@ -44,10 +45,10 @@ class RosSubscription(NamedTuple):
 
 
 class RosClient:
-    """Converts envelopes to operations and back, for one connection."""
+    """A converter between envelopes and rosbridge operations, for one connection."""
 
     def __init__(self, queue: TopicReceiveQueue, ros: int | None) -> None:
-        """Deliver to `queue`; `ros` (1, 2 or None: as written) selects the form of type names."""
+        """Deliver to `queue`; `ros` (1, 2, or None: as written) selects the form of type names."""
         self._queue = queue
         self._ros_version = ros
         self._protocol = _Protocol()
@@ -56,7 +57,7 @@ class RosClient:
         self._topics: dict[str, Any] = {}
         self._services: dict[str, Any] = {}
         self._goals: dict[str, tuple[str, object]] = {}
-        """roslibpy's id of a running goal → its action and the id of the request."""
+        """roslibpy's id of a running goal → name of the action, and id of the request."""
 
     @property
     def unanswered(self) -> int:
@@ -64,13 +65,13 @@ class RosClient:
         return self._protocol.unanswered
 
     def spell(self, ros: int | None) -> None:
-        """Use the type names of that ROS version from now on; None: as written."""
+        """Use the type names of ROS version `ros` from now on; None: names as written."""
         self._ros_version = ros
 
     # -- sending; each method returns the frames to write
 
     def listen(self, wanted: RosSubscription) -> list[bytes]:
-        """Subscribe to one topic."""
+        """Subscribe to one topic; return the frames to send."""
         topic = _Topic(
             self._ros,
             wanted.topic,
@@ -90,16 +91,16 @@ class RosClient:
         arguments: Mapping[str, object] = NOTHING,
         errback: Callable[[object], None] | None = None,
     ) -> list[bytes]:
-        """Call a service internally; on failure, only `errback` is called."""
+        """Call a service for internal use; a failure only calls `errback`."""
         call = Service(self._ros, service, "").call
         call(dict(arguments), callback=callback, errback=errback or _ignore)
         return self._protocol.written()
 
     def perform(self, envelope: Envelope) -> list[bytes]:
-        """Execute the operation of an envelope.
+        """Execute the operation of an envelope; return the frames to send.
 
         Raises:
-            TransportError: rosbridge cannot send it.
+            TransportError: rosbridge does not support the operation.
         """
         work = {
             "publish": self._publish,
@@ -166,7 +167,7 @@ class RosClient:
         self._goals[goal] = name, number
 
     def _cancel(self, attributes: Mapping[str, object], body: object) -> None:
-        """Cancel the goal with that id, or else the last running one of the action."""
+        """Cancel the goal with the given id, or otherwise the newest running goal of the action."""
         name, number = _text(attributes, "action"), attributes.get("id")
         running = [goal for goal, (action, _) in self._goals.items() if action == name]
         named = [goal for goal in running if self._goals[goal][1] == number]
@@ -177,7 +178,7 @@ class RosClient:
     # -- receiving
 
     def arrived(self, operation: dict[str, Any], size_bytes: int) -> None:
-        """Process one operation of the bridge.
+        """Process one operation from the bridge.
 
         Raises:
             BadFrame: the operation is invalid.
@@ -215,7 +216,7 @@ _ENDS = frozenset(_OUTCOMES.values())
 
 
 class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no types
-    """roslibpy's protocol, writing into a list."""
+    """roslibpy's protocol class, which writes into a list."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -229,12 +230,12 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
         return len(self._pending_service_requests) + len(self._pending_action_requests)
 
     def written(self) -> list[bytes]:
-        """Remove and return the frames written since the last call."""
+        """Remove and return the frames that were written since the last call."""
         frames, self._frames = self._frames, []
         return frames
 
     def arrived(self, operation: dict[str, Any]) -> None:
-        """Let roslibpy process an operation; raise `BadOperation` for an unknown or invalid one."""
+        """Let roslibpy process an operation, or raise `BadOperation` for an invalid operation."""
         handler: Callable[[Any], None] | None = self._message_handlers.get(operation["op"])
         if handler is None:
             unknown = one_line(repr(operation["op"]), _NAME_SHOWN)
@@ -252,11 +253,11 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
         self._frames.append(payload)
 
     def send_ros_message(self, message: Any) -> None:
-        """Write an operation; unlike roslibpy, report failures."""
+        """Write an operation; unlike in roslibpy, failures raise an error."""
         self.send_message(encode_operation(dict(message)))
 
     def send_ros_service_request(self, message: Any, callback: Any, errback: Any) -> None:
-        """Like roslibpy's method, with JSON for not-a-number and a bound."""
+        """Call a service like roslibpy; support not-a-number, and limit pending requests."""
         self.send_ros_message(message)
         _keep(self._pending_service_requests, message["id"], (callback, errback))
 
@@ -268,7 +269,7 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
         _keep(self._pending_action_requests, message["id"], (resultback, feedback, errback))
 
     def _handle_action_result(self, message: Any) -> None:
-        """Like roslibpy's method, with any status number."""
+        """Process a result like roslibpy, but accept any status number."""
         resultback, _, errback = self._pending_action_requests.pop(message["id"])
         values = message.get("values", {})
         status = message.get("status")
@@ -279,7 +280,7 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
 
 
 class _Factory(EventEmitterMixin):  # type: ignore[misc] # roslibpy ships no types
-    """roslibpy's connection factory, which is connected during its whole life."""
+    """roslibpy's connection factory, which always counts as connected."""
 
     is_connected = True
 
@@ -292,7 +293,7 @@ class _Factory(EventEmitterMixin):  # type: ignore[misc] # roslibpy ships no typ
 
 
 class _Ros(Ros):  # type: ignore[misc] # roslibpy ships no types
-    """roslibpy's client on a given protocol, instead of a connection of its own."""
+    """roslibpy's client with a given protocol instead of a network connection."""
 
     def __init__(self, protocol: _Protocol) -> None:
         self._id_counter = 0
@@ -301,13 +302,13 @@ class _Ros(Ros):  # type: ignore[misc] # roslibpy ships no types
 
 
 class _Topic(Topic):  # type: ignore[misc] # roslibpy ships no types
-    """A topic with optional CBOR messages, which are decoded before roslibpy gets them."""
+    """A topic with optional CBOR messages, which are decoded before roslibpy receives them."""
 
     SUPPORTED_COMPRESSION_TYPES = ("none", "png", "cbor")
 
 
 def _ignore(said: object) -> None:
-    """Ignore a status, or the failure of an internal query, since the bridge logs it."""
+    """Ignore the status or the failure of an internal query, because the bridge logs failures."""
 
 
 def _keep(table: dict[str, object], name: str, waiting: object) -> None:

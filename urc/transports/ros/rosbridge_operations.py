@@ -1,8 +1,8 @@
-"""Conversion between WebSocket frames and rosbridge operations, with bounds.
+"""Conversion between WebSocket frames and rosbridge operations, with size limits.
 
-Pure. A frame is JSON text, or CBOR for subscriptions that request it. An operation may arrive in
-fragments, or as a PNG image whose pixels are its JSON. JSON has no not-a-number and no infinities:
-the bridge writes null for them, and CBOR values are converted in the same way.
+Pure. A frame is JSON text, or CBOR for subscriptions that request CBOR. An operation may arrive in
+fragments, or as a PNG image with JSON text in its pixels. JSON has no not-a-number and no
+infinities, so the bridge writes null; CBOR values are converted in the same way.
 """
 
 import base64
@@ -18,18 +18,21 @@ import msgspec
 __all__ = ["BadOperation", "OperationReader", "encode_operation"]
 
 MAX_BYTES = 16 * 1024 * 1024
-"""Largest operation in bytes, in any encoding; the limit of the bridge itself is 10 MB."""
+"""Maximum size of an operation in any encoding, in bytes; the bridge's own limit is 10 MB."""
 MAX_FRAGMENTED = 8
-"""Limit of incomplete operations; beyond it, the oldest is dropped."""
+"""Maximum number of incomplete operations; beyond this limit, the oldest is dropped."""
 MAX_FRAGMENTS = 4096
 MAX_PNG_BYTES = 2 * 1024 * 1024
-"""Limit of the text in an image, in bytes; its decoding in Python takes a second at this size."""
+"""Maximum length of the text in an image, in bytes; decoding this much text in Python takes one
+second."""
 MAX_VALUES = 2_000_000
-"""Limit of commas and brackets: an empty list takes three bytes as text, but fifty in memory."""
+"""Maximum number of commas and brackets, because an empty list takes three bytes as text but fifty
+in memory."""
 _MANY_VALUES = 100_000
-"""Limit of values in CBOR with shared references: they take a tenth of a second."""
+"""Maximum number of values in CBOR data with shared references; this many values take a tenth of a
+second."""
 _CBOR_MAP = b"\xa0"
-"""First byte of a CBOR map, or a higher one; JSON never begins with these."""
+"""First byte of a CBOR map or of a higher CBOR type; JSON text never begins with these bytes."""
 _LONGEST_ID = 256
 _PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 _NUMBERS = {
@@ -42,11 +45,11 @@ _encode_json = msgspec.json.Encoder().encode
 
 
 class BadOperation(ValueError):
-    """An invalid frame or operation, with a one-line text."""
+    """An error about an invalid frame or operation, with a one-line message."""
 
 
 def encode_operation(operation: Mapping[str, object]) -> bytes:
-    """Return an operation as JSON; bytes become base64, not-a-number becomes null.
+    """Encode an operation as JSON; bytes become base64, and not-a-number becomes null.
 
     Raises:
         BadFrame: a value cannot be written as JSON.
@@ -58,16 +61,16 @@ def encode_operation(operation: Mapping[str, object]) -> bytes:
 
 
 class OperationReader:
-    """Decodes frames into operations, and joins the fragments of one connection."""
+    """A decoder of frames, which also joins the fragments of operations on one connection."""
 
     def __init__(self) -> None:
         self._halves: dict[str, dict[int, str]] = {}
-        """Fragmented operation → its fragments by number."""
+        """Id of a fragmented operation → its fragments by number."""
         self._sizes: dict[str, int] = {}
-        """Fragmented operation → characters of its fragments."""
+        """Id of a fragmented operation → total number of characters in its fragments."""
 
     def read(self, frame: bytes) -> dict[str, Any] | None:
-        """Return the operation of a frame, or None if it is incomplete.
+        """Return the operation of a frame, or None for an incomplete operation.
 
         Raises:
             BadFrame: the frame is invalid.
@@ -144,7 +147,7 @@ def _read_cbor(data: bytes) -> object:
 
 
 def _tagged(first: Any, second: Any) -> object:
-    """Return the numbers of a tagged array; the tag comes first in cbor2 6, second before."""
+    """Return the numbers of a tagged array; cbor2 passes the tag first since version 6."""
     tag = first if hasattr(first, "tag") else second
     code, data = _NUMBERS.get(tag.tag), tag.value
     if code is None or not isinstance(data, bytes) or len(data) % struct.calcsize(code):
@@ -153,22 +156,22 @@ def _tagged(first: Any, second: Any) -> object:
 
 
 class _Plain:
-    """Converts CBOR values to JSON-like ones, with a bound on their expansion.
+    """A converter of CBOR values to JSON-like values, with a limit on their expansion.
 
-    CBOR may refer to earlier values, which may refer to others: a few bytes could exceed any
-    memory.
+    CBOR values may refer to earlier values, which may contain further references, so a few bytes
+    could expand to any amount of memory.
     """
 
     def __init__(self, size: int) -> None:
-        """Initialise for a frame of `size` bytes: each of its values takes at least one."""
+        """Prepare the conversion of a frame of `size` bytes; values take at least one byte each."""
         self._room = MAX_BYTES
-        """Remaining bytes of the result; a value counts at least one."""
+        """Remaining bytes of the result; every value counts as at least one byte."""
         self._values = max(size, _MANY_VALUES)
         self._left = self._values
-        """Remaining number of values, since each takes time, however small it is."""
+        """Remaining number of values, limited because even small values take time."""
 
     def of(self, value: Any) -> Any:
-        """Return `value` with null for every number that JSON lacks."""
+        """Return `value` with null in place of numbers that JSON cannot express."""
         self._room -= 1 + (len(value) if isinstance(value, str | bytes) else 0)
         if self._room < 0:
             raise ValueError(f"it expands to more than {MAX_BYTES} bytes")
@@ -195,7 +198,7 @@ def _key(name: object) -> str:
 
 
 def _png_text(operation: Mapping[str, Any]) -> bytes:
-    """Return the JSON in the pixels of a PNG, without the padding by newlines."""
+    """Return the JSON text in the pixels of a PNG image, without the padding by newlines."""
     try:
         image = base64.b64decode(operation.get("data", ""), validate=True)
     except (binascii.Error, TypeError, ValueError) as problem:
@@ -204,7 +207,7 @@ def _png_text(operation: Mapping[str, Any]) -> bytes:
 
 
 def _pixels(image: bytes) -> bytes:
-    """Return the pixel bytes of a non-interlaced 8-bit RGB image, as the bridge makes them."""
+    """Return the pixel bytes of a non-interlaced 8-bit RGB image, the format of the bridge."""
     if not image.startswith(_PNG_MAGIC):
         raise BadOperation("the data of a png is not a PNG image")
     width = height = 0
@@ -233,7 +236,7 @@ def _pixels(image: bytes) -> bytes:
 
 
 def _unfiltered(rows: bytes, stride: int) -> bytes:
-    """Reverse the filters of a PNG; the first byte of each row selects its filter."""
+    """Reverse the filters of PNG rows; the first byte of each row selects the filter."""
     out = bytearray()
     above = bytes(stride)
     for start in range(0, len(rows), stride + 1):
@@ -253,7 +256,7 @@ def _unfiltered(rows: bytes, stride: int) -> bytes:
 
 
 def _undo_left(kind: int, row: bytearray, above: bytes) -> None:
-    """Reverse a filter that uses the pixel to the left, in place."""
+    """Reverse in place a filter that uses the pixel to the left."""
     for place in range(len(row)):
         left = row[place - 3] if place >= 3 else 0
         up = above[place]

@@ -1,15 +1,15 @@
-"""Type names of ROS 1 and ROS 2."""
+"""Type names in the forms of ROS 1 and ROS 2."""
 
 __all__ = ["spelled"]
 
 
 def spelled(name: str, kind: str, ros: int | None) -> str:
-    """Return `name` in the form of that ROS version.
+    """Return the type `name` in the form of a ROS version.
 
     Args:
-        name: ``pkg/Type`` or ``pkg/msg/Type``; "" stays "".
-        kind: the middle word: ``msg``, ``srv`` or ``action``.
-        ros: 1, 2, or None: as written.
+        name: ``pkg/Type`` or ``pkg/msg/Type``; an empty name stays empty.
+        kind: middle part of the name: ``msg``, ``srv`` or ``action``.
+        ros: ROS version 1 or 2; None: return the name as written.
     """
     words = name.split("/")
     if ros is None or not all(words) or len(words) not in (2, 3):
