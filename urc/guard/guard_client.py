@@ -101,7 +101,7 @@ class GuardClient:
         self._stopped = asyncio.Event()
 
     def start(self) -> None:
-        """Start the guard; needs a running loop."""
+        """Start the guard; requires a running event loop."""
         self.channel.start()
 
     async def finish(self) -> None:
@@ -242,7 +242,7 @@ class GuardClient:
                 yield messages.ArmControl(control.line, command, control.terms)
 
     def handle(self, message: messages.FromGuard, size: int) -> None:
-        """Handle a message of the guard; `size` is its size in bytes for flow control."""
+        """Handle a message from the guard; `size` is its size in bytes for flow control."""
         if isinstance(message, messages.StopWritten):
             self._record_stop(message)
         elif not isinstance(message, messages.Heartbeat):

@@ -20,7 +20,7 @@ class LocalChannel:
     def __init__(
         self, listener: ChannelListener, *, lines: Sequence[GuardedLineSpec], clock: LaneClock
     ) -> None:
-        """Prepare; nothing runs before `start`.
+        """Create the channel; `start` starts the guard.
 
         Args:
             listener: the client.

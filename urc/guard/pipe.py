@@ -87,7 +87,7 @@ class Pipe:
             message: a message for the encoder.
             slot: key of a replaceable message: a newer message replaces an unsent one with the same
                 key.
-            is_urgent: whether the message is sent before all unsent messages.
+            is_urgent: whether to send the message before all unsent messages.
 
         Raises:
             UNFIT: the message cannot be encoded.

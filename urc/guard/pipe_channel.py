@@ -48,7 +48,7 @@ class PipeChannel:
     """The channel to a guard in a separate process."""
 
     def __init__(self, listener: ChannelListener, *, is_inherited: bool = CAN_INHERIT) -> None:
-        """Prepare; nothing runs before `start`.
+        """Create the channel; `start` starts the guard.
 
         Args:
             listener: the client.

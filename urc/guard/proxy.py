@@ -142,7 +142,7 @@ class GuardedTransport:
         await taken
 
     async def close(self) -> None:
-        """Close at once. Never raises; a second call does nothing."""
+        """Close immediately. Never raises; a second call does nothing."""
         self._end(_CLOSED)
         self._ended = _CLOSED
         self._receiver.clear()

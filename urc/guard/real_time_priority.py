@@ -66,7 +66,7 @@ class RealTimePriority:
         """
 
     def request(self) -> str:
-        """Request the priority; return the reason of a refusal, or ""."""
+        """Request real-time priority; return the reason of a refusal, or ""."""
         if os.environ.get(SWITCH, "").lower() == "no":
             return f"{SWITCH} is no"
         refusal = _ask()

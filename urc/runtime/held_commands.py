@@ -52,7 +52,7 @@ class MotionBackend(Protocol):
         """Accept ticks of `command` from now on, under `terms`."""
 
     def tick(self, command: str, data: Payload | CountedFrame) -> None:
-        """Renew the lease of `command`; `data` is its newest frame."""
+        """Renew the lease of `command`, with `data` as its newest frame."""
 
     def renew(self, command: str, stop: Payload | FrameVariants) -> None:
         """Replace the stop frame of `command` without arming the command."""
@@ -64,7 +64,7 @@ class MotionBackend(Protocol):
         """Return whether the transport of `command` is connected, as last reported."""
 
     def release(self, command: str) -> None:
-        """Stop `command` after its release."""
+        """Stop `command` because its control was released."""
 
     def stop(self, stops: Mapping[str, Payload | FrameVariants]) -> None:
         """Stop all motion immediately; `stops` maps each held command to its stop frame."""

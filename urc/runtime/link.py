@@ -126,7 +126,7 @@ class Link:
 
     @property
     def is_full(self) -> bool:
-        """Whether the output is too long for new commands."""
+        """Whether the output queue is too long for new commands."""
         return self._outgoing.is_full
 
     def want_open(self) -> None:
@@ -134,7 +134,7 @@ class Link:
         self._wanted.set()
 
     def want_close(self, reason: str) -> None:
-        """Write the queued output and close; close at once if a reason is given."""
+        """Write the queued output, then close; with a reason, close immediately."""
         if not self._is_persistent:
             self._wanted.clear()
         if self._ended is None:
@@ -188,11 +188,11 @@ class Link:
             self._report.show("silent", fault.message)
 
     def hang_up(self, reason: str) -> None:
-        """Close the connection; the link's own task reports the end to the engine."""
+        """Close the connection; the link's own task later reports the end to the engine."""
         self._end(reason)
 
     def publish(self) -> None:
-        """Publish the state if it has changed."""
+        """Publish the link state if the state has changed."""
         self._report.publish()
 
     async def settle(self) -> str:

@@ -68,7 +68,7 @@ class LinkReport:
         self._telling: Timer | None = None
         self.state: LinkState = "idle"
         self.attempts = 0
-        """Number of failed attempts since the last good frame."""
+        """Number of failed attempts since the last valid frame."""
         self.faults = 0
         self.publish()
 
@@ -129,7 +129,7 @@ class LinkReport:
         self._hub.tell_rest(self._clock.now())
 
     def publish(self) -> None:
-        """Publish the state if it has changed."""
+        """Publish the link state if the state has changed."""
         if not self._is_changed:
             return
         self._is_changed = False

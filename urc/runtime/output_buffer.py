@@ -47,7 +47,10 @@ class _Shared(Protocol):
         """
 
     async def send_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> None:
-        """Send a counted frame; wait until the frame is sent. `left` gets the sent frame."""
+        """Send a counted frame; wait until the frame is sent.
+
+        `left` receives the frame that was sent.
+        """
 
 
 class OutputBuffer:

@@ -56,7 +56,7 @@ def problems(document: Path) -> list[Problem]:
     """Return the output of `urc validate`, including warnings and failed tests, worst first.
 
     Args:
-        document: ``TOP/drivers/puppet/driver.yaml``, next to the packages that it needs.
+        document: path of the document, such as ``TOP/drivers/puppet/driver.yaml``.
     """
     top = document.resolve().parent.parent.parent
     checked = check(

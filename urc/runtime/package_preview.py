@@ -223,12 +223,12 @@ def look(document: Path, folder: Path, widgets: Sequence[str]) -> PackagePreview
 
     Args:
         document: the document of the package.
-        folder: folder with all files of the package; references outside are an error.
+        folder: folder with all files of the package; references to files outside are an error.
         widgets: names of the included widgets.
 
     Raises:
         ProblemsError: the document has errors.
-        UrcError: it refers to a file outside.
+        UrcError: the document refers to a file outside the folder.
     """
     allowed = permissions(document, folder, widgets)
     registry = widget_folder_of(document)

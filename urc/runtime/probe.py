@@ -56,7 +56,7 @@ async def probe(
 
     Args:
         opened: returns a new session to test.
-        table: the kinds of transport.
+        table: table of the available transport types.
         longest_s: maximum duration of the test, in seconds.
 
     Raises:

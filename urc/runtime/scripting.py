@@ -108,7 +108,7 @@ class ConnectedRobot:
         Only the newest reading is kept, so a slow script skips readings and never falls behind.
 
         Raises:
-            UrcError: the driver has no such signal.
+            UrcError: the driver has no signal of this name.
         """
         for name in names:
             self._check(name)

@@ -301,7 +301,7 @@ class Session:
         """Wait until all sent data has arrived; call this method before closing the session.
 
         Returns:
-            A message about undelivered bytes, or "". Takes a few seconds at most.
+            A message about undelivered bytes, or "". The wait takes a few seconds at most.
         """
         found = await asyncio.gather(*(link.settle() for link in self._links.values()))
         return "; ".join(filter(None, found))

@@ -86,7 +86,7 @@ def parse_setting(setting: Setting, text: str, *, allows_any_port: bool = False)
     Args:
         setting: setting with a type and a range.
         text: text from the operator.
-        allows_any_port: whether port 0 is allowed, for a server whose port the system chooses.
+        allows_any_port: whether to permit port 0, for a server that lets the system choose.
 
     Raises:
         UrcError: the text is invalid; the message shows the found and the expected value. Secret

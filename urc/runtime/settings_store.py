@@ -47,7 +47,7 @@ class SettingsStore:
     """The settings file of one robot."""
 
     def __init__(self, folder: Path, name: str) -> None:
-        """Choose the file, without reading or writing it."""
+        """Select the file, without reading or writing."""
         self.file = folder / f"{quote(name, safe='')}.json"
 
     def load(self) -> StoredSettings:

@@ -31,7 +31,7 @@ def make_lines(
     Args:
         driver: the loaded driver; tunnels must not be circular.
         settings: a value for every setting.
-        table: the kinds of transport.
+        table: table of the available transport types.
 
     Raises:
         UrcError: a transport cannot be built with these settings.

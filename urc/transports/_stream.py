@@ -128,7 +128,7 @@ class TcpStream(asyncio.BufferedProtocol):
     # -- a `ByteStream`
 
     async def read(self) -> bytes:
-        """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
+        """Return at least one received byte; raise `PeerClosed` at the end of the stream."""
         while not self._filled:
             if self._ended is not None:
                 raise PeerClosed(self._ended)
@@ -215,19 +215,22 @@ class StreamTransport:
         self._stream: ByteStream | None = None
 
     async def receive(self) -> bytes:
-        """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
+        """Return at least one received byte; raise `PeerClosed` at the end of the stream."""
         if self._stream is None:
             raise PeerClosed(CLOSED)
         return await self._stream.read()
 
     async def send(self, data: Payload) -> None:
-        """Pass `data` to the kernel, waiting for buffer space; raise `PeerClosed` on an error."""
+        """Pass `data` to the kernel after a wait for space; raise `PeerClosed` on an error."""
         if self._stream is None:
             raise PeerClosed(CLOSED)
         await self._stream.write(as_bytes(data))
 
     async def close(self) -> None:
-        """Close at once, discarding unsent data. Never raises, may be called twice."""
+        """Close the connection immediately, discarding unsent data.
+
+        The method never raises and may be called twice.
+        """
         stream, self._stream = self._stream, None
         if stream is not None:
             await stream.abort()
@@ -240,7 +243,7 @@ class StreamTransport:
         return unsent_of(self._stream)
 
     async def abort(self) -> None:
-        """Close at once and discard unsent data. Never raises."""
+        """Close the connection immediately and discard unsent data. Never raises."""
         stream = self._stream
         if stream is not None and isinstance(stream, SupportsReset):
             self._stream = None

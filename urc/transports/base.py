@@ -72,7 +72,7 @@ class Transport(Protocol):
         """Target of the connection as text to display, such as ``tcp 192.168.1.5:6789``."""
 
     async def open(self, timeout_s: float) -> None:
-        """Connect, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Open the connection, or raise `ConnectFailed` within `timeout_s` seconds."""
 
     async def receive(self) -> Payload:
         """Return at least one received byte, or the next envelope.
@@ -85,7 +85,7 @@ class Transport(Protocol):
         """Send `data` after a wait for space; raise `TransportError` on a broken connection."""
 
     async def close(self) -> None:
-        """Close at once. Never raises, may be called twice."""
+        """Close immediately. The method never raises and may be called twice."""
 
 
 def bytes_of(data: Payload) -> bytes:
@@ -99,13 +99,13 @@ class ByteStream(Protocol):
     """One open connection inside a tunnel."""
 
     async def read(self) -> bytes:
-        """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
+        """Return at least one received byte; raise `PeerClosed` at the end of the stream."""
 
     async def write(self, data: bytes) -> None:
         """Send `data` after a wait for buffer space; raise `PeerClosed` on a broken connection."""
 
     async def abort(self) -> None:
-        """Close at once. Never raises, may be called twice."""
+        """Close immediately. The method never raises and may be called twice."""
 
 
 class Tunnel(Protocol):
@@ -185,7 +185,7 @@ class SupportsAbort(Protocol):
     """A transport that can be closed without sending the remaining data."""
 
     async def abort(self) -> None:
-        """Close at once and discard unsent data. Never raises."""
+        """Close the connection immediately and discard unsent data. Never raises."""
 
 
 @runtime_checkable
@@ -193,7 +193,10 @@ class SupportsOffer(Protocol):
     """A transport that can send without waiting."""
 
     def offer(self, data: bytes) -> bool:
-        """Send `data` if no earlier data waits; return whether it was accepted. Never waits."""
+        """Send `data` unless earlier data is waiting; return whether `data` was accepted.
+
+        Never waits.
+        """
 
 
 @runtime_checkable

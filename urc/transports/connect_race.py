@@ -61,7 +61,7 @@ async def connected(family: int, address: object) -> socket.socket:
 
 
 async def _once(family: int, address: object) -> socket.socket:
-    """Connect one socket; close it on failure or cancellation."""
+    """Connect one socket; close the socket on failure or cancellation."""
     loop = asyncio.get_running_loop()
     line = socket.socket(family, socket.SOCK_STREAM)
     try:

@@ -126,7 +126,7 @@ class HttpTransport:
     async def close(self) -> None:
         """Close every connection immediately and discard unsent data.
 
-        Never raises, may be called twice.
+        The method never raises and may be called twice.
         """
         talk, self._talk = self._talk, None
         if talk is not None:

@@ -79,7 +79,7 @@ class MqttTransport:
                 await self._dialer.close()
 
     async def receive(self) -> Envelope:
-        """Return the next message; raise `PeerClosed` at the end of the connection."""
+        """Return the next message; raise `PeerClosed` after the end of the connection."""
         if self._session is None:
             raise PeerClosed(CLOSED)
         return await self._session.queue.pop()
@@ -100,7 +100,10 @@ class MqttTransport:
         await self._session.publish(data)
 
     async def close(self) -> None:
-        """Close at once, discarding unsent data. Never raises, may be called twice."""
+        """Close the connection immediately, discarding unsent data.
+
+        The method never raises and may be called twice.
+        """
         session, self._session = self._session, None
         if session is not None:
             session.end()
@@ -111,7 +114,7 @@ class MqttTransport:
         return 0 if self._session is None else self._dialer.unsent(self._session.line)
 
     async def abort(self) -> None:
-        """Close at once and discard unsent data. Never raises."""
+        """Close the connection immediately and discard unsent data. Never raises."""
         session, self._session = self._session, None
         if session is not None:
             await self._dialer.reset(session.line)
@@ -210,7 +213,7 @@ class _Session:
         self._raise_if_ended()
 
     def end(self, *, has_farewell: bool = True) -> None:
-        """Close at once. The broker publishes the last will, if one is declared.
+        """Close immediately. The broker publishes the last will, if one is declared.
 
         Args:
             has_farewell: whether to send DISCONNECT, which also flushes earlier data.

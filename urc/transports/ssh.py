@@ -174,7 +174,7 @@ class SshTransport:
             self._connection = connection
 
     async def receive(self) -> bytes:
-        """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
+        """Return at least one received byte; raise `PeerClosed` at the end of the stream."""
         if self._channel is not None:
             return await self._channel.read()
         if self._connection is None:
@@ -182,7 +182,7 @@ class SshTransport:
         return await self._connection.ended()
 
     async def send(self, data: Payload) -> None:
-        """Pass `data` to the kernel, waiting for buffer space; raise `PeerClosed` on an error."""
+        """Pass `data` to the kernel after a wait for space; raise `PeerClosed` on an error."""
         if self._connection is None:
             raise PeerClosed(CLOSED)
         if self._channel is None:
@@ -192,7 +192,7 @@ class SshTransport:
     async def close(self) -> None:
         """Close the transport immediately, without affecting tunnelled transports.
 
-        Never raises, may be called twice.
+        The method never raises and may be called twice.
         """
         channel, self._channel = self._channel, None
         connection, self._connection = self._connection, None
@@ -235,7 +235,7 @@ class SshTransport:
         """Return the host key of the server, without logging in.
 
         Raises:
-            ConnectFailed: within `timeout_s` seconds.
+            ConnectFailed: no connection was possible within `timeout_s` seconds.
         """
         async with _within(timeout_s, self.target.address.text):
             if self._outer is None:

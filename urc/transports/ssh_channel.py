@@ -106,7 +106,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
     # -- a `ByteStream`
 
     async def read(self) -> bytes:
-        """Return the next bytes, at least one; raise `PeerClosed` at the end of the stream."""
+        """Return at least one received byte; raise `PeerClosed` at the end of the stream."""
         while not self._parts:
             if self._ended is not None:
                 raise PeerClosed(self._ended)
@@ -130,11 +130,11 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
         await self._until_writable()
 
     async def abort(self) -> None:
-        """Close at once. Never raises, may be called twice."""
+        """Close immediately. The method never raises and may be called twice."""
         self.discard()
 
     def discard(self) -> None:
-        """Close at once."""
+        """Close immediately."""
         self._end(CLOSED)
         self._channel.abort()
 

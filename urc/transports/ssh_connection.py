@@ -67,7 +67,7 @@ class SshConnection:
         )  # fmt: skip
 
     async def forwarded(self, host: str, port: int) -> SshChannel:
-        """Return a connection to `host` and `port` as seen from the server."""
+        """Return a channel to `host` and `port`, opened by the SSH server."""
         place = Address(host, port).text
         try:
             host = await self._checked(host, port)

@@ -76,7 +76,7 @@ class SshSocket(asyncio.BufferedProtocol):
         self._room.set()
 
     def reset(self) -> None:
-        """Close at once and discard unsent data in the kernel, so that nothing arrives late."""
+        """Close immediately and discard unsent data in the kernel, so that no data arrives late."""
         line = self._transport.get_extra_info("socket")
         if line is not None and line.fileno() >= 0:
             forget_unsent(line)

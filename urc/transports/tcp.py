@@ -99,7 +99,7 @@ class TcpListener(StreamTransport):
             raise ConnectFailed(f"cannot listen on {self._place} ({reason(fault)})") from fault
 
     async def close(self) -> None:
-        """Close at once. Never raises, may be called twice."""
+        """Close immediately. The method never raises and may be called twice."""
         is_first = self._stream is not None
         await super().close()
         if is_first and self._newer is not None:
@@ -108,7 +108,7 @@ class TcpListener(StreamTransport):
             await self._shut_down()
 
     async def abort(self) -> None:
-        """Close at once and discard unsent data. Never raises."""
+        """Close the connection immediately and discard unsent data. Never raises."""
         await super().abort()
         await self._shut_down()
 
@@ -262,7 +262,7 @@ class TcpTransport(StreamTransport):
         tls: Tls | None = None,
         read_ahead_bytes: int = READ_AHEAD_BYTES,
     ) -> None:
-        """Initialise for `host` (name or address) and `port` 1..65535, without connecting."""
+        """Prepare connections to `host` (name or address) and `port` (1 to 65535)."""
         super().__init__()
         self._reach = StreamDialer(
             host, port, tunnel=tunnel, tls=tls, read_ahead_bytes=read_ahead_bytes
@@ -274,9 +274,10 @@ class TcpTransport(StreamTransport):
         return f"tcp {self._reach.place}"
 
     async def open(self, timeout_s: float) -> None:
-        """Connect, or raise `ConnectFailed` within `timeout_s` seconds.
+        """Open the connection, or raise `ConnectFailed` within `timeout_s` seconds.
 
-        The addresses of a name are tried in turn, each with an equal share of the remaining time.
+        The addresses of a host name are tried in sequence, each with an equal share of the
+        remaining time.
         """
         await self.close()
         self._stream = await self._reach.open(timeout_s)
@@ -284,7 +285,7 @@ class TcpTransport(StreamTransport):
     # -- a `Prompt`
 
     def offer(self, data: bytes) -> bool:
-        """Send `data` if no earlier data waits; return whether it was accepted."""
+        """Send `data` unless earlier data is waiting; return whether `data` was accepted."""
         stream = self._stream
         return type(stream) is TcpStream and stream.offer(data)
 

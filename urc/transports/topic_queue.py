@@ -78,14 +78,14 @@ class TopicReceiveQueue:
         self._answers_bytes += size_bytes
 
     def end(self, reason: str) -> None:
-        """End the queue; queued envelopes can still be read."""
+        """End the queue; envelopes in the queue can still be read."""
         if self._ended is None:
             self._ended = reason
         self._arrived.set()
 
     @property
     def ended(self) -> str | None:
-        """Reason of the end; None while the connection is open."""
+        """Reason for the end of the connection; None while the connection is open."""
         return self._ended
 
     @property

@@ -61,7 +61,7 @@ class UdpTransport:
             host: name or address of the robot; "" to accept the first sender.
             port: port of the robot, 1 to 65535; 0 for the source port of its datagrams.
             listen: local port; 0 lets the system choose.
-            bind: own address; "" for all.
+            bind: local address; "" for all addresses of this machine.
             accepts_any: whether to accept datagrams from any sender, instead of only from `host`.
             is_broadcast: whether `host` is a broadcast address.
         """
@@ -152,7 +152,7 @@ class UdpTransport:
         return True
 
     async def close(self) -> None:
-        """Close at once. Never raises, may be called twice."""
+        """Close immediately. The method never raises and may be called twice."""
         line, self._line = self._line, None
         endpoint, self._endpoint = self._endpoint, None
         if endpoint is not None:

@@ -48,7 +48,7 @@ class Dialer:
         return self._reach.place
 
     async def stream(self, timeout_s: float) -> ByteStream:
-        """Return an open stream, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Return an open stream; raise `ConnectFailed` on failure within `timeout_s` seconds."""
         return await self._reach.open(timeout_s)
 
     async def plug(self, timeout_s: float) -> socket.socket:

@@ -113,8 +113,7 @@ class OptionReader:
         return seconds
 
     def place(self, plain: str) -> WebOrigin:
-        """Return the target of the option `url`, with scheme `plain`, or `plain` + ``s`` for TLS.
-        """
+        """Return the target of the option `url`; with TLS, its scheme is `plain` + ``s``."""
         url = self.text("url")
         wanted = f"{self.kind} needs a url such as {plain}://192.168.4.1/, not {url!r}"
         try:

@@ -120,7 +120,7 @@ class WebSocketTransport:
     async def close(self) -> None:
         """Send a close message, wait briefly, and close the connection.
 
-        Never raises, may be called twice.
+        The method never raises and may be called twice.
         """
         connection, self._socket = self._socket, None
         try:
@@ -150,7 +150,7 @@ class WebSocketTransport:
         return transport.get_write_buffer_size() + self._dialer.unsent(line)
 
     async def abort(self) -> None:
-        """Close at once and discard unsent data. Never raises."""
+        """Close the connection immediately and discard unsent data. Never raises."""
         connection, self._socket = self._socket, None
         try:
             if connection is not None:
@@ -225,14 +225,14 @@ class _Connection(ClientConnection):
 
 
 class _Connect(connect):
-    """A WebSocket connector that follows no redirects, because a robot must not lead URC elsewhere."""
+    """A WebSocket connector without redirects, because a robot must not lead URC elsewhere."""
 
     def process_redirect(self, exc: Exception) -> Exception | str:
         return exc
 
 
 def from_setup(setup: TransportSetup) -> Transport:
-    """Return a transport for the options of a document, or raise `TransportError`."""
+    """Return a WebSocket transport for the options of a document, or raise `TransportError`."""
     return WebSocketTransport(setup)
 
 

@@ -129,7 +129,10 @@ class RosbridgeTransport:
         await self._session.perform(data)
 
     async def close(self) -> None:
-        """Close at once, discarding unsent data. Never raises, may be called twice."""
+        """Close the connection immediately, discarding unsent data.
+
+        The method never raises and may be called twice.
+        """
         session, self._session = self._session, None
         try:
             if session is not None:
@@ -154,7 +157,7 @@ class RosbridgeTransport:
         return self._wire.unsent()
 
     async def abort(self) -> None:
-        """Close at once and discard unsent data. Never raises."""
+        """Close the connection immediately and discard unsent data. Never raises."""
         session, self._session = self._session, None
         try:
             if session is not None:

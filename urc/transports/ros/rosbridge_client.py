@@ -264,7 +264,7 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
     def send_ros_action_goal(
         self, message: Any, resultback: Any, feedback: Any, errback: Any
     ) -> None:
-        """Like roslibpy's method, with JSON for not-a-number and a bound."""
+        """Do the same as roslibpy, with JSON for not-a-number and a limit of pending requests."""
         self.send_ros_message({**message, "feedback": self.wants_feedback})
         _keep(self._pending_action_requests, message["id"], (resultback, feedback, errback))
 
