@@ -6,6 +6,7 @@ The check follows only links inside the tree, so it needs no network.
 import re
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -53,6 +54,7 @@ def fault_of(page: Path, target: str) -> str:
     return ""
 
 
+@cache
 def anchors_of(page: Path) -> set[str]:
     """Return the anchors that code-hosting sites generate from a page's headings."""
     prose = FENCE.sub("", page.read_text("utf-8"))

@@ -8,6 +8,7 @@ import json
 import re
 import sys
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +57,7 @@ def main() -> int:
     return 0
 
 
+@cache
 def read_schema(name: str) -> Schema:
     """Return a schema by its file name."""
     schema: Schema = json.loads((SCHEMAS / name).read_text("utf-8"))

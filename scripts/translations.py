@@ -13,7 +13,8 @@ import io
 import json
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 import yaml
@@ -45,14 +46,14 @@ def sources() -> Iterator[tuple[str, Path]]:
         ("urc/web/static/**/*.js", "javascript"),
         ("urc/web/**/*.py", "python"),
         ("urc/runtime/package_preview.py", "python"),
-        ("urc/runtime/package_preview.py", "python"),
         ("urc/packages/*.py", "python"),
     ):
         for path in sorted(ROOT.glob(pattern)):
             yield method, path
 
 
-def messages() -> dict[str, list[str]]:
+@cache
+def messages() -> Mapping[str, list[str]]:
     """Return message → its files, in order of appearance."""
     found: dict[str, list[str]] = {}
     for method, path in sources():
@@ -69,7 +70,7 @@ def messages() -> dict[str, list[str]]:
     return found
 
 
-def updated(tag: str, wanted: dict[str, list[str]]) -> Catalog:
+def updated(tag: str, wanted: Mapping[str, list[str]]) -> Catalog:
     """Return the catalogue with exactly these messages; existing translations stay."""
     place = FOLDER / f"{tag}.po"
     old = read_po(io.BytesIO(place.read_bytes()), tag) if place.is_file() else Catalog(tag)

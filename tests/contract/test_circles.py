@@ -1,45 +1,35 @@
 """No circles: no two modules need each other, nor two rooms of the dashboard."""
 
-import ast
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.contract.modules import MODULES, ROOT, imports_of, tree_of
+
 Graph = dict[str, set[str]]
 
 
 def python_modules() -> dict[str, Path]:
     """Return dotted name → file of all of ours."""
     found = {}
-    for path in sorted((ROOT / "urc").rglob("*.py")):
+    for path in MODULES:
         parts = path.relative_to(ROOT).with_suffix("").parts
         found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return found
 
 
-def imported(name: str, path: Path) -> Iterator[str]:
-    """Yield all that a module imports, at its top or in a function, for running or for types."""
-    package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            above = package[: len(package) - node.level + 1] if node.level else []
-            base = ".".join([*above, *([node.module] if node.module else [])])
-            yield from (f"{base}.{alias.name}" for alias in node.names)
-
-
-def python_graph() -> Graph:
+@cache
+def python_graph() -> Mapping[str, set[str]]:
     """Return module → the modules of ours that it imports."""
     modules = python_modules()
     graph: Graph = {}
     for name, path in modules.items():
         graph[name] = set()
-        for full in imported(name, path):
+        for _, full in imports_of(str(path.relative_to(ROOT)), tree_of(path)):
             wanted = full
             while wanted and wanted not in modules:
                 wanted = wanted.rpartition(".")[0]

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from tests.contract.modules import MODULES, ROOT, tree_of
 from urc.cli.main import main
 from urc.config.codes import CodePage, pages
 from urc.config.load import WidgetFolder, check
 from urc.runtime.document_tests import exercise
 from urc.runtime.registries import built_in_catalog
 
-ROOT = Path(__file__).resolve().parents[2]
 BROKEN = ROOT / "tests" / "broken"
 CODE = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 COMPOUND = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)+")
@@ -73,8 +73,8 @@ def _strings(value: ast.expr, pattern: re.Pattern[str]) -> Iterator[str]:
 def used() -> dict[str, str]:
     """Return every code that is used anywhere, and where."""
     found = {}
-    for path in sorted((ROOT / "urc").rglob("*.py")):
-        for code in codes_of(ast.parse(path.read_text("utf-8"))):
+    for path in MODULES:
+        for code in codes_of(tree_of(path)):
             found.setdefault(code, str(path.relative_to(ROOT)))
     for path in sorted(BROKEN.rglob("*.expected.txt")):
         for code in re.findall(
@@ -94,7 +94,7 @@ def test_every_code_has_a_page() -> None:
 
 def test_every_page_is_of_a_code_that_is_used() -> None:
     """A page of a code that nothing reports any more misleads."""
-    sources = "".join(path.read_text("utf-8") for path in (ROOT / "urc").rglob("*.py"))
+    sources = "".join(path.read_text("utf-8") for path in MODULES)
     assert [code for code in PAGES if f'"{code}"' not in sources] == []
 
 

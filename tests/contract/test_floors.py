@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.contract.modules import MODULES, ROOT, imports_of, tree_of
 
 FLOORS = {
     "__init__": 7,  # the names for Python users: each is imported on first use, from any floor
@@ -30,30 +30,16 @@ FLOORS = {
 PURE = {"model", "protocol", "motion"}
 IMPURE = {"asyncio", "socket", "ssl", "threading", "starlette", "uvicorn", "websockets"}
 
-MODULES = [str(path.relative_to(ROOT)) for path in sorted((ROOT / "urc").rglob("*.py"))]
-
 
 def floor_of(part: str) -> float:
     """Return a part's floor: private modules at the top are the cellar, unknown parts a tower."""
     return FLOORS.get(part, 0 if part.startswith("_") else 99)
 
 
-def imports_of(path: str, text: str) -> Iterator[tuple[int, str]]:
-    """Yield the line and the absolute dotted name of everything a module imports."""
-    package = Path(path).parts[:-1]
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Import):
-            yield from ((node.lineno, alias.name) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            above = package[: len(package) - node.level + 1] if node.level else ()
-            base = ".".join((*above, *([node.module] if node.module else [])))
-            yield from ((node.lineno, f"{base}.{alias.name}") for alias in node.names)
-
-
-def faults_of(path: str, text: str) -> Iterator[str]:
+def faults_of(path: str, tree: ast.Module) -> Iterator[str]:
     """Yield one line for each import that the module may not have."""
     part = Path(path).parts[1].removesuffix(".py")
-    for line, name in imports_of(path, text):
+    for line, name in imports_of(path, tree):
         top, _, rest = name.partition(".")
         other = rest.partition(".")[0]
         if part in PURE and top in IMPURE:
@@ -65,10 +51,11 @@ def faults_of(path: str, text: str) -> Iterator[str]:
             yield f"{path}:{line}: {part} may not import {other or 'urc'}"
 
 
-@pytest.mark.parametrize("path", MODULES)
-def test_imports_only_from_floors_below(path: str) -> None:
+def test_imports_only_from_floors_below() -> None:
     """No module reaches up, or across to a sibling."""
-    assert list(faults_of(path, (ROOT / path).read_text("utf-8"))) == []
+    names = {path: str(path.relative_to(ROOT)) for path in MODULES}
+    faults = (fault for path in MODULES for fault in faults_of(names[path], tree_of(path)))
+    assert list(faults) == []
 
 
 @pytest.mark.parametrize(
@@ -93,7 +80,7 @@ def test_imports_only_from_floors_below(path: str) -> None:
 )
 def test_a_forbidden_import_is_found(path: str, text: str, fault: str) -> None:
     """The check sees imports in functions, relative ones and whole packages."""
-    assert list(faults_of(path, text)) == [f"{path}:{fault}"]
+    assert list(faults_of(path, ast.parse(text))) == [f"{path}:{fault}"]
 
 
 @pytest.mark.parametrize(
@@ -107,4 +94,4 @@ def test_a_forbidden_import_is_found(path: str, text: str, fault: str) -> None:
 )
 def test_imports_downwards_and_inside_are_allowed(path: str, text: str) -> None:
     """What the house allows is not reported."""
-    assert list(faults_of(path, text)) == []
+    assert list(faults_of(path, ast.parse(text))) == []

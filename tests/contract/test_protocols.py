@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from urc.config.load import check
+from tests.contract.profiles import profile_of
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import to_text
@@ -28,7 +28,6 @@ from urc.protocol.events import (
 )
 from urc.runtime.coverage import measure
 from urc.runtime.document_tests import exercise, sample_settings
-from urc.runtime.registries import built_in_catalog
 from urc.simulator.emulated_robot import EmulatedConnection, EmulatedRobot
 
 FILES = sorted((Path(__file__).parents[1] / "protocols").glob("*.yaml"))
@@ -42,14 +41,6 @@ def file(request: pytest.FixtureRequest) -> Path:
     """The document of one protocol."""
     path: Path = request.param
     return path
-
-
-def profile_of(file: Path) -> Profile:
-    """Return the profile in a document that is without a finding."""
-    checked = check(os.fspath(file), built_in_catalog())
-    assert [to_text(problem) for problem in checked.problems] == []
-    assert checked.profile is not None
-    return checked.profile
 
 
 def test_there_are_protocols_of_many_kinds() -> None:

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
+from tests.contract.profiles import profile_of
 from tests.contract.test_protocols import Conversation
 from urc.config.load import WidgetFolder, check
-from urc.model.profile import Profile
 from urc.problems import to_text
 from urc.runtime.coverage import measure
 from urc.runtime.document_tests import exercise, sample_settings
@@ -42,14 +42,6 @@ def test_every_shipped_document_has_no_finding() -> None:
     found = {os.fspath(file): check(file, built_in_catalog(), registry).problems for file in files}
     assert len(found) >= 2
     assert {name: problems for name, problems in found.items() if problems} == {}
-
-
-def profile_of(file: Path) -> Profile:
-    """Return the profile in a document that is without a finding, warnings included."""
-    checked = check(os.fspath(file), built_in_catalog())
-    assert [to_text(problem) for problem in checked.problems] == []
-    assert checked.profile is not None
-    return checked.profile
 
 
 def test_the_robots_of_the_thesis_and_those_that_people_own_are_there() -> None:

@@ -112,16 +112,17 @@ def with_absolute_references(file: str, schema: Any) -> Any:
     return schema
 
 
-@pytest.mark.parametrize(("file", "place", "schema"), ALL, ids=[place for _, place, _ in ALL])
-def test_kinds_are_told_apart_by_if_and_then(file: str, place: str, schema: Any) -> None:
+def test_kinds_are_told_apart_by_if_and_then() -> None:
     """With `oneOf` a typing error ends in "not valid under any of the given schemas"."""
-    assert not {"oneOf", "anyOf", "allOf", "not"} & schema.keys()
+    words = {"oneOf", "anyOf", "allOf", "not"}
+    assert [place for _, place, schema in ALL if words & schema.keys()] == []
 
 
-@pytest.mark.parametrize(("file", "place", "schema"), ALL, ids=[place for _, place, _ in ALL])
-def test_no_key_is_a_boolean_of_yaml_1_1(file: str, place: str, schema: Any) -> None:
+def test_no_key_is_a_boolean_of_yaml_1_1() -> None:
     """A reader that knows only YAML 1.1 must see the same keys."""
-    assert not YAML_1_1_BOOLEANS & schema.get("properties", {}).keys()
+    keys = [(place, key) for _, place, schema in ALL for key in schema.get("properties", {})]
+    assert keys
+    assert [(place, key) for place, key in keys if key in YAML_1_1_BOOLEANS] == []
 
 
 # ---- the quick verdict and jsonschema

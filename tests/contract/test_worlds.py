@@ -6,11 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.contract.profiles import profile_of
 from tests.contract.test_protocols import Conversation
-from urc.config.load import load_profile
-from urc.model.profile import Profile
 from urc.protocol.events import Request
-from urc.runtime.registries import built_in_catalog
 from urc.simulator.simulated_body import SimulatedBody
 from urc.simulator.world.world import World
 
@@ -45,11 +43,6 @@ STOPS_AFTER_S = {"absolem": 1.0, "turtlebot4": 0.5, "ardupilot-rover": 3.0, "tel
 """What the robots themselves do when commands stop, as their pages say; all others go on."""
 
 
-def profile_of(name: str) -> Profile:
-    """Return the profile of a robot that ships."""
-    return load_profile(FOLDER / f"{name}.yaml", built_in_catalog())
-
-
 def command(talk: Conversation, name: str, arguments: Mapping[str, object]) -> None:
     """Run a command, which must not be refused."""
     before = len(talk.faults)
@@ -73,7 +66,7 @@ def pose(world: World) -> tuple[float, float, float]:
 @pytest.mark.parametrize("name", sorted(DRIVES))
 def test_it_goes_ahead_and_to_the_left_and_stops_when_it_is_let_go(name: str) -> None:
     """By the bytes of its own driver, over the framing of its own line."""
-    profile = profile_of(name)
+    profile = profile_of(FOLDER / f"{name}.yaml")
     talk = Conversation(profile)
     talk.begin()
     talk.wait(3.0)
@@ -102,7 +95,7 @@ def test_it_goes_ahead_and_to_the_left_and_stops_when_it_is_let_go(name: str) ->
 @pytest.mark.parametrize("name", sorted(DRIVES))
 def test_when_commands_stop_it_does_what_the_real_one_does(name: str) -> None:
     """Its fail-safe, or nothing at all: then it goes on until something is in its way."""
-    profile = profile_of(name)
+    profile = profile_of(FOLDER / f"{name}.yaml")
     talk = Conversation(profile)
     talk.begin()
     talk.wait(3.0)
@@ -128,7 +121,7 @@ def test_when_commands_stop_it_does_what_the_real_one_does(name: str) -> None:
 
 def test_every_robot_that_moves_or_senses_has_a_world() -> None:
     """All but the arm and the toy of the tutorial."""
-    names = {file.stem for file in FOLDER.glob("*.yaml")}
-    without = {name for name in names if profile_of(name).world is None}
+    files = list(FOLDER.glob("*.yaml"))
+    without = {file.stem for file in files if profile_of(file).world is None}
     assert without == {"puppet", "ur-e-series"}
-    assert {*DRIVES} == names - without - {"esp32-cam", "gpsd", "nmea-gps"}
+    assert {*DRIVES} == {file.stem for file in files} - without - {"esp32-cam", "gpsd", "nmea-gps"}

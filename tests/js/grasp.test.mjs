@@ -1,4 +1,4 @@
-// One pointer that has hold of an element: `node --import ./tests/js/page.mjs --test tests/js/`.
+// One pointer that has hold of an element: `node --import ./tests/js/page.mjs tests/js/grasp.test.mjs`.
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { grasp } from "urc/command_kit";

@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * Lets Node find what a page finds by its import map: `node --import ./tests/js/page.mjs --test …`.
+ * Lets Node find what a page finds by its import map: `node --import ./tests/js/page.mjs …`.
  */
 import { register } from "node:module";
 
