@@ -1,18 +1,20 @@
-"""The command `./dev test`: lint, types and every test, in a fixed order, with one summary.
+"""The command `./dev test`: lint, types and every test, with one summary.
 
-`./dev test quick` leaves out the tests with real servers and browsers; it needs only Node. A failed
-step does not stop later steps. Exit code 0 when all passed, 1 otherwise. A test without its program
-is left out by name; with ``CI=true`` that is a failure.
+`./dev test quick` leaves out the tests with real servers and browsers; it needs only Node. Its
+steps run in parallel, and the others follow. A failed step does not stop later steps. Exit code 0
+when all passed, 1 otherwise. A test without its program is left out by name; with ``CI=true`` that
+is a failure.
 """
 
+import asyncio
 import hashlib
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -34,8 +36,6 @@ class Step:
     name: str
     command: tuple[str, ...]
     timeout_s: float = 120
-    beside: tuple[str, ...] = ()
-    """A second command to run at the same time; it must pass too, and its output comes last."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,34 +58,37 @@ STATIC = (
 PYTEST = (PYTHON, "-m", "pytest")
 
 
-def halves(tests: str, *half: str, timeout_s: float) -> Step:
-    """Return a step that runs the folders `half` of `tests`, in parallel with all other tests.
+def halves(tests: str, *half: str, timeout_s: float) -> tuple[Step, Step]:
+    """Return two steps: the tests in `half` of the folder, and all others.
 
-    The processes of these two groups do not communicate. A third one that distributed thousands of
-    small tests would need a fifth of the processors.
+    Their processes do not communicate. A third one that distributed thousands of small tests would
+    need a fifth of the processors.
     """
-    half = tuple(f"{tests}/{name}" for name in half)
-    others = (*PYTEST, tests, *(f"--ignore={path}" for path in half))
     name = f"tests {tests.rpartition('/')[2]}"
-    return Step(name, (*PYTEST, *half), timeout_s, beside=others)
+    chosen = tuple(f"{tests}/{one}" for one in half)
+    others = (tests, *(f"--ignore={path}" for path in chosen))
+    return (
+        Step(f"{name} 1", (*PYTEST, *others), timeout_s),
+        Step(f"{name} 2", (*PYTEST, *chosen), timeout_s),
+    )
 
 
+# The longest first: at the end, few are left to wait for.
 QUICK = (
-    halves(
+    *halves(
+        "tests/contract",
+        *("test_robots.py", "test_protocols.py", "test_worlds.py", "test_schemas.py"),
+        *("test_codes.py", "test_circles.py", "test_floors.py", "test_house.py"),
+        timeout_s=420,
+    ),
+    *halves(
         "tests/unit",
         *("protocol", "runtime", "guard", "simulator", "motion", "config"),
         timeout_s=240,
     ),
-    halves(
-        "tests/contract",
-        *("test_robots.py", "test_protocols.py", "test_worlds.py"),
-        *("test_schemas.py", "test_codes.py", "test_house.py"),
-        timeout_s=420,
-    ),
 )
 QUICK_NEEDS = tuple(need for need in NEEDS if need.name == "node")
-TESTS = (
-    *QUICK,
+SLOW = (
     # Most of them wait for a server or for silence, so a few in parallel need no more processor.
     Step(
         "tests e2e",
@@ -106,19 +109,21 @@ def main() -> int:
         print("usage: ./dev test [quick]", file=sys.stderr)
         return 2
     is_quick = bool(sys.argv[1:])
+    start = time.monotonic()
     outcomes: list[Outcome] = []
     brought = bring(QUICK_NEEDS if is_quick else NEEDS)
     javascript, not_checked = javascript_step()
     brought.look_again()  # npm also installs a language server
     environment = os.environ | brought.environment
-    steps = (*STATIC, *([javascript] if javascript else []), *(QUICK if is_quick else TESTS))
+    quick = (*STATIC, *([javascript] if javascript else []), *QUICK)
     try:
-        for step in steps:
-            outcomes.append(run(step, environment))
+        outcomes += run(quick, environment)
+        for step in () if is_quick else SLOW:
+            outcomes += run([step], environment)
     except KeyboardInterrupt:
         print("\ninterrupted", file=sys.stderr)
         return 1
-    return summarise(outcomes, brought, not_checked)
+    return summarise(outcomes, brought, not_checked, time.monotonic() - start)
 
 
 def javascript_step() -> tuple[Step | None, str]:
@@ -153,73 +158,74 @@ def install_checkers() -> None:
     stamp.write_text(lock, encoding="utf-8")
 
 
-def run(step: Step, environment: Mapping[str, str]) -> Outcome:
-    """Run one step with its output shown at once, and end all processes that it started."""
-    print(f"\n== {step.name}", flush=True)
+def run(steps: Sequence[Step], environment: Mapping[str, str]) -> list[Outcome]:
+    """Run the steps in parallel, one for each processor, and end all processes that they started.
+
+    A single step shows its output at once; one of several shows its output at its end.
+    """
+    return asyncio.run(_run_all(steps, environment))
+
+
+async def _run_all(steps: Sequence[Step], environment: Mapping[str, str]) -> list[Outcome]:
+    free = asyncio.Semaphore(os.cpu_count() or 1)
+
+    async def in_turn(step: Step) -> Outcome:
+        async with free:
+            if len(steps) == 1:
+                print(f"\n== {step.name}", flush=True)
+                return await _run(step, environment, None)
+            with TemporaryFile() as output:
+                outcome = await _run(step, environment, output)
+                output.seek(0)
+                said = output.read().decode("utf-8", "replace")
+            print(f"\n== {step.name}\n{said}", end="", flush=True)
+            return outcome
+
+    async with asyncio.TaskGroup() as group:  # after an interrupt, it waits for the end of each
+        tasks = [group.create_task(in_turn(step)) for step in steps]
+    return [task.result() for task in tasks]
+
+
+async def _run(step: Step, environment: Mapping[str, str], output: IO[bytes] | None) -> Outcome:
+    """Run a step; `output` replaces standard output and standard error."""
     start = time.monotonic()
-    fault = ""
-    with ExitStack() as started:
-        processes = [started.enter_context(running(step.command, environment))]
-        if step.beside:
-            said = started.enter_context(shown_at_the_end())
-            processes.append(started.enter_context(running(step.beside, environment, said)))
-        try:
-            for process in processes:
-                code = process.wait(max(0.0, start + step.timeout_s - time.monotonic()))
-                fault = fault or (f"exit code {code}" if code else "")
-        except subprocess.TimeoutExpired:
-            fault = f"not done within {step.timeout_s:.0f} s"
-    return Outcome(step.name, fault, time.monotonic() - start)
-
-
-@contextmanager
-def running(
-    command: tuple[str, ...], environment: Mapping[str, str], output: IO[bytes] | None = None
-) -> Iterator[subprocess.Popen[bytes]]:
-    """Start a program, and end it with all its children; `output` replaces standard output."""
     # A session of its own, so that processes of a killed test can be ended too.
-    process = subprocess.Popen(
-        command,
+    process = await asyncio.create_subprocess_exec(
+        *step.command,
         cwd=ROOT,
         env=dict(environment),
-        stdin=subprocess.DEVNULL,
+        stdin=asyncio.subprocess.DEVNULL,
         stdout=output,
         stderr=output,
         start_new_session=os.name != "nt",
     )
     try:
-        yield process
+        async with asyncio.timeout(step.timeout_s):
+            code = await process.wait()
+        fault = f"exit code {code}" if code else ""
+    except TimeoutError:
+        fault = f"not done within {step.timeout_s:.0f} s"
     finally:
-        end_group(process)
+        await _end_group(process)
+    return Outcome(step.name, fault, time.monotonic() - start)
 
 
-@contextmanager
-def shown_at_the_end() -> Iterator[IO[bytes]]:
-    """Yield a file to write to, and print its content at the end."""
-    with TemporaryFile() as said:
-        try:
-            yield said
-        finally:
-            said.seek(0)
-            print(said.read().decode("utf-8", "replace"), flush=True)
-
-
-def end_group(process: subprocess.Popen[bytes]) -> None:
+async def _end_group(process: asyncio.subprocess.Process) -> None:
     """Kill all processes that the step left running."""
-    if os.name == "nt":
-        process.kill()
-    else:
-        with suppress(ProcessLookupError, PermissionError):  # usually no process is left
+    with suppress(ProcessLookupError, PermissionError):  # usually no process is left
+        if os.name == "nt":
+            process.kill()
+        else:
             os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
+    await process.wait()
 
 
-def summarise(outcomes: list[Outcome], brought: Brought, not_checked: str) -> int:
+def summarise(outcomes: list[Outcome], brought: Brought, not_checked: str, seconds: float) -> int:
     """Print a line for each step, then the left-out tests and the result; return the exit code."""
-    print("\n== summary", flush=True)
+    print(f"\n== summary, after {seconds:.0f} s", flush=True)
     for outcome in outcomes:
         word = "FAILED" if outcome.fault else "ok"
-        print(f"{word:>8}  {outcome.name:<12} {outcome.seconds:6.1f} s  {outcome.fault}".rstrip())
+        print(f"{word:>8}  {outcome.name:<16} {outcome.seconds:6.1f} s  {outcome.fault}".rstrip())
     left_out = [f"{need.purpose}: no {need.name}" for need in brought.left_out]
     left_out += [not_checked] if not_checked else []
     for text in left_out:

@@ -2,14 +2,16 @@
 
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from threading import Timer
 
 import pytest
 
-from scripts.check import TESTS, Step, run
+from scripts.check import SLOW, Step, run
 from tests.e2e.together import TOGETHER
 
 HERE = Path(__file__).parent
@@ -37,30 +39,45 @@ RELEASE_TIMEOUT_S = 10
 def test_a_step_ends_well_or_says_how(program: str, timeout_s: float, fault: str) -> None:
     """Exit code 0 is the only success; a hang is a failure too."""
     step = Step("step", (sys.executable, "-c", program), timeout_s)
-    assert run(step, os.environ).fault == fault
+    assert [one.fault for one in run([step], os.environ)] == [fault]
 
 
-@pytest.mark.parametrize(
-    ("here", "beside", "timeout_s", "fault"),
-    [
-        ("", "", 30, ""),
-        ("raise SystemExit(3)", "", 30, "exit code 3"),
-        ("", "raise SystemExit(4)", 30, "exit code 4"),
-        ("", SLEEP, 5, "not done within 5 s"),
-    ],
-)
-def test_both_commands_of_a_step_must_end_well(
-    capfd: pytest.CaptureFixture[str], here: str, beside: str, timeout_s: float, fault: str
+def test_steps_in_parallel_have_their_own_faults_and_outputs(
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
-    """What the second says is shown, whole and after the first, however it ends."""
-    say = "print('I am {}', flush=True);"
-    first, second = (
-        (sys.executable, "-c", say.format("first") + here),
-        say.format("second") + beside,
-    )
-    step = Step("step", first, timeout_s, beside=(sys.executable, "-c", second))
-    assert run(step, os.environ).fault == fault
-    assert capfd.readouterr().out.split("\n")[:4] == ["", "== step", "I am first", "I am second"]
+    """A failed step ends no other step; the output of each is whole, and shown however it ends."""
+    say = "import sys, time; print('I am', flush=True); time.sleep(0.5);"
+    ends = ["", "print('late', file=sys.stderr); raise SystemExit(3)", SLEEP, ""]
+    faults = ["", "exit code 3", "not done within 5 s", ""]
+    steps = [
+        Step(f"step {place}", (sys.executable, "-c", say + end), 5)
+        for place, end in enumerate(ends)
+    ]
+    outcomes = run(steps, os.environ)
+    assert [(one.name, one.fault) for one in outcomes] == [
+        (step.name, fault) for step, fault in zip(steps, faults, strict=True)
+    ]
+    shown = capfd.readouterr().out.split("\n== ")
+    assert sorted(shown) == [
+        "",
+        "step 0\nI am\n",
+        "step 1\nI am\nlate\n",
+        "step 2\nI am\n",
+        "step 3\nI am\n",
+    ]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signal")
+def test_an_interrupt_ends_all_steps() -> None:
+    """No step that waits for its turn is started."""
+    steps = [Step(f"step {place}", (sys.executable, "-c", SLEEP)) for place in range(20)]
+    interrupt = Timer(1.0, os.kill, (os.getpid(), signal.SIGINT))
+    interrupt.start()
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        run(steps, os.environ)
+    interrupt.join()
+    assert time.monotonic() - start < 30
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no process groups to end")
@@ -70,7 +87,7 @@ def test_nothing_outlives_a_step(tmp_path: Path, ending: str) -> None:
     import fcntl  # not on Windows
 
     step = Step("step", (sys.executable, "-c", WITH_CHILD + ending, str(tmp_path / "lock")), 3)
-    run(step, os.environ)
+    run([step], os.environ)
     with (tmp_path / "lock").open() as lock:
         deadline = time.monotonic() + RELEASE_TIMEOUT_S
         while True:
@@ -85,7 +102,7 @@ def test_nothing_outlives_a_step(tmp_path: Path, ending: str) -> None:
 def test_modules_that_belong_together_are_run_by_one_process() -> None:
     """As the step says it; a group that nobody keeps is a fault that shows now and then only."""
     assert sorted(TOGETHER) == sorted({file.stem for file in HERE.rglob("*.py")} & {*TOGETHER})
-    (command,) = (step.command for step in TESTS if "loadgroup" in step.command)
+    (command,) = (step.command for step in SLOW if "loadgroup" in step.command)
     several = command[command.index("-n") :]
     done = subprocess.run(
         [*command[:3], str(HERE / "test_editor.py"), "-k", "shipped", "-v", *several],

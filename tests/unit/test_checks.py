@@ -1,6 +1,7 @@
 """`./dev test`, `./dev bench` and `./dev docs`: what counts as a failure, and how it is told."""
 
 import ast
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,6 +16,7 @@ from scripts.needs import NEEDS, Brought, Need
 OK = check.Outcome("lint", "", 0.1)
 BAD = check.Outcome("tests", "exit code 1", 2.0)
 COMPLETE = Brought()
+QUICK = [step.name for step in (*check.STATIC, *check.QUICK)]
 WITHOUT_NETCAT = Brought(left_out=[need for need in NEEDS if need.name == "netcat"])
 
 
@@ -56,17 +58,17 @@ def test_the_verdict(
 ) -> None:
     """A failed step fails; what was left out fails only with CI=true, and is always told."""
     monkeypatch.setenv("CI", ci)
-    assert check.summarise(outcomes, brought, not_checked) == code
+    assert check.summarise(outcomes, brought, not_checked, 1.0) == code
     shown = capsys.readouterr().out
     assert shown.splitlines()[-1] == last
     assert ("LEFT OUT" in shown) == bool(brought.left_out or not_checked)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "tests", "needs_browser"),
+    ("arguments", "code", "groups", "needs_browser"),
     [
-        ([], 0, ["tests unit", "tests contract", "tests e2e", "tests motion"], True),
-        (["quick"], 0, ["tests unit", "tests contract"], False),
+        ([], 0, [QUICK, ["tests e2e"], ["tests motion"]], True),
+        (["quick"], 0, [QUICK], False),
         (["fast"], 2, [], False),
     ],
 )
@@ -74,27 +76,27 @@ def test_the_quick_check_has_no_servers(
     monkeypatch: pytest.MonkeyPatch,
     arguments: list[str],
     code: int,
-    tests: list[str],
+    groups: list[list[str]],
     needs_browser: bool,
 ) -> None:
-    """Lint and types are in both; what only the long one needs is not installed for the quick."""
-    ran: list[str] = []
+    """Both run the same quick steps; a program for the other tests is not installed for them."""
+    ran: list[list[str]] = []
     wanted: list[str] = []
 
     def bring(names: tuple[Need, ...]) -> Brought:
         wanted.extend(need.name for need in names)
         return Brought()
 
-    def run(step: check.Step, environment: object) -> check.Outcome:
-        ran.append(step.name)
-        return check.Outcome(step.name, "", 0.1)
+    def run(steps: Sequence[check.Step], environment: object) -> list[check.Outcome]:
+        ran.append([step.name for step in steps])
+        return [check.Outcome(step.name, "", 0.1) for step in steps]
 
     monkeypatch.setattr(check, "bring", bring)
     monkeypatch.setattr(check, "javascript_step", lambda: (None, ""))
     monkeypatch.setattr(check, "run", run)
     monkeypatch.setattr("sys.argv", ["check", *arguments])
     assert check.main() == code
-    assert ran == ([step.name for step in check.STATIC] + tests if tests else [])
+    assert ran == groups
     assert ("chromium" in wanted) == needs_browser
 
 
@@ -102,7 +104,7 @@ def test_the_summary_names_the_command_that_brings_what_is_missing(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """One line to paste."""
-    check.summarise([OK], WITHOUT_NETCAT, "")
+    check.summarise([OK], WITHOUT_NETCAT, "", 1.0)
     lines = capsys.readouterr().out.splitlines()
     assert "LEFT OUT  tests with netcat as the client: no netcat" in lines
     assert lines[-2].endswith("apt-get install -y netcat-openbsd")
@@ -117,7 +119,7 @@ def test_what_npm_brings_is_named_and_left_out_until_it_is_there(
     brought = Brought(left_out=[server])
     brought.look_again()
     assert brought.environment["URC_LEFT_OUT"] == "language-server"
-    check.summarise([OK], brought, "")
+    check.summarise([OK], brought, "", 1.0)
     lines = capsys.readouterr().out.splitlines()
     assert (
         "LEFT OUT  tests of the schemas in an editor's language server: no language-server" in lines
