@@ -157,7 +157,7 @@ def compile_expression(text: str, *, allows_bytes: bool = False) -> Template:
 def text_of(value: object) -> str:
     """Return the text form of `value`, as in templates."""
     if isinstance(value, bytes):
-        raise ExpressionError("bytes are not text; send them by 'hex:' or 'bytes:'")
+        raise ExpressionError("bytes are not text; send bytes with 'hex:' or 'bytes:'")
     return value if isinstance(value, str) else spelt(value)
 
 

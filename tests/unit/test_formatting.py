@@ -79,21 +79,29 @@ def test_filters_take_fields_apart(
 @pytest.mark.parametrize(
     ("expression", "names", "why"),
     [
-        ("x | column('v')", {"x": [{"w": 1}]}, "the row {'w': 1} has no part 'v'"),
-        ("x | column(5, ',')", {"x": ["a,b"]}, "the row ['a', 'b'] has no part 5"),
-        ("x | cut(0, -1)", {"x": [3]}, "3 has no parts in a row"),
+        ("x | column('v')", {"x": [{"w": 1}]}, "the row {'w': 1} has no column 'v'"),
+        ("x | column(5, ',')", {"x": ["a,b"]}, "the row ['a', 'b'] has no column 5"),
+        ("x | cut(0, -1)", {"x": [3]}, "expected text or a list, found 3"),
         ("x | digits(3, 64)", {"x": "0000"}, "4 characters cannot be split into numbers of 3 each"),
         ("x | digits(1, 10)", {"x": "A"}, "'A' is not a digit of base 10"),
-        ("x | signed(8)", {"x": 256}, "the number is a whole number from 0 to 255, found 256"),
-        ("x | hexbytes | unpack('u16le', 1)", {"x": "0102"}, "2 bytes have no 'u16le' at 1"),
+        ("x | signed(8)", {"x": 256}, "the number must be a whole number from 0 to 255, found 256"),
+        (
+            "x | hexbytes | unpack('u16le', 1)",
+            {"x": "0102"},
+            "2 bytes contain no 'u16le' at offset 1",
+        ),
         (
             "x | hexbytes | unpack(n)",
             {"x": "0102", "n": "word"},
             "a type such as 'u16le'",
         ),
-        ("x | hexbytes | numbers('u16le')", {"x": "010203"}, "3 bytes have no 'u16le' at 2"),
-        ("x | unpack('u8')", {"x": "a"}, "expected bytes, as from 'hexbytes'"),
-        ("x | ramp(1, n)", {"x": 0, "n": 9000}, "a number of steps is a whole number from 0"),
+        (
+            "x | hexbytes | numbers('u16le')",
+            {"x": "010203"},
+            "3 bytes contain no 'u16le' at offset 2",
+        ),
+        ("x | unpack('u8')", {"x": "a"}, "expected bytes, such as from 'hexbytes'"),
+        ("x | ramp(1, n)", {"x": 0, "n": 9000}, "the count must be a whole number from 0"),
     ],
 )
 def test_what_does_not_fit_says_so(expression: str, names: dict[str, object], why: str) -> None:

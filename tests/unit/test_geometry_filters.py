@@ -35,10 +35,10 @@ def test_what_each_gives(text: str, expected: float) -> None:
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("-1 | sqrt", "'sqrt' has no value for -1; it takes numbers from 0"),
-        ("2 | asin", "'asin' has no value for 2; it takes -1 to 1"),
-        ("0 | log", "'log' has no value for 0; it takes numbers above 0"),
-        ("1000 | exp", "'exp' has no value for 1000"),
+        ("-1 | sqrt", "'sqrt' is not defined for -1; expected a number of at least 0"),
+        ("2 | asin", "'asin' is not defined for 2; expected -1 to 1"),
+        ("0 | log", "'log' is not defined for 0; expected a number above 0"),
+        ("1000 | exp", "'exp' is not defined for 1000"),
         ("'a' | sin", "expected a number, found 'a'"),
     ],
 )

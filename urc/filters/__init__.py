@@ -1,1 +1,1 @@
-"""Filters of Jinja expressions, by subject."""
+"""The filters of Jinja expressions, grouped by subject."""

@@ -1,7 +1,8 @@
-"""Filters of expressions that make bytes, hash them, or write them as text.
+"""Filters of expressions that create bytes, hash bytes, or convert bytes to text.
 
-Private to `urc.filters.table`. Hashed text is UTF-8. Each filter accepts every value of a document:
-it returns a result, or raises TypeError or ValueError with a text for people.
+Private to `urc.filters.table`. Text is encoded as UTF-8 before it is hashed. Each filter accepts
+any value from a document: the filter returns a result, or raises TypeError or ValueError with a
+message for people.
 """
 
 import binascii
@@ -19,22 +20,22 @@ _YEAR_10000: Final = 253402300800
 
 
 def written_number(name: str, value: object) -> bytes:
-    """Return `value` as the bytes of the type called `name`; whole numbers are rounded."""
+    """Return `value` encoded as the number type `name`; integer types round the value."""
     number = number_of(name)
     if number is None:
         raise ValueError(f"there is no type {_short(name)}")
     if not isinstance(value, (int, float)):
-        raise TypeError(f"{name!r} takes a number, found {_short(value)}")
+        raise TypeError(f"expected a number for {name!r}, found {_short(value)}")
     if number.kind == "float":
         try:
             return writer_of(number)(value)
         except (OverflowError, struct.error):
             raise ValueError(f"{_short(value)} is too large for {name!r}") from None
     if isinstance(value, float) and not abs(value) < 1e30:
-        raise ValueError(f"{name!r} takes a whole number, found {value!r}")
+        raise ValueError(f"expected a whole number for {name!r}, found {value!r}")
     whole, least, most = round(value), number.least, number.most
     if not least <= whole <= most:
-        raise ValueError(f"{_short(whole)} does not fit into {name!r}: {least} to {most}")
+        raise ValueError(f"{_short(whole)} does not fit into {name!r}: expected {least} to {most}")
     return writer_of(number)(whole)
 
 
@@ -48,7 +49,7 @@ def _short(value: object) -> str:
 
 
 def _data(value: object) -> bytes:
-    """Return bytes unchanged, and text as UTF-8."""
+    """Return bytes unchanged, and text encoded as UTF-8."""
     data = value.encode("utf-8", "surrogatepass") if isinstance(value, str) else value
     if not isinstance(data, bytes):
         raise TypeError(f"expected text, found {_short(value)}")
@@ -58,12 +59,12 @@ def _data(value: object) -> bytes:
 
 
 def together(left: object, right: object) -> bytes:
-    """Return the concatenation of two values as bytes; text becomes UTF-8."""
+    """Return the concatenation of two values as bytes; text is encoded as UTF-8."""
     return _data(_data(left) + _data(right))
 
 
 def _iso(value: object) -> str:
-    """Return a time in seconds since 1970 as ``2026-01-31T12:00:00.000Z``."""
+    """Return a time in seconds since 1970 in ISO format, such as ``2026-01-31T12:00:00.000Z``."""
     from datetime import UTC, datetime
 
     if not isinstance(value, (int, float)) or not 0 <= value < _YEAR_10000:
@@ -113,7 +114,7 @@ BYTE_FILTERS: Final[dict[str, Callable[..., Any]]] = {
     "hexbytes": _hexbytes,
     "utf8": _data,
 }
-"""Filters that return bytes; they take no argument."""
+"""Filters that return bytes and take no argument."""
 TEXT_FILTERS: Final[dict[str, tuple[Callable[..., Any], int]]] = {
     "b64encode": (_b64encode, 0),
     "hmac_sha256": (_hmac_sha256, 1),
@@ -122,4 +123,4 @@ TEXT_FILTERS: Final[dict[str, tuple[Callable[..., Any], int]]] = {
     "sha1": (_hash("sha1"), 0),
     "sha256": (_hash("sha256"), 0),
 }
-"""Filters that return text → function and number of arguments."""
+"""Filters that return text, each with its function and number of arguments."""

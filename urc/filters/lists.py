@@ -1,8 +1,8 @@
-"""Filters and operators of expressions over lists and texts.
+"""Filters and operators of expressions for lists and texts.
 
-Private to `urc.filters.table`. Each function accepts every value of a document: it returns a
-result, or raises TypeError or ValueError with a text for people. The size of the input bounds that
-of the result.
+Private to `urc.filters.table`. Each function accepts any value from a document: the function
+returns a result, or raises TypeError or ValueError with a message for people. The size of the input
+limits the size of the result.
 """
 
 import re
@@ -40,7 +40,7 @@ def _numbers(value: object) -> Sequence[Any]:
         raise ValueError("an empty list has no minimum or maximum")
     for item in items:
         if not isinstance(item, (int, float)):
-            raise TypeError(f"expected a list of numbers, found {_short(item)} in it")
+            raise TypeError(f"expected a list of numbers, found the element {_short(item)}")
     return items
 
 
@@ -51,18 +51,18 @@ def _text(value: object) -> str:
 
 
 def sliced(value: Any, start: Any, stop: Any) -> Any:
-    """Return the slice of a text, list or bytes from `start` up to `stop`; None for its end."""
+    """Return a slice of text, a list or bytes, from `start` up to `stop`; None for either end."""
     if not isinstance(value, (str, list, tuple, bytes)):
-        raise TypeError(f"{_short(value)} has no parts in a row")
+        raise TypeError(f"expected text, a list or bytes, found {_short(value)}")
     for place in (start, stop):
         if place is not None and (not isinstance(place, int) or isinstance(place, bool)):
-            raise TypeError(f"a place in a row is a whole number, found {_short(place)}")
+            raise TypeError(f"expected a whole number as index, found {_short(place)}")
     return value[start:stop]
 
 
 @lru_cache(maxsize=512)
 def compiled(source: str, test: str) -> "Pattern":
-    """Return the pattern of a test, anchored at the start for ``match``; raise `PatternError`."""
+    """Return the compiled pattern, anchored at the start for ``match``; raise `PatternError`."""
     from urc._patterns import compile_pattern  # 2 ms that only a driver with such a test pays
 
     pattern = compile_pattern(source)  # first, so that errors refer to the written text
@@ -82,7 +82,7 @@ def is_search(value: Any, source: str) -> bool:
 def _join(value: Any, between: Any = "") -> str:
     parts = [spelt(one) for one in _list(value)]
     if any(isinstance(one, bytes) for one in _list(value)):
-        raise TypeError("bytes are not text; send them by 'hex:' or 'bytes:'")
+        raise TypeError("bytes are not text; send bytes with 'hex:' or 'bytes:'")
     text = _text(between)
     if sum(map(len, parts)) + len(parts) * len(text) > MAX_TEXT:
         raise ValueError(f"the text has more than {MAX_TEXT} characters")
@@ -113,7 +113,7 @@ def _sum(value: Any) -> Any:
 
 
 def _ddmm(value: Any, hemisphere: Any = "N") -> float | None:
-    """Return the degrees of a number in the format DDMM.mmm; None for an empty value."""
+    """Return degrees from a number in the format DDMM.mmm; None for an empty value."""
     if value is None or value == "":
         return None
     sign = _HEMISPHERES.get(hemisphere) if isinstance(hemisphere, str) else None
@@ -122,7 +122,7 @@ def _ddmm(value: Any, hemisphere: Any = "N") -> float | None:
     text = value if isinstance(value, str) else repr(value)
     found = _DDMM.fullmatch(text)
     if found is None or float(found[2]) >= 60:
-        raise ValueError(f"expected degrees and minutes, as 4807.038, found {_short(value)}")
+        raise ValueError(f"expected degrees and minutes, such as 4807.038, found {_short(value)}")
     return sign * (int(found[1] or 0) + float(found[2]) / 60)
 
 
@@ -136,4 +136,5 @@ LIST_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "split": (_split, (0, 1)),
     "sum": (_sum, (0, 0)),
 }
-"""Filter → function, and its least and largest number of arguments after the subject."""
+"""Each filter with its function, and its minimum and maximum number of arguments after the
+subject."""

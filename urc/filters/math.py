@@ -1,7 +1,7 @@
-"""Angles, roots and rounding for expressions.
+"""Filters of expressions for angles, roots and rounding.
 
 Private to `urc.filters.table`. Angles are in radians. An undefined result, such as the root of a
-negative number, raises ValueError, as everywhere in expressions.
+negative number, raises ValueError, as in all expressions.
 """
 
 import math
@@ -19,7 +19,7 @@ def _number(value: object) -> float:
 
 
 def _of(name: str, function: Callable[..., float], where: str = "") -> Callable[..., float]:
-    """Return `function` over numbers; `where` describes its domain in errors."""
+    """Return a filter that applies `function`; error messages end in `where`, its valid range."""
 
     def filtered(*values: object) -> float:
         numbers = [_number(value) for value in values]
@@ -27,15 +27,15 @@ def _of(name: str, function: Callable[..., float], where: str = "") -> Callable[
             return function(*numbers)
         except (ValueError, OverflowError):
             shown = " and ".join(f"{number:g}" for number in numbers)
-            reason = f"'{name}' has no value for {shown}"
+            reason = f"'{name}' is not defined for {shown}"
             raise ValueError(f"{reason}; {where}" if where else reason) from None
 
     return filtered
 
 
 GEOMETRY_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
-    "acos": (_of("acos", math.acos, "it takes -1 to 1"), (0, 0)),
-    "asin": (_of("asin", math.asin, "it takes -1 to 1"), (0, 0)),
+    "acos": (_of("acos", math.acos, "expected -1 to 1"), (0, 0)),
+    "asin": (_of("asin", math.asin, "expected -1 to 1"), (0, 0)),
     "atan": (_of("atan", math.atan), (0, 0)),
     "atan2": (_of("atan2", math.atan2), (1, 1)),
     "ceil": (_of("ceil", math.ceil), (0, 0)),
@@ -44,10 +44,10 @@ GEOMETRY_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] =
     "exp": (_of("exp", math.exp), (0, 0)),
     "floor": (_of("floor", math.floor), (0, 0)),
     "hypot": (_of("hypot", math.hypot), (1, 1)),
-    "log": (_of("log", math.log, "it takes numbers above 0"), (0, 0)),
+    "log": (_of("log", math.log, "expected a number above 0"), (0, 0)),
     "radians": (_of("radians", math.radians), (0, 0)),
     "sin": (_of("sin", math.sin), (0, 0)),
-    "sqrt": (_of("sqrt", math.sqrt, "it takes numbers from 0"), (0, 0)),
+    "sqrt": (_of("sqrt", math.sqrt, "expected a number of at least 0"), (0, 0)),
     "tan": (_of("tan", math.tan), (0, 0)),
 }
 """Filter → function, and its least and largest number of arguments after the subject."""

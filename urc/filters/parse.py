@@ -1,8 +1,8 @@
-"""Filters that parse the content of one field: tables, digits, packed numbers.
+"""Filters that parse the content of one field, such as tables, digits and packed numbers.
 
-Private to `urc.filters.table`. Each filter accepts every value of a document, takes linear time,
+Private to `urc.filters.table`. Each filter accepts any value from a document, runs in linear time,
 and returns at most `MAX_PARTS` values. A filter returns a result, or raises TypeError or ValueError
-with a text for people.
+with a message for people.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -38,7 +38,7 @@ def _text(value: object) -> str:
 def _whole(value: object, what: str, least: int, most: int) -> int:
     if isinstance(value, int) and not isinstance(value, bool) and least <= value <= most:
         return value
-    raise ValueError(f"{what} is a whole number from {least} to {most}, found {_short(value)}")
+    raise ValueError(f"{what} must be a whole number from {least} to {most}, found {_short(value)}")
 
 
 def _check_count(count: int, what: str) -> None:
@@ -47,7 +47,7 @@ def _check_count(count: int, what: str) -> None:
 
 
 def _column(value: Any, key: Any, between: Any = None) -> list[Any]:
-    """Return one part of every row, by name, by position, or by position in a separated text."""
+    """Return one column of all rows, by name, or by position in a list or separated text."""
     rows = _list(value)
     if between is not None:
         if not _text(between):
@@ -62,7 +62,7 @@ def _column(value: Any, key: Any, between: Any = None) -> list[Any]:
         if (isinstance(row, Mapping) and key in row) or _is_place(row, key):
             found.append(row[key])
         else:
-            raise ValueError(f"the row {_short(row)} has no part {_short(key)}")
+            raise ValueError(f"the row {_short(row)} has no column {_short(key)}")
     return found
 
 
@@ -72,20 +72,20 @@ def _is_place(row: Any, key: Any) -> bool:
 
 
 def _cut(value: Any, start: Any, stop: Any = None) -> list[Any]:
-    """Return the part from `start` up to `stop` of every text or list in a list."""
-    begin = _whole(start, "a place", -MAX_PARTS, MAX_PARTS)
-    end = None if stop is None else _whole(stop, "a place", -MAX_PARTS, MAX_PARTS)
+    """Return the part from `start` up to `stop` of each text or list in a list."""
+    begin = _whole(start, "the start", -MAX_PARTS, MAX_PARTS)
+    end = None if stop is None else _whole(stop, "the end", -MAX_PARTS, MAX_PARTS)
     for row in _list(value):
         if not isinstance(row, (str, list, tuple)):
-            raise TypeError(f"{_short(row)} has no parts in a row")
+            raise TypeError(f"expected text or a list, found {_short(row)}")
     _check_count(sum(len(range(len(row))[begin:end]) for row in value), "parts")
     return [row[begin:end] for row in value]
 
 
 def _digits(value: Any, width: Any, base: Any, zero: Any = 48) -> list[int]:
-    """Return the numbers with `width` characters each, the highest digit first."""
-    text, size = _text(value), _whole(width, "a width", 1, 16)
-    radix = _whole(base, "a base", 2, 256)
+    """Return numbers with a fixed `width` in characters, each with its highest digit first."""
+    text, size = _text(value), _whole(width, "the width", 1, 16)
+    radix = _whole(base, "the base", 2, 256)
     first = ord(zero) if isinstance(zero, str) and len(zero) == 1 else zero
     least = _whole(first, "the code of the digit zero", 0, 0x10FFFF)
     if len(text) % size:
@@ -103,14 +103,14 @@ def _digits(value: Any, width: Any, base: Any, zero: Any = 48) -> list[int]:
 
 
 def _signed(value: Any, bits: Any) -> int:
-    """Return the value of a two's complement number of `bits` bits."""
-    size = _whole(bits, "the bits", 1, _MOST_BITS)
+    """Return the signed value of a two's complement number with `bits` bits."""
+    size = _whole(bits, "the number of bits", 1, _MOST_BITS)
     number = _whole(value, "the number", 0, (1 << size) - 1)
     return number - (1 << size) if number >> size - 1 else number
 
 
 class _Short(ValueError):
-    """The bytes contain no number of this type."""
+    """The bytes do not contain a number of this type."""
 
 
 @cache  # the type names are few
@@ -124,22 +124,22 @@ def _reader(name: str) -> Callable[[bytes, int, int], tuple[Any, int]]:
 def _bytes(value: Any) -> bytes:
     if isinstance(value, bytes):
         return value
-    raise TypeError(f"expected bytes, as from 'hexbytes', found {_short(value)}")
+    raise TypeError(f"expected bytes, such as from 'hexbytes', found {_short(value)}")
 
 
 def _unpack(value: Any, name: Any, at: Any = 0) -> int | float:
-    """Return the number of a type at an offset of the bytes."""
+    """Return the number of a type at a byte offset."""
     read = _reader(_text(name))
-    data, place = _bytes(value), _whole(at, "a place", 0, MAX_PARTS)
+    data, place = _bytes(value), _whole(at, "the offset", 0, MAX_PARTS)
     try:
         number: int | float = read(data, place, len(data))[0]
     except _Short:
-        raise ValueError(f"{len(data)} bytes have no {name!r} at {place}") from None
+        raise ValueError(f"{len(data)} bytes contain no {name!r} at offset {place}") from None
     return number
 
 
 def _numbers(value: Any, name: Any) -> list[int | float]:
-    """Return all consecutive numbers of a type in the bytes."""
+    """Return all consecutive numbers of one type in the bytes."""
     read, data = _reader(_text(name)), _bytes(value)
     _check_count(len(data), "bytes")
     found, place = [], 0
@@ -147,7 +147,7 @@ def _numbers(value: Any, name: Any) -> list[int | float]:
         try:
             number, place = read(data, place, len(data))
         except _Short:
-            raise ValueError(f"{len(data)} bytes have no {name!r} at {place}") from None
+            raise ValueError(f"{len(data)} bytes contain no {name!r} at offset {place}") from None
         found.append(number)
     return found
 
@@ -157,11 +157,11 @@ def _hexdigits(value: Any) -> str:
 
 
 def _ramp(value: Any, step: Any, count: Any) -> list[float]:
-    """Return `count` numbers from the subject upwards, with the distance `step`."""
+    """Return `count` numbers that start at the subject and increase by `step`."""
     for one in (value, step):
         if not isinstance(one, (int, float)):
             raise TypeError(f"expected a number, found {_short(one)}")
-    return [value + place * step for place in range(_whole(count, "a number of steps", 0, 8192))]
+    return [value + place * step for place in range(_whole(count, "the count", 0, 8192))]
 
 
 CUT_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {

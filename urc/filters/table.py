@@ -1,8 +1,8 @@
-"""Operators and filters of expressions: the functions that compiled templates call.
+"""Operators and filters of expressions: all functions that compiled templates call.
 
-Private to `urc.expressions`. Every function accepts all values of a document: it returns a result,
-or raises TypeError, ValueError or ArithmeticError with a text for people. No function turns small
-operands into a large result.
+Private to `urc.expressions`. Every function accepts any value from a document: the function returns
+a result, or raises TypeError, ValueError or ArithmeticError with a message for people. No function
+produces a large result from small operands.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -17,9 +17,9 @@ __all__ = ["FILTERS", "SCOPE", "filter_names"]
 
 MAX_TEXT = 65536
 MAX_BITS = 4096
-"""Bound of integers: they stay below 2**4096."""
+"""Maximum size of integers, in bits."""
 MAX_DIGITS = 15
-"""Digits on either side of the decimal point that `round` accepts."""
+"""Maximum number of digits on either side of the decimal point that `round` accepts."""
 
 
 def _number(value: object) -> Any:
@@ -85,8 +85,8 @@ def _item(value: Any, key: Any) -> Any:
     if isinstance(value, (list, tuple)) and isinstance(key, int):
         if -len(value) <= key < len(value):
             return value[key]
-        raise ValueError(f"there is no item {key} among {len(value)}")
-    raise TypeError(f"{_short(value)} has no part {key!r}")
+        raise ValueError(f"there is no item {key} in a list of {len(value)}")
+    raise TypeError(f"{_short(value)} has no key {key!r}")
 
 
 def _joined(parts: list[str]) -> str:
@@ -101,7 +101,7 @@ def _join(*parts: Any) -> str:
 
 def _text(value: Any) -> str:
     if isinstance(value, bytes):
-        raise TypeError("bytes are not text; send them by 'hex:' or 'bytes:'")
+        raise TypeError("bytes are not text; send bytes with 'hex:' or 'bytes:'")
     return spelt(value)
 
 
@@ -210,14 +210,14 @@ def _sign(value: Any) -> str:
 
 
 class Filter(NamedTuple):
-    """A filter: its function, and the number of arguments after the subject."""
+    """A filter: its function, and its number of arguments after the subject."""
 
     function: Callable[..., Any]
     arity: tuple[int, int]
     gives_bytes: bool = False
     """Whether the filter returns bytes, which only ``hex:`` and ``bytes:`` can send."""
     refuses: Callable[[str], str] | None = None
-    """Check of a constant first argument: returns the error, or ""."""
+    """Check of a constant first argument, which returns the error or ""."""
 
 
 FILTERS: dict[str, Filter] = {
@@ -279,12 +279,12 @@ _OPERATORS = (_add, _sub, _mul, _div, _floordiv, _mod, _pow, _item, _join)
 _TESTS = (_is_defined, _is_none, _is_number, _is_string)
 
 SCOPE: dict[str, Any] = {"__builtins__": {}}
-"""The only names accessible to compiled templates."""
+"""The only names that compiled templates can access."""
 SCOPE |= {"_slice": lists.sliced, "_match": lists.is_match, "_search": lists.is_search}
 SCOPE |= {function.__name__: function for function in (*_OPERATORS, *_TESTS)}
 SCOPE |= {f"_filter_{name}": filter_.function for name, filter_ in FILTERS.items()}
 
 
 def filter_names() -> str:
-    """Return the filter names for messages, without the many filters that return bytes."""
+    """Return the filter names for messages, except the many filters that return bytes."""
     return ", ".join(sorted(name for name, one in FILTERS.items() if not one.gives_bytes))

@@ -1,1 +1,1 @@
-"""Public fakes for tests of URC and of third-party transports and widgets."""
+"""Public fakes for tests of URC, of third-party transports and of third-party widgets."""

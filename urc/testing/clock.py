@@ -1,4 +1,4 @@
-"""A clock that moves only under control of a test."""
+"""A fake clock that only a test moves forward."""
 
 import asyncio
 import heapq
@@ -8,13 +8,15 @@ from itertools import count
 __all__ = ["FakeClock", "settle"]
 
 _TURNS = 30
-"""Turns of the loop after which all ready tasks have run; it exceeds every chain in URC."""
+"""Number of loop turns after which all ready tasks have run; longer than every chain of tasks in
+URC."""
 _QUIET_TURNS = 3
-"""Idle turns after which no task is ready any more, because a chain has no gaps."""
+"""Number of consecutive idle turns after which no task is ready, because chains of tasks have no
+gaps."""
 
 
 async def settle() -> None:
-    """Run every ready task until it waits."""
+    """Run every ready task until all tasks wait."""
     # The loop's queue of ready callbacks; a loop without it gets all turns.
     ready = getattr(asyncio.get_running_loop(), "_ready", None)
     quiet = 0
@@ -34,7 +36,7 @@ class _FakeAlarm:
 
 
 class FakeClock:
-    """A replacement for `urc.runtime.clock.LoopClock`; it starts at `start_s`."""
+    """A replacement for `urc.runtime.clock.LoopClock`; its time starts at `start_s`."""
 
     def __init__(self, start_s: float = 1000.0) -> None:
         self._now = start_s
@@ -42,11 +44,11 @@ class FakeClock:
         self._numbers = count()
 
     def now(self) -> float:
-        """Return the current fake time."""
+        """Return the current fake time, in seconds."""
         return self._now
 
     async def sleep(self, seconds: float) -> None:
-        """Return once `advance` has passed `seconds` from now; at once for zero seconds."""
+        """Wait until `advance` has moved the time by `seconds`; for zero, return immediately."""
         if seconds <= 0:
             await asyncio.sleep(0)
             return
@@ -58,18 +60,18 @@ class FakeClock:
             alarm.cancel()
 
     def call_at(self, time_s: float, action: Callable[[], None]) -> _FakeAlarm:
-        """Call `action` when `advance` reaches `time_s`."""
+        """Call `action` when `advance` reaches the time `time_s`."""
         alarm = _FakeAlarm(action)
         heapq.heappush(self._due, (time_s, next(self._numbers), alarm))
         return alarm
 
     async def hold_up(self, seconds: float) -> None:
-        """Pass time without running anything, as a blocked loop does; then run overdue calls."""
+        """Move the time without running any call, as a blocked loop; then run overdue calls."""
         self._now += seconds
         await self.advance(0)
 
     async def advance(self, seconds: float) -> None:
-        """Pass time, and run each due call and its effects in order."""
+        """Move the time forward, and run each due call with its effects in order."""
         end_s = self._now + seconds
         await settle()
         while self._due and self._due[0][0] <= end_s:

@@ -1,4 +1,4 @@
-"""A fake robot for the dashboard: profiles with widgets, and a session with only a hub."""
+"""A fake robot for the dashboard: profiles with widgets, and a session without transport."""
 
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
@@ -41,7 +41,7 @@ def _declared(manifest: str) -> Any:
 
 
 def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -> Widget:
-    """Return a widget of the shipped folder `name`, or of `folder`, that accepts any type."""
+    """Return a widget that accepts any type, from the shipped folder `name` or from `folder`."""
     place = folder or shipped("widgets") / name
     manifest = place / "widget.yaml"
     declared = _declared(manifest.read_text("utf-8")) if manifest.is_file() else {}
@@ -68,7 +68,7 @@ def plain_widget(name: str, inputs: Sequence[str], folder: Path | None = None) -
 
 
 def option_defaults(widget: Widget) -> dict[str, object]:
-    """Return the defaults in the widget's manifest, which the loader applies."""
+    """Return the default options in the widget's manifest, which the loader applies."""
     return {
         name: schema["default"]
         for name, schema in widget.options.items()
@@ -85,9 +85,9 @@ def dashboard_profile(
     settings: Mapping[str, Setting] | None = None,
     commands: Mapping[str, Command] | None = None,
 ) -> Profile:
-    """Return a profile with slots in one row; by default, one battery as in the puppet.
+    """Return a profile with all slots in one row; by default, one battery as in the puppet.
 
-    Missing options of a use take the defaults of the widget's manifest.
+    Missing options of a widget use take the defaults of the widget's manifest.
     """
     wanted = uses or (WidgetUse("battery", "battery", {"level": "battery"}),)
     known = {each.name: each for each in widgets}
@@ -119,7 +119,7 @@ def dashboard_profile(
 
 
 class FakeRobot:
-    """A fake session under control of a test. The session counts calls of `open`."""
+    """A fake session under the control of a test. The session counts the calls of `open`."""
 
     def __init__(self, profile: Profile, clock: Clock | None = None) -> None:
         self.profile = profile
@@ -133,13 +133,14 @@ class FakeRobot:
         self.pulls: list[tuple[str, Pull]] = []
         """Requests to sequences."""
         self.latched: list[str] = []
-        """Reasons of all latched stops."""
+        """Reasons of all latched stops, in order."""
         self.frames = FakeFrames(profile.driver)
         self.backend: MotionBackend | None = FakeMotionBackend(self.clock)
         self.on_motion: Callable[[MotionEvent], None] | None = None
-        """Takes the events of held commands."""
+        """Callback for the events of held commands."""
         self.on_command: Callable[[str, Mapping[str, Reading]], Mapping[str, Value]] | None = None
-        """Returns the values of a command's reply, or raises an error; None: no values."""
+        """Callback that returns the values of a command's reply, or raises an error; None replies
+        without values."""
 
     def open(self) -> AbstractAsyncContextManager["FakeRobot"]:
         """Return the context of a connected robot."""
@@ -164,7 +165,7 @@ class FakeRobot:
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
     ) -> Replied:
-        """Record the command, report its name as sent, and return the reply of the test."""
+        """Record the command, report its name as the sent frame, and return the test's reply."""
         if on_sent is not None:
             on_sent(name.encode())
         self.confirmed_by.append(confirmed_by)
@@ -173,24 +174,24 @@ class FakeRobot:
         return Replied(len(self.commands), name, values)
 
     def pull(self, sequence: str, what: Pull) -> None:
-        """Record the request to a sequence."""
+        """Record a request about a sequence."""
         self.pulls.append((sequence, what))
 
     def latch(self, reason: str) -> None:
-        """Record the reason of a latched stop."""
+        """Record the reason for a latched stop."""
         self.latched.append(reason)
 
     def set_reading(
         self, signal: str, value: Reading, *, alarm: Alarm = "", age_s: float = 0.0
     ) -> None:
-        """Deliver a reading that was measured `age_s` ago."""
+        """Deliver a reading that is `age_s` seconds old."""
         self.hub.publish([Sample(signal, value, self.clock.now() - age_s, alarm)])
 
     def link(self, state: LinkState, detail: str = "", *, age_s: float = 0.0) -> None:
-        """Set the state of the only transport, as of `age_s` ago."""
+        """Set the state of the only transport, beginning `age_s` seconds ago."""
         since_s = self.clock.now() - age_s
         self.hub.set_link(LinkStatus("wire", state, "tcp 127.0.0.1:6789", since_s, detail))
 
     def log(self, text: str) -> None:
-        """Add a log entry."""
+        """Add an entry to the log."""
         self.hub.log(LogEntry(self.clock.now(), "info", "wire", text))

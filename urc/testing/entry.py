@@ -1,4 +1,4 @@
-"""Access to the dashboard of a test: known keys, and the cookies of an admitted browser.
+"""Access to the dashboard of a test, with known keys and the cookies of admitted browsers.
 
 For tests alone.
 """
@@ -13,16 +13,16 @@ KEY = "the-start-key-of-a-test"
 TOKEN = "the-token-of-managers-in-a-test"  # noqa: S105 - valid only in tests
 
 ACCESS = Access(key=KEY, instance="test", token=TOKEN)
-"""Access to a dashboard on this machine only."""
+"""Access to a dashboard that only this machine can reach."""
 OPEN = copy(ACCESS)
-"""Access to a dashboard that other machines can reach, with the same browsers."""
+"""Access to a dashboard that other machines can reach too, with the same admitted browsers."""
 OPEN.is_open = True
 
 HERE = {ACCESS.cookie: str(ACCESS.admit(KEY))}
-"""Cookies of a browser with the start key."""
+"""Cookies of a browser that has handed in the start key."""
 HERE_COOKIE = f"{ACCESS.cookie}={HERE[ACCESS.cookie]}"
-"""Header with these cookies."""
+"""Cookie header of a browser that has handed in the start key."""
 MANAGER = {ACCESS.cookie: str(ACCESS.admit(TOKEN))}
-"""Cookies of a browser with the token of managers."""
+"""Cookies of a browser that has handed in the token of managers."""
 BEARER = {"authorization": f"Bearer {KEY}"}
-"""Header for requests from a program."""
+"""Authorization header for requests from a program."""

@@ -1,4 +1,4 @@
-"""A test of a framing with data split in several ways."""
+"""A test of a framing with differently split data."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol, TypeVar
@@ -9,24 +9,24 @@ Frame = TypeVar("Frame", covariant=True)
 
 
 class Feedable(Protocol[Frame]):
-    """A decoder of bytes into frames."""
+    """A decoder that cuts bytes into frames."""
 
     def feed(self, data: bytes) -> Sequence[Frame]:
-        """Return the frames that `data` completes."""
+        """Return all frames that `data` completes."""
 
 
 def feed_three_ways(
     decoder: Callable[[], Feedable[Frame]], data: bytes, trailing: bytes = b"\x00trailing"
 ) -> list[Frame]:
-    """Decode `data` whole, byte by byte, and followed by `trailing` bytes; return the frames.
+    """Decode `data` whole, byte by byte, and followed by `trailing`; return the frames.
 
     Args:
-        decoder: returns a new decoder for each way.
+        decoder: returns a new decoder for each of the three ways.
         data: complete frames.
-        trailing: beginning of an incomplete frame.
+        trailing: bytes that begin an incomplete frame.
 
     Raises:
-        AssertionError: two ways gave different frames.
+        AssertionError: two of the three ways returned different frames.
     """
     whole = list(decoder().feed(data))
     by_byte: list[Frame] = []

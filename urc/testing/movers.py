@@ -1,4 +1,4 @@
-"""A fake motion backend: it records written frames with their times, as readable text."""
+"""A fake motion backend, which records written frames with their times as readable text."""
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
@@ -17,30 +17,30 @@ __all__ = ["FakeFrames", "FakeMotionBackend", "FakeSession"]
 
 
 class FakeFrames:
-    """Frames of held commands as text: ``drive speed=0.5 turn=0``, and ``drive stop``."""
+    """Frames of held commands as text, such as ``drive speed=0.5 turn=0`` and ``drive stop``."""
 
     def __init__(self, driver: Driver) -> None:
         self.driver = driver
         self.refusal = ""
-        """Reason to refuse frames, or ""."""
+        """Reason for refusing frames; "" accepts frames."""
         self.on_motion: Callable[[MotionEvent], None] | None = None
-        """Takes the events of the engine."""
+        """Callback for the motion events of the engine."""
         self.is_greeted = True
-        """Whether all steps of the connection have run."""
+        """Whether all steps that follow the connection have run."""
         self.number = 0
-        """Counter of the newest frame; 0 for frames without counters."""
+        """Counter of the newest frame; 0 for frames without a counter."""
 
     def is_lasting(self, command: str) -> bool:
-        """Return whether the stop frame never changes."""
+        """Return whether the stop frame of the command never changes."""
         self._known(command)
         return not self.number
 
     def has_stops(self, command: str) -> bool:
-        """Return whether no further stop frame is needed now."""
+        """Return whether the command needs no further stop frame."""
         return False
 
     def is_ready(self, command: str) -> bool:
-        """Return whether the transport is ready."""
+        """Return whether the command's transport is ready."""
         self._known(command)
         return self.is_greeted
 
@@ -49,13 +49,13 @@ class FakeFrames:
             raise KeyError(command)
 
     def send(self, line: str = "wire") -> int:
-        """Use a counter for another frame, and return it."""
+        """Use the counter for another frame, and return its new value."""
         self.number = number = self.number + 1
         self.tell(NumbersUsed(line))
         return number
 
     def tell(self, event: MotionEvent) -> None:
-        """Tell an event of the engine."""
+        """Report an event of the engine."""
         if self.on_motion is not None:
             self.on_motion(event)
 
@@ -63,11 +63,11 @@ class FakeFrames:
         return f"{self.number + 1} " if self.number else ""
 
     def stop_frame(self, command: str) -> Payload:
-        """Return the stop frame, without using a counter."""
+        """Return the stop frame of a command, without using a counter."""
         return f"{self._numbered()}{command} stop".encode()
 
     def motion_frame(self, command: str, arguments: Mapping[str, Reading], now: float) -> Payload:
-        """Return the command's arguments, after the checks of the engine."""
+        """Return the motion frame with the command's arguments, after the checks of the engine."""
         if self.refusal:
             raise UrcError(self.refusal)
         values = check_arguments(self.driver.commands[command], arguments)
@@ -79,7 +79,7 @@ class FakeFrames:
 
 
 class FakeSession:
-    """The part of a session that a motion controller needs."""
+    """The part of a session that the motion controller uses."""
 
     def __init__(self, frames: FakeFrames, backend: MotionBackend | None) -> None:
         self.frames = frames
@@ -87,7 +87,7 @@ class FakeSession:
 
     @property
     def on_motion(self) -> Callable[[MotionEvent], None] | None:
-        """Takes the events of the engine."""
+        """Callback for the motion events of the engine."""
         return self.frames.on_motion
 
     @on_motion.setter
@@ -96,15 +96,15 @@ class FakeSession:
 
 
 class FakeMotionBackend:
-    """Real movers with a fake transport that accepts all data while `is_up`."""
+    """Real hold-to-run machines with a fake transport, which accepts all data while `is_up`."""
 
     def __init__(self, clock: Clock, write: Callable[[bytes], None] | None = None) -> None:
         self.written: list[tuple[float, str]] = []
-        """Time and text of each write; writes to a closed transport are missing."""
+        """Time and text of each write; writes to a closed transport are not recorded."""
         self.reasons: list[Reason] = []
-        """Reasons of the stops, in order."""
+        """Reasons of all stops, in order."""
         self.ticked_s = float("-inf")
-        """Time of the last accepted tick."""
+        """Time of the last accepted tick, in seconds."""
         self.is_up = True
         self._clock = clock
         self._write = write
@@ -114,11 +114,11 @@ class FakeMotionBackend:
 
     @property
     def texts(self) -> list[str]:
-        """Return the written texts."""
+        """Return the texts of all written frames."""
         return [text for _, text in self.written]
 
     def arm(self, command: str, terms: HoldTerms) -> None:
-        """Accept ticks from now on."""
+        """Accept ticks of the command from now on."""
         hold_to_run = self._backend.get(command)
         if hold_to_run is None or hold_to_run.state == "idle":
             hold_to_run = self._backend[command] = HoldToRun(terms)
@@ -132,16 +132,16 @@ class FakeMotionBackend:
         self.write_due()
 
     def renew(self, command: str, stop: Payload | FrameVariants) -> None:
-        """Replace the stop frame of a command."""
+        """Replace the stop frame of the command."""
         hold_to_run = self._backend[command]
         hold_to_run.renew(hold_to_run.terms.stopped_by(stop))
 
     def is_stopping(self, command: str) -> bool:
-        """Return whether the command moves the robot."""
+        """Return whether the command moves the robot or still has to stop it."""
         return command in self._backend and self._backend[command].state != "idle"
 
     def is_open(self, command: str) -> bool:
-        """Return whether the transport is connected."""
+        """Return whether the command's transport is connected."""
         return self.is_up
 
     def release(self, command: str) -> None:
@@ -159,11 +159,11 @@ class FakeMotionBackend:
         self.write_due()
 
     async def stops(self) -> Sequence[tuple[str, Reason]]:
-        """Wait until the stops are written."""
+        """Wait until stops are written, and return them."""
         return [await self._stops.get()]
 
     def write_due(self) -> None:
-        """Write the due frames, also after the transport is up again."""
+        """Write all due frames, which may have waited for the transport."""
         now = self._clock.now()
         for command, hold_to_run in self._backend.items():
             while self.is_up and (data := hold_to_run.due(now, is_clear=True)) is not None:

@@ -1,4 +1,4 @@
-"""A robot with one transport, built without a document."""
+"""A robot with one transport, built without a YAML document."""
 
 from urc.expressions import compile_template
 from urc.model.driver import (
@@ -22,13 +22,13 @@ __all__ = ["line_profile", "regex", "text"]
 
 
 def regex(source: str) -> ReadSpec:
-    """Return the form ``regex`` of a reply or message."""
+    """Return the ``regex`` form of a reply or message."""
     pattern = compile_pattern(source)
     return ReadSpec("regex", {"pattern": pattern}, pattern.groups)
 
 
 def text(source: str) -> WriteSpec:
-    """Return the form ``text`` of a frame to send."""
+    """Return the ``text`` form of a frame to send."""
     template = compile_template(source)
     return WriteSpec("text", {"template": template}, template.names, template.settings)
 
@@ -48,12 +48,12 @@ def line_profile(
     """Return a profile like the puppet's: line feeds, one number signal, one poll, two commands.
 
     Args:
-        is_per_request: whether each request has its own connection.
+        is_per_request: whether each request opens a separate connection.
         every_s: period of the poll, in seconds; None for a robot without polls.
-        timeouts: timeouts of the one transport, named ``wire``.
-        backoff: backoff of the transport.
-        transport: row of the transports table.
-        max_bytes: limit of a frame, in bytes.
+        timeouts: timeouts of the only transport, which is named ``wire``.
+        backoff: delays between attempts to reconnect; None for the defaults.
+        transport: type of the transport, as in the transports table.
+        max_bytes: maximum size of a frame, in bytes.
     """
     wire = TransportSpec(
         name="wire",

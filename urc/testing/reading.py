@@ -1,4 +1,4 @@
-"""The form of a reply or message, built from its YAML."""
+"""The form of a reply or message, built from YAML."""
 
 from collections.abc import Collection
 
@@ -14,7 +14,7 @@ __all__ = ["read_spec", "reader_of"]
 
 
 def read_spec(text: str, signals: Collection[str] = (), encoding: str = "utf-8") -> ReadSpec:
-    """Return the form in `text`, which fits the schema.
+    """Return the form in the YAML `text`, which must match the schema.
 
     Raises:
         ProblemsError: the form has errors.
@@ -29,5 +29,5 @@ def read_spec(text: str, signals: Collection[str] = (), encoding: str = "utf-8")
 
 
 def reader_of(text: str, signals: Collection[str] = (), encoding: str = "utf-8") -> PayloadReader:
-    """Return the reader of the form in `text`."""
+    """Return the reader for the form in the YAML `text`."""
     return build_reader(read_spec(text, signals, encoding), CodecContext(encoding))

@@ -1,4 +1,4 @@
-"""Forms of binary frames, built from YAML without a whole document."""
+"""Forms of binary frames, built from YAML without a complete document."""
 
 from collections.abc import Mapping
 
@@ -17,12 +17,12 @@ __all__ = ["frame", "reader", "struct_read", "struct_write", "writer"]
 
 
 def struct_read(source: str) -> ReadSpec:
-    """Return the form of ``struct:`` in `source`.
+    """Return the form under ``struct:`` in the YAML `source`.
 
-    The source may also have ``types:`` and ``enums:``.
+    The source may also contain ``types:`` and ``enums:``.
 
     Raises:
-        AssertionError: the form has problems.
+        AssertionError: the form in `source` has problems.
     """
     part, context, problems = _context(source)
     spec = parse_read(part.must("struct"), problems, context)
@@ -32,7 +32,7 @@ def struct_read(source: str) -> ReadSpec:
 
 
 def struct_write(source: str) -> WriteSpec:
-    """Return the same form for sending."""
+    """Return the form under ``struct:`` in the YAML `source`, for sending."""
     part, context, problems = _context(source)
     spec = parse_write(part.must("struct"), problems, context)
     _assert_none(problems)
@@ -41,17 +41,17 @@ def struct_write(source: str) -> WriteSpec:
 
 
 def reader(source: str, encoding: str = "utf-8") -> PayloadReader:
-    """Return the reader of frames of this form."""
+    """Return a reader for frames of the form in `source`."""
     return build_reader(struct_read(source), CodecContext(encoding))
 
 
 def writer(source: str, encoding: str = "utf-8") -> PayloadWriter:
-    """Return the writer of frames of this form."""
+    """Return a writer for frames of the form in `source`."""
     return build_writer(struct_write(source), CodecContext(encoding))
 
 
 def frame(data: bytes | str) -> Frame:
-    """Return a frame of bytes, or of hex digits."""
+    """Return a frame that contains `data`, given as bytes or hex digits."""
     return Frame(bytes.fromhex(data) if isinstance(data, str) else data, "utf-8")
 
 

@@ -1,4 +1,4 @@
-"""An in-memory transport: the test plays the robot."""
+"""An in-memory transport, whose robot is played by the test."""
 
 import asyncio
 from collections import deque
@@ -11,11 +11,12 @@ __all__ = ["MemoryTransport", "table_of"]
 
 
 class MemoryTransport:
-    """A replacement for any transport.
+    """A replacement for any transport, in the memory of the test.
 
-    Received bytes come from `feed`, or from `answer`, which is called with all sent data and
-    returns the chunks of the reply. `sent` has the sent data, in its original pieces. `hang_up`
-    closes the connection, `refuse` rejects it, and `stall_open` and `stall_sends` block.
+    The transport receives bytes from `feed`, and from `answer`, which is called with all sent data
+    and returns the chunks of a reply. `sent` contains the sent data, in its original pieces.
+    `hang_up` closes the connection, `refuse` rejects connections, and `stall_open` and
+    `stall_sends` block.
     """
 
     def __init__(
@@ -28,12 +29,12 @@ class MemoryTransport:
         self.address = address
         """Address for people."""
         self.sent: list[bytes] = []
-        """All sent pieces of all connections."""
+        """All pieces of data sent over all connections."""
         self.opens = 0
-        """Number of calls of `open`, including failures."""
+        """Number of calls of `open`, including failed calls."""
         self.is_open = False
         self.stall_open = False
-        """While true, `open` blocks beyond its timeout, which breaks its contract."""
+        """Whether `open` blocks beyond its timeout, in violation of its contract."""
         self._answer = answer
         self._greeting = tuple(chunks)
         self._arriving: deque[bytes | PeerClosed] = deque()
@@ -45,12 +46,12 @@ class MemoryTransport:
     # -- the robot's side
 
     def feed(self, *chunks: bytes) -> None:
-        """Send each of `chunks` separately, as the robot."""
+        """Send each of `chunks` separately, in the role of the robot."""
         self._arriving.extend(chunks)
         self._changed.set()
 
     def hang_up(self, reason: str = "the robot closed the connection") -> None:
-        """Close the connection as the robot, after all data fed before."""
+        """Close the connection in the role of the robot, after all data fed so far."""
         self._arriving.append(PeerClosed(reason))
         self._changed.set()
 
@@ -59,7 +60,7 @@ class MemoryTransport:
         self._refusals.extend([reason] * times)
 
     def stall_sends(self, is_stalled: bool = True) -> None:
-        """Make the robot refuse further bytes, or accept them again."""
+        """Make the robot accept no more bytes, or accept bytes again."""
         if is_stalled:
             self._flowing.clear()
         else:
@@ -68,7 +69,7 @@ class MemoryTransport:
     # -- the five members of a transport
 
     async def open(self, timeout_s: float) -> None:
-        """Connect, unless `refuse` or `stall_open` prevents it."""
+        """Connect, unless `refuse` or `stall_open` prevents a connection."""
         self.opens += 1
         if self.stall_open:
             await asyncio.Event().wait()
@@ -79,7 +80,7 @@ class MemoryTransport:
         self.feed(*self._greeting)
 
     async def receive(self) -> bytes:
-        """Return the next fed chunk."""
+        """Return the next chunk of fed data."""
         while not self._arriving:
             if not self.is_open:
                 raise PeerClosed("the connection is closed")
@@ -92,7 +93,7 @@ class MemoryTransport:
         return chunk
 
     async def send(self, data: bytes) -> None:
-        """Record `data`, and feed the robot's reply."""
+        """Record `data`, and feed the reply of the robot."""
         await self._flowing.wait()
         if not self.is_open:
             raise PeerClosed("the connection is closed")
@@ -108,7 +109,7 @@ class MemoryTransport:
 
 
 def table_of(**transports: Transport) -> Table:
-    """Return a transports table whose rows return these transports, with any options."""
+    """Return a table that yields these transports by name, with any options."""
     return _GivenTable(transports)
 
 

@@ -61,10 +61,10 @@ def test_bytes_are_written_and_read_back(
 
 
 REFUSED = [
-    ("hex: '{{ x | u8 }}'", {"x": 256}, "256 does not fit into 'u8': 0 to 255"),
-    ("hex: '{{ x | i8 }}'", {"x": -129}, "-129 does not fit into 'i8': -128 to 127"),
-    ("hex: '{{ x | u8 }}'", {"x": float("nan")}, "'u8' takes a whole number, found nan"),
-    ("hex: '{{ x | u8 }}'", {"x": "a"}, "'u8' takes a number, found 'a'"),
+    ("hex: '{{ x | u8 }}'", {"x": 256}, "256 does not fit into 'u8': expected 0 to 255"),
+    ("hex: '{{ x | i8 }}'", {"x": -129}, "-129 does not fit into 'i8': expected -128 to 127"),
+    ("hex: '{{ x | u8 }}'", {"x": float("nan")}, "expected a whole number for 'u8', found nan"),
+    ("hex: '{{ x | u8 }}'", {"x": "a"}, "expected a number for 'u8', found 'a'"),
     ("hex: '{{ x | f32be }}'", {"x": 1e39}, "1e+39 is too large for 'f32be'"),
     ("hex: '{{ x | hexbytes }}'", {"x": "0g"}, "expected hex digits, found '0g'"),
     ("bytes: ['{{ x }}']", {"x": 256}, "x: expected a byte, 0 to 255, found 256"),
