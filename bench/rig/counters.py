@@ -132,7 +132,7 @@ def _profile(port: int) -> Profile:
 async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
     """Hold one control all the time and another sometimes; then release both, or stop sending."""
     controller, loop = MotionController(session.profile.driver), asyncio.get_running_loop()
-    controller.join(Operator("hand", "hand", "driver"))
+    controller.join(Operator("hand", "hand", "drive"))
     controller.attach(session)
     ready_s = loop.time() + _READY_S
     while not session.frames.is_ready("drive"):

@@ -69,7 +69,7 @@ async def test_the_dev_page_says_who_moved_the_robot_and_who_was_refused(
     entries = dev.locator("[data-why] > li")
     moved = entries.and_(dev.locator("[data-what='moved']"))
     await expect(moved).to_have_count(1)
-    await expect(moved).to_contain_text("engineer")
+    await expect(moved).to_contain_text("administer")
     await expect(moved).to_contain_text('drive {"')
     await expect(moved.locator(".dev-hex")).to_contain_text("5620")  # "V "
     stopped = entries.and_(dev.locator("[data-what='stopped']"))
@@ -90,7 +90,7 @@ async def test_the_dev_page_says_who_moved_the_robot_and_who_was_refused(
     assert told.returncode == 0, told.stderr
     lines = [json.loads(line) for line in told.stdout.splitlines()]
     begins = next(line for line in lines if line["what"] == "moved")
-    assert (begins["who"], begins["role"], begins["command"]) == (holder, "engineer", "drive")
+    assert (begins["who"], begins["role"], begins["command"]) == (holder, "administer", "drive")
 
 
 def audit(data: str, *words: str) -> subprocess.CompletedProcess[str]:

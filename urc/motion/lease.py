@@ -7,14 +7,13 @@ lease. STOP needs no lease and is latched: nothing moves until an operator reset
 never starts motion.
 """
 
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 from urc.model.driver import STOPPED
+from urc.model.role import Role, includes
 
-__all__ = ["LeaseChanged", "Operator", "Lease", "LeaseState", "LeaseRefused", "Role", "WATCHES"]
+__all__ = ["LeaseChanged", "Operator", "Lease", "LeaseState", "LeaseRefused", "WATCHES"]
 
-Role = Literal["viewer", "driver", "engineer", "admin"]
-_RANK: Final = {"viewer": 0, "driver": 1, "engineer": 2, "admin": 3}
 WATCHES: Final = "this page only watches"
 SILENT_S: Final = 60.0
 """Time without input after which the holder loses the lease, in seconds."""
@@ -30,7 +29,7 @@ class Operator(NamedTuple):
     """Unique while connected."""
     name: str = ""
     """Name shown to other operators."""
-    role: Role = "driver"
+    role: Role = "drive"
 
 
 class LeaseState(NamedTuple):
@@ -107,7 +106,7 @@ class Lease:
             stops: number of stops when the command was requested; None for a request made now.
         """
         state = self.state
-        if _RANK[client.role] < _RANK["driver"]:
+        if not includes(client.role, "drive"):
             return WATCHES
         if state.latched_by:
             return self.latched
@@ -130,7 +129,7 @@ class Lease:
     def acquire(self, client: Operator, now: float) -> LeaseChanged | LeaseRefused:
         """Grant the free lease to `client`."""
         state = self.state
-        if _RANK[client.role] < _RANK["driver"]:
+        if not includes(client.role, "drive"):
             return LeaseRefused("viewers cannot drive")
         if state.latched_by:
             return LeaseRefused(self.latched)
@@ -145,7 +144,7 @@ class Lease:
         state = self.state
         if state.holder is None or state.holder.id == client.id:
             return self.acquire(client, now)
-        if _RANK[client.role] < _RANK["driver"]:
+        if not includes(client.role, "drive"):
             return LeaseRefused("viewers cannot drive")
         if state.asked_by is not None and state.asked_by.id != client.id:
             return LeaseRefused(f"{_called(state.asked_by)} asks for the controls already")
@@ -164,8 +163,8 @@ class Lease:
         return LeaseChanged(self.state, must_stop=False)
 
     def force(self, client: Operator, now: float) -> LeaseChanged | LeaseRefused:
-        """Take the lease from its holder. Only engineers may."""
-        if _RANK[client.role] < _RANK["engineer"]:
+        """Take the lease from its holder. The role ``maintain`` is needed."""
+        if not includes(client.role, "maintain"):
             return LeaseRefused("taking the controls by force needs an engineer")
         if self.state.latched_by:
             return LeaseRefused(self.latched)
@@ -194,7 +193,7 @@ class Lease:
 
         A reset starts no motion.
         """
-        if _RANK[client.role] < _RANK["driver"]:
+        if not includes(client.role, "drive"):
             return LeaseRefused("viewers can stop the robot, and cannot reset it")
         if not self.state.latched_by:
             return LeaseRefused("nothing is stopped")

@@ -22,7 +22,7 @@ from urc.runtime.secret_forms import HIDDEN, SecretForms
 
 __all__ = ["AuditRecorder"]
 
-_NOBODY: Final = Operator("", "", "viewer")
+_NOBODY: Final = Operator("", "", "watch")
 _AGAIN_S: Final = 1.0
 """Minimum interval between entries for the same refusal, in seconds."""
 _MOST_KEPT: Final = 64

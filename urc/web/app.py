@@ -357,7 +357,7 @@ class _Routes:
             flow = websocket.scope["state"]["flow"]
             peer = guest_of(websocket)
             if service.robot.playback is not None:
-                peer = peer._replace(role="viewer")
+                peer = peer._replace(role="watch")
             await BrowserClient(websocket, service, flow, peer).serve()
 
     async def spare(self, websocket: WebSocket) -> None:

@@ -203,7 +203,7 @@ class World:
     def __init__(self, session: Session, robot: Robot, clock: FakeClock) -> None:
         self.session, self.robot, self.clock = session, robot, clock
         self.controller = MotionController(session.profile.driver)
-        self.controller.join(Operator("ann", "ann", "engineer"))
+        self.controller.join(Operator("ann", "ann", "maintain"))
         assert session.backend is not None
         self.guard = session.backend
         self.controller.attach(session)

@@ -5,12 +5,13 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
 from tests.effort import examples
-from urc.motion.lease import Lease, LeaseChanged, LeaseRefused, LeaseState, Operator, Role
+from urc.model.role import Role
+from urc.motion.lease import Lease, LeaseChanged, LeaseRefused, LeaseState, Operator
 
 ANNA = Operator("a", "Anna")
 BERT = Operator("b", "Bert")
-CARL = Operator("c", "Carl", role="engineer")
-EVE = Operator("e", "Eve", role="viewer")
+CARL = Operator("c", "Carl", role="maintain")
+EVE = Operator("e", "Eve", role="watch")
 
 
 def test_whoever_comes_first_drives_and_the_others_are_told_who() -> None:
@@ -219,7 +220,7 @@ def test_the_count_of_stops_goes_on_in_the_next_lease() -> None:
     assert Lease(LeaseState(7, stops=3)).state == LeaseState(8, stops=3)
 
 
-ROLES: list[Role] = ["viewer", "driver", "engineer", "admin"]
+ROLES: list[Role] = ["watch", "drive", "maintain", "administer"]
 
 
 class ThreeClients(RuleBasedStateMachine):

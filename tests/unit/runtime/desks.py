@@ -88,9 +88,9 @@ class Scene:
         self.frames = FakeFrames(driver)
         if is_attached:
             self.controller.attach(FakeSession(self.frames, self.backend))
-        for name, role in {"ann": "driver", "bob": "driver", "eve": "engineer"}.items():
+        for name, role in {"ann": "drive", "bob": "drive", "eve": "maintain"}.items():
             self.controller.join(Operator(name, name, role))  # type: ignore[arg-type]
-        self.controller.join(Operator("vic", "vic", "viewer"))
+        self.controller.join(Operator("vic", "vic", "watch"))
         self.now = 100.0
         self._number = 0
 

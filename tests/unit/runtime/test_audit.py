@@ -23,7 +23,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def entry(number: int, robot: str = "puppet", text: str = "") -> AuditEntry:
-    return AuditEntry(1000.0 + number, robot, "moved", "screen 1", "driver", "s1", 7, "go", text)
+    return AuditEntry(1000.0 + number, robot, "moved", "screen 1", "drive", "s1", 7, "go", text)
 
 
 @pytest.fixture

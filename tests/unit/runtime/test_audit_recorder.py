@@ -7,8 +7,8 @@ from urc.runtime.audit import AuditEntry
 from urc.runtime.audit_recorder import HIDDEN, AuditRecorder
 from urc.runtime.hub import AuditRecord, Hub, MotionRecord
 
-ANN = Operator("s1", "screen 1", "driver")
-BEN = Operator("s2", "screen 2", "engineer")
+ANN = Operator("s1", "screen 1", "drive")
+BEN = Operator("s2", "screen 2", "maintain")
 
 
 class Book:
@@ -33,11 +33,11 @@ def test_a_motion_leaves_its_begin_and_its_end() -> None:
     book.recorder.stopped("go", "expired", 11.2)
     begin, end = book.entries
     assert begin == AuditEntry(
-        99.0, "rover", "moved", "screen 1", "driver", "s1", 7, "go", '{"v": 0}', "5620300a",
+        99.0, "rover", "moved", "screen 1", "drive", "s1", 7, "go", '{"v": 0}', "5620300a",
         "begins",
     )  # fmt: skip
     assert end == AuditEntry(
-        99.0, "rover", "stopped", "screen 1", "driver", "s1", 7, "go", '{"v": 19}', "562031390a",
+        99.0, "rover", "stopped", "screen 1", "drive", "s1", 7, "go", '{"v": 19}', "562031390a",
         "expired", 20, 1.2,
     )  # fmt: skip
 

@@ -24,9 +24,9 @@ from urc.testing.movers import FakeFrames, FakeSession
 SPEED = Argument("speed", min=-1.0, max=1.0, default=0.0, is_required=False)
 STEPS = 10_000
 SCREENS = (
-    Operator("s0", "screen 0", "driver"),
-    Operator("s1", "screen 1", "driver"),
-    Operator("s2", "screen 2", "engineer"),
+    Operator("s0", "screen 0", "drive"),
+    Operator("s1", "screen 1", "drive"),
+    Operator("s2", "screen 2", "maintain"),
 )
 COMMANDS = ("drive", "lift")
 VERBS = ("take", "ask", "yes", "no", "force", "leave", "reset")

@@ -135,7 +135,7 @@ def test_a_request_without_an_answer_is_granted_in_time() -> None:
     it.tick("ann", speed=0.5)
     assert it.controller.deadline is not None
     it.controller.expire(it.controller.deadline)
-    assert it.controller.lease.state.holder == Operator("bob", "bob", "driver")
+    assert it.controller.lease.state.holder == Operator("bob", "bob", "drive")
     assert it.heard()[-1] == "stop drive"
 
 
@@ -232,7 +232,7 @@ def test_recorded_ticks_are_refused_by_the_next_connection() -> None:
     it.drive("ann", "take")
     echo = it.controller.heartbeat("ann", it.now)
     it.controller.part("ann")
-    it.controller.join(Operator("ann", "ann", "driver"))
+    it.controller.join(Operator("ann", "ann", "drive"))
     it.drive("ann", "take")
     it.controller.heartbeat("ann", it.now)
     given = ControlInput(it.controller.lease.state.epoch, 1, echo)
@@ -414,7 +414,7 @@ def test_a_robot_of_which_only_something_moves_by_itself_can_be_stopped_without_
     assert it.drive("ann", "take") == ""
     assert it.controller.lease.interlock(Operator("bob")) == "ann has the controls"
     assert it.controller.lease.interlock(Operator("ann")) == ""
-    assert it.controller.lease.interlock(Operator("vic", role="viewer")) == "this page only watches"
+    assert it.controller.lease.interlock(Operator("vic", role="watch")) == "this page only watches"
 
 
 def test_a_robot_that_refuses_ends_the_motion_in_its_own_words() -> None:

@@ -18,7 +18,7 @@ def test_a_request_lasts_as_long_as_it_says_and_may_be_declined() -> None:
     assert it.controller.lease.state.asked_until == it.now + 5
     assert it.drive("ann", "no") == ""
     state = it.controller.lease.state
-    assert (state.holder, state.asked_by) == (Operator("ann", "ann", "driver"), None)
+    assert (state.holder, state.asked_by) == (Operator("ann", "ann", "drive"), None)
 
 
 def test_a_new_session_owes_no_stop_to_what_rests() -> None:

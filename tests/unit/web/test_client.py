@@ -11,7 +11,7 @@ from starlette.types import Message
 
 from urc.model.driver import Command
 from urc.model.profile import Setting
-from urc.motion.lease import Role
+from urc.model.role import Role
 from urc.protocol.events import Replied
 from urc.runtime.audit import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
@@ -110,7 +110,7 @@ class Scene:
     """A client that is connected to a fake robot."""
 
     def __init__(
-        self, service: RobotService, robot: FakeRobot, clock: FakeClock, role: Role = "driver"
+        self, service: RobotService, robot: FakeRobot, clock: FakeClock, role: Role = "drive"
     ) -> None:
         self.robot = robot
         self.clock = clock
@@ -126,7 +126,7 @@ async def scene(
     settings: dict[str, Setting] | None = None,
     *,
     commands: dict[str, Command] | None = None,
-    role: Role = "driver",
+    role: Role = "drive",
 ) -> AsyncIterator[Scene]:
     """Serve one client; it and the station are gone after the test."""
     clock = FakeClock()

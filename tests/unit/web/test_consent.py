@@ -10,7 +10,7 @@ from tests.unit.web.test_client import FakeLine
 from urc.model.driver import Command
 from urc.model.exchange import Confirm
 from urc.model.payload import WriteSpec
-from urc.motion.lease import Role
+from urc.model.role import Role
 from urc.runtime.audit import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
 from urc.testing.clock import FakeClock, settle
@@ -41,7 +41,7 @@ class Screens:
         self.lines: list[FakeLine] = []
         self._tasks: list[asyncio.Task[None]] = []
 
-    async def come(self, role: Role = "driver") -> FakeLine:
+    async def come(self, role: Role = "drive") -> FakeLine:
         """Let one more look."""
         line = FakeLine()
         self.lines.append(line)
@@ -142,7 +142,7 @@ async def test_stop_ends_questions_and_takes_back_what_was_agreed_to() -> None:
 async def test_a_second_screen_says_yes() -> None:
     """Every screen that may drive is asked, the asker is told, and the audit has both."""
     async with screens() as it:
-        asker, other, viewer = await it.come(), await it.come(), await it.come("viewer")
+        asker, other, viewer = await it.come(), await it.come(), await it.come("watch")
         await run(asker, "beam")
         await settle()
         late = await it.come()
@@ -209,7 +209,7 @@ async def test_a_question_is_over_when_its_asker_leaves() -> None:
 async def test_what_is_wanted_of_a_sequence_reaches_the_session() -> None:
     """And the audit; a word that nobody knows is no message."""
     async with screens() as it:
-        line, viewer = await it.come(), await it.come("viewer")
+        line, viewer = await it.come(), await it.come("watch")
         viewer.say({"t": "steer", "command": "take_off", "verb": "abort"})
         await settle()
         line.say({"t": "steer", "command": "take_off", "verb": "pause"})

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tests.unit.runtime.desks import DRIVER
-from urc.motion.lease import Role
+from urc.model.role import Role
 from urc.protocol.events import MotionEvent, MotionRefused
 from urc.runtime.audit import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
@@ -43,7 +43,7 @@ class Scene:
     def latch(self, reason: str) -> None:
         """Take why nothing may be begun that moves by itself."""
 
-    def add_page(self, place: str = "", role: Role = "driver") -> OperatorSession:
+    def add_page(self, place: str = "", role: Role = "drive") -> OperatorSession:
         """Sit down, and read what is told at once."""
         operator = self.controls.add_page(place, role, lambda: None)
         self.told[operator.client.id] = []
@@ -264,7 +264,7 @@ def audited(it: Scene) -> list[str]:
 async def test_the_audit_says_who_moved_what_and_why_it_stopped() -> None:
     """The frame, the arguments and the lease are in it; a release is a reason."""
     async with scene() as it:
-        ann = it.add_page(role="engineer")
+        ann = it.add_page(role="maintain")
         it.say(ann, "take")
         it.tick(ann, 0.5)
         await it.clock.advance(0.05)
@@ -277,7 +277,7 @@ async def test_the_audit_says_who_moved_what_and_why_it_stopped() -> None:
             "stopped screen 1 drive released",
         ]
         moved, stopped = it.audit[1:]
-        assert (moved.robot, moved.role, moved.client) == ("rover", "engineer", "s1")
+        assert (moved.robot, moved.role, moved.client) == ("rover", "maintain", "s1")
         assert moved.epoch == it.controls.controller.lease.state.epoch
         assert moved.arguments == '{"speed": 0.5}'
         assert bytes.fromhex(moved.data) == b"drive speed=0.5"

@@ -206,7 +206,7 @@ async def test_a_latched_stop_holds_over_a_new_version() -> None:
     """Nothing moves because somebody saved a file; the screens are still known."""
     async with scene(with_commands("go", is_held=True)) as it:
         controls = it.service.controls
-        operator = controls.add_page("", "engineer", lambda: None)
+        operator = controls.add_page("", "maintain", lambda: None)
         controls.stop("screen 1")
         await settle()
         assert it.service.is_at_rest
@@ -222,7 +222,7 @@ async def test_a_version_waits_while_somebody_drives(tmp_path: Path) -> None:
     """It is good, and not yet running; it runs when the controls are free."""
     async with scene(with_commands("go", is_held=True)) as it:
         watch, controller = it.watch, it.service.controls.controller
-        screen = Screen("s9", "screen 9", "engineer")
+        screen = Screen("s9", "screen 9", "maintain")
         controller.join(screen)
         assert controller.drive("s9", "take", it.clock.now()) == ""
         await settle()

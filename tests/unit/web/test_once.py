@@ -32,7 +32,7 @@ def refusals(line: FakeLine) -> list[str]:
 
 async def test_a_page_that_only_watches_gives_no_command_and_may_stop() -> None:
     """Whatever the command does; nothing of it reaches the robot."""
-    async with scene(commands=FOLD, role="viewer") as it:
+    async with scene(commands=FOLD, role="watch") as it:
         for number, command in enumerate(("ask", "fold")):
             it.line.say({"t": "run", "id": number, "command": command})
         for verb in ("pause", "step", "resume", "abort"):
@@ -69,7 +69,7 @@ async def test_what_moves_by_itself_needs_no_lease_and_is_refused_after_a_stop()
 async def test_what_moves_by_itself_is_refused_while_somebody_else_drives() -> None:
     """Whoever has the controls may give it."""
     async with scene(commands=FOLD) as it:
-        other = it.service.controls.add_page("10.0.0.7", "driver", lambda: None)
+        other = it.service.controls.add_page("10.0.0.7", "drive", lambda: None)
         it.service.controls.handle(other, Drive("take"))
         it.line.say({"t": "run", "id": 1, "command": "fold"})
         it.line.say({"t": "run", "id": 2, "command": "ask"})
@@ -107,7 +107,7 @@ async def test_what_moves_for_some_values_is_refused_for_those_while_somebody_el
     text = WriteSpec("text", {})
     command = Command("steer", "wire", text, {"mode": mode}, moves=True, moves_if=moves_if)
     async with scene(commands={"steer": command}) as it:
-        other = it.service.controls.add_page("10.0.0.7", "driver", lambda: None)
+        other = it.service.controls.add_page("10.0.0.7", "drive", lambda: None)
         it.service.controls.handle(other, Drive("take"))
         for number, given in enumerate((4, 10, 10.0, "fast")):
             it.line.say(

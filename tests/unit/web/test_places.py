@@ -44,7 +44,7 @@ def test_who_has_a_key_is_counted_by_it_and_not_by_the_address() -> None:
     ("peer", "operators"),
     [
         (SocketPeer("192.0.2.7", "driver", "at 192.0.2.7"), SEATS),
-        (SocketPeer("", "engineer", "here browser 1", True), KNOWN_SEATS),
+        (SocketPeer("", "maintain", "here browser 1", True), KNOWN_SEATS),
     ],
 )
 def test_one_visitor_has_a_bounded_number_of_seats_at_a_robot(

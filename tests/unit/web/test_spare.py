@@ -200,6 +200,6 @@ async def test_a_flood_closes_it() -> None:
 async def test_viewers_are_told_no_key() -> None:
     """They drive nothing."""
     async with scene() as it:
-        operator = it.controls.add_page("", "viewer", lambda: None)
+        operator = it.controls.add_page("", "watch", lambda: None)
         (lease,) = it.read(operator)
         assert lease["spare"] == ""

@@ -11,9 +11,10 @@ from hmac import compare_digest
 from typing import Literal
 
 from urc.model.driver import Driver
+from urc.model.role import Role, includes
 from urc.motion.freshness import ControlInput
 from urc.motion.hold_to_run import Reason
-from urc.motion.lease import LeaseState, Operator, Role
+from urc.motion.lease import LeaseState, Operator
 from urc.motion.rate_limiter import RateLimiter
 from urc.runtime.audit import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
@@ -178,8 +179,8 @@ class ControlService:
     def changes(self, operator: OperatorSession) -> list[str]:
         """Return all messages that the page has not received."""
         texts: list[str] = []
-        is_told = (
-            self.controller.can_move or operator.client.role == "viewer"
+        is_told = self.controller.can_move or not includes(
+            operator.client.role, "drive"
         )  # a watcher gives no commands
         if is_told and operator.seen != self._number:
             operator.seen = self._number

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 
 from urc.model.driver import Command, Driver
 from urc.model.payload import Payload
+from urc.model.role import includes
 from urc.model.values import NOTHING
 from urc.motion.lease import WATCHES, Operator
 from urc.protocol.requests.encode import BadArgument, check_arguments
@@ -98,12 +99,12 @@ class OneShotCommands:
         known = self.driver.commands.get(command)
         if known is not None and _moves(known, arguments):
             return self._controller().lease.interlock(client, stops)
-        return WATCHES if client.role == "viewer" else ""
+        return "" if includes(client.role, "drive") else WATCHES
 
     def pull_refusal(self, client: Operator, sequence: str, what: Pull) -> str:
         """Return why the page may not steer a sequence; any operator may pause or end one."""
         if what in ("pause", "abort"):
-            return WATCHES if client.role == "viewer" else ""
+            return "" if includes(client.role, "drive") else WATCHES
         return self.refusal(client, sequence)
 
     # -- session

@@ -19,6 +19,7 @@ import msgspec
 
 from urc.model.driver import STOPPED, Command
 from urc.model.exchange import Confirm
+from urc.model.role import includes
 from urc.model.values import Reading
 from urc.protocol.sequences.commands import questions
 from urc.runtime.clock import Clock, within
@@ -159,7 +160,7 @@ class TwoPersonRule:
     def handle(self, operator: OperatorSession, said: wire.Approval) -> None:
         """Handle the answer of a page; ignore an answer to a question that is over."""
         one = self._questions.get(said.n)
-        if one is None or one.answer.done() or operator.client.role == "viewer":
+        if one is None or one.answer.done() or not includes(operator.client.role, "drive"):
             return
         if not said.yes:
             one.answer.set_result(None)
@@ -167,7 +168,7 @@ class TwoPersonRule:
             one.answer.set_result(operator)
 
     def _send(self, operator: OperatorSession, one: _Question) -> None:
-        if operator.client.role == "viewer" and operator is not one.asker:
+        if not includes(operator.client.role, "drive") and operator is not one.asker:
             return
         text = wire.encode_ask(
             one.number,

@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 
 from starlette.types import Message
 
-from urc.motion.lease import Role
+from urc.model.role import Role
 
 __all__ = ["TokenBucket", "FlowControl", "SocketPeer", "ClientSocket", "SocketFlow"]
 
@@ -143,7 +143,7 @@ class SocketPeer(NamedTuple):
 
     place: str = ""
     """Network address, shown to other pages; "" for this machine."""
-    role: Role = "driver"
+    role: Role = "drive"
     who: str = ""
     """Identity for the limit on sockets: a browser, program or address; "" for no limit."""
     is_known: bool = False

@@ -28,8 +28,8 @@ def guest_of(connection: HTTPConnection) -> SocketPeer:
     is_known = visitor.standing != "stranger"
     who = f"{visitor.standing} {visitor.name}" if is_known else f"at {host}"
     if "watch" in connection.query_params:
-        return SocketPeer(place, "viewer", who, is_known)
-    return SocketPeer(place, "engineer" if has_key else "driver", who, is_known)
+        return SocketPeer(place, "watch", who, is_known)
+    return SocketPeer(place, "administer" if has_key else "drive", who, is_known)
 
 
 def is_here(connection: HTTPConnection) -> bool:

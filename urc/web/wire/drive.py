@@ -7,6 +7,7 @@ from typing import Literal
 
 import msgspec
 
+from urc.model.role import includes
 from urc.motion.hold_to_run import Reason
 from urc.motion.lease import REQUEST_S, LeaseState, Operator
 from urc.web.wire.text import Outbound, cut, encoded, milliseconds
@@ -150,9 +151,9 @@ def encode_lease(
             latched=state.latched_by,
             stops=state.stops,
             confirmed=is_confirmed,
-            drives=you.role != "viewer",
-            forces=you.role in ("engineer", "admin"),
-            spare=spare if you.role != "viewer" else "",
+            drives=includes(you.role, "drive"),
+            forces=includes(you.role, "maintain"),
+            spare=spare if includes(you.role, "drive") else "",
         )
     )
 
