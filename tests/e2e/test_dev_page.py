@@ -123,7 +123,7 @@ async def test_the_parser_is_tried_on_what_is_pasted(
         await page.get_by_label("Written as").select_option("hex")
         await page.get_by_label("What the robot sends").fill("42 4x")
         await page.get_by_role("button", name="Try").click()
-        await expect(tried).to_contain_text("▲ hex: expected pairs of digits; word 2 is '4x'")
+        await expect(tried).to_contain_text("▲ expected pairs of hex digits; word 2 is '4x'")
         await expect(page.locator("[data-signals] tr")).to_contain_text("12 %")
 
 
@@ -137,7 +137,7 @@ async def test_a_save_is_loaded_and_a_mistake_changes_nothing(
         good = file.read_text("utf-8")
         file.write_text(good.replace("type: integer, unit", "type: intger, unit"), "utf-8")
         state = page.locator("[data-profile-state]")
-        await expect(state).to_contain_text("the version before it goes on")
+        await expect(state).to_contain_text("the previous version keeps running")
         finding = page.locator(".dev-finding")
         await expect(finding).to_contain_text("bell.yaml:18:20: error")
         await expect(finding).to_contain_text("^^^^^^")
@@ -146,7 +146,7 @@ async def test_a_save_is_loaded_and_a_mistake_changes_nothing(
         await ring.get_by_role("button", name="Send").click()
         await expect(ring.locator(".dev-result")).to_contain_text("✓ done")
         file.write_text(good + "  hum: { title: Hum, send: HUM }\n", "utf-8")
-        await expect(state).to_contain_text("was saved and is running now")
+        await expect(state).to_contain_text("was saved and is now running")
         await expect(finding).to_have_count(0)
         await until(lambda: sum(line.startswith(b"LOGIN") for line in bell.lines) == 2)
         hum = page.locator(".dev-command", has_text="Hum")
@@ -260,7 +260,7 @@ async def test_without_dev_there_is_no_such_page(urc_process: Start, tmp_path: P
         answer = (await reader.read()).decode()
     writer.close()
     assert answer.startswith("HTTP/1.1 404 ")
-    assert "The dev page is off. Start URC with --dev to turn it on." in answer
+    assert "The developer page is disabled. Start URC with --dev to enable it." in answer
     url = address.replace("http://", "ws://") + "robots/lamp/dev/ws"
     with pytest.raises(InvalidStatus, match="404"):
         async with joined(url, address):

@@ -78,7 +78,7 @@ class BrowserClient:
         missing = missing_settings(self._service.robot)
         if missing:
             names = ", ".join(setting.name for setting in missing)
-            await self._refuse(wire.CLOSE_NOT_READY, f"not set yet: {names}")
+            await self._refuse(wire.CLOSE_NOT_READY, f"missing settings: {names}")
         elif self._service.is_full:
             await self._refuse(wire.CLOSE_FULL, "too many clients watch this robot")
         elif not self._service.has_place_for(self._peer):
@@ -123,7 +123,7 @@ class BrowserClient:
         except* WebSocketDisconnect:
             pass
         except* TimeoutError:
-            log.warning("a client took nothing for %g s and was disconnected", STALL_S)
+            log.warning("a client read nothing for %g s and was disconnected", STALL_S)
             self._flow.abort()
         finally:
             if self._operator is not None:
@@ -297,7 +297,7 @@ class BrowserClient:
     ) -> None:
         if len(self._commands) + len(self._answers) >= COMMANDS_AT_ONCE:
             # The refusal closes and queues nothing: it is the page's only reply.
-            text = f"{COMMANDS_AT_ONCE} commands are still under way"
+            text = f"{COMMANDS_AT_ONCE} commands are still running"
             if len(self._answers) < 2 * COMMANDS_AT_ONCE:
                 self._reply(asked, code="busy", message=text)
             else:

@@ -265,7 +265,7 @@ def test_the_allowance_comes_back_with_time() -> None:
 async def test_a_robot_that_is_not_ready_refuses_with_the_settings_names() -> None:
     """No session is opened while a setting is undefined."""
     async with scene(settings={"host": Setting("host", "host")}) as it:
-        assert it.line.closed == (4409, "not set yet: host")
+        assert it.line.closed == (4409, "missing settings: host")
         assert it.robot.opened == 0
 
 

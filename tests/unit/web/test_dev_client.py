@@ -233,7 +233,7 @@ async def test_a_version_waits_while_somebody_drives(tmp_path: Path) -> None:
         assert watch._try_switch()
         await settle()
         assert list(it.service.robot.profile.driver.commands) == ["new"]
-        assert (watch.state, watch.told) == ("running", "was saved and is running now")
+        assert (watch.state, watch.told) == ("running", "was saved and is now running")
 
 
 async def test_a_version_that_cannot_be_made_changes_nothing() -> None:

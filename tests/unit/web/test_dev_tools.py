@@ -135,8 +135,8 @@ def test_nobody_takes_it_and_each_says_why(robot: Driver) -> None:
     """A pattern that does not match, and a condition that does not hold."""
     (piece,) = try_out(robot, {}, "wire", b"S idle 2\n").pieces
     assert piece.takers == ()
-    assert "message level: ^BAT (?P<battery>[0-9]+)$ does not match" in piece.reasons
-    assert "message mood: its 'when' is not true: _n == '1'" in piece.reasons
+    assert "message level: the pattern ^BAT (?P<battery>[0-9]+)$ does not match" in piece.reasons
+    assert "message mood: the condition under 'when' is false: _n == '1'" in piece.reasons
     (piece,) = try_out(robot, {}, "wire", b"\xff\n").pieces
     assert all("is not utf-8 text" in reason for reason in piece.reasons)
 
@@ -164,12 +164,12 @@ def test_a_message_is_tried_with_its_topic(lamp: Driver) -> None:
     (piece,) = try_out(lamp, {}, "broker", b'{"on": true}', "lamp/state").pieces
     assert piece.takers[0].samples == (("lit", True, ""),)
     (piece,) = try_out(lamp, {}, "broker", b'{"on": true}', "lamp/other").pieces
-    assert piece.reasons == ("message state: it listens to 'lamp/state', this is 'lamp/other'",)
+    assert piece.reasons == ("message state: expected the topic 'lamp/state', found 'lamp/other'",)
 
 
 def test_an_unknown_line_is_refused(robot: Driver) -> None:
     """There is one of another name."""
-    with pytest.raises(UrcError, match="no transport 'radio'; there are: wire"):
+    with pytest.raises(UrcError, match="no transport 'radio'; known transports: wire"):
         try_out(robot, {}, "radio", b"")
 
 

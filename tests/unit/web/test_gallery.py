@@ -124,7 +124,7 @@ def test_a_widget_with_too_many_files_is_refused(tmp_path: Path) -> None:
     """A folder is no place for a library."""
     for number in range(MOST_FILES + 1):
         (tmp_path / f"f{number}.js").write_text("", "utf-8")
-    with pytest.raises(UrcError, match=f"{MOST_FILES} are allowed"):
+    with pytest.raises(UrcError, match=f"at most {MOST_FILES} are allowed"):
         widget_assets([Widget("lamp", "Lamp", tmp_path)])
 
 

@@ -23,11 +23,11 @@ async def test_one_job_at_a_time_and_it_can_be_given_up(tmp_path: Path) -> None:
     jobs = Jobs(store, lambda _: [])
     dial = package("widget", "dial")
     job = jobs.begin(FileSource("dial.zip", [dial], [dial.manifest.key]))
-    with pytest.raises(Busy, match="is under way"):
+    with pytest.raises(Busy, match="is still in progress"):
         jobs.begin(FileSource("dial.zip", [dial], [dial.manifest.key]))
     jobs.cancel(job.number)
     assert job.news().state == "cancelled"
-    with pytest.raises(Busy, match="no job waits for approval"):
+    with pytest.raises(Busy, match="no job is waiting for approval"):
         await jobs.agree(job.number)
     with pytest.raises(Busy, match="another page"):
         jobs.cancel(job.number + 1)

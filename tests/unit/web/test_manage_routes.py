@@ -180,7 +180,7 @@ def test_what_is_installed_stands_on_the_menu(tmp_path: Path) -> None:
         assert "No driver yet" in client.get("/").text
         assert client.get("/robots/rover/settings").status_code == 404
         again = client.post("/api/v1/packages/remove", json={"package": "drivers/rover"})
-        assert again.json()["error"] == "drivers/rover was not installed by itself"
+        assert again.json()["error"] == "drivers/rover was not installed directly"
 
 
 def test_a_damaged_package_costs_its_own_card(tmp_path: Path) -> None:
@@ -236,7 +236,7 @@ def test_settings_are_checked_kept_and_used(tmp_path: Path) -> None:
         assert not wrong["isSaved"]
         assert file.load().settings == {}
         unknown = send(client, settings={"no-such": "1"})
-        assert unknown["faults"] == {"no-such": "the driver has no such setting"}
+        assert unknown["faults"] == {"no-such": "the driver has no setting with this name"}
         part = send(client, settings={"host": "10.0.0.7", "key": ""})
         assert part["text"] == "saved; not set yet: Key"
         assert send(client, settings={"host": "10.0.0.7", "key": "open sesame"})["isSaved"]

@@ -51,10 +51,10 @@ def test_query_says_how_many_and_since_when(client: TestClient) -> None:
 @pytest.mark.parametrize(
     ("query", "text"),
     [
-        ("last=many", "'last' and 'since' are numbers"),
-        ("last=0", "'last' is 1 to 1000, 'since' a time in seconds since 1970"),
-        ("last=1001", "'last' is 1 to 1000, 'since' a time in seconds since 1970"),
-        ("since=nan", "'last' is 1 to 1000, 'since' a time in seconds since 1970"),
+        ("last=many", "expected numbers for 'last' and 'since'"),
+        ("last=0", "expected 'last' from 1 to 1000, and 'since' in seconds since 1970"),
+        ("last=1001", "expected 'last' from 1 to 1000, and 'since' in seconds since 1970"),
+        ("since=nan", "expected 'last' from 1 to 1000, and 'since' in seconds since 1970"),
     ],
 )
 def test_slip_in_the_query_is_told(client: TestClient, query: str, text: str) -> None:

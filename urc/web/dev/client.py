@@ -128,7 +128,7 @@ class DevClient:
         except* WebSocketDisconnect:
             pass
         except* TimeoutError:
-            log.warning("a developer page took nothing for %g s and was disconnected", STALL_S)
+            log.warning("a developer page read nothing for %g s and was disconnected", STALL_S)
             self._flow.abort()
         finally:
             self._watch.listeners.discard(self._news.set)
@@ -213,7 +213,7 @@ class DevClient:
         self._edition = watch.edition
         robot = watch.robot
         missing = ", ".join(setting.name for setting in missing_settings(robot))
-        told = watch.told or (f"is not connected: not set yet: {missing}" if missing else "")
+        told = watch.told or (f"is not connected; missing settings: {missing}" if missing else "")
         text = wire.encode_profile(
             robot.profile.driver,
             MESSAGING,
@@ -257,7 +257,7 @@ class DevClient:
         try:
             self._questions.put_nowait(asked)
         except asyncio.QueueFull:
-            self._log(_refused(asked, f"{QUESTIONS} requests are pending already"))
+            self._log(_refused(asked, f"{QUESTIONS} requests are already pending"))
 
     def _close(self, code: int, reason: str) -> None:
         self._closing = (code, reason)
@@ -284,7 +284,7 @@ def _answered(asked: wire.ParseRequest | wire.PreviewRequest, known: _Known) -> 
         )
     except Exception as bug:  # a supervisor: a bug costs the answer
         log.exception("a request of a developer page failed")
-        return _refused(asked, f"it failed inside URC ({type(bug).__name__}: {bug})")
+        return _refused(asked, f"internal error in URC ({type(bug).__name__}: {bug})")
 
 
 def _refused(asked: wire.ParseRequest | wire.PreviewRequest, text: str) -> str:

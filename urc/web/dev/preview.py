@@ -63,7 +63,9 @@ def preview(
     """
     found = driver.commands.get(command)
     if found is None:
-        return Preview(f"there is no command {command!r}; there are: {', '.join(driver.commands)}")
+        return Preview(
+            f"there is no command {command!r}; known commands: {', '.join(driver.commands)}"
+        )
     try:
         values = check_arguments(found, arguments)
         frames = tuple(_frames(driver, settings, found, values, 0))
@@ -118,7 +120,7 @@ def _run(
         }
         yield from _frames(driver, settings, inner, check_arguments(inner, given), depth + 1)
     except ExpressionError as error:
-        yield PreviewLine("", b"", f"its arguments are only known at run time: {error}")
+        yield PreviewLine("", b"", f"the arguments are known only at run time: {error}")
 
 
 def _written(
@@ -154,7 +156,7 @@ def _in_words(step: sequence.Step) -> str:
         case sequence.SetStep(values):
             return f"sets {', '.join(values)}"
         case sequence.IfStep(condition):
-            return f"continues if {condition.source}, else takes its other steps"
+            return f"continues if {condition.source}, else runs the steps under 'else'"
         case sequence.FailStep():
             return "ends without success"
         case sequence.RunStep(command) | sequence.SendStep(command):

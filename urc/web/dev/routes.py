@@ -24,8 +24,8 @@ from urc.web.wire import messages as wire
 
 __all__ = ["HOW_TO_TURN_ON", "Dev", "DevPage", "dev_url", "no_dev_routes"]
 
-HOW_TO_TURN_ON = "The dev page is off. Start URC with --dev to turn it on."
-_ONLY_HERE = "The dev page needs the key in the address that URC printed."
+HOW_TO_TURN_ON = "The developer page is disabled. Start URC with --dev to enable it."
+_ONLY_HERE = "The developer page needs the key in the address that URC printed."
 CLIENTS = 16
 """Maximum number of open developer pages."""
 
@@ -125,7 +125,7 @@ class Dev:
         elif not self._is_here(websocket):
             await websocket.close(wire.CLOSE_NO_ROBOT, _ONLY_HERE)
         elif self._open >= CLIENTS:
-            await websocket.close(wire.CLOSE_FULL, f"{CLIENTS} developer pages are open already")
+            await websocket.close(wire.CLOSE_FULL, f"{CLIENTS} developer pages are already open")
         else:
             self._open += 1
             try:

@@ -110,7 +110,7 @@ class DevStart:
             return told(404, "no robot of that name is served here")
         driver = self._fleet.driven_by(name)
         if driver:
-            return told(409, f"{name} is being driven ({driver}): let go first")
+            return told(409, f"{name} is being driven ({driver}): release the controls first")
         try:
             robot = await asyncio.to_thread(self._read, name)
             self._take(name, robot)

@@ -41,9 +41,9 @@ async def timeline(
         last = int(request.query_params.get("last", USUAL))
         since = float(request.query_params.get("since", 0))
     except ValueError:
-        return JSONResponse({"error": "'last' and 'since' are numbers"}, 400, _HEADERS)
+        return JSONResponse({"error": "expected numbers for 'last' and 'since'"}, 400, _HEADERS)
     if not 1 <= last <= MOST or not 0 <= since < float("inf"):
-        text = f"'last' is 1 to {MOST}, 'since' a time in seconds since 1970"
+        text = f"expected 'last' from 1 to {MOST}, and 'since' in seconds since 1970"
         return JSONResponse({"error": text}, 400, _HEADERS)
     try:
         found = await asyncio.to_thread(_settled, log, robot, since, last)

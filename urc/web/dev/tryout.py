@@ -99,7 +99,7 @@ def pasted_bytes(text: str, *, is_hex: bool, encoding: str) -> bytes:
     """
     data = _from_hex(text) if is_hex else _from_text(text, encoding)
     if len(data) > MOST_BYTES:
-        raise UrcError(f"{len(data)} bytes; at most {MOST_BYTES} are parsed at a time")
+        raise UrcError(f"the input has {len(data)} bytes; at most {MOST_BYTES} are parsed")
     return data
 
 
@@ -124,7 +124,9 @@ def try_out(
     """
     spec = driver.transports.get(transport)
     if spec is None:
-        raise UrcError(f"there is no transport {transport!r}; there are: {_all(driver.transports)}")
+        raise UrcError(
+            f"there is no transport {transport!r}; known transports: {_all(driver.transports)}"
+        )
     asked = _candidates(driver, spec, settings)
     if spec.type in MESSAGING:
         frame = frame_of(_envelope(spec, data, topic), spec.encoding)
@@ -172,7 +174,7 @@ def _envelope(spec: TransportSpec, data: bytes, topic: str) -> Envelope:
         try:
             body = json.loads(data)
         except (ValueError, RecursionError) as error:
-            raise UrcError(f"a message of {spec.type} is JSON: {error}") from None
+            raise UrcError(f"expected JSON for a message of {spec.type}: {error}") from None
     if topic:
         return Envelope("message", {"topic": topic}, body)
     return Envelope("response", {"id": 1, "ok": True}, body)
@@ -191,7 +193,7 @@ def _take(
     reasons: tuple[str, ...] = ()
     if not takers:
         told = [f"{one.name}: {_why_not(_anew(frame), one, spec, settings)}" for one in asked]
-        reasons = tuple(told[:MOST_REASONS]) or (f"the driver reads nothing on {spec.name}",)
+        reasons = tuple(told[:MOST_REASONS]) or (f"the driver expects no data on {spec.name}",)
     return tuple(takers), reasons
 
 
@@ -227,21 +229,21 @@ def _why_not(
     """Return the reason why a frame does not match, for people."""
     read = one.read
     if read.topic is not None and (topic := topic_of(read, settings)) != frame.topic:
-        came = "an answer" if frame.topic is None else repr(frame.topic)
-        return f"it listens to {topic!r}, this is {came}"
+        came = "a reply" if frame.topic is None else repr(frame.topic)
+        return f"expected the topic {topic!r}, found {came}"
     context = CodecContext(spec.encoding, settings)
     try:
         found = build_reader(read._replace(when=None), context).read(frame)
     except (BadItem, BadText) as error:
         return str(error)
     if found is not None and read.when is not None:
-        return f"its 'when' is not true: {read.when.source}"
+        return f"the condition under 'when' is false: {read.when.source}"
     pattern = read.options.get("pattern")
     if isinstance(pattern, Pattern):
-        return f"{pattern.source} does not match"
+        return f"the pattern {pattern.source} does not match"
     if read.lines is not None:
         return "the multiline reply is incomplete"
-    return f"it cannot be decoded as {read.form}"
+    return f"the frame cannot be decoded as {read.form}"
 
 
 def _candidates(
@@ -300,7 +302,7 @@ def _from_hex(text: str) -> bytes:
     digits = re.sub(r"0[xX]|[\s,:;]", " ", text).split()
     for number, word in enumerate(digits, 1):
         if len(word) % 2 or not re.fullmatch(r"[0-9A-Fa-f]+", word):
-            raise UrcError(f"hex: expected pairs of digits; word {number} is {word[:20]!r}")
+            raise UrcError(f"expected pairs of hex digits; word {number} is {word[:20]!r}")
     return bytes.fromhex("".join(digits))
 
 
@@ -318,7 +320,7 @@ def _from_text(text: str, encoding: str) -> bytes:
                 data += _ESCAPES[word]
             else:
                 known = r"\n \r \t \0 \e \\ and \xHH"
-                raise UrcError(f"character {match.start() + 1}: there are {known}, found \\{word}")
+                raise UrcError(f"character {match.start() + 1}: expected {known}, found \\{word}")
         return bytes(data + text[at:].encode(encoding))
     except UnicodeEncodeError as error:
         wrong = text[error.start : error.end]

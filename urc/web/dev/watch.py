@@ -113,15 +113,15 @@ class ProfileWatch:
             errors = [problem for problem in found.problems if problem.severity == "error"]
             if errors:
                 log.warning("%s", ProblemsError(errors))
-            self._report("broken", "cannot be used; the version before it goes on")
+            self._report("broken", "cannot be used; the previous version keeps running")
         elif found.profile.name != name:
             self._next = None
-            text = f"its name is {found.profile.name!r} now; {name!r} keeps running: restart URC"
+            text = f"has the new name {found.profile.name!r}; {name!r} keeps running: restart URC"
             self._report("broken", text)
         else:
             self._next = found.profile
             if not self._try_switch():
-                text = "is valid, and waits until the controls are free and every stop has arrived"
+                text = "is valid; the switch waits until no operator drives and no stop is pending"
                 self._report("waiting", text)
 
     def _try_switch(self) -> bool:
@@ -133,11 +133,11 @@ class ProfileWatch:
             robot = self.remake(profile)
             self.take(robot)
         except UrcError as error:
-            self._report("broken", f"cannot be used: {error}; the version before it goes on")
+            self._report("broken", f"cannot be used: {error}; the previous version keeps running")
             return True
         self._robot = robot
-        failed = " with findings" if has_errors(self.problems) else ""
-        self._report("running", f"was saved and is running now{failed}")
+        failed = " with problems" if has_errors(self.problems) else ""
+        self._report("running", f"was saved and is now running{failed}")
         return True
 
     def _report(self, state: State, told: str) -> None:

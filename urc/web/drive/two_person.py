@@ -124,7 +124,9 @@ class TwoPersonRule:
             CommandFailed: approval was refused, withdrawn or too late, or STOP was pressed.
         """
         if len(self._questions) >= _MOST:
-            raise CommandFailed("busy", f"{_MOST} questions wait for a second person already")
+            raise CommandFailed(
+                "busy", f"{_MOST} questions are already waiting for a second person"
+            )
         answer: asyncio.Future[OperatorSession | None] = asyncio.get_running_loop().create_future()
         until_s = self._clock.now() + WAIT_S
         one = _Question(next(self._numbers), run, asker, command, confirm, until_s, answer)

@@ -117,7 +117,7 @@ class RobotFactory:
         filled = self.filled(profile, chosen)
         for secret in sorted(filled.withheld):
             log.warning(
-                "%s: the setting %s was entered for another place, package or version of URC:"
+                "%s: the setting %s was entered for another destination, package or version of URC:"
                 " enter it again",
                 name,
                 secret,
@@ -196,7 +196,7 @@ class RobotFactory:
     def fitted(self, added: InstalledInterface, profile: Profile) -> InterfaceFit:
         """Return an installed interface, bound to the signals and commands of a robot."""
         if added.lock.key.name in profile.interfaces:
-            return InterfaceFit(None, fault="this robot has an interface of that name already")
+            return InterfaceFit(None, fault="this robot already has an interface with this name")
         return fit_interface(added.document, profile, widget_folder_of(added.document))
 
     def interfaces(self) -> list[InstalledInterface]:

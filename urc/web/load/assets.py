@@ -134,7 +134,7 @@ def widget_assets(widgets: Iterable[Widget]) -> Assets:
         folder = folders.setdefault(widget.name, widget.folder)
         if folder != widget.folder:
             raise UrcError(
-                f"two robots bring different widgets named {widget.name!r}: "
+                f"two robots use different widgets named {widget.name!r}: "
                 f"{folder} and {widget.folder}"
             )
         # Also missing ones: an author may write the widget while the page is open.
@@ -149,7 +149,9 @@ def _more_files(widget: Widget) -> Iterable[tuple[str, _File]]:
     more = folder_assets(widget.folder).files
     mine = {name: file for name, file in more.items() if not any(map(_is_hidden, name.split("/")))}
     if len(mine) > MOST_FILES:
-        raise UrcError(f"widget {widget.name!r} has {len(mine)} files; {MOST_FILES} are allowed")
+        raise UrcError(
+            f"widget {widget.name!r} has {len(mine)} files; at most {MOST_FILES} are allowed"
+        )
     return mine.items()
 
 

@@ -160,7 +160,7 @@ class Jobs:
     def begin(self, what: Wanted) -> Job:
         """Start to plan an installation; raise `Busy` while another job is working."""
         if self.newest is not None and self.newest.state == "working":
-            raise Busy(f"{self.newest.title} is under way: wait for it, or cancel it")
+            raise Busy(f"{self.newest.title} is still in progress: wait for its end, or cancel it")
         if self._left >= _LEFT_MOST:
             raise Busy("too many cancelled downloads are still open: try again in two minutes")
         title = what.name if isinstance(what, FileSource) else str(what)
@@ -190,10 +190,10 @@ class Jobs:
         job = self._asked(number)
         planned = job.planned
         if job.state != "asks" or planned is None:
-            raise Busy("no job waits for approval: start again")
+            raise Busy("no job is waiting for approval: start a new job")
         if planned.risks and not takes_risks:
             raise PackageError(
-                f"{planned.plan.lock} has access of its own to this machine: approve that, too"
+                f"{planned.plan.lock} has its own access to this machine: approve this access too"
             )
         job.state, job.line = "working", _INSTALLING
         try:
@@ -231,7 +231,7 @@ class Jobs:
 
     def _asked(self, number: int) -> Job:
         if self.newest is None or self.newest.number != number:
-            raise Busy("another page has started another job meanwhile")
+            raise Busy("another page has started a newer job")
         return self.newest
 
     async def _work(self, job: Job, plan: Callable[[], _Planned]) -> None:
@@ -314,7 +314,7 @@ class Jobs:
         if isinstance(what, Lock):
             plan = plan_update(what, known, self._store, job.notes.append)
             if plan is None:
-                raise PackageError(f"{what} is the newest version already")
+                raise PackageError(f"{what} is already the newest version")
             return plan
         source = what if isinstance(what, FileSource) else self._source_at(what)
         return plan_file(source, known, self._store, job.notes.append)

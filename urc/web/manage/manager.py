@@ -211,7 +211,7 @@ class Manager:
             and required.range in ("*", lock.version)
         ]
         if not meant:
-            raise PackageError(f"{required} was not installed by itself")
+            raise PackageError(f"{required} was not installed directly")
         return meant
 
     def forgettable(self, required: PackageRequirement) -> list[str]:

@@ -109,7 +109,7 @@ _KINDS: Final = tuple(FOLDERS.values())
 _T = TypeVar("_T")
 _Handler = Callable[["ManageRoutes", Request], Awaitable[Response]]
 
-ONLY_HERE: Final = "this needs the key in the address that URC printed, or the token of --manage"
+ONLY_HERE: Final = "this needs the key in the address printed by URC, or the token of --manage"
 
 
 class ApiError(Exception):
@@ -353,12 +353,12 @@ class ManageRoutes:
                 pass  # a folder of this machine may have that name
         if not self._is_here(request):
             raise ApiError(
-                403, "a path of this machine needs the key in the address that URC printed"
+                403, "a path on this machine needs the key in the address that URC printed"
             )
         place = Path(path).expanduser()
         if not place.is_absolute():
             raise PackageError(
-                f"{path!r} is neither a path in a repository, as /interfaces/NAME/, nor a full path"
-                " on this machine"
+                f"{path!r} is neither a path in a repository, such as /interfaces/NAME/,"
+                " nor a full path on this machine"
             )
         return place

@@ -109,7 +109,7 @@ class SettingsRoutes:
             self._manage.check(request)
             said = await body_of(request, SettingsAsked)
             if name in self._trying:
-                raise Busy(f"the settings of {name} are being tested already")
+                raise Busy(f"the settings of {name} are already being tested")
             self._trying.add(name)
             try:
                 return answer(await self._save(name, said))
@@ -247,5 +247,5 @@ def _typed(profile: Profile, said: SettingsAsked) -> tuple[dict[str, str], dict[
             faults[name] = printable(str(error))
     for name in said.settings:
         if name not in profile.settings:
-            faults[name] = "the driver has no such setting"
+            faults[name] = "the driver has no setting with this name"
     return texts, faults

@@ -79,7 +79,7 @@ def _wrapped(name: str, data: bytes, installed: Sequence[Lock]) -> FileSource:
     document: dict[str, Any] = read if isinstance(read, dict) else {}
     if document.get("kind") != "interface":
         raise PackageError(
-            f"{name}: expected an interface; drivers, robots and widgets come as packages"
+            f"{name}: expected an interface; drivers, robots and widgets must be packages"
         )
     called = document.get("name")
     if not isinstance(called, str) or not NAME.fullmatch(called):

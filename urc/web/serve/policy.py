@@ -232,14 +232,14 @@ class Policy:
         names = self._names if is_near else self._names | self._own
         if authority is None or not is_host_allowed(authority, names, is_loopback=is_near):
             shown = authority.host if authority is not None else "that host name"
-            return 421, f"This server does not answer to {shown}; --allow-host adds a name."
+            return 421, f"This server accepts no requests to {shown}; --allow-host adds a name."
         is_upgrade = scope["type"] == "websocket"
         if is_upgrade or scope["method"] not in _SAFE_METHODS:
             origins = _values(scope, b"origin")
             if not origins and scope["state"]["visitor"].is_program:
                 pass  # a page of another site cannot send the key
             elif len(origins) != 1 or not is_origin_ours(origins[0], scope["scheme"], authority):
-                return 403, "Only this server's own pages may do that."
+                return 403, "Only this server's own pages may send this request."
         lengths = _values(scope, b"content-length")
         if any(not text.isdecimal() or int(text[:20]) > BODY_BYTES for text in lengths):
             return 413, f"A request may carry at most {BODY_BYTES} bytes."

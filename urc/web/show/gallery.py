@@ -298,7 +298,7 @@ class Gallery:
         """Return the widget names in the URL; raise status 404 for too many names."""
         wanted = list(dict.fromkeys(request.path_params["names"].split(SEPARATOR)))
         if len(wanted) > MOST_AT_ONCE:
-            raise HTTPException(404, f"A page shows {MOST_AT_ONCE} widgets at most.")
+            raise HTTPException(404, f"A page shows at most {MOST_AT_ONCE} widgets.")
         return wanted
 
     def _shown(self, name: str) -> WidgetView:

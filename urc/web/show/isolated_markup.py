@@ -75,7 +75,7 @@ def _rendered(jobs: list[str]) -> list[RenderedMarkup]:
     if len(jobs) > 1:
         return [made for job in jobs for made in _rendered([job])]
     fault = (
-        f"it cannot be rendered with {PROCESSOR_S} s of processor time and"
+        f"the template cannot be rendered with {PROCESSOR_S} s of processor time and"
         f" {MEMORY_BYTES >> 20} MiB of memory"
     )
     return [RenderedMarkup(Markup(), fault)]
@@ -122,7 +122,7 @@ def _render(job: str) -> tuple[str, str, int]:
         for piece in widget_template(source).generate(variables):
             count += len(piece)
             if count > MOST_CHARACTERS:
-                return "", f"its markup has more than {MOST_CHARACTERS} characters", 1
+                return "", f"the markup has more than {MOST_CHARACTERS} characters", 1
             pieces.append(piece)
     except Exception as error:  # a template may raise anything
         text = str(error).partition("\n")[0][:500]

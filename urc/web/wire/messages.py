@@ -221,7 +221,7 @@ def decoded(decoder: msgspec.json.Decoder[_Message], text: str | bytes) -> _Mess
         BadMessage: the message is too long, or matches no type of `decoder`.
     """
     if len(text) > INBOUND_BYTES:
-        raise BadMessage(f"longer than {INBOUND_BYTES} bytes")
+        raise BadMessage(f"the message is longer than {INBOUND_BYTES} bytes")
     try:
         return decoder.decode(text)
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
