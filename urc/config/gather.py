@@ -128,7 +128,7 @@ def _check_placement(root: Node, problems: Problems) -> None:
                 f"'{key}' is a key of the driver",
                 at=key,
                 key=True,
-                hint="move it to the driver's document, or write the whole driver here",
+                hint="move the key to the driver's document, or write the whole driver here",
             )
 
 

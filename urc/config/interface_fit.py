@@ -63,7 +63,7 @@ def fit_interface(path: str, profile: Profile, registry: WidgetFolder) -> Interf
     sources = gathered.sources
     if sources is None or sources.kind != "interface":
         faults = [one.message for one in gathered.problems if one.severity == "error"]
-        return InterfaceFit(None, fault=next(iter(faults), "it is not an interface"))
+        return InterfaceFit(None, fault=next(iter(faults), "the document is not an interface"))
     problems = Problems()
     interface = parse_interface(sources.root, sources.root.text("name"), problems)
     known = _Known(profile.widgets, registry)
@@ -79,5 +79,5 @@ def fit_interface(path: str, profile: Profile, registry: WidgetFolder) -> Interf
     }
     widgets = {use.widget: known.get(use.widget) for use in uses.values() if use is not None}
     if not widgets:
-        return InterfaceFit(None, fault="this robot fills none of its slots")
+        return InterfaceFit(None, fault="this robot fills no slot of the interface")
     return InterfaceFit(interface, {name: one for name, one in widgets.items() if one is not None})

@@ -64,7 +64,10 @@ def load_profile(
         return checked.profile
     if not has_errors(checked.problems):
         if checked.kind in ("robot", "driver"):
-            text = f"this is a partial {checked.kind}, which others include or extend"
+            text = (
+                f"this is a partial {checked.kind}, which only other documents can include or"
+                " extend"
+            )
             raise ProblemsError([Problem("partial-document", text, fspath(path))])
         raise ProblemsError(
             [

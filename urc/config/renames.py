@@ -125,7 +125,7 @@ def renamed_hint(path: tuple[str | int, ...], key: str, known: Mapping[str, Any]
         if one.old != key or one.new not in known:
             continue
         if re.search(f"(?:^|/)(?:{one.place})$", where):
-            return f"its name is '{one.new}' now; 'urc migrate' renames it"
+            return f"the new name is '{one.new}'; 'urc migrate' replaces old names"
     return ""
 
 
@@ -133,5 +133,5 @@ def renamed_value_hint(key: str, value: str) -> str:
     """Return a hint for a value with an old name, or ""."""
     for one in VALUES:
         if (one.key, one.old) == (key, value):
-            return f"its name is '{one.new}' now; 'urc migrate' renames it"
+            return f"the new name is '{one.new}'; 'urc migrate' replaces old names"
     return ""

@@ -152,7 +152,7 @@ def test_an_old_key_is_told_with_its_new_name_and_migrated(tmp_path: Path, renam
     name = "dial/widget.yaml" if rename.content == "widget" else "x.yaml"
     assert migrated(tmp_path, old) == new
     hints = [one.hint for one in problems(tmp_path, old, name) if one.code == "unknown-key"]
-    assert hints == [f"its name is '{rename.new}' now; 'urc migrate' renames it"]
+    assert hints == [f"the new name is '{rename.new}'; 'urc migrate' replaces old names"]
     assert "unknown-key" not in {one.code for one in problems(tmp_path, new, name)}
 
 
@@ -160,7 +160,7 @@ def test_an_old_type_of_transport_is_told_with_its_new_name(tmp_path: Path) -> N
     """The type of a transport is a value."""
     text = "urc: 1\nkind: robot\nname: x\ntransports: { a: { type: rosbridge, host: h } }\n"
     told = [one.hint for one in problems(tmp_path, text, "x.yaml")]
-    assert "its name is 'ros' now; 'urc migrate' renames it" in told
+    assert "the new name is 'ros'; 'urc migrate' replaces old names" in told
     assert migrated(tmp_path, text) == text.replace("rosbridge", "ros")
 
 

@@ -194,7 +194,9 @@ class _First:
         self._expander.problems.error(
             Node(self._expander.document, path, None),
             "unknown-variable",
-            f"{name!r} has no {word!r}" if word else f"{name!r} has several values; name one",
+            f"{name!r} has no {word!r}"
+            if word
+            else f"{name!r} has several values; name one of them",
             offset=offset,
             length=len(name) + len(word) + bool(word),
             hint=did_you_mean(word, first, "it has") if is_mapping else plain,

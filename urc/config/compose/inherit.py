@@ -144,14 +144,16 @@ class _Composer:
         if real in chain:
             names = [os.path.basename(name) for name in (*chain[chain.index(real) :], real)]
             self._problems.error(
-                reference, "reference-loop", f"documents build on each other: {' → '.join(names)}"
+                reference,
+                "reference-loop",
+                f"documents extend or include each other in a circle: {' → '.join(names)}",
             )
             return None
         if len(chain) >= _DEEPEST:
             self._problems.error(
                 reference,
                 "too-many-files",
-                f"more than {_DEEPEST} documents build on each other",
+                f"more than {_DEEPEST} documents extend or include each other",
             )
             return None
         self.sources.setdefault(target.file, target)
@@ -176,8 +178,8 @@ class _Composer:
             found = value.problem(
                 (),
                 "include-clash",
-                f"{place} has another value for it",
-                hint="set it in the document that includes both",
+                f"{place} gives this key another value",
+                hint="set the key in the document that includes both",
             )
             self._problems.problems.append(found._replace(path=".".join(map(str, path))))
         return [merged]

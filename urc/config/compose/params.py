@@ -54,7 +54,7 @@ def fill_params(
                 "unused-param",
                 f"nothing uses the param {name!r}",
                 key=True,
-                hint=f"write {{params.{name}}} at the place for it",
+                hint=f"write {{params.{name}}} in place of the value",
             )
     return result
 
@@ -165,7 +165,7 @@ class _Filler:
                     self._problems.error(
                         Node(document, (key,), item),
                         "too-large",
-                        "this is too long after the params are filled in",
+                        "the text is too long after its params are filled in",
                         key=True,
                     )
             value[key], marks[key] = tree.value, tree.mark

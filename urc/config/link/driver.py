@@ -60,7 +60,7 @@ def check_option(
     problems.error(
         part,
         "wrong-type",
-        f"'{part.name}' is {wanted}, and the setting {found[1]!r} has the type {setting.type}",
+        f"'{part.name}' is {wanted}, but the setting {found[1]!r} has the type {setting.type}",
         hint=f"give the setting 'type: {hint}'",
     )
 
@@ -94,7 +94,7 @@ class _Linker:
             self.problems.error(
                 part,
                 "missing-key",
-                f"'{key}' is missing, and there are {len(names)} transports",
+                f"'{key}' is missing, but the driver has {len(names)} transports",
                 key=True,
                 hint=did_you_mean("", names, "transports"),
             )
@@ -203,7 +203,7 @@ class _Linker:
                 r"settings",
                 "settings",
                 "unknown-setting",
-                "'settings' has all settings; name one of them",
+                "'settings' contains all settings; name one of them",
                 did_you_mean("", self.settings, "settings"),
             )
 
@@ -283,7 +283,7 @@ def _check_poll_names(part: Node, driver: Driver, problems: Problems) -> None:
             problems.error(
                 inner,
                 "duplicate-name",
-                f"{other} has the name {poll.name!r}, too",
+                f"{other} also has the name {poll.name!r}",
                 at="name",
                 hint="give each its own name",
             )

@@ -82,7 +82,7 @@ def _link_slew(problems: Problems, slew: Mapping[str, Node], command: Command) -
         if kind not in ("integer", "number") or argument.choices:
             what = "has choices" if argument.choices else f"is {kind}"
             text = f"argument {name!r} {what}, and has no values in between"
-            hint = "limit arguments that are numbers without choices"
+            hint = "limit only numeric arguments without choices"
             problems.error(inner, "wrong-type", text, key=True, hint=hint)
 
 
@@ -99,7 +99,7 @@ def refuse_two_person(linker: Linker, part: Node, command: Command) -> None:
         linker.problems.error(
             part,
             "wrong-command",
-            f"{command.name!r} needs two people, and it would run automatically here",
+            f"{command.name!r} needs two people, and must not run automatically",
             hint="run a command without two_person",
         )
 
@@ -128,7 +128,7 @@ def link_poll(linker: Linker, part: Node, poll: Poll) -> None:
         linker.problems.error(
             part.must("run"),
             "wrong-command",
-            f"{poll.run!r} is {what}, and a poll must only read",
+            f"{poll.run!r} is {what}, but a poll must only read",
             hint="run a command that only reads",
         )
         return
@@ -254,7 +254,7 @@ def link_arguments(
             part,
             "missing-argument",
             f"command {command.name!r} needs {missing[0]!r}",
-            hint=f"give it here, or give a default to the argument {missing[0]!r}",
+            hint=f"give a value here, or give a default to the argument {missing[0]!r}",
             **where,
         )
 

@@ -53,7 +53,7 @@ def _check_one(part: Node, send: WriteSpec, spec: TransportSpec, problems: Probl
                 "contains-delimiter",
                 f"{_what(send)} {_shown(mark)} inside, which the framing adds to each frame:"
                 " the robot would receive two frames",
-                hint="remove it: the framing adds the marks of a frame",
+                hint="remove this part: the framing adds the marks of a frame",
             )
             return
     wanted = None if layout.size is None else layout.size - layout.head - layout.tail
@@ -93,8 +93,8 @@ def _check_end(part: Node, problems: Problems) -> None:
         problems.warn(
             part,
             "literal-backslash",
-            f"this ends with the 2 characters {part.data[-2:]}, not with a control character",
-            hint='remove them: the framing adds the end; "\\r" in double quotes is a CR',
+            f"the text ends with the 2 characters {part.data[-2:]}, not with a control character",
+            hint='remove both characters: the framing adds the end; "\\r" in double quotes is a CR',
         )
 
 

@@ -169,7 +169,7 @@ def _bindings(
                 inner,
                 "wrong-type",
                 f"{key!r} is an output, so it needs the name of a command",
-                hint="only an input of many signals takes a list",
+                hint="only an input for several signals takes a list",
             )
         else:
             port = widget.outputs[key]

@@ -47,10 +47,10 @@ def _check_answer(part: Node | None, spec: TransportSpec | None, problems: Probl
         problems.error(
             part,
             "wrong-form",
-            f"a reply cannot be a {verb!r}, which expects a reply itself",
+            f"a reply in the form {verb!r} would expect another reply",
             at=verb,
             key=True,
-            hint="write 'publish', or text or bytes if the transport carries them",
+            hint="write 'publish', or write text or bytes on a byte transport",
         )
 
 
@@ -186,7 +186,7 @@ def _check_head(part: Node, spec: TransportSpec, problems: Problems) -> None:
             f"replies over {spec.type} have no headers and no status",
             at="head",
             key=True,
-            hint="remove 'head': it is for replies over http",
+            hint="remove 'head', which is only for replies over http",
         )
 
 

@@ -98,8 +98,8 @@ def _check_hold(
         problems.warn(
             part,
             "not-held",
-            f"command {command.name!r} is a held command, and {port.name!r} of widget"
-            f" {widget.name!r} is no hold-to-run control",
+            f"command {command.name!r} is a held command, but {port.name!r} of widget"
+            f" {widget.name!r} is not a hold-to-run control",
             hint="use a hold-to-run widget: joystick, hold-button",
         )
     return port.is_held is (command.hold is not None)
@@ -140,8 +140,8 @@ def _check_values(
         problems.error(
             part,
             "missing-argument",
-            f"{port.name!r} of widget {widget.name!r} does not give all that {command.name!r}"
-            f" needs: {listed(missing)}",
+            f"{port.name!r} of widget {widget.name!r} does not give all arguments of"
+            f" {command.name!r}: {listed(missing)}",
             hint=_remedy(command, port, taken, missing),
         )
     elif port.arguments and not taken:
@@ -229,7 +229,7 @@ def _misfit(port: WidgetPort, argument: Argument) -> str:
     """Return the reason why an argument cannot take an output's value, or "" if it can."""
     if not _is_of_type(port, argument):
         given = "number" if port.is_held else " or ".join(port.types)
-        return f"it is {given}, and the argument is {argument.type}"
+        return f"the value is {given}, and the argument is {argument.type}"
     if port.unit and are_apart(port.unit, argument.unit):
         return f"unit {port.unit!r} is given, and the argument is in {argument.unit!r}"
     return ""

@@ -50,7 +50,7 @@ def _check_needs(
         problems.error(
             part,
             "unbound-input",
-            f"widget {widget.name!r} has no bindings, so it would be empty",
+            f"widget {widget.name!r} has no bindings and would be empty",
             key=True,
             hint=", or ".join(ways),
         )
@@ -119,8 +119,8 @@ def _check_units(
                     "wrong-unit",
                     f"{port.name!r} and {other.name!r} of widget {widget.name!r} need the same"
                     f" unit: {what} is in {unit!r}, {wanted[0]} in {wanted[1]!r}",
-                    hint="the widget does not convert; bind other ones, or compute a signal in"
-                    " that unit",
+                    hint="the widget does not convert units; bind other signals, or compute a"
+                    " signal in that unit",
                 )
                 break
 
@@ -160,7 +160,9 @@ def _check_order(part: Node, use: WidgetUse, widget: Widget, problems: Problems)
                 own.get(name) or own[above],
                 "wrong-order",
                 f"option {name!r} is {low:g}, and must be below {above!r}, {high:g}",
-                hint="change one of the two" if above in own else f"give the option {above} too",
+                hint="change one of the two options"
+                if above in own
+                else f"give the option {above} too",
             )
 
 
@@ -173,7 +175,7 @@ def _check_local(part: Node, widget: Widget, problems: Problems) -> None:
                 "not-local",
                 f"option {name!r} must be an address on this dashboard's server,"
                 f" found {inner.data!r}",
-                hint="a page loads nothing from other servers; start it with one slash",
+                hint="a page loads nothing from other servers; start the address with one slash",
             )
 
 

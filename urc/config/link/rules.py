@@ -29,7 +29,11 @@ def link_values(
             if name in driver.signals or name in ("now", "settings", "world"):
                 what = "a signal" if name in driver.signals else "something else"
                 text = f"{name!r} is already {what}"
-                hint = "give its initial value under 'signals'" if what == "a signal" else ""
+                hint = (
+                    "give the initial value of a signal under 'signals'"
+                    if what == "a signal"
+                    else ""
+                )
                 problems.error(inner, "duplicate-name", text, key=True, hint=hint)
             values[name] = tuple(inner.data) if isinstance(inner.data, list) else inner.data
     if "signals" in parts:
@@ -151,7 +155,7 @@ def _of_command(linker: Linker, part: Node, rule: SimulatorRule) -> set[str]:
         hint = "write a rule with 'match' for each of its steps"
         linker.problems.error(inner, "wrong-command", text, hint=hint)
     elif command.send.form == "frames":
-        text = f"{rule.request!r} sends several frames, and a rule matches one"
+        text = f"{rule.request!r} sends several frames, but a rule matches only one"
         hint = "write a rule with match: for each of its frames"
         linker.problems.error(inner, "wrong-command", text, hint=hint)
     elif command.transport != rule.transport:
@@ -178,7 +182,7 @@ def _check_poll(linker: Linker, part: Node, rule: SimulatorRule) -> None:
 def _elsewhere(linker: Linker, part: Node, rule: SimulatorRule, transport: str) -> None:
     if transport not in linker.driver.transports:
         return  # reported at the request
-    text = f"{rule.request!r} goes to {transport!r}, and this rule is for {rule.transport!r}"
+    text = f"{rule.request!r} is sent to {transport!r}, but this rule is for {rule.transport!r}"
     linker.problems.error(part, "wrong-transport", text)
 
 
@@ -213,7 +217,7 @@ def _check_told(linker: Linker, part: Node, told: frozenset[str]) -> None:
     for name, inner in part.named("set").items():
         if name in told:
             text = f"the world sets the signal {name!r}"
-            hint = "remove it here, or from world.signals"
+            hint = "remove the signal here, or from world.signals"
             linker.problems.error(inner, "two-sources", text, key=True, hint=hint)
 
 

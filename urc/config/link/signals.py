@@ -27,14 +27,14 @@ def link_signals(part: Node, driver: Driver, check: _Check, problems: Problems) 
             problems.error(
                 place,
                 "constant-value",
-                "this expression has no signal, so it would never be computed",
+                "this expression uses no signal and would never be computed",
                 hint=did_you_mean("", driver.signals, "signals"),
             )
         if name in set_by_frames:
             problems.error(
                 place,
                 "two-sources",
-                f"{name!r} is computed here, and set by {set_by_frames[name]}",
+                f"{name!r} is computed here, but also set by {set_by_frames[name]}",
                 key=True,
                 hint="rename one of the two",
             )

@@ -31,7 +31,7 @@ def check_words(
         problems.warn(
             part,
             "unknown-word",
-            f"{name!r} is never {text!r}: its values are its states",
+            f"{name!r} is never {text!r}: this text is not one of its states",
             offset=max(0, found),
             length=len(text) if found >= 0 else len(template.source),
             hint=hint or did_you_mean(text, states.values(), "words"),

@@ -33,7 +33,7 @@ def link_sequences(linker: Linker, part: Node) -> None:
             linker.problems.error(
                 inner,
                 "duplicate-name",
-                f"a command has the name {name!r}, too",
+                f"a command also has the name {name!r}",
                 key=True,
                 hint="give each its own name",
             )
@@ -137,7 +137,7 @@ class _Walk:
                         " limited",
                         at="repeat",
                         key=True,
-                        hint="use a loop in only one of the two",
+                        hint="use a loop in only one of the two sequences",
                     )
 
     def _run(self, part: Node, step: sequence.RunStep) -> None:
@@ -183,7 +183,8 @@ class _Walk:
             self._linker.problems.error(
                 part,
                 "no-connection",
-                f"{transport!r} opens a connection for each request, and none between two steps",
+                f"{transport!r} opens a connection for each request, and has no connection between"
+                " two steps",
                 hint="run a command with a reply, or make the connection persistent",
             )
 

@@ -120,7 +120,7 @@ def _link_steps(
         spec = driver.transports.get(step.connects)
         if spec is not None and spec.connection == "per_request":
             text = f"{spec.name!r} opens a connection for each request"
-            hint = "run a command with a request there"
+            hint = "run a command with a request on this transport"
             problems.error(inner, "wrong-transport", text, at="connects", hint=hint)
         may_fail = bool(step.fails or after.fails)
         _check_run(inner, step.run or None, step.arguments, driver, problems, may_fail=may_fail)
@@ -196,7 +196,12 @@ def _fitting(part: Node, signal: Signal, kind: str, problems: Problems) -> Value
         return value
     if kind in ("object", "image", "blob"):
         text = f"signal {signal.name!r}: a value of type {kind} cannot be compared"
-        problems.error(part, "wrong-type", text, hint="compare a signal that is computed from it")
+        problems.error(
+            part,
+            "wrong-type",
+            text,
+            hint="compare another signal that is computed from this signal",
+        )
         return None
     try:
         return fit(value, kind)
@@ -235,7 +240,7 @@ def _reply_to(
             inner,
             "unknown-request",
             f"there is no poll {waiting}: {text}",
-            hint="polls count from 0",
+            hint="the first poll has the number 0",
         )
         return None
     poll = driver.polls[waiting]
@@ -246,7 +251,8 @@ def _reply_to(
         problems.error(
             inner,
             "wrong-transport",
-            f"poll {waiting} waits on {poll.transport!r}, which is not fed",
+            f"poll {waiting} waits on {poll.transport!r}, but this test does not feed"
+            f" {poll.transport!r}",
         )
     return waiting
 

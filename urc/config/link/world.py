@@ -75,7 +75,7 @@ def _link_signals(
     for name, inner in part.named("signals").items():
         if settable(name, inner, driver, problems) is not None and name in begun:
             text = f"the world sets the signal {name!r}"
-            hint = "remove it here, or from the world"
+            hint = "remove the signal here, or from the world"
             problems.error(parts["signals"], "two-sources", text, at=name, key=True, hint=hint)
 
 

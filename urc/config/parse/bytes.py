@@ -47,10 +47,10 @@ def _literal(text: str, part: Node, encoding: str, problems: Problems) -> bytes 
         problems.error(
             part,
             "bad-template",
-            "these bytes are constant: templates are not possible here",
+            "these bytes are constant and cannot contain templates",
             offset=template.start(),
             length=len(template[0]),
-            hint="write the bytes themselves; use settings only in sent frames",
+            hint="write constant bytes; settings are only possible in sent frames",
         )
         return None
     backslash = _BACKSLASH.search(text)

@@ -116,7 +116,7 @@ def _trailer(part: Node, encoding: str, problems: Problems) -> DeclaredTrailer |
             problems.error(part, "empty-mark", f"'{key}' is empty and marks nothing", at=key)
             return None
         if bytes_found and isinstance(part.data.get("at", "end"), int):
-            text = f"'at' has no effect with '{key}', which gives the place of the checksum"
+            text = f"'at' has no effect with '{key}', which gives the position of the checksum"
             problems.error(part, "misplaced-key", text, at="at", key=True)
     needs = {"optional": "after", "skip": "each", "leading_zeros": "after"}
     for key, needed in needs.items():
@@ -173,7 +173,7 @@ def _crc(part: Node, problems: Problems) -> CrcSpec | None:
                 "too-wide",
                 f"0x{number:X} has more than {width} bits",
                 at=name,
-                hint="leave out the highest bit of the polynomial" if name == "poly" else "",
+                hint="omit the highest bit of the polynomial" if name == "poly" else "",
             )
     if not is_good:
         return None
@@ -221,7 +221,7 @@ def _window(part: Node, problems: Problems) -> ByteRange | str:
             part,
             "empty-window",
             f"the range from {start} to {stop} is empty",
-            hint="places count from 0; negative places count back from the end of the frame",
+            hint="positions start at 0; negative positions count back from the end of the frame",
         )
         return "payload"
     return ByteRange(start, stop)

@@ -31,7 +31,7 @@ def parse_conversion(part: Node, problems: Problems, kind: str = "number") -> Co
                     f"'{key}' has no effect for {kind}",
                     at=key,
                     key=True,
-                    hint="it needs the type integer or number",
+                    hint="this key needs the type integer or number",
                 )
     absent = tuple(inner.data for inner in part.listed("not_available"))
     if kind in ("integer", "number"):
@@ -88,7 +88,8 @@ def _polynomial(part: Node, problems: Problems) -> tuple[float, ...]:
                     f"'{key}' and 'polynomial' both convert the value",
                     at=key,
                     key=True,
-                    hint="in a polynomial, offset is the first coefficient, and scale the second",
+                    hint="in a polynomial, the offset is the first coefficient, and the scale is"
+                    " the second",
                 )
         return tuple(inner.data for inner in coefficients)
     if scale == 0:
@@ -96,7 +97,7 @@ def _polynomial(part: Node, problems: Problems) -> tuple[float, ...]:
             part.must("scale"),
             "zero-scale",
             "a scale of 0 makes every value the same",
-            hint="remove it, or give the size of one step of the raw number",
+            hint="remove 'scale', or give the size of one step of the raw number",
         )
     if scale is None and offset is None:
         return ()
@@ -112,7 +113,7 @@ def _points(part: Node | None, problems: Problems) -> tuple[tuple[float, float],
             problems.error(
                 after,
                 "wrong-order",
-                f"{after.data[0]:g} is not above {before.data[0]:g} of the point before it",
-                hint="the first number of each pair is the raw number, and must rise",
+                f"{after.data[0]:g} is not above {before.data[0]:g} of the previous point",
+                hint="the first number of each pair is the raw number, and must increase",
             )
     return tuple((inner.data[0], inner.data[1]) for inner in pairs)

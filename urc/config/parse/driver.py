@@ -206,7 +206,7 @@ def _check_argument(part: Node, kind: str, of: str, problems: Problems) -> None:
             "bad-name",
             f"an argument cannot have the name {part.name!r}",
             key=True,
-            hint=f"in templates this name is {what}",
+            hint=f"in templates, this name means {what}",
         )
     if of != "string" and "allow_control" in part.data:
         problems.error(

@@ -123,7 +123,7 @@ def _check_hidden(part: Node, at: str, table: Mapping[int, int], problems: Probl
     """Report a replacement of an escaped byte if the replacement needs an escape itself."""
     wrong = next((one for one in table.values() if one in table), None)
     if wrong is not None:
-        text = f"{wrong:02X} replaces an escaped byte, and needs an escape itself"
+        text = f"{wrong:02X} replaces an escaped byte, but needs an escape itself"
         problems.error(part, "overlap", text, at=at)
 
 

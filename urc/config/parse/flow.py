@@ -109,19 +109,24 @@ def command_with_flow(command: Command, part: Node, problems: Problems) -> Comma
         problems.error(
             part,
             "not-idempotent",
-            "the robot may perform it twice when its reply is lost",
+            "the robot may perform the command twice when a reply is lost",
             at="retries",
             hint="write idempotent: true if a repetition does no harm, or remove 'retries'",
         )
     if retries and command.reply is None:
         problems.error(
-            part, "misplaced-key", "'retries' needs 'reply': without it no failure shows",
+            part, "misplaced-key", "'retries' needs 'reply', because only a reply shows a failure",
             at="retries", key=True,
         )  # fmt: skip
     if part.text("priority") == "realtime":
         refuse(part, ("coalesce", "rate_limit"), "has no effect with realtime priority", problems)
     if hold is not None:
-        refuse(part, ("moves", "stop"), "has no effect with 'hold', which moves it", problems)
+        refuse(
+            part,
+            ("moves", "stop"),
+            "has no effect with 'hold', which declares motion",
+            problems,
+        )
         _refuse_asides(part.get("reply"), problems)
     stops = part.flag("stop", default=False)
     if stops:
@@ -365,9 +370,9 @@ def _retries(part: Node | None, problems: Problems) -> tuple[int, Retry]:
         problems.error(
             part,
             "wrong-order",
-            "the first wait is longer than the longest wait",
+            "the first delay is longer than the longest delay",
             at="initial",
-            hint="'initial' is the first wait, 'max' the longest",
+            hint="'initial' is the first delay, and 'max' is the longest delay",
         )
     return part.integer("count") or 0, Retry(initial_s, max_s)
 

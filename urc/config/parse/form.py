@@ -107,7 +107,7 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
         problems.error(
             part,
             "two-forms" if given else "missing-form",
-            f"{found} are both forms of this frame"
+            f"{found} both define the form of this frame"
             if given
             else "the form of the frame is missing",
             at=given[1] if given else "",

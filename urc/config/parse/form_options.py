@@ -58,7 +58,7 @@ def with_collected(part: Node, spec: ReadSpec, problems: Problems) -> ReadSpec:
         begin, end = inner.get("begin"), inner.get("end")
         if begin is None and end is None:
             text = "'begin' or 'end' is missing"
-            hint = "give a condition for its first frame (begin), or for its last frame (end)"
+            hint = "give a condition for the first frame (begin), or for the last frame (end)"
             problems.error(inner, "missing-key", text, key=True, hint=hint)
         value = problems.expression(inner.must("value"), allows_bytes=True)
         if value is not None:

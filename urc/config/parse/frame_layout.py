@@ -82,7 +82,7 @@ def _check_trail(part: Node, written: DeclaredChecksum, count: int, problems: Pr
         problems.error(
             written.part,
             "misplaced-key",
-            f"'{key}' needs text frames; frames of type {kind!r} have fixed places",
+            f"'{key}' needs text frames, but frames of type {kind!r} have fixed positions",
             at=key,
             key=True,
             hint="give the place of the checksum with 'at'",
@@ -222,7 +222,9 @@ def _check_checksum(
     at, size, frame_size = checksum.at, checksum.size, layout.size
     if at < 0 and at + size > 0:
         text = f"a checksum of {size} bytes at {at} exceeds the end of the frame"
-        problems.error(part, "outside-frame", text, at="at", hint=f"the last possible is {-size}")
+        problems.error(
+            part, "outside-frame", text, at="at", hint=f"the last possible position is {-size}"
+        )
         return
     if frame_size is not None and not -frame_size <= at <= frame_size - size:
         text = f"a checksum of {size} bytes at {at} is not inside a frame of {frame_size}"
@@ -231,7 +233,11 @@ def _check_checksum(
     if at < 0 and at + size > -len(layout.end):
         text = f"the checksum at {at} overlaps the end bytes"
         problems.error(
-            part, "overlap", text, at="at", hint=f"the last possible is {-size - len(layout.end)}"
+            part,
+            "overlap",
+            text,
+            at="at",
+            hint=f"the last possible position is {-size - len(layout.end)}",
         )
     if 0 <= at < len(layout.start):
         text = f"the checksum at {at} overlaps the start bytes"
@@ -273,7 +279,7 @@ def _check_size(part: Node, layout: FrameLayout, longest: int, problems: Problem
         problems.error(
             part,
             "frame-too-small",
-            f"{layout.size} bytes cannot hold the start, end and checksum, which take {least}",
+            f"{layout.size} bytes are too few for the start, end and checksum, which take {least}",
             at="size",
         )
     elif max(least, layout.size or 0) > longest:
@@ -297,7 +303,9 @@ def _parse_length(part: Node, encoding: str, problems: Problems) -> LengthSpec:
     mark = None if until is None else parse_bytes(until, encoding, problems)
     if until is not None and mark == b"":
         text = "'until' is empty and ends no number"
-        problems.error(until, "empty-mark", text, hint="give the bytes after it, such as ':'")
+        problems.error(
+            until, "empty-mark", text, hint="give the bytes after the number, such as ':'"
+        )
     return LengthSpec(
         offset=part.integer("offset") or 0,
         size=size,
@@ -321,7 +329,7 @@ def _check_length(part: Node, start: bytes, length: LengthSpec, problems: Proble
             "overlap",
             f"the length field at {length.offset} overlaps the start bytes",
             at="offset",
-            hint="places count from the first byte of the frame, start bytes included",
+            hint="positions count from the first byte of the frame, including the start bytes",
         )
     if length.spelling == "raw" and length.size > _MOST_BYTES:
         text = f"a binary number has {_MOST_BYTES} bytes at most, found {length.size}"
@@ -354,5 +362,5 @@ def _check_loose(part: Node, problems: Problems) -> None:
         for one in inner.items() if isinstance(inner.data, list) else [inner]:
             if "over" not in one.data or one.must("over").data == "payload":
                 text = "the start of the payload is not fixed"
-                hint = "write 'over: frame', or give two places"
+                hint = "write 'over: frame', or give two positions"
                 problems.error(one, "misplaced-key", text, hint=hint)

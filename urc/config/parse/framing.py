@@ -197,7 +197,7 @@ def _check_case(
         problems.error(
             part,
             "never-matches",
-            f"its frames start with {start.hex(' ')}, not with {first.hex(' ')}",
+            f"the frames of this case start with {start.hex(' ')}, not with {first.hex(' ')}",
         )
 
 
@@ -212,7 +212,7 @@ def _check_pattern(part: Node, problems: Problems) -> None:
         problems.error(
             part,
             "bad-pattern",
-            f"{text[far]!r} is not a byte, and the pattern matches bytes",
+            f"{text[far]!r} is not a byte, but the pattern matches bytes",
             offset=far,
             hint="write each byte as \\xHH",
         )
@@ -223,7 +223,7 @@ def _check_pattern(part: Node, problems: Problems) -> None:
             part,
             "matches-nothing",
             "the pattern also matches an empty frame",
-            hint="make it match at least one byte",
+            hint="change the pattern to match at least one byte",
         )
     elif _has_anchor(tree):
         problems.error(

@@ -45,7 +45,7 @@ def parse_interface(part: Node, name: str, problems: Problems) -> Interface:
             "misplaced-key",
             f"{background!r} is also in the grid",
             at="background",
-            hint="a background slot is behind the grid, not in it",
+            hint="a background slot is behind the grid, not inside",
         )
     return interface._replace(background=background)
 
@@ -97,7 +97,7 @@ def _pictures(part: Node, problems: Problems, *, is_tab: bool) -> dict[str, Layo
             "missing-key",
             f"{'a tab' if is_tab else 'an interface'} lacks 'grid'",
             key=True,
-            hint="draw it: a line for each row, a name for each cell, '.' for an empty cell",
+            hint="draw the grid: a line for each row, a name for each cell, '.' for an empty cell",
         )
     if one is not None and several is not None:
         problems.error(
@@ -136,7 +136,7 @@ def _grid(part: Node, problems: Problems) -> Layout:
             problems.error(
                 part,
                 "uneven-rows",
-                f"row {number} has {_cells(len(row))}, the first row has {width}",
+                f"row {number} has {_cells(len(row))}, but the first row has {width}",
                 offset=row[0][1],
                 length=row[-1][1] + len(row[-1][0]) - row[0][1],
                 hint="every row needs the same number of cells; '.' is an empty cell",

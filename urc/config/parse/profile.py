@@ -34,7 +34,7 @@ def parse_setting(part: Node, problems: Problems) -> Setting:
             "secret-in-document",
             "a document must not contain a secret",
             key=True,
-            hint="remove 'default': the operator fills it in",
+            hint="remove 'default': the operator enters the secret",
         )
     is_required = part.flag("required", default=True)
     if not is_required and default_part is not None:
@@ -44,7 +44,7 @@ def parse_setting(part: Node, problems: Problems) -> Setting:
             "'required' has no effect with 'default': the setting is never empty",
             at="required",
             key=True,
-            hint="remove one of the two",
+            hint="remove one of the two keys",
         )
     setting = Setting(
         name=part.name,

@@ -110,7 +110,7 @@ def _asides(part: Node, problems: Problems, context: FormContext) -> Provisional
                 "wrong-order",
                 "'within' is shorter than the timeout of the reply",
                 at="within",
-                hint="'timeout' limits the wait for each reply, 'within' for all of them",
+                hint="'timeout' limits the wait for each reply, 'within' the wait for all replies",
             )
     resend = part.get("resend")
     if resend is not None and isinstance(resend.data, dict):

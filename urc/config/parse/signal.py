@@ -26,7 +26,7 @@ def parse_signal(part: Node, title: str, problems: Problems) -> Signal:
     _check_vector(part, kind, problems)
     low, high = check_range(part, element, problems)
     if part.name == "pi":
-        text, hint = "a signal cannot have the name 'pi'", "in expressions this name is the number"
+        text, hint = "a signal cannot have the name 'pi'", "in expressions, 'pi' means the number"
         problems.error(part, "bad-name", text, key=True, hint=hint)
     precision = part.integer("precision")
     if precision is not None and element != "number":
@@ -105,7 +105,7 @@ def _check_vector(part: Node, kind: str, problems: Problems) -> None:
                 f"'{key}' has no effect for {kind}",
                 at=key,
                 key=True,
-                hint=f"it needs 'type: {kinds[0]}'",
+                hint=f"this key needs 'type: {kinds[0]}'",
             )
 
 
@@ -159,7 +159,8 @@ def _deadband(
         problems.error(
             part,
             "out-of-range",
-            f"a change of {band:g} is impossible between {low:g} and {high:g}, so none would show",
+            f"a change of {band:g} is impossible between {low:g} and {high:g}, so no change would"
+            " show",
             at="deadband",
         )
     return band
@@ -184,7 +185,7 @@ def _formula(part: Node, problems: Problems) -> Template | None:
                 f"'{key}' has no effect for a computed signal",
                 at=key,
                 key=True,
-                hint="put it into the formula under 'value'",
+                hint="put the conversion into the formula under 'value'",
             )
     return problems.expression(inner)
 
@@ -198,10 +199,11 @@ def _check_hysteresis(part: Node, values: Mapping[str, float | None], problems: 
         problems.warn(
             part,
             "wide-hysteresis",
-            f"the alarm at {low:g} would end only at {low + width:g}, when that at {high:g} has"
-            " begun",
+            f"the alarm at {low:g} would end only at {low + width:g}, after the alarm at {high:g}"
+            " has started",
             at="hysteresis",
-            hint=f"make it smaller than {high - low:g}, the distance between the two",
+            hint=f"make the hysteresis smaller than {high - low:g}, the distance between the two"
+            " limits",
         )
 
 

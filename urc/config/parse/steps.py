@@ -56,8 +56,8 @@ def parse_steps(part: Node, context: StepContext, problems: Problems) -> tuple[s
         problems.error(
             part,
             "too-many-steps",
-            f"with all rounds of 'repeat' it has {most} steps;"
-            f" the limit is {sequence.MAX_STEPS_DONE}",
+            f"with all rounds of 'repeat', the sequence has {most} steps; the limit is"
+            f" {sequence.MAX_STEPS_DONE}",
             hint="make 'times' smaller",
         )
     return steps

@@ -152,7 +152,7 @@ def _message(part: Node, problems: Problems) -> Envelope:
     verb, inner = next((verb, one) for verb in _VERBS if (one := part.get(verb)) is not None)
     bodies = [key for key in _BODIES if key in inner.data]
     if len(bodies) > 1:
-        text = f"'{bodies[0]}' and '{bodies[1]}' are two bodies of one message"
+        text = f"'{bodies[0]}' and '{bodies[1]}' both define the body of one message"
         problems.error(inner, "two-forms", text, at=bodies[1], key=True)
     body: object = None
     for key in bodies:

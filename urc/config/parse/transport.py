@@ -98,9 +98,9 @@ def _backoff(part: Node | None, problems: Problems) -> Backoff:
         problems.error(
             part,
             "wrong-order",
-            "the first wait is longer than the longest wait",
+            "the first delay is longer than the longest delay",
             at="initial",
-            hint="'initial' is the first wait, 'max' the longest",
+            hint="'initial' is the first delay, and 'max' is the longest delay",
         )
     jitter = part.number("jitter")
     return Backoff(initial, longest, default.jitter if jitter is None else jitter)

@@ -26,9 +26,10 @@ def parse_widget(document: Document, problems: Problems) -> Widget:
         problems.error(
             part,
             "wrong-name",
-            f"the folder has the name {folder.absolute().name!r}, the widget {name!r}",
+            f"the folder has the name {folder.absolute().name!r}, but the widget has the name"
+            f" {name!r}",
             at="name",
-            hint="give both the same name",
+            hint="give the folder and the widget the same name",
         )
     size = part.get("size")
     smallest = [int(inner.data) for inner in size.listed("min")] if size else []

@@ -37,7 +37,7 @@ def check_answers(part: Node, driver: Driver, problems: Problems) -> None:
             problems.error(
                 inner,
                 "never-replies",
-                f"{driver.messages[name].transport!r} receives nothing: it has 'replies: never'",
+                f"{driver.messages[name].transport!r} receives nothing because of 'replies: never'",
                 key=True,
                 hint=_HINT,
             )
@@ -60,7 +60,7 @@ def _check_silence(
             problems.error(
                 inner,
                 "nothing-refuses",
-                "silence means success, and no error reply is declared",
+                "silence means success, but no error reply is declared",
                 at="silence",
                 key=True,
                 hint="write errors: with the error replies, or remove 'reply'",

@@ -59,15 +59,15 @@ def _check_line(part: Node, spec: TransportSpec, problems: Problems) -> None:
             part.must("keepalive").must("every"),
             "slow-keepalive",
             f"the watchdog of the robot runs out first, after {shown_duration(watchdog_s)}",
-            hint="half of that time allows for one lost frame",
+            hint="half of this time allows for one lost frame",
         )
     waits_s = sum(_wait_s(step) for step in all_steps(spec.on_close))
     if waits_s > _GOOD_BYE_S:
         problems.warn(
             part.must("on_close"),
             "long-on-close",
-            f"its waits take {shown_duration(waits_s)}, and the limit is"
-            f" {shown_duration(_GOOD_BYE_S)} in all",
+            f"the waits of these steps take {shown_duration(waits_s)}, but the limit is"
+            f" {shown_duration(_GOOD_BYE_S)} in total",
             key=True,
         )
 
@@ -89,8 +89,8 @@ def _check_baud(part: Node, driver: Driver, spec: TransportSpec, problems: Probl
         problems.warn(
             part,
             "too-many-polls",
-            f"the polls need {bytes_per_s * _BITS_OF_A_BYTE:.0f} bit/s or more, and the line"
-            f" carries {baud:g}",
+            f"the polls need {bytes_per_s * _BITS_OF_A_BYTE:.0f} bit/s or more, but the line"
+            f" carries only {baud:g}",
             at="baud",
         )
 
@@ -115,8 +115,8 @@ def _check_stages(
         problems.warn(
             part.must("stages"),
             "stages-block-line",
-            f"while it waits up to {shown_duration(longest_s)} for its last stage, the poll every"
-            f" {shown_duration(min(periods))} waits, too",
+            f"while this command waits up to {shown_duration(longest_s)} for its last stage, the"
+            f" poll every {shown_duration(min(periods))} also waits",
             key=True,
             hint="write queue: { in_flight: 2 } if the robot can reply in between",
         )
@@ -135,7 +135,7 @@ def _check_haste(part: Node, driver: Driver, name: str, problems: Problems) -> N
                 part.must("within"),
                 "verify-too-early",
                 f"{signal!r} is read only every {shown_duration(min(periods))}",
-                hint="give it more than one period, or poll more often",
+                hint="make 'within' longer than one period, or poll more often",
             )
 
 
@@ -148,9 +148,9 @@ def _check_poll(part: Node, poll: Poll, problems: Problems) -> None:
         problems.warn(
             part.must("offline").must("retry"),
             "retry-too-early",
-            f"an offline part is asked more often than an online part"
+            f"an offline part is polled more often than an online part"
             f" (every {shown_duration(poll.every_s)})",
-            hint="make it longer than 'every'",
+            hint="make 'retry' longer than 'every'",
         )
 
 

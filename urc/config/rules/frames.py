@@ -150,10 +150,10 @@ def _check_messages(part: Node, driver: Driver, problems: Problems) -> None:
                 problems.warn(
                     inner,
                     "ambiguous-frame",
-                    f"{other!r}, above, takes the same frames{shown}, so this one gets none"
-                    " of them",
+                    f"{other!r}, above, takes the same frames{shown}, so no frame reaches this"
+                    " declaration",
                     key=True,
-                    hint="put the more specific one first, or distinguish them by 'when'",
+                    hint="put the more specific declaration first, or distinguish both by 'when'",
                 )
                 break
         seen.append((name, message.transport, message.read, text))
@@ -234,15 +234,15 @@ def _check_refusals(part: Node, reply: Reply, problems: Problems) -> None:
                 else "the pattern matches an empty reply",
                 hint=f"match the start of {what}: '^ERR'"
                 if what == "an error"
-                else "match the start of such a frame",
+                else "match the start of the frame",
             )
         elif good is not None and _Text(pattern).takes_all_of(good):
             problems.warn(
                 inner,
                 "ambiguous-frame",
-                f"the reply on success matches it, such as {good.samples[0][:_SHOWN]!r}: it would"
-                f" count as {what}",
-                hint=f"make it match {whose} only; they are tried first",
+                f"the reply on success also matches, such as {good.samples[0][:_SHOWN]!r}, and"
+                f" would count as {what}",
+                hint=f"make the pattern match {whose} only; it is tried first",
             )
     _check_struct_refusals(part, reply, problems)
 
@@ -281,8 +281,9 @@ def _check_struct_refusals(part: Node, reply: Reply, problems: Problems) -> None
             problems.warn(
                 inner,
                 "ambiguous-frame",
-                "the reply on success matches it, and would count as an error",
-                hint="give 'when' a condition that holds for errors only; they are tried first",
+                "the reply on success also matches, and would count as an error",
+                hint="give 'when' a condition that is true only for errors, because errors are"
+                " tried first",
             )
 
 
@@ -308,7 +309,7 @@ def _check_empty(
             problems.warn(
                 place,
                 "matches-empty",
-                f"{name!r} may be empty here, and empty text is not a number",
+                f"{name!r} may be empty here, but empty text is not a number",
                 hint="write + instead of *, or not_available: [''] if empty means 'not known'",
                 **where,
             )
@@ -340,7 +341,7 @@ def _check_words(part: Node, problems: Problems) -> None:
                     code,
                     f"nothing uses the {noun} {name!r}",
                     key=True,
-                    hint="name it in a struct, or remove it",
+                    hint="use the name in a struct, or remove the declaration",
                 )
 
 

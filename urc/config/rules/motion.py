@@ -55,8 +55,8 @@ def check_motion(part: Node, driver: Driver, problems: Problems) -> None:
             "the loss of the robot would go unnoticed: no transport has 'stale_after',"
             " and no poll has a reply",
             key=True,
-            hint="give its transport stale_after: or add a poll with a reply, or"
-            " write replies: never if it never sends anything",
+            hint="give the transport stale_after: or add a poll with a reply, or write replies:"
+            " never if the robot never sends anything",
         )
     elif held:
         for name, spec in driver.transports.items():
@@ -78,7 +78,7 @@ def _check_freeze(one: tuple[Node, Command, Hold], spec: TransportSpec, problems
         f" {spec.name!r} has no liveness check",
         key=True,
         hint=f"give {spec.name!r} a stale_after: as short as the robot's traffic allows, or"
-        " replies: never if it never sends anything",
+        " replies: never if the robot never sends anything",
     )
 
 
@@ -90,7 +90,7 @@ def _check_line(part: Node, spec: TransportSpec | None, problems: Problems) -> N
             f"a held command needs an open connection, and {spec.name!r} opens one for each"
             " request",
             key=True,
-            hint="leave out 'connection: per_request', or send it over another transport",
+            hint="remove 'connection: per_request', or send the command over another transport",
         )
 
 
@@ -102,8 +102,8 @@ def _check_watchdog(part: Node, command: Command, hold: Hold, problems: Problems
             "unknown-watchdog",
             f"the robot's own watchdog after the last {command.name!r} is unknown",
             key=True,
-            hint="write watchdog: with the time in its manual, or watchdog: none if it never"
-            " stops itself",
+            hint="write watchdog: with the time from the manual, or watchdog: none if the robot"
+            " never stops itself",
         )
         return
     if hold.lease_s >= watchdog_s:
@@ -118,9 +118,10 @@ def _check_watchdog(part: Node, command: Command, hold: Hold, problems: Problems
         problems.error(
             part.must("repeat"),
             "repeat-too-slow",
-            f"it is repeated every {shown_duration(hold.repeat_s)}, and the robot stops itself"
-            f" after {shown_duration(watchdog_s)}: it would stutter",
-            hint="repeat it three times within the watchdog, so that one value may be lost",
+            f"the command is repeated every {shown_duration(hold.repeat_s)}, but the robot stops"
+            f" itself after {shown_duration(watchdog_s)}: the motion would stutter",
+            hint="repeat the command three times within the watchdog, so that one value may be"
+            " lost",
         )
 
 
@@ -129,16 +130,15 @@ def _check_step(part: Node, hold: Hold, step_s: float, problems: Problems) -> No
         problems.error(
             part.must("repeat"),
             "step-backlog",
-            f"it is repeated every {shown_duration(hold.repeat_s)}, and a step takes"
-            f" {shown_duration(step_s)}: steps would pile up in the robot, and move it after the"
-            " release",
-            hint="repeat it at the rate of the steps, or make the steps smaller",
+            f"the command is repeated every {shown_duration(hold.repeat_s)}, but a step takes"
+            f" {shown_duration(step_s)}: a backlog of steps would move the robot after the release",
+            hint="repeat the command at the rate of the steps, or make the steps smaller",
         )
     if step_s > LONG_LEASE_S:
         problems.warn(
             part.must("step"),
             "long-step",
-            f"the robot moves on for {shown_duration(step_s)} after the release",
+            f"the robot keeps moving for {shown_duration(step_s)} after the release",
             hint="make the steps smaller or faster: a step cannot be interrupted",
         )
 
@@ -148,7 +148,8 @@ def _check_lease(part: Node, hold: Hold, problems: Problems) -> None:
         problems.warn(
             part.must("lease"),
             "long-lease",
-            f"the robot moves on for {shown_duration(hold.lease_s)} after its operator is lost",
+            f"the robot keeps moving for {shown_duration(hold.lease_s)} after the connection to"
+            " its operator is lost",
             hint=f"{shown_duration(0.25)} is usual, and {shown_duration(LONG_LEASE_S)} is long",
         )
 
@@ -188,8 +189,8 @@ def _check_will(
         "motion-without-will",
         f"if the connection to the broker is lost, nothing ends {command.name!r}",
         key=True,
-        hint=f"give {spec.name!r} a will: with the topic and payload of its stop: the"
-        " broker publishes it then",
+        hint=f"give {spec.name!r} a will: with the topic and payload of the stop, which the broker"
+        " publishes in this case",
     )
 
 

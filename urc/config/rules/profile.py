@@ -48,7 +48,7 @@ def _check_name(sources: Sources, problems: Problems) -> None:
         problems.warn(
             sources.root,
             "name-mismatch",
-            f"the robot has the name {name!r}, and its file {file.name!r}",
+            f"the robot has the name {name!r}, but its file has the name {file.name!r}",
             at="name",
             hint=f"write name: {file.stem}, or rename the file to {name}{file.suffix}",
         )
@@ -62,9 +62,8 @@ def _check_unused(sources: Sources, driver: Driver, uses: NameUses, problems: Pr
                 "never-set",
                 f"nothing sets the signal {name!r}",
                 key=True,
-                hint=f"capture it in a reply or message, such as (?P<{name}>…) in a"
-                f" 'regex', {{{name}}} in a 'pattern', or 'u16be {name}' in a 'struct', or compute"
-                " it with 'value'",
+                hint=f"set the signal by (?P<{name}>…) in a 'regex', {{{name}}} in a 'pattern',"
+                f" 'u16be {name}' in a 'struct', or a formula under 'value'",
             )
     for name, part in sources.driver.named("transports").items():
         if name not in uses.transports:
@@ -78,7 +77,7 @@ def _check_unused(sources: Sources, driver: Driver, uses: NameUses, problems: Pr
                 "unused-setting",
                 f"nothing uses the setting {name!r}",
                 key=True,
-                hint=f"write {{{{ settings.{name} }}}} at the place for it",
+                hint=f"write {{{{ settings.{name} }}}} in place of the value",
             )
 
 

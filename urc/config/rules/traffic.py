@@ -26,9 +26,9 @@ def check_traffic(part: Node, driver: Driver, problems: Problems) -> None:
             problems.warn(
                 inner.must("every"),
                 "too-many-polls",
-                f"it is polled {1 / poll.every_s:g} times a second, and {poll.run!r} may be sent"
-                f" {rate:g} times",
-                hint="poll more slowly, or raise its 'rate_limit'",
+                f"the command is polled {1 / poll.every_s:g} times a second, but {poll.run!r} may"
+                f" be sent only {rate:g} times",
+                hint="poll more slowly, or raise the command's 'rate_limit'",
             )
     _check_counted(part, driver, problems)
     _check_ports(part, driver, problems)
@@ -57,8 +57,8 @@ def _check_counted(part: Node, driver: Driver, problems: Problems) -> None:
                 "uncounted",
                 f"{transport!r} counts the unread bytes of the robot, and no reply shows"
                 " when it has read these bytes",
-                hint="give it the 'reply' of the robot, or priority: realtime if the"
-                " robot does not buffer it",
+                hint="add the 'reply' of the robot, or priority: realtime if the robot does not"
+                " buffer the command",
             )
 
 
@@ -77,8 +77,9 @@ def _check_ports(part: Node, driver: Driver, problems: Problems) -> None:
             problems.warn(
                 inner.must(key),
                 "same-port",
-                f"{seen[place]!r} listens on {place[1]}, too, and only one transport can",
-                hint="give each its own port, or use one transport and distinguish the messages",
+                f"{seen[place]!r} also listens on {place[1]}, but only one transport can",
+                hint="give each transport its own port, or use one transport and distinguish the"
+                " messages",
             )
         seen.setdefault(place, name)
 
@@ -98,7 +99,7 @@ def _check_kept(part: Node, command: Command, problems: Problems) -> None:
         problems.error(
             part.must("publish"),
             "motion-kept",
-            f"{command.name!r} moves the robot, and with this {key} it {what}",
+            f"{command.name!r} moves the robot, but with '{key}' the command {what}",
             at=key,
             key=True,
             hint=f"remove '{key}': late motion moves a robot without an operator",
@@ -118,9 +119,9 @@ def _check_pace(part: Node, command: Command, spec: TransportSpec, problems: Pro
             problems.warn(
                 part.must("repeat"),
                 "hold-rate-limited",
-                f"it is repeated every {shown_duration(repeat_s)}, and {what} allows it every"
-                f" {shown_duration(limit_s)}",
-                hint="make 'repeat' at least as long",
+                f"the command is repeated every {shown_duration(repeat_s)}, but {what} allows it"
+                f" only every {shown_duration(limit_s)}",
+                hint="make 'repeat' at least as long as this time",
             )
 
 
@@ -147,5 +148,5 @@ def _check_silence(part: Node, spec: TransportSpec, driver: Driver, problems: Pr
                 "slow-keepalive",
                 f"the line {what} after {shown_duration(limit_s)}, but the robot is polled every"
                 f" {shown_duration(min(periods))}",
-                hint="make it at least two periods, so that one reply may be lost",
+                hint="allow at least two periods, so that one reply may be lost",
             )

@@ -44,11 +44,11 @@ _MOVING_TYPES: Final = _words(
 _QUANTITIES: Final = {"speed": "a speed", "rotation": "a rotation"}
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _HINT: Final = (
-    "write hold: { … } for motion by hand, moves: true if it goes on, stop: true if"
-    " it ends motion, or moves: false if nothing moves"
+    "write hold: { … } for manual motion, moves: true for autonomous motion, stop: true for a"
+    " stop, or moves: false for no motion"
 )
 _HINT_OF_STEPS: Final = (
-    "write steps: [ … ] with moves: true if the motion goes on, or moves: false if nothing moves"
+    "write steps: [ … ] with moves: true for autonomous motion, or moves: false for no motion"
 )
 
 
@@ -89,8 +89,8 @@ def check_unguarded(part: Node, driver: Driver, problems: Problems) -> None:
                     f"{name!r} starts autonomous motion: STOP has no command to end it,"
                     " and it needs no confirmation",
                     key=True,
-                    hint="mark the command that ends it with stop: true, or add 'confirm' to"
-                    " this one if the robot has no such command",
+                    hint="mark the command that ends the motion with stop: true; if the robot has"
+                    " no stop, add 'confirm' to this command",
                 )
 
 

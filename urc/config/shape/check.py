@@ -134,7 +134,7 @@ def _without_kind(document: Document) -> Problem:
             (),
             "wrong-type",
             "a document must be a mapping of keys to values",
-            hint="it starts with 'urc: 1' and 'kind: robot'",
+            hint="a document starts with 'urc: 1' and 'kind: robot'",
         )
     if "kind" not in data:
         near = {"knd", "type", "kinds"} & data.keys()

@@ -52,7 +52,7 @@ _SAME_TYPES: Final = {
 _URL: Final = re.compile(r"[a-z]+://(?P<host>[^/:?#]+)(?::(?P<port>[0-9]+))?(?P<path>/[^?#]+)?")
 _FRAMING: Final = "framing: { type: delimiter, tx: LF, rx: LF }"
 _ELSEWHERE: Final = {
-    ("reply_to", "leaves"): "polls run at their times here, and 'feed' gives their replies",
+    ("reply_to", "leaves"): "polls run automatically in these steps; 'feed' gives their replies",
     ("signal", "command"): "bind an input to the name of a signal, such as level: battery;"
     " only an output takes 'command'",
 }
@@ -74,7 +74,7 @@ def key_hint(key: str, known: Mapping[str, Any], value: object = None, path: Pat
         return _place_hint(value, known)
     others = [word for word in _OTHER_WORDS.get(key, ()) if word in known]
     if others:
-        return f"the key is '{others[0]}' here"
+        return f"use the key '{others[0]}'"
     return did_you_mean(key, known, "keys")
 
 
@@ -94,7 +94,7 @@ def word_hint(word: str, words: Sequence[str]) -> str:
     """Return a hint with the known word that an unknown word probably means, or ""."""
     other = _SAME_TYPES.get(word.lower(), "")
     if other in words:
-        return f"the word is '{other}' here"
+        return f"use the word '{other}'"
     near = did_you_mean(word, words)
     return near if near.startswith("did you") else ""
 
@@ -143,7 +143,7 @@ def type_hint(
 ) -> str:
     """Return a hint for the conversion of a value to one of `types`, or ""."""
     if value is None:
-        return "give it a value, or remove the key"
+        return "give the key a value, or remove the key"
     if is_duration and isinstance(value, (int, float)) and not isinstance(value, bool):
         return f"write the unit: {value}s, or {value}ms"
     if "string" in types and isinstance(value, (bool, int, float)):

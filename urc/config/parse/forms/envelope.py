@@ -56,7 +56,7 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
         return None
     url = attributes.get("url")
     if isinstance(url, Template) and any(not name.startswith("_") for name in url.names):
-        text = "'url' must be one field from the robot, such as _next, and nothing else"
+        text = "'url' must consist of one field from the robot, such as _next"
         hint = "put arguments and settings into 'path' or 'query', which stay on this server"
         problems.error(part.must("url"), "wrong-form", text, hint=hint)
         return None

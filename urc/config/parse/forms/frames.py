@@ -16,9 +16,9 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
         problems.error(
             part,
             "many-frames",
-            "several frames of one command are sent together, and here each is a message of"
-            " its own",
-            hint="write a command for each, or a 'framing' where the line is a stream",
+            "several frames of one command are sent together, but each frame is a separate"
+            " message on this transport",
+            hint="write a command for each frame, or declare a 'framing' if the line is a stream",
         )
         return None
     frames: list[WriteSpec] = []
@@ -28,11 +28,11 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
         if found is None:
             return None
         if found.form == "envelope":
-            text = "this frame is a message of its own, and cannot be sent together with others"
-            problems.error(item, "many-frames", text, hint="write a command for each")
+            text = "this frame is a separate message, and cannot be sent together with other frames"
+            problems.error(item, "many-frames", text, hint="write a command for each frame")
         elif COUNTERS in found.names:
-            text = "a frame with a counter cannot be sent together with others"
-            problems.error(item, "many-frames", text, hint="write a command for each")
+            text = "a frame with a counter cannot be sent together with other frames"
+            problems.error(item, "many-frames", text, hint="write a command for each frame")
         frames.append(found)
     return WriteSpec(
         "frames",

@@ -76,7 +76,7 @@ def _expression(part: Node, text: str, offset: int, problems: Problems) -> Templ
         problems.error(
             part,
             "no-width",
-            f"{shown!r} does not give its size in bytes",
+            f"{shown!r} does not define its size in bytes",
             offset=offset + len(text) - len(text.lstrip()),
             length=len(shown),
             hint=f"end it with a filter: {{{{ {plain} | u8 }}}}, u16be, f32le, hexbytes, utf8 …",

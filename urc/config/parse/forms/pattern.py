@@ -54,7 +54,7 @@ def _parse(text: str) -> tuple[tuple[PatternField, ...], str]:
             literal += piece[0][0]
         elif piece[1] is None:
             hint = "write {{ or }} for a brace of the frame"
-            raise _Fault(f"{piece[0]!r} is not closed or not opened", piece.start(), hint=hint)
+            raise _Fault(f"{piece[0]!r} has no matching brace", piece.start(), hint=hint)
         else:
             # Before a field of fixed width, blanks are counted.
             is_fixed = piece[1].rpartition(":")[2].isdecimal()

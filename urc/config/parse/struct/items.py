@@ -75,7 +75,9 @@ class ItemParser:
             found.append(item)
             total += weight_of(item)
             if total > MOST_ITEMS:
-                text = f"it has more than {MOST_ITEMS} items, including those of its types"
+                text = (
+                    f"the struct has more than {MOST_ITEMS} items, including the items of its types"
+                )
                 self.problems.error(inner, "wrong-size", text)
                 return ()
         self._check_rest(part, found)
@@ -89,8 +91,8 @@ class ItemParser:
                 self.problems.error(
                     part.items()[place + 1],
                     "after-rest",
-                    "the item before it takes the rest of the frame",
-                    hint="give that item a size, or put it last",
+                    "the previous item takes the rest of the frame",
+                    hint="give the previous item a size, or put it last",
                 )
 
     def _item(self, part: Node) -> Item | None:
@@ -229,7 +231,7 @@ class ItemParser:
         if item.kind == "packed":
             return item
         if least_size((item._replace(times=None, condition=None),)) == 0:
-            text = "each of its items must take at least one byte"
+            text = "each item of an array must take at least one byte"
             self.problems.error(part, "bad-item", text, at="count")
             return None
         return item
@@ -290,12 +292,12 @@ class ItemParser:
             return
         words = [word for _, word in subject.enum]
         if isinstance(key, str) and subject.number.kind == "integer" and key not in words:
-            text = f"{key!r} is no value of {subject.id!r}"
-            hint = f"its words: {', '.join(words)}" if words else "it has only numbers"
+            text = f"{key!r} is not a value of {subject.id!r}"
+            hint = f"its words: {', '.join(words)}" if words else "the item has only numbers"
             self.problems.error(part, "unknown-word", text, key=True, hint=hint)
         elif isinstance(key, int) and key in dict(subject.enum):
             word = dict(subject.enum)[key]
-            text = f"{subject.id!r} has the word {word!r} for this value, never {key}"
+            text = f"{subject.id!r} has the word {word!r} for this value, not {key}"
             self.problems.error(part, "unknown-word", text, key=True, hint=f"write {word}:")
         elif isinstance(key, int) and subject.number.kind == "integer":
             check_fits(part, subject.number, key, self.problems, key=True)

@@ -83,7 +83,7 @@ class LeafParser:
             self.problems.error(
                 part.must("bits"),
                 "wrong-size",
-                f"the bits take {widths} in all, and {named.data} has {number.bits}",
+                f"the bits take {widths} in total, but {named.data} has {number.bits}",
                 hint="declare reserved bits with { width: … }" if widths < number.bits else "",
             )
             return None
@@ -130,10 +130,13 @@ def parse_content(part: Node, item: Item, encoding: str, problems: Problems) -> 
         problems.error(
             part,
             "misplaced-key" if key else "missing-key",
-            "'size' and 'until' both define its end" if key else "'size' or 'until' is missing",
+            "'size' and 'until' both define the end of the item"
+            if key
+            else "'size' or 'until' is missing",
             at=key,
             key=True,
-            hint="'size: 8', 'size: u8' for a length before it, 'size: rest', or 'until: NUL'",
+            hint="write 'size: 8', 'size: u8' for a preceding length, 'size: rest', or 'until:"
+            " NUL'",
         )
         return None
     is_fixed = item.size is not None and item.size.kind == "fixed"

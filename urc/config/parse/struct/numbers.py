@@ -176,7 +176,7 @@ def _enum(part: Node, problems: Problems) -> Enum:
             problems.error(inner, "duplicate-name", text, key=True)
         elif word in words:
             text = f"another number has the word {word!r}"
-            hint = "give each number its own word, so that a word stands for one number"
+            hint = "give each number its own word"
             problems.error(inner, "duplicate-name", text, hint=hint)
         found[raw] = word
         words.add(word)

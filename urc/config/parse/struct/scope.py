@@ -54,7 +54,7 @@ class Scope:
     def check_name(self, part: Node, name: str) -> None:
         """Report an id that is reserved, or not a valid name."""
         if name in FRAME_NAMES or number_of(name) is not None or name == "settings":
-            self._problems.error(part, "bad-name", f"{name!r} has another meaning here")
+            self._problems.error(part, "bad-name", f"{name!r} is a reserved name")
         elif name and not (name.isidentifier() and name.isascii() and name == name.lower()):
             text = f"{name!r} is not a valid item name"
             hint = "use lower-case letters, digits and underscores"
