@@ -1,1 +1,1 @@
-"""Decoding and encoding of bytes, without I/O and without a clock."""
+"""Protocol engine: decoding and encoding of bytes, without I/O or a clock."""

@@ -1,7 +1,7 @@
 """The engine: the synchronous state machine of one driver.
 
 Pure: no I/O, no clock, no callbacks, no tasks. The owner of a transport reports events with their
-times, and performs the returned events. Live robots, document tests, playback and the simulator
+time, and executes the returned events. Live robots, document tests, playback and the simulator
 share this engine.
 
     events = engine.start("wire", now)            # the transport is connected
@@ -12,13 +12,13 @@ share this engine.
     events = engine.finish(now)                   # close in order; each connection ends with a
         `Close`
 
-A returned `Close` means that the engine has discarded that connection. Close it, and do not report
-it by `closed`.
+A returned `Close` means that the engine has discarded the connection. The owner must close the
+connection, without calling `closed`.
 
 Theory of operation. Conversations, polls, commands and sequences do not call each other. A
-conversation returns internal events in its list: a request has `ExchangeEnded`, an expected frame
-was `Matched`, or the conversation is `ConnectionClosing`. `_settle` removes these events, informs
-the owners, and advances the sequences, until only events for the outside remain.
+conversation also returns internal events: `ExchangeEnded` for a finished request, `Matched` for an
+expected frame, and `ConnectionClosing`. `_settle` removes the internal events, informs the owners,
+and advances the sequences, until only external events remain.
 """
 
 from collections.abc import Mapping, Sequence
@@ -74,18 +74,20 @@ __all__ = ["Engine"]
 _PLAIN = frozenset(
     (Send, Violation, Open, Ready, Replied, Failed, NumbersUsed, MotionReady, MotionRefused)
 )
-"""Events that the engine passes on without acting."""
+"""Types of the events that the engine returns unchanged."""
 
 
 class Engine:
-    """A running driver. Not re-entrant; every method returns a list of events.
+    """The protocol state machine of one driver.
+
+    Methods return lists of events, and are not re-entrant.
 
     Args:
-        driver: as loaded; its patterns and templates are already compiled.
-        settings: value of every setting of the profile.
-        fresh: sources of time and randomness for sent frames; fixed ones for tests.
-        is_compiled: generate a function for each message and command. Worthwhile in live sessions,
-            but not in short document tests.
+        driver: a loaded driver, with compiled patterns and templates.
+        settings: values of all settings of the profile, by name.
+        fresh: sources of time and randomness for sent frames; fixed sources for tests.
+        is_compiled: whether to generate a function for each message and command. Generated
+            functions save time in live sessions, but not in short document tests.
 
     Raises:
         BadArgument: a constant frame contains its own delimiter, or cannot be encoded.
@@ -134,13 +136,13 @@ class Engine:
         self._is_begun = False
         self._is_timed = self._schedule.keeps_alive or self.readings.is_timed
         self._is_watched = needs_readings(driver)
-        """Whether any condition reads the latest samples."""
+        """Whether any condition or formula needs the newest samples."""
 
     # -- methods
 
     @property
     def deadline(self) -> float | None:
-        """Latest time for the next `tick`; minus infinity before the first call."""
+        """Time for the next `tick`; minus infinity before the first call, None for never."""
         if not self._is_begun:
             return float("-inf")
         first: float | None = None
@@ -160,7 +162,7 @@ class Engine:
 
     @property
     def calm_s(self) -> float:
-        """Minimum delay to any deadline that received data or a command may set, in seconds."""
+        """Minimum delay until any new deadline after received data or a command, in seconds."""
         return self._calm_s
 
     def start(self, transport: str, now: float) -> list[Event]:
@@ -187,7 +189,7 @@ class Engine:
         return self._settle(events, now) + self._submit_polls(now)
 
     def closed(self, transport: str, reason: str, now: float) -> list[Event]:
-        """Record that `transport` is not connected, or that connecting failed."""
+        """Record that `transport` is disconnected, or that connecting failed."""
         line = self.lines[transport]
         events = line.closed(reason, now)
         self._down(line, reason or "the robot closed the connection")
@@ -198,7 +200,7 @@ class Engine:
         return self._settle(self.lines[transport].receive(data, now), now)
 
     def command(self, request: Request, now: float) -> list[Event]:
-        """Run a command. Exactly one `Replied` or `Failed` reports the end of the command."""
+        """Run a command; exactly one `Replied` or `Failed` reports the outcome."""
         asked, people = ReplySink(request), request.confirmed_by
         events = self.run(request.command, request.arguments, asked, now, confirmed_by=people)
         return self._settle(events, now)
@@ -222,9 +224,9 @@ class Engine:
         return told + self._submit_polls(now)
 
     def latch(self, reason: str, now: float) -> list[Event]:
-        """End every sequence, and refuse autonomous motion; "" allows it again.
+        """Stop every sequence, and refuse autonomous motion until the reason is "".
 
-        Login sequences continue: without them, no stop would reach the robot.
+        Login sequences continue, because a stop can reach the robot only after the login.
         """
         self.known.latch(reason)
         if not reason:
@@ -235,7 +237,7 @@ class Engine:
         return self._settle([], now)
 
     def finish(self, now: float) -> list[Event]:
-        """Close every connection in order: each ends with a `Close`, after `GOOD_BYE_S` at most."""
+        """Close all connections in an orderly way, each with a `Close` within `GOOD_BYE_S`."""
         events: list[LineEvent] = []
         self._schedule.stop()
         for line in self.lines.values():
@@ -258,9 +260,9 @@ class Engine:
         confirmed_by: tuple[str, ...] = (),
         unless: Unless | None = None,
     ) -> list[LineEvent]:
-        """Run a command or sequence; its outcome goes to `sink`, exactly once.
+        """Run a command or sequence, and report the outcome to `sink` exactly once.
 
-        The command is not sent once `unless` returns a reason.
+        The command is not sent if `unless` returns a reason.
         """
         found = self._commands.get(command)
         if found is None:
@@ -313,7 +315,7 @@ class Engine:
     # -- handling of internal events
 
     def _settle(self, events: list[LineEvent], now: float) -> list[Event]:
-        """Act on the internal events; return the events for the outside."""
+        """Handle all internal events; return the external events."""
         told: list[Event] = []
         pending = events
         while True:
@@ -333,7 +335,7 @@ class Engine:
                 return told
 
     def _act(self, event: LineEvent, told: list[Event], now: float) -> None:
-        """Act on one event; append the resulting outside events to `told`."""
+        """Handle one event; append the resulting external events to `told`."""
         if type(event) in _PLAIN:
             told.append(event)  # type: ignore[arg-type]  # events for the outside
         elif isinstance(event, ExchangeEnded):
@@ -360,7 +362,7 @@ class Engine:
                 runner.check_conditions(now)
 
     def _advance(self, now: float) -> list[LineEvent]:
-        """Advance the sequences until all of them wait."""
+        """Advance all sequences until every sequence waits."""
         pending: list[LineEvent] = []
         for runner in tuple(self._runners):
             pending += runner.advance(now)
@@ -381,7 +383,7 @@ class Engine:
         )
 
     def _down(self, line: Conversation, reason: str) -> None:
-        """End everything that was started on a lost connection."""
+        """Stop the sequences and polls of a lost connection."""
         name = line.spec.name
         for runner in self._runners:
             uses = name in runner.program.transports and not line.is_per_request
@@ -390,7 +392,7 @@ class Engine:
         self._schedule.down(line)
 
     def _submit_polls(self, now: float) -> list[Event]:
-        """Submit the due polls and keepalives."""
+        """Submit the polls and keepalives that are due."""
         told: list[Event] = []
         for events in self._schedule.submit_due(self.run, now):
             told += self._settle(events, now)

@@ -1,4 +1,4 @@
-"""Input and output events of an engine: its only interface to the outside."""
+"""Input and output events of an engine, its only external interface."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -25,15 +25,15 @@ __all__ = [
 
 
 class Request(NamedTuple):
-    """One command to run. Exactly one `Replied` or `Failed` answers each request."""
+    """A request to run a command, answered by exactly one `Replied` or `Failed`."""
 
     id: int
     command: str
     arguments: Mapping[str, Reading] = NOTHING
     confirmed_by: tuple[str, ...] = ()
-    """People who have confirmed the command, including the person who requested it."""
+    """Names of the people who have confirmed the command, including the requester."""
     on_sent: Callable[[Payload], None] | None = None
-    """Callback for each sent payload, except secret ones and those of sequences."""
+    """Callback for each sent payload, except for secrets and sequences."""
 
 
 class Open(NamedTuple):
@@ -43,40 +43,40 @@ class Open(NamedTuple):
 
 
 class Send(NamedTuple):
-    """Send these bytes, framing included, or this envelope."""
+    """Send bytes, including framing, or an envelope."""
 
     transport: str
     data: Payload
     is_secret: bool = False
-    """Whether its text must not be shown or logged."""
+    """Whether `data` contains a secret, and must not be shown or logged."""
     counted: CountedFrame | None = None
-    """The same frame with its counters, on a connection that the guard shares."""
+    """The frame with its counter numbers, for a connection shared with the guard."""
 
 
 class Close(NamedTuple):
-    """Close this transport; the engine has discarded its connection."""
+    """Close this transport; the engine has already discarded the connection."""
 
     transport: str
     reason: str = ""
-    """Reason of a failure; "" for the normal end of a per-request connection."""
+    """Reason for a failure; "": normal end of a per-request connection."""
 
 
 class Ready(NamedTuple):
-    """The login has succeeded: all requests may be sent."""
+    """The login has succeeded, so all requests may be sent."""
 
     transport: str
 
 
 class Samples(NamedTuple):
-    """Samples of frames received together, in order, each with its computed signals."""
+    """Samples of frames that were received together, in order and including computed signals."""
 
     transport: str
-    """Name of the transport; "" when an alarm began without a frame."""
+    """Name of the transport; "" for an alarm that began without a frame."""
     samples: tuple[Sample, ...]
 
 
 class Replied(NamedTuple):
-    """The request has succeeded. `values` are the fields of the reply by name."""
+    """The request has succeeded; `values` has the reply fields by name."""
 
     id: int
     command: str
@@ -84,44 +84,44 @@ class Replied(NamedTuple):
 
 
 class Failed(NamedTuple):
-    """The request has ended without success."""
+    """The request has failed."""
 
     id: int
     command: str
     code: str
-    """``timed-out``, ``refused``, ``disconnected``, ``bad-argument``, ``queue-full``, ``at-work``,
-    ``unknown-command``, ``superseded``, ``not-allowed``, ``not-confirmed``,
-    ``not-verified``, ``failed``."""
+    """Failure code: ``timed-out``, ``refused``, ``disconnected``, ``bad-argument``, ``queue-full``,
+    ``at-work``, ``unknown-command``, ``superseded``, ``not-allowed``, ``not-confirmed``,
+    ``not-verified`` or ``failed``."""
     message: str
 
 
 class Violation(NamedTuple):
-    """A protocol violation on the wire: counted and shown, never raised."""
+    """A protocol violation by the robot, which is counted and shown but never raised."""
 
     transport: str
     code: str
-    """``frame-too-long``, ``no-match``, ``bad-value``, ``bad-text``, ``cut-frame``,
-    ``reply-timeout``, ``late-reply``, ``refused``, ``bad-argument``, ``silent``, ``failed``."""
+    """Violation code: ``frame-too-long``, ``no-match``, ``bad-value``, ``bad-text``, ``cut-frame``,
+    ``reply-timeout``, ``late-reply``, ``refused``, ``bad-argument``, ``silent`` or ``failed``."""
     message: str
 
 
 class NumbersUsed(NamedTuple):
-    """Counters of this line advanced: the stop frames rendered so far have used numbers.
+    """The counters of this connection advanced, so rendered stop frames may have outdated numbers.
 
-    The event occurs only on lines whose counters are shared with motion (`MotionEncoder.share`).
+    The event occurs only on connections with counters shared with motion (`MotionEncoder.share`).
     """
 
     transport: str
 
 
 class MotionReady(NamedTuple):
-    """This line of held commands is connected, and its start-up steps are done."""
+    """A connection for held commands is open, and its login is complete."""
 
     transport: str
 
 
 class MotionRefused(NamedTuple):
-    """The robot refuses a held command."""
+    """The robot has refused a held command."""
 
     transport: str
     command: str
@@ -129,5 +129,5 @@ class MotionRefused(NamedTuple):
 
 
 MotionEvent = NumbersUsed | MotionReady | MotionRefused
-"""Events for the controller of held commands."""
+"""Events for the motion controller."""
 Event = Open | Send | Close | Ready | Samples | Replied | Failed | Violation | MotionEvent

@@ -1,1 +1,1 @@
-"""Python source, generated from a driver and compiled at load."""
+"""Generation and compilation of Python source from a driver."""

@@ -1,8 +1,8 @@
-"""Functions generated from source text, once per declaration, with readable tracebacks.
+"""Construction of functions from generated source text, with readable tracebacks.
 
 The callers of `function_of` build the source from fixed names and from the `repr()` of constants.
-No other text of a document enters the source. `linecache` holds the source during the lifetime of
-the function, so that a traceback shows the generated line.
+No other text of a document enters the source. `linecache` keeps the source during the lifetime of
+the function, so tracebacks show the generated lines.
 """
 
 import weakref
@@ -18,13 +18,13 @@ _numbers = count(1)
 def function_of(
     name: str, arguments: str, lines: Sequence[str], scope: Mapping[str, object]
 ) -> Callable[..., Any]:
-    """Return the function whose body is `lines`.
+    """Return a function with the body `lines`.
 
     Args:
         name: name of the function, a Python identifier.
-        arguments: parameter list, as in a ``def``.
-        lines: lines of the body, indented by at least four blanks.
-        scope: global names of the function.
+        arguments: parameter list of the function, as in ``def``.
+        lines: lines of the function body, indented by at least four spaces.
+        scope: global variables of the function, by name.
     """
     import linecache  # what is made is made late, so that what makes it is imported late
 

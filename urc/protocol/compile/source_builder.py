@@ -1,7 +1,7 @@
-"""Builder for the source text of a generated struct function.
+"""Builder of the source text of a generated struct function.
 
-Pure. WARNING: the lines are compiled and run. The lines may contain only text of this package, the
-`repr()` of a constant, or a name made by `SourceBuilder.bind`; never text of a document.
+Pure. WARNING: the source is compiled and run. The source may contain only text of this package, the
+`repr()` of constants, and names from `SourceBuilder.bind`, but no text of a document.
 """
 
 from collections.abc import Callable
@@ -15,11 +15,11 @@ BUILTINS = {"bytes": bytes, "int": int, "len": len, "round": round, "type": type
 
 
 class SourceBuilder:
-    """A function under construction."""
+    """Source text of a function under construction."""
 
     def __init__(self) -> None:
         self.scope: dict[str, Any] = dict(BUILTINS)
-        """Global names of the function."""
+        """Global variables of the function, by name."""
         self.lines: list[str] = []
 
     def bind(self, word: str, value: object) -> str:

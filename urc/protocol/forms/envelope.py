@@ -1,7 +1,7 @@
-"""The form of envelopes: publish, call, goal, request.
+"""The form of envelopes: publish, call, goal and request.
 
-Pure. An envelope has an address (attributes) and a body. Another form writes the body. JSON stays
-data, because such transports have an encoding of their own.
+Pure. An envelope has an address (attributes) and a body. Another form writes the body. JSON bodies
+stay data, because each transport for messages has its own encoding.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,18 +26,18 @@ _UP: Final = (".", "..")
 class _Piece(NamedTuple):
     template: Template
     is_value: bool
-    """Whether it is an argument, and not part of the document or its settings."""
+    """Whether the piece contains an argument, and not only text or settings."""
 
 
 class PathTemplate:
-    """Writes an address: the path of a request, or a topic.
+    """A writer for addresses: paths of requests, and names of topics, services and actions.
 
-    A value is one segment of its address and cannot redirect it. A value that is the whole address
-    may have several segments. Settings are as trusted as the document.
+    A value is one segment of the address, so a value cannot redirect the request. A value for the
+    whole address may have several segments. Settings are as trusted as the document.
     """
 
     def __init__(self, pieces: tuple[_Piece, ...], written: Callable[[str, bool], str]) -> None:
-        """Initialise with `pieces`; `written` converts a value, which may be the whole address."""
+        """Initialise with `pieces`; `written(value, is_whole)` checks and converts a value."""
         self._pieces = pieces
         self._written = written
 
@@ -54,11 +54,11 @@ class PathTemplate:
 
 
 def place_writer(name: str, tree: object) -> PathTemplate | None:
-    """Return the writer of the attribute `name`; None if it needs no check.
+    """Return the writer of the attribute `name`; None for an attribute without restrictions.
 
     Args:
-        name: ``path``, ``topic`` …
-        tree: the compiled attribute.
+        name: name of the attribute, such as ``path`` or ``topic``.
+        tree: compiled value of the attribute.
     """
     written = _WRITTEN.get(name)
     if written is None or not isinstance(tree, Template) or tree.names <= _SETTINGS:
@@ -71,7 +71,7 @@ def place_writer(name: str, tree: object) -> PathTemplate | None:
 
 
 def _path(text: str, is_whole: bool) -> str:
-    """Return a value as a part of a path."""
+    """Return a value in the form for a URL path."""
     parts = text.split("/") if is_whole else [text]
     if any(part in _UP for part in parts):
         raise NotWritable(f"{quoted(text)} would lead to another path")
@@ -79,7 +79,7 @@ def _path(text: str, is_whole: bool) -> str:
 
 
 def _name(text: str, is_whole: bool, *, what: str) -> str:
-    """Return a value as a part of the name of a topic, a service or an action."""
+    """Return a value in the form for the name of a topic, service or action."""
     for sign in (*_WILD, *(() if is_whole else ("/",))):
         if sign in text:
             raise NotWritable(
@@ -95,13 +95,13 @@ _WRITTEN: Final[Mapping[str, Callable[[str, bool], str]]] = {
 
 
 _ADDRESS: Final = ("topic", "service", "action", "method", "path", "url", "query")
-"""Attributes that identify an envelope; all others are delivery options."""
+"""Attributes that identify an envelope; all other attributes are delivery options."""
 _TEXTS: Final = ("query", "headers")
-"""Mappings whose values are text on the wire."""
+"""Attributes with mappings of text values."""
 
 
 class EnvelopeWriter:
-    """Writes an envelope, or reads one back into the values of its names."""
+    """A writer for envelopes, which also reads the values back from an envelope."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._verb = cast("str", spec.options["verb"])
@@ -129,7 +129,7 @@ class EnvelopeWriter:
         return Envelope(self._verb, attributes, self._body and self._body.write(namespace))
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the values of the names, or None for another envelope."""
+        """Return the values by name; None for an envelope that does not match."""
         envelope = frame.payload
         if not isinstance(envelope, Envelope) or envelope.verb != self._verb:
             return None
@@ -153,7 +153,7 @@ class EnvelopeWriter:
         return None if said is None else {**found, **said}
 
     def _is_here(self, tree: Any, value: Any, found: dict[str, object]) -> bool:
-        """Return whether `value` matches `tree`; add the values of its names to `found`."""
+        """Return whether `value` matches `tree`; add the values by name to `found`."""
         if isinstance(tree, Mapping):
             if not isinstance(value, Mapping) or tree.keys() != value.keys():
                 return False

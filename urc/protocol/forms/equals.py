@@ -13,23 +13,23 @@ __all__ = ["AnyReader", "EqualsReader", "RawReader", "SilenceReader"]
 
 
 class SilenceReader:
-    """Matches no frame: the robot stays silent on success, and the timeout is the reply."""
+    """A reader that matches no frame, for robots that stay silent on success."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         """Ignore both arguments: the form has no options."""
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return None: any frame is another frame."""
+        """Return None, because no frame matches."""
 
 
 class EqualsReader:
-    """Matches exactly one frame."""
+    """A reader that matches exactly one frame."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._payload = encoded(cast("str", spec.options["text"]), context.encoding)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return no fields for that frame, or None for any other."""
+        """Return no fields for the expected frame, and None for any other frame."""
         return NOTHING if frame.payload == self._payload else None
 
     def write(self, fields: Mapping[str, object]) -> Payload:
@@ -38,7 +38,7 @@ class EqualsReader:
 
 
 class AnyReader:
-    """Matches every frame, for replies whose content is irrelevant."""
+    """A reader that matches every frame, for replies with irrelevant content."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         """Ignore both arguments: the form has no options."""
@@ -53,18 +53,18 @@ class AnyReader:
 
 
 class RawReader:
-    """Reads every frame of bytes as one field."""
+    """A reader that returns every frame of bytes as one field."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._field = cast("str", spec.options["field"])
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the bytes of the frame; None for a message without bytes."""
+        """Return the bytes of the frame as a field; None for a message without bytes."""
         payload = frame.payload
         return {self._field: payload} if isinstance(payload, bytes) else None
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return the bytes of the field; raise `NotWritable` for any other value."""
+        """Return the bytes of the field; raise `NotWritable` if the value is not bytes."""
         value = fields.get(self._field)
         if not isinstance(value, bytes):
             raise NotWritable(f"{self._field}: expected bytes, found {quoted(value)}")

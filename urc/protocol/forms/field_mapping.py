@@ -1,6 +1,6 @@
 """Field conversions of one frame, ``set`` and ``when``.
 
-Pure. The reader wraps the reader of the form, in both directions.
+Pure. The reader wraps the reader of the form for reading and writing.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ __all__ = ["ShapedReader"]
 
 
 class ShapedReader:
-    """Reads by the form, converts the fields, checks ``when``, and adds the values of ``set``."""
+    """A reader that converts the fields of a form, checks ``when``, and adds values of ``set``."""
 
     def __init__(self, inner: PayloadReader, spec: ReadSpec, context: CodecContext) -> None:
         self._inner = inner
@@ -36,7 +36,7 @@ class ShapedReader:
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields, or None for another kind of frame."""
+        """Return the fields; None for a frame that does not match."""
         raw = self._inner.read(frame)
         if raw is None:
             return None
@@ -72,7 +72,7 @@ class ShapedReader:
             return False  # it reads a field of another frame
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return a frame that reads as `fields`, except for those of ``set``."""
+        """Return a frame with `fields`, except for the fields of ``set``."""
         raw: dict[str, object] = {}
         for name, value in fields.items():
             if name in self._sets:
@@ -89,7 +89,7 @@ class ShapedReader:
 
 
 def _without_value(error: ExpressionError, operands: list[object]) -> Unusable | None:
-    """Return the result of a failed expression: the first unusable operand, None, or the error."""
+    """Return the result of a failed expression: an unusable operand, None, or the error."""
     for operand in operands:
         if isinstance(operand, Unusable):
             return operand

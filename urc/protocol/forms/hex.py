@@ -1,4 +1,4 @@
-"""The forms ``hex`` and ``bytes``: constant bytes with expressions between them."""
+"""The forms ``hex`` and ``bytes``: constant bytes and expressions."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -16,7 +16,7 @@ _PLAIN = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*(?:\|\s*([a-z0-9]+)\s*)?")
 
 
 class BytesWriter:
-    """Writes concatenated pieces; reads back the pieces that are a name with a width."""
+    """A writer for concatenated pieces, which also reads back names with a fixed width."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._pieces = cast("tuple[bytes | Template, ...]", spec.options["pieces"])
@@ -53,7 +53,7 @@ class BytesWriter:
         )
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the values of pieces like ``{{ name | u16be }}``, or None for another frame."""
+        """Return the values of pieces such as ``{{ name | u16be }}``; None for no match."""
         data, at = frame.payload, 0
         if not isinstance(data, bytes):
             return None
@@ -85,7 +85,7 @@ class BytesWriter:
         return found if at == len(data) else None
 
     def _end(self, data: bytes, at: int, place: int) -> int:
-        """Return the end of a piece of variable size: the next constant, or the end of data."""
+        """Return the end of a variable-size piece: the next constant, or the end of the data."""
         for piece in self._pieces[place + 1 :]:
             if isinstance(piece, bytes):
                 return data.find(piece, at)

@@ -1,6 +1,6 @@
-"""Status and headers of an HTTP response, as fields.
+"""Status and headers of an HTTP response as fields.
 
-Pure. The reader wraps the reader of the body, in both directions.
+Pure. The reader wraps the reader of the body for reading and writing.
 """
 
 from collections.abc import Mapping
@@ -13,11 +13,11 @@ from urc.protocol.values.payload import Frame, NotWritable, PayloadReader
 __all__ = ["LOCATION", "STATUS", "HeadReader", "is_redirect"]
 
 STATUS: Final = "status"
-"""Name of the status among the headers."""
+"""Name of the status in the header declarations."""
 _REDIRECTS: Final = 3
 """First digit of redirect statuses."""
 LOCATION: Final = "location"
-"""Header with the target of a redirect."""
+"""Header with the target URL of a redirect."""
 
 
 def is_redirect(frame: Frame) -> bool:
@@ -27,7 +27,10 @@ def is_redirect(frame: Frame) -> bool:
 
 
 class HeadReader:
-    """Reads the status and headers, and delegates the body. A missing header gives no field."""
+    """A reader for the status and headers, with another reader for the body.
+
+    Fields of missing headers are omitted.
+    """
 
     def __init__(self, reader: PayloadReader, spec: ReadSpec) -> None:
         self._reader = reader
@@ -47,7 +50,7 @@ class HeadReader:
         return {**found, **{field: value for field, value in head.items() if value is not None}}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return the response that reads as `fields`; raise `NotWritable`."""
+        """Return the response with `fields`; raise `NotWritable` if impossible."""
         body = self._reader.write({k: v for k, v in fields.items() if k not in self._head})
         if not isinstance(body, bytes):
             raise NotWritable("only an HTTP response has a status and headers")

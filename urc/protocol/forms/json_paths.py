@@ -1,10 +1,11 @@
-"""The form ``json`` for reading: fields of a document, found by paths.
+"""The form ``json`` for reading: fields at paths in a document.
 
-Theory of operation. Plain paths become `msgspec` types with a member for each step of a path. The
+Theory of operation. Plain paths become `msgspec` types with one member for each path step. The
 decoder of `msgspec` skips everything else, and a generated function picks the fields
-(`urc.protocol.compile.source`). If a document has another structure, that decoder raises an error;
-the document is then decoded whole and walked step by step. JMESPath always uses the second way.
-Both ways give the same fields for the same document.
+(`urc.protocol.compile.source`). The decoder raises an error for a document with another structure.
+The document is then decoded completely, and the paths are followed step by step. JMESPath
+expressions always need complete decoding. Both methods return the same fields for the same
+document.
 """
 
 import json
@@ -25,7 +26,7 @@ _Find = Callable[[Any], object]
 
 
 class JsonReader:
-    """Reads the values at the paths; writes a document with values at the paths."""
+    """A reader for the values at paths, which also writes documents with values at paths."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         paths = cast("Mapping[str, object]", spec.options["paths"])
@@ -43,7 +44,7 @@ class JsonReader:
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the found fields, or None for no fields or an invalid document."""
+        """Return the fields found; None for an invalid document or one without fields."""
         if self.pick is not None and isinstance(frame.payload, bytes):
             try:
                 return self.pick(frame.payload)
@@ -60,7 +61,7 @@ class JsonReader:
         return {name: value for name, value in found.items() if value is not _MISSING} or None
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return a document with `fields` at their paths."""
+        """Return a JSON document with `fields` at their paths."""
         root: dict[str, Any] = {}
         for name in fields.keys() & self._finders.keys() - self._paths.keys():
             raise NotWritable(f"{name}: a search in a document cannot be inverted")
@@ -121,7 +122,7 @@ def _searcher(expression: Any) -> _Find:
 
 
 def _put(root: dict[str, Any], path: JsonPath, value: object) -> None:
-    """Set the value at `path`, creating the parents."""
+    """Set the value at `path`, creating missing parents."""
     holder: Any = root
     for step, after in zip(path, (*path[1:], None), strict=True):
         if isinstance(step, int):

@@ -1,4 +1,4 @@
-"""The form ``json`` for sending: JSON text, with typed values in the places of templates."""
+"""The form ``json`` for sending: JSON text with typed values in place of templates."""
 
 import json
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ __all__ = ["JsonWriter", "filled", "matches"]
 
 
 class JsonWriter:
-    """Writes a value as compact JSON; reads back the leaves that are plain names or counters."""
+    """A writer for compact JSON, which also reads back the values of plain names and counters."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._tree: Any = spec.options["tree"]
@@ -41,17 +41,17 @@ class JsonWriter:
             raise NotWritable("JSON has no infinite number and no not-a-number") from None
 
     def value(self, namespace: Mapping[str, object]) -> object:
-        """Return the data of `write`; raise `NotWritable` or `ExpressionError`."""
+        """Return the data before encoding; raise `NotWritable` or `ExpressionError`."""
         value = filled(self._tree, namespace)
         self._text(value)
         return value
 
     def completed(self, value: object) -> object:
-        """Return a ROS message with zeros for missing members, as a bridge reads it."""
+        """Return a ROS message with zeros for missing members, like a ROS bridge."""
         return _completed(self._tree, value)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the values in the places of plain names, or None when the rest differs."""
+        """Return the values of plain names; None if the rest of the document differs."""
         payload = frame.payload
         try:
             value = payload.body if isinstance(payload, Envelope) else json.loads(frame.text)
@@ -62,7 +62,7 @@ class JsonWriter:
 
 
 def filled(tree: Any, namespace: Mapping[str, object]) -> Any:
-    """Return `tree` with its templates evaluated."""
+    """Return `tree` with all templates evaluated."""
     if isinstance(tree, Template):
         return tree.evaluate(namespace)
     if isinstance(tree, dict):

@@ -1,4 +1,4 @@
-"""Generated types for a set of paths, and the function that picks the fields.
+"""Generated types for a set of JSON paths, and a function that extracts the fields.
 
 Private to `urc.protocol.forms.json_paths`.
 """
@@ -15,20 +15,20 @@ from urc.protocol.compile.source import function_of
 __all__ = ["ExtractionPlan", "PathNode", "build_pick", "plan_of"]
 
 _LISTS_TO = 64
-"""Largest array index that is decoded by type; longer arrays are rarely needed."""
+"""Maximum array index for typed decoding; higher indices are rarely needed."""
 
 
 class _Shape:
-    """The required type at one place of the document."""
+    """The required type of the value at one path of the document."""
 
     def __init__(self) -> None:
         self.names: dict[str, _Shape] = {}
         self.element: _Shape | None = None
-        """Shape of all elements of an array."""
+        """Type of all elements of an array; None for a value that is not an array."""
         self.is_leaf = False
 
     def below(self, step: str | int) -> "_Shape":
-        """Return the shape after one step, created if missing."""
+        """Return the shape after one path step, creating a missing shape."""
         if isinstance(step, str):
             return self.names.setdefault(step, _Shape())
         if self.element is None:
@@ -36,7 +36,7 @@ class _Shape:
         return self.element
 
     def is_plain(self) -> bool:
-        """Return whether the shape has a single type, at every level."""
+        """Return whether the shape has a single type at every level."""
         kinds = self.is_leaf + bool(self.names) + (self.element is not None)
         inner = [*self.names.values(), *([self.element] if self.element else [])]
         return (
@@ -47,11 +47,11 @@ class _Shape:
 
 
 class PathNode:
-    """The fields at one place, and the steps from it."""
+    """The fields at one path, and the next steps of longer paths."""
 
     def __init__(self, shape: _Shape) -> None:
         self.shape = shape
-        """Shape at the place."""
+        """Required type of the value at this path."""
         self.fields: list[str] = []
         self.steps: dict[str | int, PathNode] = {}
 
@@ -60,21 +60,22 @@ class ExtractionPlan(NamedTuple):
     """The plan for extracting the fields of some paths from a document."""
 
     decode: Callable[[bytes], Any]
-    """Decode a document; raises `msgspec.DecodeError` for another structure."""
+    """Function that decodes a document, or raises `msgspec.DecodeError` for another structure."""
     want: PathNode
 
     def access(self, want: PathNode, step: str | int) -> str:
-        """Return the source text that accesses `step` of a place."""
+        """Return the source text for accessing `step` of a value."""
         if isinstance(step, int):
             return f"[{step}]"
         return f".f{list(want.shape.names).index(step)}"
 
     def picking(self, variable: str, begin: Callable[[str], str]) -> Iterator[str]:
-        """Yield lines that take the present fields out of `variable`.
+        """Yield source lines that extract all available fields from `variable`.
 
         Args:
-            variable: the decoded value.
-            begin: returns the text before the value of a field; "" skips the field.
+            variable: name of the variable with the decoded value.
+            begin: function that returns the source text before the value of a field; "" skips the
+                field.
         """
         yield from self._picking(self.want, variable, "    ", begin)
 
@@ -103,7 +104,7 @@ class ExtractionPlan(NamedTuple):
 
 
 def plan_of(paths: Mapping[str, JsonPath]) -> ExtractionPlan | None:
-    """Return the plan, or None if types cannot express the paths."""
+    """Return the plan; None if types cannot express the paths."""
     shape = _Shape()
     want = PathNode(shape)
     for name, path in paths.items():
@@ -121,7 +122,7 @@ def plan_of(paths: Mapping[str, JsonPath]) -> ExtractionPlan | None:
 
 
 def build_pick(plan: ExtractionPlan) -> Callable[[bytes], dict[str, object] | None]:
-    """Return the function from bytes to found fields.
+    """Return a function that extracts the fields found in a document.
 
     The function raises `msgspec.DecodeError` for a document of another structure.
     """

@@ -1,7 +1,7 @@
 """The form ``pattern``: literal text with typed fields.
 
-A pattern becomes a regular expression with linear running time by construction: every repeat is
-possessive, over characters that cannot follow it.
+A pattern becomes a regular expression with linear run time. Every repeat is possessive, over
+characters that cannot follow the repeat.
 """
 
 import re
@@ -18,7 +18,7 @@ from urc.protocol.values.text_values import encoded, field_text
 __all__ = ["CASTS", "PatternReader", "pattern_source"]
 
 _BLANK: Final = r"\s\x1c-\x1f"
-"""ASCII characters that `split` and `float` of Python treat as blanks."""
+"""ASCII characters that Python's `split` and `float` treat as blanks."""
 _SOURCES: Final[Mapping[FieldKind, str]] = {
     "integer": r"[+-]?[0-9]{1,400}+",
     "number": r"[+-]?(?:(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?:[eE][+-]?[0-9]++)?"
@@ -43,23 +43,23 @@ _FILLERS: Final[Mapping[FieldKind, object]] = {"integer": 0, "number": 0, "hex":
 
 
 class PatternReader:
-    """Reads typed fields from text, and writes text with the values of the fields."""
+    """A reader for typed fields in text, which also writes text with field values."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._holes = cast("tuple[PatternField, ...]", spec.options["holes"])
         self._tail = cast("str", spec.options["tail"])
         self._start = _start(self._holes, self._tail)
-        """First literal word; "" if it is unknown."""
+        """First literal word of the pattern; "": unknown."""
         self._match: Callable[[str], re.Match[str] | None] | None = None
-        """Regular expression, compiled on first use: a driver has many patterns, a test needs
-        few."""
+        """Regular expression of the pattern. Compilation waits for the first use, because a test
+        needs few of a driver's patterns."""
         self._casts = [
             (place, hole.name, _cast_of(hole))
             for place, hole in enumerate(self._holes, 1)
             if hole.name
         ]
         self._words = _words(self._holes, self._tail)
-        """Words of the pattern, if it consists of whole words and needs no regular expression."""
+        """Words of a pattern of whole words; None for a pattern that needs a regular expression."""
         self._has_widths = any(hole.width for hole in self._holes)
         self._encoding = context.encoding
 
@@ -102,7 +102,7 @@ class PatternReader:
 
 
 def _words(holes: tuple[PatternField, ...], tail: str) -> list[str | PatternField] | None:
-    """Return the literal words and the fields, or None when a field is only part of a word."""
+    """Return the literal words and the fields; None if a field is only part of a word."""
     words: list[str | PatternField] = []
     for place, hole in enumerate(holes):
         before = hole.before.lstrip() if place == 0 else hole.before
@@ -123,7 +123,7 @@ def _words(holes: tuple[PatternField, ...], tail: str) -> list[str | PatternFiel
 
 
 def _by_words(words: list[str | PatternField], found: list[str]) -> dict[str, object] | None:
-    """Return the fields of a text that consists of these words, or None for another text."""
+    """Return the fields of a text with these words; None if the text does not match."""
     if len(found) != len(words):
         return None
     fields: dict[str, object] = {}
@@ -140,14 +140,14 @@ def _by_words(words: list[str | PatternField], found: list[str]) -> dict[str, ob
 
 
 def _start(holes: tuple[PatternField, ...], tail: str) -> str:
-    """Return the first literal word of a pattern; "" if it begins with a field."""
+    """Return the first literal word of a pattern; "" for a pattern that begins with a field."""
     if holes and holes[0].width:
         return ""
     return (holes[0].before if holes else tail).lstrip().partition(" ")[0]
 
 
 def pattern_source(holes: tuple[PatternField, ...], tail: str) -> str:
-    """Return the regular expression of a pattern, with a group for each field."""
+    """Return the regular expression of a pattern, with one group for each field."""
     befores = [hole.before for hole in holes]
     pieces = [] if holes and holes[0].width else [rf"[{_BLANK}]*+"]
     for place, hole in enumerate(holes):
@@ -176,7 +176,7 @@ def _field(kind: FieldKind, after: str) -> str:
 
 
 def _cast_of(hole: PatternField) -> Callable[[str], object]:
-    """Return the function from text to value; an empty column has no value."""
+    """Return a function that converts text to a value, and the text of an empty column to None."""
     cast_to = CASTS[hole.kind]
     if not hole.width:
         return cast_to

@@ -1,4 +1,4 @@
-"""The form ``regex``: a pattern whose named groups are the fields."""
+"""The form ``regex``: a pattern with fields as named groups."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final, cast
@@ -12,26 +12,26 @@ from urc.protocol.values.text_values import encoded, field_text
 __all__ = ["RegexReader"]
 
 _WIDEST: Final = 16
-"""Longest respelt number, in characters."""
+"""Maximum length of a number in alternative spellings, in characters."""
 _PLACES: Final = 6
 
 
 class RegexReader:
-    """Reads text by a pattern; writes the shortest matching text."""
+    """A reader for text with a pattern, which also writes the shortest matching text."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._pattern = cast("Pattern", spec.options["pattern"])
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the named groups, without those that did not take part in the match."""
+        """Return the named groups that participated in the match, by name."""
         found = self._pattern.search(frame.text)
         if found is None:
             return None
         return {name: text for name, text in found.items() if text is not None}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return text with `fields` in the places of the groups."""
+        """Return a matching text with `fields` as groups."""
         texts = {name: self._text(name, value) for name, value in fields.items()}
         text = example(self._pattern, texts)
         found = self._pattern.search(text)
@@ -40,7 +40,7 @@ class RegexReader:
         return encoded(text, self._encoding)
 
     def _text(self, name: str, value: object) -> str:
-        """Return a field as its group requires it: with leading zeros or fixed decimals."""
+        """Return a field in the spelling that its group requires, such as leading zeros."""
         text = field_text(value)
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not is_number or len(text) > _WIDEST or name not in self._pattern.groups:
@@ -55,7 +55,7 @@ class RegexReader:
 
 
 def _padded(text: str) -> Iterator[str]:
-    """Yield other spellings of a number: with leading zeros, a sign, more or fewer decimals."""
+    """Yield other spellings of a number: leading zeros, a sign, more or fewer decimals."""
     own = len(text.partition(".")[2])
     number = float(text)
     for places in (*range(own, -1, -1), *range(own + 1, _PLACES + 1)):

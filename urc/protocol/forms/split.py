@@ -12,7 +12,7 @@ __all__ = ["KeyvalueReader", "SplitReader"]
 
 
 class SplitReader:
-    """Reads values by their position. An empty part means "not available"."""
+    """A reader for values by position. An empty part means "not available"."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         options = spec.options
@@ -21,11 +21,11 @@ class SplitReader:
         self._has_more = bool(options["has_more"])
         self._strip = cast("str | None", options["strip"])
         self._tail = cast("str", options.get("tail", ""))
-        """Name of the field for all remaining parts; "" for none."""
+        """Name of the field for all remaining parts; "": no such field."""
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the parts by name, or None for a wrong number of parts."""
+        """Return the parts by name; None for a wrong number of parts."""
         return self._read(frame.text)
 
     def _read(self, text: str) -> dict[str, object] | None:
@@ -41,7 +41,7 @@ class SplitReader:
         }
 
     def _with_tail(self, parts: list[str]) -> dict[str, object] | None:
-        """Return the parts, with all from the last name on in one list."""
+        """Return the parts by name, with all remaining parts as a list under the last name."""
         first, strip = len(self._names) - 1, self._strip
         if len(parts) < first:
             return None
@@ -53,7 +53,7 @@ class SplitReader:
         return found
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return the joined parts; a missing one becomes empty, or a dash."""
+        """Return the joined parts; a missing part becomes empty text or a dash."""
         filler = "" if self._by else "-"
         names = self._names[:-1] if self._tail else self._names
         parts = [field_text(fields.get(name)) or filler for name in names]
@@ -71,7 +71,7 @@ class SplitReader:
 
 
 class KeyvalueReader:
-    """Reads values by their key. An empty value means "not available"."""
+    """A reader for values by key. An empty value means "not available"."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         options = spec.options
@@ -79,12 +79,12 @@ class KeyvalueReader:
         self._separator = cast("str", options["separator"])
         self._names = dict(cast("Mapping[str, str]", options["keys"]))
         self._first = cast("tuple[str, ...]", options.get("first", ()))
-        """Names of the leading parts that are not pairs."""
+        """Names of the leading parts, which are not key-value pairs."""
         self._strip = cast("str | None", options.get("strip"))
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the values of the known keys, or None when no key is known."""
+        """Return the values of the known keys; None if no key is known."""
         return self._read(frame.text)
 
     def _read(self, text: str) -> dict[str, object] | None:
@@ -105,7 +105,7 @@ class KeyvalueReader:
         return found or None
 
     def _bare(self, pairs: list[str]) -> dict[str, object] | None:
-        """Remove and return the leading parts; None when a pair is among them."""
+        """Remove and return the leading parts; None if a leading part is a pair."""
         parts = [part for part in pairs if part.strip(self._strip)]
         front = parts[: len(self._first)]
         if len(front) < len(self._first) or any(self._separator in part for part in front):
@@ -115,7 +115,7 @@ class KeyvalueReader:
         return {name: part.strip(self._strip) for name, part in named if name}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return the pairs of the given fields."""
+        """Return the key-value pairs of `fields`, joined."""
         keys = {name: key for key, name in self._names.items()}
         texts = {keys[name]: field_text(value) for name, value in fields.items() if name in keys}
         pairs = [field_text(fields.get(name)) or "-" for name in self._first]

@@ -1,7 +1,7 @@
-"""Tables of the forms, in both directions, and the construction of readers and writers.
+"""Tables of the forms for reading and writing, and the construction of readers and writers.
 
 Pure. A row of `READERS` or `WRITERS` is a factory ``(spec, context) -> reader`` (or writer). Each
-engine calls it once; `urc.protocol.values.payload` has the interfaces.
+engine calls the factory once. The interfaces are in `urc.protocol.values.payload`.
 """
 
 from urc.model.payload import ReadSpec, WriteSpec

@@ -16,11 +16,11 @@ _NAME = re.compile(
     r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*"
     r"(?:\|\s*(?:fixed|round|int|float|string|pad|trim|join)\s*(?:\([^()]*\))?\s*)*"
 )
-"""A name with formatting filters only, so that its value can be read back."""
+"""A name with only formatting filters, so the value can be read back."""
 
 
 class TextWriter:
-    """Writes a rendered template; reads one back if its expressions are plain names."""
+    """A writer for rendered templates, which also reads back the values of plain names."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._template = cast("Template", spec.options["template"])
@@ -36,10 +36,10 @@ class TextWriter:
             raise NotWritable(f"{quoted(wrong)} cannot be written in {self._encoding}") from None
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the text in the places of the plain names.
+        """Return the text at the positions of plain names, by name; None for an unexpected text.
 
-        The number of a counter has the key ``seq.NAME``. If a field could end in several places, it
-        ends at the first.
+        The number of a counter has the key ``seq.NAME``. A field ends at the first possible
+        position.
         """
         try:
             text = frame.text
@@ -76,10 +76,10 @@ class TextWriter:
 
 
 class _Piece(NamedTuple):
-    """A field and the literal text after it; the first piece has no field."""
+    """A field and the following literal text; the first piece has no field."""
 
     name: str
-    """Name of the field; "" if it is unknown."""
+    """Name of the field; "": unknown."""
     literal: str
 
 

@@ -1,7 +1,7 @@
-"""Topics and subscriptions of a driver on a transport that carries messages.
+"""Topics and subscriptions of a driver on a transport for messages.
 
-Pure. A topic may have wildcards as in MQTT (version 5.0, section 4.7): ``+`` stands for one level,
-``#`` at the end for all following levels.
+Pure. A topic may have MQTT wildcards (version 5.0, section 4.7): ``+`` for one level, and ``#`` at
+the end for all following levels.
 """
 
 import re
@@ -22,9 +22,9 @@ FEEDBACK = "/feedback"
 
 
 class TopicReader:
-    """Reads the messages of one topic by another form.
+    """A reader for the messages of one topic, using the reader of another form.
 
-    With wildcards, the field ``_topic`` has the actual topic.
+    For a topic with wildcards, the field ``_topic`` has the actual topic.
     """
 
     def __init__(self, reader: PayloadReader, spec: ReadSpec, context: CodecContext) -> None:
@@ -34,7 +34,7 @@ class TopicReader:
         self._is_plain = not _WILD.search(self._topic)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields, or None for another topic or another kind of message."""
+        """Return the fields; None for another topic, or a message that does not match."""
         topic = frame.topic
         if topic != self._topic if self._is_plain else topic is None or not self._fits(topic):
             return None
@@ -42,7 +42,7 @@ class TopicReader:
         return found if found is None or self._is_plain else {**found, "_topic": topic}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return the message that reads as `fields`; raise `NotWritable`."""
+        """Return a message with `fields`; raise `NotWritable` if impossible."""
         topic = str(fields.get("_topic") or _WILD.sub("x", self._topic))
         if not self._fits(topic):
             raise NotWritable(f"{topic!r} is not a topic of {self._topic!r}")
@@ -54,7 +54,7 @@ _WILD = re.compile(r"(?<![^/])[+#](?![^/])")
 
 
 def matches(topic: str) -> Callable[[str], bool]:
-    """Return the function that tells whether a name matches `topic`, wildcards included."""
+    """Return a function that checks whether a name matches `topic`, including wildcards."""
     if not _WILD.search(topic):
         return lambda name: name == topic
     levels = topic.split("/")
@@ -95,9 +95,9 @@ def frame_of(payload: Payload, encoding: str) -> Frame:
 def listened(
     driver: Driver, transport: str, settings: Mapping[str, object]
 ) -> dict[str, Mapping[str, Value]]:
-    """Return topic → subscription options, for all topics of a driver on a transport.
+    """Return the subscription options of a driver on a transport, by topic.
 
-    For repeated topics, the first options take precedence, and later ones add missing keys.
+    For repeated topics, the first options take precedence, and later options add missing keys.
     """
     topics: dict[str, dict[str, Value]] = {}
     for read in _reads(driver, transport):

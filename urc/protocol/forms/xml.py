@@ -1,7 +1,7 @@
-"""The form ``xml``: fields of a document, found by element paths.
+"""The form ``xml``: fields at element paths in a document.
 
 The form uses the parser of the standard library. A document with a document type declaration is
-rejected before parsing: entities cannot expand, and external resources are never loaded.
+rejected before parsing. Entities therefore cannot expand, and external resources are never loaded.
 """
 
 from collections.abc import Iterator, Mapping
@@ -21,14 +21,14 @@ _MAX_DEPTH = 100
 
 
 class XmlReader:
-    """Reads texts and attributes; writes a document with these values."""
+    """A reader for element texts and attributes, which also writes documents with such values."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._paths = dict(cast("Mapping[str, XmlPath]", spec.options["paths"]))
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields found, or None for no fields or an invalid document."""
+        """Return the fields found; None for an invalid document or one without fields."""
         return self._read(frame.text)
 
     def _read(self, text: str) -> dict[str, object] | None:
@@ -43,7 +43,7 @@ class XmlReader:
         return found or None
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return a document with `fields` in their places."""
+        """Return an XML document with `fields` at their paths."""
         root: ElementTree.Element | None = None
         for name, value in fields.items():
             path = self._paths.get(name)
@@ -83,7 +83,7 @@ def _parsed(text: str) -> ElementTree.Element | None:
 
 
 def _local(tag: object) -> str:
-    """Return a name without its namespace, which ElementTree writes as ``{namespace}name``."""
+    """Return an ElementTree name ``{namespace}name`` without the namespace."""
     return tag.rpartition("}")[2] if isinstance(tag, str) else ""
 
 

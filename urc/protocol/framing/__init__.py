@@ -1,1 +1,1 @@
-"""All framings, one module per family; each is imported on first use."""
+"""All framings, with one module per family that is imported on first use."""

@@ -1,13 +1,13 @@
 """Interfaces and shared code of the framings.
 
-Pure. Each framing works in both directions, so that the emulated robot uses the same declaration
+Pure. Each framing works in both directions, so an emulated robot can use the same declaration
 (`reversed`).
 
 Theory of operation. A decoder removes frames from the front of a `ReceiveBuffer`, one per call.
-Remaining bytes stay in the buffer, so that another decoder can continue when a reply has its own
-framing. Memory is bounded: the buffer never exceeds the longest frame. Time is linear: bytes are
-scanned once, or again only within a `RescanBudget`. After invalid bytes the decoder reports one
-violation, and continues where the next frame may begin.
+Remaining bytes stay in the buffer, so another decoder can continue if a reply has a different
+framing. Memory is bounded: the buffer never exceeds the maximum frame size. Time is linear: bytes
+are scanned once, and rescanned only within a `RescanBudget`. After invalid bytes, the decoder
+reports one violation, and continues at the next possible start of a frame.
 """
 
 from collections.abc import Callable
@@ -32,92 +32,92 @@ __all__ = [
 ]
 
 SKIPPED: Final = ""
-"""Code of a frame that is dropped silently; only a `switch` sees it."""
+"""Code of a frame that is dropped silently, for use by a `switch`."""
 Open = Callable[[bytes], bytes]
 
 
 class FramingError(UrcError):
-    """A payload that this framing cannot carry."""
+    """The framing cannot encode the payload."""
 
 
 class FrameFault(NamedTuple):
-    """Bytes that are not a valid frame."""
+    """A violation: received bytes that are not a valid frame."""
 
     code: str
-    """``frame-too-long``, ``bad-checksum``, ``no-frame`` …"""
+    """Code of the violation: ``frame-too-long``, ``bad-checksum``, ``no-frame`` …"""
     message: str
     closes: bool = False
-    """Whether the connection must be closed."""
+    """Whether the violation closes the connection."""
 
 
 class Decoder(Protocol):
-    """Cuts one stream. Each connection has a new decoder, without old data."""
+    """A decoder that cuts one byte stream into frames. Each connection has a new decoder."""
 
     @property
     def pending(self) -> int:
-        """Buffered bytes of an incomplete frame."""
+        """Number of buffered bytes of an incomplete frame."""
 
     @property
     def deadline(self) -> float | None:
-        """Time at which `tick` may complete a frame; None when only bytes can."""
+        """Time at which `tick` may complete a frame; None if only received bytes can."""
 
     def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
-        """Append bytes and return the completed frames, in order."""
+        """Append received bytes; return the completed frames and violations in order."""
 
     def push(self, data: bytes, now: float = 0.0) -> None:
-        """Append bytes for `next`."""
+        """Append received bytes for `next` to decode."""
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Remove one frame or violation from the stream and return it; None if incomplete."""
+        """Remove and return the next frame or violation; return None if incomplete."""
 
     def tick(self, now: float) -> list[bytes | FrameFault]:
-        """Return the frames that the silence until `now` has completed."""
+        """Return the frames and violations that silence until `now` has completed."""
 
 
 class Framing(Protocol):
-    """One method of cutting frames, with its options."""
+    """A framing method with its options."""
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame; raise `FramingError` if it would be ambiguous."""
+        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
-        """Return a new decoder for the bytes in `stream` and all that follow."""
+        """Return a new decoder for the bytes in `stream` and all later bytes."""
 
     def reversed(self) -> "Framing":
-        """Return the same framing for the other end of the connection."""
+        """Return the framing for the other end of the connection."""
 
 
 class StreamDecoder:
-    """Shared code of the decoders. A subclass adds `next`."""
+    """Base class of the decoders. A subclass implements `next`."""
 
     def __init__(self, stream: ReceiveBuffer | None, max_bytes: int) -> None:
         self._stream = ReceiveBuffer() if stream is None else stream
         self._max_bytes = max_bytes
         self._is_lost = False
-        """Whether the bytes since the last frame are invalid, which is reported once."""
+        """Whether the bytes since the last frame are invalid; invalid bytes are reported once."""
         self._is_case = False
-        """Whether a `switch` chooses a case after each frame."""
+        """Whether the decoder is a case of a `switch`."""
 
     @property
     def pending(self) -> int:
-        """Bytes held back."""
+        """Number of buffered bytes of an incomplete frame."""
         return len(self._stream)
 
     @property
     def deadline(self) -> float | None:
-        """Always None, because only bytes complete a frame."""
+        """None, because only received bytes complete a frame."""
         return None
 
     def push(self, data: bytes, now: float = 0.0) -> None:
-        """Append bytes for `next`."""
+        """Append received bytes for `next` to decode."""
         self._stream.push(data)
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Return one frame or violation, or None if incomplete."""
+        """Remove and return the next frame or violation; return None if incomplete."""
         raise NotImplementedError
 
     def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
-        """Append bytes and return the completed frames, in order."""
+        """Append received bytes; return the completed frames and violations in order."""
         self.push(data, now)
         frames: list[bytes | FrameFault] = []
         while (frame := self.next(now)) is not None:
@@ -125,22 +125,22 @@ class StreamDecoder:
         return frames
 
     def tick(self, now: float) -> list[bytes | FrameFault]:
-        """Return an empty list: silence completes no frames."""
+        """Return an empty list, because silence completes no frame."""
         return []
 
     def restart(self) -> None:
-        """Reset the state: a `switch` begins a frame of this case here."""
+        """Reset the state for a new frame, selected by a `switch`."""
         self._is_lost = False
         self._is_case = True
 
     def _refused(self, error: BadFrame) -> FrameFault | None:
-        """Return the violation for an invalid frame, or None if it is dropped silently."""
+        """Return the violation for an invalid frame; None for a frame that is dropped silently."""
         if error.code == SKIPPED and not self._is_case:
             return None
         return FrameFault(error.code, str(error), error.closes)
 
     def _before(self, mark: bytes) -> int:
-        """Return the number of bytes before the next `mark`, or before its possible beginning."""
+        """Return the number of bytes before the next `mark`, which may be incomplete."""
         stream, data = self._stream, self._stream.data
         found = data.find(mark, stream.at)
         if found < 0:
@@ -150,7 +150,7 @@ class StreamDecoder:
         return found - stream.at
 
     def _skip(self, count: int) -> FrameFault | None:
-        """Discard bytes that begin no frame; return a violation for the first of them."""
+        """Discard bytes outside any frame; return a violation, or None if already reported."""
         stream = self._stream
         first = stream.data[stream.at : stream.at + 1]
         stream.at += count
@@ -159,7 +159,7 @@ class StreamDecoder:
         )
 
     def _lost(self, code: str, message: str, *, closes: bool = False) -> FrameFault | None:
-        """Return a violation, or None if this run of invalid bytes has already been reported."""
+        """Return a violation, or None if the run of invalid bytes is already reported."""
         if self._is_lost:
             return None
         self._is_lost = True
@@ -167,13 +167,13 @@ class StreamDecoder:
 
 
 def frame_codec_of(spec: FramingSpec) -> FrameCodec | None:
-    """Return the frame codec of `spec`, or None when payloads are the frames themselves."""
+    """Return the frame codec of `spec`; None if the frame is the payload."""
     layout = cast("FrameLayout | None", spec.options.get("layout"))
     return None if layout is None or layout == FrameLayout() else FrameCodec(layout)
 
 
 def encode_frame(codec: FrameCodec | None, payload: bytes, max_bytes: int) -> bytes:
-    """Return the frame around `payload`; raise `FramingError` if it cannot be framed."""
+    """Return the frame of `payload`; raise `FramingError` if impossible."""
     try:
         frame = payload if codec is None else codec.close(payload)
     except BadFrame as error:

@@ -1,7 +1,7 @@
-"""Checksums behind a text of variable length.
+"""Checksums after a text of variable length.
 
-Pure. A `ChecksumTrailer` removes the checksum from the content between the markers of a frame, or
-adds it. The remaining content has fixed places.
+Pure. A `ChecksumTrailer` adds the checksum to the content between a frame's markers, or removes the
+checksum. The remaining content has fixed positions.
 """
 
 from urc.model.framing import TrailerSpec
@@ -11,17 +11,17 @@ __all__ = ["ChecksumTrailer"]
 
 
 class ChecksumTrailer:
-    """The checksum behind a text, or one behind each of its lines."""
+    """A checksum after a text, or after each line of a text."""
 
     def __init__(self, spec: TrailerSpec, start: bytes) -> None:
         self._spec = spec
         self._before = b"" if spec.each else start
-        """Bytes of the frame in front of the text, included in places."""
+        """Bytes of the frame before the text; positions include these bytes."""
         self._checksum = Checksum(spec.checksum)
         self._size = self._checksum.size
 
     def take_off(self, text: bytes) -> bytes:
-        """Return `text` without checksums; raise `BadFrame` for a wrong or missing one."""
+        """Return `text` without checksums; raise `BadFrame` for a wrong or missing checksum."""
         spec = self._spec
         if not spec.each:
             return self._checked(text)
@@ -32,7 +32,7 @@ class ChecksumTrailer:
         )
 
     def put_on(self, text: bytes) -> bytes:
-        """Return `text` with its checksums; raise `BadFrame` if they cannot be computed."""
+        """Return `text` with checksums; raise `BadFrame` if a checksum cannot be computed."""
         spec = self._spec
         if not spec.each:
             return self._encode_frame(text)
@@ -56,7 +56,7 @@ class ChecksumTrailer:
         return content
 
     def _parted(self, text: bytes) -> tuple[bytes, bytes] | None:
-        """Return content and checksum; None for a missing optional checksum."""
+        """Return the content and the checksum, or None for a missing optional checksum."""
         spec, size = self._spec, self._size
         if not spec.mark:
             if len(text) < size:

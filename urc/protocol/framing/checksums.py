@@ -1,4 +1,4 @@
-"""Checksums over part of a frame: verified on receipt, written when sending.
+"""Checksums over part of a frame, verified on receipt and written when sending.
 
 Pure. The arithmetic is in `urc._checksum_math`. All operations take linear time.
 """
@@ -24,7 +24,7 @@ class BadFrame(UrcError):
 
 
 class Checksum:
-    """One checksum of one kind of frame."""
+    """A checksum of a frame layout."""
 
     def __init__(self, spec: ChecksumSpec) -> None:
         self.spec = spec
@@ -33,14 +33,14 @@ class Checksum:
         self._salt = _salter(spec.salt)
 
     def check(self, frame: bytes) -> None:
-        """Raise `BadFrame` unless the frame carries the right checksum."""
+        """Verify the checksum of a received frame; raise `BadFrame` for a wrong checksum."""
         place = self._place(frame)
         right = self.right(frame, self._window(frame, place))
         if right is not None:
             self.compare(frame[place : place + self.size], right)
 
     def write(self, frame: bytearray) -> None:
-        """Write the checksum into its place; raise `BadFrame` if the frame has no such place."""
+        """Write the checksum into the frame; raise `BadFrame` if the frame is too short."""
         place = self._place(frame)
         right = self.right(frame, self._window(frame, place))
         if right is None:
@@ -48,9 +48,9 @@ class Checksum:
         frame[place : place + self.size] = right
 
     def right(self, frame: bytes | bytearray, window: bytes) -> bytes | None:
-        """Return the required checksum bytes, computed over `window`.
+        """Return the bytes of the correct checksum, computed over `window`.
 
-        With an unknown salt, the result may be None: the frame is then accepted unchecked.
+        For an unknown salt, the result may be None; the frame is then accepted unchecked.
         """
         data = window
         if self.spec.is_from_hex:
@@ -65,7 +65,7 @@ class Checksum:
         return self._spelt(self._compute(data))
 
     def compare(self, found: bytes, right: bytes) -> None:
-        """Raise `BadFrame` unless `found` equals `right`; the case of hex digits is ignored."""
+        """Raise `BadFrame` if `found` differs from `right`, ignoring the case of hex digits."""
         spelling = self.spec.spelling
         if found == right or (spelling[0] in "hH" and found.upper() == right.upper()):
             return
@@ -75,11 +75,11 @@ class Checksum:
         )
 
     def wrong(self, message: str) -> BadFrame:
-        """Return the error for a frame with a wrong checksum."""
+        """Return the error for a received frame with a wrong checksum."""
         return BadFrame("bad-checksum", message, closes=self.spec.closes)
 
     def saltless(self, frame: bytes | bytearray) -> BadFrame:
-        """Return the error for a frame to be sent whose salt is unknown."""
+        """Return the error for sending a frame with an unknown salt."""
         number = self.spec.salt.number(frame)
         return BadFrame("no-salt", f"the salt table of the checksum has no row {number}")
 
@@ -90,7 +90,7 @@ class Checksum:
         return place
 
     def _window(self, frame: bytes | bytearray, place: int) -> bytes:
-        """Return the input of the checksum, with zeros in place of the checksum itself."""
+        """Return the input of the checksum, with zeros in place of the checksum."""
         start, data = cut(frame, self.spec.over)
         stop = start + len(data)
         first, last = max(start, place), min(stop, place + self.size)

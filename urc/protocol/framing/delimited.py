@@ -33,7 +33,7 @@ class DelimiterFraming(NamedTuple):
         return cls(tx, rx, spec.max_bytes, frame_codec_of(spec))
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame, or raise `FramingError`."""
+        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
         frame = payload if self.codec is None else encode_frame(self.codec, payload, self.max_bytes)
         if self.tx and self.tx in frame:
             raise FramingError(
@@ -42,20 +42,20 @@ class DelimiterFraming(NamedTuple):
         return frame + self.tx
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
-        """Return a new decoder."""
+        """Return a new decoder for received bytes."""
         return DelimiterDecoder(
             stream, self.rx, self.max_bytes, None if self.codec is None else self.codec.open
         )
 
     def reversed(self) -> "DelimiterFraming":
-        """Return the same framing for the other end of the connection."""
+        """Return the framing for the other end of the connection."""
         return self._replace(tx=self.rx, rx=self.tx)
 
 
 class DelimiterDecoder(StreamDecoder):
-    """A decoder that remembers its search position, so that slow frames take linear time.
+    """A decoder for frames with a delimiter, in linear time even for slow frames.
 
-    A frame that is too long is dropped and reported once; decoding continues after the next
+    A frame over the size limit is dropped and reported once. Decoding continues after the next
     delimiter.
     """
 
@@ -76,17 +76,17 @@ class DelimiterDecoder(StreamDecoder):
         """Number of scanned bytes without a delimiter."""
         self._is_skipping = False
         self._credit: RescanBudget | None = None
-        """Budget within a case of a `switch`, where a frame that is too long costs only its first
-        byte."""
+        """Rescan budget within a case of a `switch`, where only the first byte of a frame over the
+        size limit is dropped."""
 
     def restart(self) -> None:
-        """Reset the state: a `switch` begins a frame here."""
+        """Reset the state for a new frame, selected by a `switch`."""
         super().restart()
         self._searched = 0
         self._credit = self._credit or RescanBudget()
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Return one frame or violation, or None if incomplete."""
+        """Remove and return the next frame or violation; return None if incomplete."""
         stream, delimiter = self._stream, self._delimiter
         while stream.at < len(stream.data):
             start = stream.at
@@ -111,7 +111,7 @@ class DelimiterDecoder(StreamDecoder):
         return None
 
     def ahead(self) -> list[bytes]:
-        """Return the complete frames, if several, without removing them from the stream.
+        """Return all complete frames if several are buffered, without removing any frame.
 
         The list is empty if a frame needs a check. `skip` removes the used frames.
         """
@@ -126,7 +126,7 @@ class DelimiterDecoder(StreamDecoder):
         return frames if max(map(len, frames)) <= self._max_bytes else []
 
     def skip(self, count: int, size: int) -> None:
-        """Remove the first `count` frames of `ahead`, which have `size` bytes in total."""
+        """Remove the first `count` frames of `ahead`; `size` is their total size in bytes."""
         if count:
             self._stream.at += size + count * len(self._delimiter)
             self._searched = 0
@@ -140,7 +140,7 @@ class DelimiterDecoder(StreamDecoder):
             return self._refused(error)
 
     def _wait(self, credit: RescanBudget | None) -> FrameFault | None:
-        """Keep the bytes that may become a frame."""
+        """Keep the bytes of an incomplete frame; return a violation if there are too many."""
         stream, keep = self._stream, len(self._delimiter) - 1
         fault = None
         if credit is not None and len(stream) >= self._max_bytes + len(self._delimiter):

@@ -1,7 +1,7 @@
 """Length fields with a variable number of digits: ``#3512``, ``512:``.
 
-Pure. The payload moves with the field, so the number counts only bytes after the field: `adjust` is
-relative to its end.
+Pure. The payload starts after the last digit, so the length counts from the end of the field, and
+`adjust` is relative to the end.
 """
 
 from urc.model.framing import LengthSpec
@@ -11,16 +11,16 @@ __all__ = ["DigitLength"]
 
 
 class DigitLength:
-    """A length in digits, after a digit that counts them or before a terminator."""
+    """A length field in digits, with a leading digit count or a terminator."""
 
     def __init__(self, spec: LengthSpec) -> None:
         self._spec = spec
         self._base = 10 if spec.spelling == "dec" else 16
         self.end = spec.offset + (spec.size + 1 if spec.is_counted else 1 + len(spec.until))
-        """Least number of frame bytes needed to read it."""
+        """Minimum number of frame bytes for reading the length field."""
 
     def total(self, data: bytes | bytearray, at: int) -> int | None:
-        """Return the size of the frame at `at`; negative if invalid, None if incomplete."""
+        """Return the frame size at `at` in bytes; negative if invalid, None if incomplete."""
         digits = self._digits(data, at)
         if digits is None:
             return None
@@ -29,7 +29,7 @@ class DigitLength:
         return -1 if number < 0 else behind + number * self._spec.unit + self._spec.adjust
 
     def head(self, frame: bytes) -> int:
-        """Return the offset of the payload in a whole frame."""
+        """Return the offset of the payload in a complete frame."""
         digits = self._digits(frame, 0)
         if digits is None:
             raise BadFrame("short-frame", f"{len(frame)} bytes are too few to hold the length")
@@ -37,10 +37,10 @@ class DigitLength:
         return end + len(self._spec.until)
 
     def before(self, payload: bytes, tail: int) -> bytes:
-        """Return the length field for that payload and `tail` bytes behind it.
+        """Return the length field for a payload and a trailer of `tail` bytes.
 
         Raises:
-            BadFrame: the field cannot represent the size.
+            BadFrame: the length field cannot represent the size.
         """
         spec = self._spec
         number, left = divmod(len(payload) + tail - spec.adjust, spec.unit)
@@ -54,7 +54,7 @@ class DigitLength:
         return text + spec.until if spec.until else count.rjust(spec.size, b"0") + text
 
     def _digits(self, data: bytes | bytearray, at: int) -> slice | None:
-        """Return the range of the digits, possibly empty; None if incomplete."""
+        """Return the range of the digits, which may be empty; None if incomplete."""
         spec = self._spec
         first = at + spec.offset
         if spec.until:
@@ -72,7 +72,7 @@ class DigitLength:
 
 
 def _number(digits: bytes, base: int) -> int:
-    """Return the number, or -1 for an invalid one."""
+    """Return the number in the digits; -1 for an invalid number."""
     if not digits.isalnum() or len(digits) > 16:
         return -1
     try:

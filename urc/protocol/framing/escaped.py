@@ -1,10 +1,10 @@
 """Framings with byte stuffing of the whole content, including markers.
 
 Theory of operation. Markers (start, end, delimiter) are sent unchanged. The content between them is
-stuffed last: length and checksum count the original bytes. If every marker is escaped, its first
-occurrence is genuine, and the ordinary search finds it. A doubled escape byte may begin a marker,
-so these decoders process the escapes one by one. A frame with a length field is decoded byte by
-byte until its length is reached.
+stuffed last: length and checksum count the original bytes. If every marker byte in the content is
+escaped, an ordinary search finds the markers. If a doubled escape byte may begin a marker, the
+decoder processes all escapes in order. A frame with a length field is decoded byte by byte up to
+its length.
 """
 
 from functools import partial
@@ -31,7 +31,7 @@ __all__ = ["EscapedFraming"]
 
 
 class EscapedFraming(NamedTuple):
-    """Start, stuffed content, end; a delimited frame may have another end in each direction."""
+    """Frames with a start, stuffed content and an end, which may differ between directions."""
 
     codec: FrameCodec
     stuffing: Stuffing
@@ -49,7 +49,7 @@ class EscapedFraming(NamedTuple):
         return cls(FrameCodec(layout), Stuffing(escape), tx, rx, spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame, or raise `FramingError`."""
+        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
         frame = encode_frame(self.codec, payload, self.max_bytes)
         start, end = self.codec.layout.start, self.codec.layout.end
         inner = frame[len(start) : len(frame) - len(end)]
@@ -64,7 +64,7 @@ class EscapedFraming(NamedTuple):
         return start + content + self.tx
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
-        """Return a new decoder."""
+        """Return a new decoder for received bytes."""
         layout = self.codec.layout
         if isinstance(self.codec.length, LengthField):
             return _LengthDecoder(stream, self, self.codec.length)
@@ -78,11 +78,11 @@ class EscapedFraming(NamedTuple):
         return BracketsDecoder(stream, layout.start, layout.end, marked, most)
 
     def reversed(self) -> "EscapedFraming":
-        """Return the same framing for the other end of the connection."""
+        """Return the framing for the other end of the connection."""
         return self._replace(tx=self.rx, rx=self.tx)
 
     def opened(self, content: bytes) -> bytes:
-        """Return the payload of the content between the markers; raise `BadFrame`."""
+        """Return the payload from the content between the markers; raise `BadFrame` if invalid."""
         layout = self.codec.layout
         frame = layout.start + self.stuffing.unstuff(content) + layout.end
         if len(frame) > self.max_bytes:
@@ -91,12 +91,12 @@ class EscapedFraming(NamedTuple):
         return self.codec.open(frame)
 
     def opened_between(self, start: bytes, end: bytes, frame: bytes) -> bytes:
-        """Return the payload of a frame with its markers; raise `BadFrame`."""
+        """Return the payload from a frame including its markers; raise `BadFrame` if invalid."""
         return self.opened(frame[len(start) : len(frame) - len(end)])
 
 
 class _DoubledDecoder(StreamDecoder):
-    """Decodes frames that end with an escape sequence such as DLE ETX."""
+    """A decoder for frames that end with an escape sequence such as DLE ETX."""
 
     def __init__(self, stream: ReceiveBuffer | None, framing: EscapedFraming) -> None:
         super().__init__(stream, 2 * framing.max_bytes)
@@ -104,7 +104,7 @@ class _DoubledDecoder(StreamDecoder):
         self._start, self._end = framing.codec.layout.start, framing.rx
         self._escape = framing.stuffing.escape
         self._searched = -1
-        """Number of frame bytes without a marker; -1 before a frame has begun."""
+        """Number of scanned frame bytes without an end; -1 before the start of a frame."""
 
     def restart(self) -> None:
         super().restart()
@@ -121,7 +121,7 @@ class _DoubledDecoder(StreamDecoder):
                 return found
 
     def _to_start(self) -> FrameFault | None:
-        """Advance to the next start that is neither a doubled escape nor an end."""
+        """Advance to the next start of a frame, skipping doubled escapes and ends."""
         stream, start = self._stream, self._start
         if not start:
             self._searched = 0 if len(stream) else -1
@@ -147,7 +147,7 @@ class _DoubledDecoder(StreamDecoder):
         return self._skip(place - stream.at) if place > stream.at else None
 
     def _to_end(self) -> bytes | FrameFault | None:
-        """Return the complete frame, or None; -1 in `_searched` continues the search."""
+        """Return the complete frame or None; if `_searched` is -1, the search must continue."""
         stream, data, end = self._stream, self._stream.data, self._end
         while True:
             place = data.find(self._escape, stream.at + self._searched)
@@ -185,7 +185,7 @@ class _DoubledDecoder(StreamDecoder):
 
 
 class _LengthDecoder(StreamDecoder):
-    """Decodes frames whose length field counts the bytes before stuffing."""
+    """A decoder for frames with a length field that counts the original bytes, before stuffing."""
 
     def __init__(
         self, stream: ReceiveBuffer | None, framing: EscapedFraming, length: LengthField
@@ -201,9 +201,9 @@ class _LengthDecoder(StreamDecoder):
     def _begin(self) -> None:
         self._plain = Unstuffer(self._stuffing)
         self._total = 0
-        """Size of the frame in bytes, once its length field is decoded."""
+        """Size of the frame in bytes; 0 before the length field is decoded."""
         self._taken = len(self._start)
-        """Number of processed wire bytes since the beginning of the frame."""
+        """Number of processed wire bytes since the start of the frame."""
 
     def restart(self) -> None:
         super().restart()
@@ -229,7 +229,7 @@ class _LengthDecoder(StreamDecoder):
         return None
 
     def _read(self) -> tuple[str, ...] | None:
-        """Process bytes until the frame is complete; return (), None if incomplete, or an error."""
+        """Process bytes; return () if complete, None if incomplete, or an error's code and text."""
         stream, plain, start = self._stream, self._plain, self._start
         inner = len(start)
         while True:
@@ -249,7 +249,7 @@ class _LengthDecoder(StreamDecoder):
                 return "bad-stuffing", "a frame has invalid byte stuffing; skipped"
 
     def _ending(self) -> tuple[str, ...] | None:
-        """Check the end bytes, with the same results as `_take`."""
+        """Check the end bytes, with the same results as `_read`."""
         at = self._stream.at + self._taken
         there = bytes(self._stream.data[at : at + len(self._end)])
         if there == self._end:
@@ -257,13 +257,13 @@ class _LengthDecoder(StreamDecoder):
         return None if self._end.startswith(there) else ("no-frame", "a frame without its end")
 
     def _to_start(self) -> FrameFault | None:
-        """Advance to the next start bytes, or to their possible beginning."""
+        """Advance to the next start bytes, or to incomplete start bytes at the end."""
         gone = self._before(self._start)
         self._credit.earn(gone)
         return self._skip(gone) if gone else None
 
     def _frame(self) -> bytes | FrameFault | None:
-        """Decode the complete frame."""
+        """Decode and return the payload of the complete frame."""
         size = self._taken + len(self._end)
         try:
             payload = self._codec.open(self._start + bytes(self._plain.plain) + self._end)
@@ -282,6 +282,6 @@ class _LengthDecoder(StreamDecoder):
         self._begin()
 
     def _leave(self, code: str, text: str, *, closes: bool = False) -> FrameFault | None:
-        """Continue after the first byte of an invalid frame, if the budget allows a second scan."""
+        """Continue after the first byte of an invalid frame if the budget allows rescanning."""
         self._move(1 if self._credit.spend(self._taken) else max(1, self._taken))
         return self._lost(code, text, closes=closes)

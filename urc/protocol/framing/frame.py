@@ -21,11 +21,11 @@ __all__ = ["BadFrame", "LengthField", "FrameCodec", "length_of"]
 Open = Callable[[bytes], bytes]
 
 _CCITT: Final = {CrcSpec(16, 0x1021): 0, CrcSpec(16, 0x1021, 0xFFFF): 0xFFFF}
-"""Checksums with a direct function in the standard library → start value."""
+"""Start values of the CRCs that the standard library computes, by CRC parameters."""
 
 
 def generate_open(layout: FrameLayout, slow: Open) -> Open:
-    """Return the function from a frame to its payload; `slow` is the general decoder."""
+    """Return a function that decodes a frame to its payload; `slow` is the general decoder."""
     spec = layout.checksum
     if spec is not None and not _is_common(spec):
         return slow
@@ -76,7 +76,7 @@ def _found(spec: ChecksumSpec) -> str:
 
 
 class FrameCodec:
-    """Wraps and unwraps payloads: constants, length field and checksum."""
+    """A codec between payloads and frames with constants, length field and checksum."""
 
     def __init__(self, layout: FrameLayout) -> None:
         self.layout = layout
@@ -94,10 +94,11 @@ class FrameCodec:
             and not self._is_text
         )
         self.open = generate_open(layout, self._open) if is_plain else self._open
-        """Frame → payload; raises `BadFrame` for a wrong or missing checksum."""
+        """Function that returns the payload of a frame, or raises `BadFrame` for an invalid
+        frame."""
 
     def _open(self, frame: bytes) -> bytes:
-        """Return the payload; raise `BadFrame` for a wrong or missing checksum."""
+        """Return the payload of a frame; raise `BadFrame` for an invalid frame."""
         if self._is_text:
             frame = self._read(frame)
         for checksum in self._checksums:
@@ -111,9 +112,9 @@ class FrameCodec:
         return payload if self._stuffing is None else self._stuffing.unstuff(payload)
 
     def close(self, payload: bytes) -> bytes:
-        """Return the frame around `payload`; raise `BadFrame` if the payload does not fit.
+        """Return the frame of `payload`; raise `BadFrame` if the payload does not fit.
 
-        Bytes outside the payload and the fields of the layout are zeros.
+        Bytes outside the payload and the declared fields are zeros.
         """
         layout = self.layout
         if self._stuffing is not None:
@@ -139,7 +140,7 @@ class FrameCodec:
         return self._spelt(bytes(frame)) if self._is_text else bytes(frame)
 
     def _read(self, frame: bytes) -> bytes:
-        """Return the frame without its trailing checksum and with its digits decoded."""
+        """Return the frame without the trailing checksum and with decoded digits."""
         start, end = self.layout.start, self.layout.end
         if len(frame) < len(start) + len(end):
             raise BadFrame("short-frame", f"{len(frame)} bytes are too few for this kind of frame")
@@ -149,7 +150,7 @@ class FrameCodec:
         return start + _bytes_of(content, self.layout.digits) + end
 
     def _spelt(self, frame: bytes) -> bytes:
-        """Return the frame in its wire form; the inverse of `_read`."""
+        """Return the frame in wire form, the inverse of `_read`."""
         start, end = self.layout.start, self.layout.end
         content = _digits_of(frame[len(start) : len(frame) - len(end)], self.layout.digits)
         if self._trailer is not None:
@@ -185,12 +186,12 @@ def length_of(spec: LengthSpec) -> "LengthField | DigitLength":
 
 
 class LengthField:
-    """The length field of a frame."""
+    """A length field of fixed size."""
 
     def __init__(self, spec: LengthSpec) -> None:
         self._spec = spec
         self.end = max(spec.offset + spec.size, spec.flag_at + 1)
-        """Number of frame bytes needed to read it."""
+        """Number of frame bytes for reading the length field."""
         self._mask = (1 << min(spec.bits, 8 * spec.size)) - 1
 
     def total(self, data: bytes | bytearray, at: int) -> int:
@@ -212,10 +213,10 @@ class LengthField:
         return number * spec.unit + spec.adjust
 
     def write(self, frame: bytearray, stop: int) -> None:
-        """Write the size of `frame` into it, before the place `stop`.
+        """Write the size of `frame` into its length field, before offset `stop`.
 
         Raises:
-            BadFrame: the field has no room, or cannot represent the size.
+            BadFrame: the length field does not fit, or cannot represent the size.
         """
         spec = self._spec
         number, left = divmod(len(frame) - spec.adjust, spec.unit)

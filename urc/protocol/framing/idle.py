@@ -1,4 +1,4 @@
-"""The framings ``idle``, where silence ends a frame, and ``datagram``, with whole frames."""
+"""The framings ``idle`` (silence ends a frame) and ``datagram`` (each receive is one frame)."""
 
 from typing import NamedTuple, cast
 
@@ -17,7 +17,7 @@ __all__ = ["DatagramFraming", "IdleFraming"]
 
 
 class IdleFraming(NamedTuple):
-    """A frame ends after `gap_s` seconds of silence."""
+    """Frames that end after `gap_s` seconds of silence."""
 
     gap_s: float
     codec: FrameCodec | None
@@ -29,20 +29,20 @@ class IdleFraming(NamedTuple):
         return cls(cast("float", spec.options["gap_s"]), frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame, or raise `FramingError`."""
+        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
         return encode_frame(self.codec, payload, self.max_bytes)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
-        """Return a new decoder."""
+        """Return a new decoder for received bytes."""
         return _IdleDecoder(stream, self)
 
     def reversed(self) -> "IdleFraming":
-        """Return the same framing for the other end of the connection."""
+        """Return the framing for the other end of the connection."""
         return self
 
 
 class DatagramFraming(NamedTuple):
-    """Each receive gives one frame."""
+    """Frames that arrive whole, one for each receive."""
 
     codec: FrameCodec | None
     max_bytes: int
@@ -53,20 +53,20 @@ class DatagramFraming(NamedTuple):
         return cls(frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame, or raise `FramingError`."""
+        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
         return encode_frame(self.codec, payload, self.max_bytes)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
-        """Return a new decoder."""
+        """Return a new decoder for received bytes."""
         return _WholeDecoder(stream, self.codec, self.max_bytes)
 
     def reversed(self) -> "DatagramFraming":
-        """Return the same framing for the other end of the connection."""
+        """Return the framing for the other end of the connection."""
         return self
 
 
 class _WholeDecoder(StreamDecoder):
-    """Takes all received bytes as one frame."""
+    """A decoder that returns all received bytes as one frame."""
 
     def __init__(
         self, stream: ReceiveBuffer | None, codec: FrameCodec | None, max_bytes: int
@@ -90,9 +90,9 @@ class _WholeDecoder(StreamDecoder):
 
 
 class _IdleDecoder(_WholeDecoder):
-    """Keeps the frames that ended by silence until they are requested.
+    """A decoder for frames that end with silence.
 
-    `now` is the time of receipt; without a clock, only `tick` ends frames.
+    `now` is the time of receipt. Without a clock, only `tick` ends frames.
     """
 
     def __init__(self, stream: ReceiveBuffer | None, framing: IdleFraming) -> None:
@@ -134,7 +134,7 @@ class _IdleDecoder(_WholeDecoder):
         return frames
 
     def _end(self, now: float) -> None:
-        """Complete the frame when the silence until `now` is long enough."""
+        """Complete the frame if the silence until `now` is long enough."""
         if self._newest is None:
             if len(self._stream):
                 self._newest = now  # bytes left by another decoder

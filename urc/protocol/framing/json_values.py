@@ -1,9 +1,9 @@
 """The framing ``json``: consecutive JSON objects or arrays.
 
-Theory of operation. Only brackets and quotes determine the end of a value. A pattern jumps from one
-to the next, so every byte is scanned once. Blanks, line ends and the record separator of RFC 7464
-may separate two values. A mismatched bracket, or a control character inside a string, cannot be
-JSON: everything up to it is dropped.
+Theory of operation. Only brackets and quotes determine the end of a value. A regular expression
+finds the brackets and quotes, so every byte is scanned once. Blanks, line ends and the record
+separator of RFC 7464 may separate two values. Mismatched brackets and control characters inside
+strings are invalid: all data up to the error is dropped.
 """
 
 import re
@@ -33,7 +33,7 @@ _QUOTE, _BACKSLASH = ord('"'), ord("\\")
 
 
 class JsonFraming(NamedTuple):
-    """One JSON object or array is one frame; `tx` follows each sent frame."""
+    """Frames of one JSON object or array each; `tx` follows each sent frame."""
 
     tx: bytes
     codec: FrameCodec | None
@@ -46,19 +46,19 @@ class JsonFraming(NamedTuple):
         return cls(cast("bytes", spec.options.get("tx", b"")), frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame, or raise `FramingError`."""
+        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
         frame = encode_frame(self.codec, payload, self.max_bytes)
         if _JsonDecoder(None, b"", None, self.max_bytes).feed(frame) != [frame.strip(_BETWEEN)]:
             raise FramingError(f"{payload[:80]!r} is not one JSON object or array")
         return frame if self.is_reversed else frame + self.tx
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
-        """Return a new decoder."""
+        """Return a new decoder for received bytes."""
         between = self.tx if self.is_reversed else b""
         return _JsonDecoder(stream, between, self.codec, self.max_bytes)
 
     def reversed(self) -> "JsonFraming":
-        """Return the same framing for the other end of the connection."""
+        """Return the framing for the other end of the connection."""
         return self._replace(is_reversed=not self.is_reversed)
 
 
@@ -74,10 +74,10 @@ class _JsonDecoder(StreamDecoder):
     def restart(self) -> None:
         super().restart()
         self._open: list[int] = []
-        """Expected closing brackets of all open brackets."""
+        """Expected closing brackets, in the order of the open brackets."""
         self._is_in_string = False
         self._looked = 0
-        """Number of scanned bytes of the stream."""
+        """Number of scanned bytes of the current value."""
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
         stream = self._stream
@@ -110,7 +110,7 @@ class _JsonDecoder(StreamDecoder):
         return fault
 
     def _to_end(self) -> int:
-        """Return the size of the value; 0 if incomplete, -1 if invalid."""
+        """Return the size of the JSON value in bytes; 0 if incomplete, -1 if invalid."""
         stream, data, stack = self._stream, self._stream.data, self._open
         while True:
             pattern = _IN_STRING if self._is_in_string else _MARK

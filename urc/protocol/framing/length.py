@@ -1,9 +1,9 @@
 """The framings ``fixed`` and ``length``: the first bytes of a frame determine its size.
 
-Theory of operation. If the frame has start bytes, the decoder advances to the next ones; otherwise
-every byte may begin a frame. An invalid frame (bad length, wrong end bytes, wrong checksum) costs
-only its first byte: the true frame may begin right after it. Only checksums would then scan the
-same bytes again and again, so `RescanBudget` limits them; after that, the whole candidate is
+Theory of operation. With start bytes, the decoder advances to the next start bytes; otherwise,
+every byte may begin a frame. After a bad length, wrong end bytes or a wrong checksum, only the
+first byte is dropped. A valid frame may begin at the second byte. Checksums may then scan the same
+bytes repeatedly, so `RescanBudget` limits rescanning. Beyond the budget, the whole invalid frame is
 dropped.
 """
 
@@ -27,7 +27,7 @@ __all__ = ["LengthFraming"]
 
 
 class LengthFraming(NamedTuple):
-    """Frames of a fixed size, or with a length field; the same in both directions."""
+    """Frames of fixed size or with a length field, equal in both directions."""
 
     codec: FrameCodec
     max_bytes: int
@@ -38,15 +38,15 @@ class LengthFraming(NamedTuple):
         return cls(frame_codec_of(spec) or FrameCodec(FrameLayout()), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame, or raise `FramingError`."""
+        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
         return encode_frame(self.codec, payload, self.max_bytes)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
-        """Return a new decoder."""
+        """Return a new decoder for received bytes."""
         return _MeasuredDecoder(stream, self.codec, self.max_bytes)
 
     def reversed(self) -> "LengthFraming":
-        """Return the same framing for the other end of the connection."""
+        """Return the framing for the other end of the connection."""
         return self
 
 
@@ -65,7 +65,7 @@ class _MeasuredDecoder(StreamDecoder):
         self._plain = (
             0 if self._start or self._end or not self._least <= size <= max_bytes else size
         )
-        """Size of every frame, if no check precedes its decoding; else 0."""
+        """Size of every frame in bytes, if decoding needs no previous check; 0 otherwise."""
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
         stream, data = self._stream, self._stream.data
@@ -113,7 +113,7 @@ class _MeasuredDecoder(StreamDecoder):
         return self._leave(gone) if gone else None
 
     def _frame(self, frame: bytes) -> bytes | FrameFault | None:
-        """Return the payload, a violation, or None for a violation that was already reported."""
+        """Return the payload, a violation, or None for a violation that is already reported."""
         try:
             payload = self._codec.open(frame)
         except BadFrame as error:
@@ -136,7 +136,7 @@ class _MeasuredDecoder(StreamDecoder):
         self._stream.at += count
 
     def _endless(self, there: int) -> FrameFault | None:
-        """Wait for the rest of a length field of variable size."""
+        """Wait for the remaining bytes of a variable-size length field."""
         return self._bad_length(there) if there >= self._max_bytes else None
 
     def _bad_length(self, size: int) -> FrameFault | None:

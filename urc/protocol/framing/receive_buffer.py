@@ -1,4 +1,4 @@
-"""The receive buffer of one connection, and the budget for scanning bytes again.
+"""The receive buffer of one connection, and the budget for rescanning bytes.
 
 Pure; for `urc.protocol.framing.table`.
 """
@@ -9,7 +9,7 @@ __all__ = ["RescanBudget", "ReceiveBuffer"]
 
 
 class ReceiveBuffer:
-    """The received bytes of one connection that no frame has consumed yet."""
+    """The unconsumed received bytes of one connection."""
 
     __slots__ = ("at", "data")
 
@@ -22,7 +22,7 @@ class ReceiveBuffer:
         return len(self.data) - self.at
 
     def push(self, data: bytes) -> None:
-        """Append bytes, and discard the consumed ones."""
+        """Append received bytes, and discard consumed bytes."""
         if self.at:
             del self.data[: self.at]
             self.at = 0
@@ -30,9 +30,10 @@ class ReceiveBuffer:
 
 
 class RescanBudget:
-    """Budget of bytes that may be scanned a second time; it grows with each consumed byte.
+    """The number of bytes that may be rescanned, which grows with each consumed byte.
 
-    The total work is thus at most `RATE` + 1 times the bytes of the stream, plus `MOST` once.
+    The total number of scanned bytes is at most `RATE` + 1 times the size of the stream, plus
+    `MOST`.
     """
 
     RATE: Final = 8
@@ -47,12 +48,12 @@ class RescanBudget:
         return self._left >= self.MOST
 
     def earn(self, count: int) -> None:
-        """Increase the budget for `count` consumed bytes."""
+        """Increase the budget by `RATE` bytes for each of `count` consumed bytes."""
         if self._left < self.MOST:
             self._left = min(self.MOST, self._left + self.RATE * count)
 
     def spend(self, count: int) -> bool:
-        """Return whether `count` bytes may be scanned again, and reduce the budget."""
+        """Return whether `count` bytes may be rescanned; if so, reduce the budget."""
         if self._left < count:
             return False
         self._left -= count

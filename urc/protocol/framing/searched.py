@@ -1,4 +1,4 @@
-"""The framings ``regex`` and ``brackets``, which search for frames."""
+"""The framings ``regex`` and ``brackets``, which search for frames in the stream."""
 
 import re
 from collections.abc import Callable
@@ -23,19 +23,20 @@ from urc.protocol.framing.receive_buffer import ReceiveBuffer
 __all__ = ["BracketsDecoder", "BracketsFraming", "RegexFraming"]
 
 Search = Callable[[bytes | bytearray, int], Any]
-"""Search function: data and start offset → a match of `re` or RE2, or None."""
+"""Search function: returns the next match of `re` or RE2 after a start offset, or None."""
 
 _SMALL: Final = 256
-"""Buffer size up to which every receive searches again, in bytes."""
+"""Maximum buffer size for a new search after every receive, in bytes."""
 _GROWTH: Final = 8
-"""A larger buffer is searched again after growing by one part in `_GROWTH`, or after `_QUIET_S`."""
+"""Growth of a larger buffer before a new search, as a divisor of its size; silence for `_QUIET_S`
+also starts a search."""
 _QUIET_S: Final = 0.005
 
 
 class RegexFraming(NamedTuple):
     """Frames that match a pattern.
 
-    With `tx`, a sent frame need not match: it ends with `tx`, as the other end expects.
+    With `tx`, a sent frame ends with `tx` and need not match the pattern.
     """
 
     search: Search
@@ -52,7 +53,7 @@ class RegexFraming(NamedTuple):
         return cls(search, tx, frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame, or raise `FramingError`."""
+        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
         frame = encode_frame(self.codec, payload, self.max_bytes)
         if self.tx and not self.is_reversed:
             if self.tx in frame:
@@ -64,19 +65,19 @@ class RegexFraming(NamedTuple):
         return frame
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
-        """Return a new decoder."""
+        """Return a new decoder for received bytes."""
         if self.tx and self.is_reversed:
             opened = None if self.codec is None else self.codec.open
             return DelimiterDecoder(stream, self.tx, self.max_bytes, opened)
         return _RegexDecoder(stream, self.search, self.codec, self.max_bytes)
 
     def reversed(self) -> "RegexFraming":
-        """Return the same framing for the other end of the connection."""
+        """Return the framing for the other end of the connection."""
         return self._replace(is_reversed=not self.is_reversed)
 
 
 def _searcher(pattern: str) -> Search:
-    """Return the search over bytes; each character of the pattern is the byte of that number."""
+    """Return a search function over bytes for a Latin-1 pattern."""
     source = pattern.removeprefix("^").encode("latin-1")
     try:
         import re2
@@ -100,7 +101,7 @@ class _RegexDecoder(StreamDecoder):
         self._search = search
         self._codec = codec
         self._tried = 0
-        """Number of searched bytes without a match."""
+        """Number of bytes that have been searched without a match."""
         self._newest = 0.0
 
     @property
@@ -157,7 +158,7 @@ class _RegexDecoder(StreamDecoder):
         return None
 
     def _wait(self) -> FrameFault | None:
-        """Keep the newest bytes, which may contain the beginning of a frame."""
+        """Keep the newest bytes, because a frame may begin there."""
         fault = None
         surplus = len(self._stream) - self._max_bytes
         if surplus > 0:
@@ -167,9 +168,9 @@ class _RegexDecoder(StreamDecoder):
 
 
 class BracketsFraming(NamedTuple):
-    """Frames between two markers; markers and bytes between frames are not part of the payload.
+    """Frames between an opening and a closing marker. The payload excludes the markers.
 
-    Frames are not nested: at a second opening marker, the frame begins again.
+    Frames are not nested: a second opening marker restarts the frame.
     """
 
     codec: FrameCodec
@@ -181,7 +182,7 @@ class BracketsFraming(NamedTuple):
         return cls(frame_codec_of(spec) or FrameCodec(FrameLayout()), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame, or raise `FramingError`."""
+        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
         frame = encode_frame(self.codec, payload, self.max_bytes)
         layout = self.codec.layout
         inner = frame[len(layout.start) : len(frame) - len(layout.end)]
@@ -193,17 +194,17 @@ class BracketsFraming(NamedTuple):
         return frame
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
-        """Return a new decoder."""
+        """Return a new decoder for received bytes."""
         layout = self.codec.layout
         return BracketsDecoder(stream, layout.start, layout.end, self.codec.open, self.max_bytes)
 
     def reversed(self) -> "BracketsFraming":
-        """Return the same framing for the other end of the connection."""
+        """Return the framing for the other end of the connection."""
         return self
 
 
 class BracketsDecoder(StreamDecoder):
-    """A decoder that remembers its search position for the closing marker."""
+    """A decoder for frames between two markers, in linear time."""
 
     def __init__(
         self, stream: ReceiveBuffer | None, start: bytes, end: bytes, opened: Open, max_bytes: int
@@ -212,15 +213,15 @@ class BracketsDecoder(StreamDecoder):
         self._opened = opened
         self._open, self._close = start, end
         self._searched = 0
-        """Number of scanned bytes without a closing marker; 0 before an opening marker."""
+        """Number of scanned bytes without a closing marker; 0 before the opening marker."""
 
     def restart(self) -> None:
-        """Reset the state: a `switch` begins a frame here."""
+        """Reset the state for a new frame, selected by a `switch`."""
         super().restart()
         self._searched = 0
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Return one frame or violation, or None if incomplete."""
+        """Remove and return the next frame or violation; return None if incomplete."""
         stream, data = self._stream, self._stream.data
         while True:
             if not self._searched:
@@ -253,7 +254,7 @@ class BracketsDecoder(StreamDecoder):
         return self._skip(gone) if gone else None
 
     def _overflow(self) -> FrameFault | None:
-        """Continue at the newest opening marker, the only one that can still be closed in time."""
+        """Continue at the newest opening marker; earlier frames already exceed the size limit."""
         stream = self._stream
         fault = self._too_long()
         last = stream.data.rfind(self._open, stream.at + len(self._open))
@@ -267,7 +268,7 @@ class BracketsDecoder(StreamDecoder):
         return self._lost("frame-too-long", text)
 
     def _frame(self, close: int) -> bytes | FrameFault | None:
-        """Remove the frame that ends with the marker at `close`; return None for an empty one."""
+        """Remove and return the frame that ends at `close`; return None for an empty frame."""
         stream = self._stream
         stop = close + len(self._close)
         if self._open == self._close and close == stream.at + len(self._open):

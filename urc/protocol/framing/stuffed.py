@@ -1,6 +1,6 @@
 """Byte stuffing: ``slip`` (RFC 1055) and ``cobs`` (Cheshire and Baker, 1999).
 
-Both framings remove one byte value from the payload, which then ends the frame.
+Both framings replace one byte value in the payload, and use this byte value as the end of a frame.
 """
 
 import re
@@ -19,11 +19,11 @@ _END, _ESCAPE = b"\xc0", b"\xdb"
 _ESCAPED_END, _ESCAPED_ESCAPE = b"\xdb\xdc", b"\xdb\xdd"
 _BAD_ESCAPE: Final = re.compile(rb"\xdb(?![\xdc\xdd])")
 _BLOCK: Final = 254
-"""Largest number of non-zero bytes after one code byte of COBS."""
+"""Maximum number of non-zero bytes after one COBS code byte."""
 
 
 class SlipFraming(NamedTuple):
-    """Frames that end with END (0xC0), which is escaped inside."""
+    """SLIP frames, which end with END (0xC0) and escape END in the payload."""
 
     codec: FrameCodec | None
     max_bytes: int
@@ -34,25 +34,25 @@ class SlipFraming(NamedTuple):
         return cls(frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame, or raise `FramingError`."""
+        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
         frame = encode_frame(self.codec, payload, self.max_bytes)
         if not frame:
             raise FramingError("SLIP cannot send an empty frame")
         return frame.replace(_ESCAPE, _ESCAPED_ESCAPE).replace(_END, _ESCAPED_END) + _END
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
-        """Return a new decoder."""
+        """Return a new decoder for received bytes."""
         most = 2 * self.max_bytes
         opened = _opener(_from_slip, self.codec, self.max_bytes)
         return DelimiterDecoder(stream, _END, most, opened, skips_empty=True)
 
     def reversed(self) -> "SlipFraming":
-        """Return the same framing for the other end of the connection."""
+        """Return the framing for the other end of the connection."""
         return self
 
 
 class CobsFraming(NamedTuple):
-    """Frames that end with a zero byte and contain no other zero."""
+    """COBS frames, which end with a zero byte and contain no other zero byte."""
 
     codec: FrameCodec | None
     max_bytes: int
@@ -63,17 +63,17 @@ class CobsFraming(NamedTuple):
         return cls(frame_codec_of(spec), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame, or raise `FramingError`."""
+        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
         return _to_cobs(encode_frame(self.codec, payload, self.max_bytes)) + b"\0"
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
-        """Return a new decoder."""
+        """Return a new decoder for received bytes."""
         most = self.max_bytes + self.max_bytes // _BLOCK + 1
         opened = _opener(_from_cobs, self.codec, self.max_bytes)
         return DelimiterDecoder(stream, b"\0", most, opened, skips_empty=True)
 
     def reversed(self) -> "CobsFraming":
-        """Return the same framing for the other end of the connection."""
+        """Return the framing for the other end of the connection."""
         return self
 
 

@@ -1,8 +1,8 @@
-"""Declared byte stuffing: escape sequences for bytes with a meaning in the framing.
+"""Declared byte stuffing: escape sequences for bytes with a special meaning in the framing.
 
-Pure. Three methods cover common robots. An escape byte precedes a replaced byte (HDLC and PPP: 7D
-and the byte xor 20; a table, as in SLIP). An escape byte is doubled (DLE DLE). A byte is inserted
-after a sequence (FF FF FD is followed by another FD).
+Pure. Three methods are sufficient for common robots. An escape byte precedes a replaced byte (HDLC
+and PPP: 7D and the byte xor 20; SLIP: a table). An escape byte is doubled (DLE DLE). An additional
+byte follows a sequence (FF FF FD is followed by FD).
 """
 
 import re
@@ -18,15 +18,15 @@ _ANY: Final = range(256)
 
 
 class Stuffing:
-    """One method of byte stuffing, in both directions; each takes linear time."""
+    """Encoding and decoding of byte stuffing, in linear time."""
 
     def __init__(self, spec: EscapeSpec) -> None:
         self.spec = spec
         self.escape = bytes((spec.byte,))
         self.is_doubled = not spec.after and spec.table.get(spec.byte) == spec.byte
-        """Whether the escape byte itself may begin a marker."""
+        """Whether the escape byte may also begin a marker."""
         self.meant = _meant(spec)
-        """Byte after the escape → decoded byte of the pair."""
+        """Decoded bytes, by the byte after the escape byte."""
         if spec.after:
             self._plain, self._inserted = spec.after, bytes((spec.insert,))
             self._pair = re.compile(re.escape(spec.after) + b"(.?)", re.DOTALL)
@@ -40,14 +40,14 @@ class Stuffing:
             }
 
     def stuff(self, data: bytes) -> bytes:
-        """Return `data` in its wire form."""
+        """Return `data` with byte stuffing."""
         if self.spec.after:
             return data.replace(self._plain, self._plain + self._inserted)
         written = self._written
         return self._hidden.sub(lambda found: written[found[0]], data)
 
     def unstuff(self, data: bytes) -> bytes:
-        """Return the original bytes of `data`; raise `BadFrame` for invalid stuffing."""
+        """Return `data` without byte stuffing; raise `BadFrame` for invalid stuffing."""
         if self.spec.after:
             return self._pair.sub(self._before, data) if self._plain in data else data
         return self._pair.sub(self._one, data) if self.escape in data else data
@@ -74,17 +74,17 @@ def _meant(spec: EscapeSpec) -> Mapping[int, int]:
 
 
 class Unstuffer:
-    """Decodes byte stuffing incrementally, byte by byte."""
+    """An incremental decoder of byte stuffing, byte by byte."""
 
     def __init__(self, stuffing: Stuffing) -> None:
         self._stuffing = stuffing
         self.plain = bytearray()
         self._is_escaped = False
         self._tail = b""
-        """Newest bytes, as many as the sequence before an inserted byte."""
+        """Newest bytes, for recognising the sequence before an inserted byte."""
 
     def feed(self, byte: int) -> bool:
-        """Process one byte; return False when it is invalid here."""
+        """Process one byte; return False for an invalid byte."""
         spec = self._stuffing.spec
         if spec.after:
             if self._is_escaped:
@@ -108,5 +108,5 @@ class Unstuffer:
 
     @property
     def is_between(self) -> bool:
-        """Whether the next byte completes an escape."""
+        """Whether the next byte completes an escape sequence."""
         return self._is_escaped

@@ -1,8 +1,7 @@
-"""The framing ``switch``: several framings on one stream, chosen by the first bytes of each frame.
+"""The framing ``switch``: several framings on one stream, selected by the first bytes.
 
 Theory of operation. All cases share one `ReceiveBuffer`. The first bytes of a frame select the
-case. After each frame or violation of that case, the selection starts again. Bytes that begin no
-case are skipped.
+case. After each frame or violation, a new selection starts. Bytes that match no case are skipped.
 """
 
 import re
@@ -24,25 +23,25 @@ __all__ = ["SwitchFraming"]
 
 
 class SwitchFraming(NamedTuple):
-    """Cases in the order of selection."""
+    """Cases in the order of selection, as pairs of first bytes and framing."""
 
     cases: tuple[tuple[bytes, Framing], ...]
     max_bytes: int
     otherwise: Framing | None = None
-    """Framing of all other frames; None: other frames are invalid."""
+    """Framing of frames that match no case; None: such frames are invalid."""
     is_robot: bool = False
-    """Whether this is the end of the emulated robot."""
+    """Whether the framing is for the robot's end of the connection, in an emulated robot."""
 
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> "SwitchFraming":
-        """Return the framing for the option ``cases``: pairs of first bytes and `FramingSpec`."""
+        """Return the framing for the options ``cases`` and ``otherwise``."""
         cases = cast("tuple[tuple[bytes, FramingSpec], ...]", spec.options["cases"])
         other = cast("FramingSpec | None", spec.options.get("otherwise"))
         built = tuple((first, build_framing(one)) for first, one in cases)
         return cls(built, spec.max_bytes, None if other is None else build_framing(other))
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of the first case whose first bytes match for this payload."""
+        """Return the frame from the first case that matches `payload`."""
         refused = ""
         other = self.otherwise if self.is_robot and _is_text(payload) else None
         if other is not None and not any(payload.startswith(first) for first, _ in self.cases):
@@ -63,7 +62,7 @@ class SwitchFraming(NamedTuple):
         raise FramingError(refused or f"no case of the framing begins like {payload[:40]!r}")
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
-        """Return a new decoder."""
+        """Return a new decoder for received bytes."""
         shared = ReceiveBuffer() if stream is None else stream
         cases = [(first, framing.decoder(shared)) for first, framing in self.cases]
         other = None if self.otherwise is None else self.otherwise.decoder(shared)
@@ -74,14 +73,14 @@ class SwitchFraming(NamedTuple):
         )
 
     def reversed(self) -> "SwitchFraming":
-        """Return the same framing for the other end of the connection."""
+        """Return the framing for the other end of the connection."""
         cases = tuple((first, framing.reversed()) for first, framing in self.cases)
         other = None if self.otherwise is None else self.otherwise.reversed()
         return self._replace(cases=cases, otherwise=other, is_robot=not self.is_robot)
 
 
 def _is_text(payload: bytes) -> bool:
-    """Guess which frames of an emulated robot are text lines among binary frames."""
+    """Return whether a payload of an emulated robot is probably a text line, not a binary frame."""
     return payload.isascii() and payload.decode("ascii").isprintable()
 
 
@@ -136,7 +135,7 @@ class _SwitchDecoder(StreamDecoder):
         return frames
 
     def _end_case(self, found: bytes | FrameFault) -> bytes | FrameFault | None:
-        """Leave the case after `found`; return None for a violation that was already reported."""
+        """End the case after `found`; return None for a violation that is already reported."""
         self._active = None
         if isinstance(found, bytes):
             self._is_lost = False
@@ -147,7 +146,7 @@ class _SwitchDecoder(StreamDecoder):
         return self._lost(*found[:2], closes=found.closes)
 
     def _choose(self) -> FrameFault | None:
-        """Select the case of the frame at the front, and advance to that frame."""
+        """Select the case of the next frame, and advance to the frame."""
         stream = self._stream
         if self._other is not None:
             self._choose_here(self._other)
@@ -168,7 +167,7 @@ class _SwitchDecoder(StreamDecoder):
         return fault
 
     def _choose_here(self, other: StreamDecoder) -> None:
-        """Select the case of the frame at the next byte, or `other` if no case matches."""
+        """Select the case of a frame at the next byte, or `other` if no case matches."""
         stream = self._stream
         front = bytes(stream.data[stream.at : stream.at + self._longest])
         chosen = next((one for first, one in self._cases if front.startswith(first)), None)

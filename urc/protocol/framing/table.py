@@ -1,7 +1,7 @@
-"""Framings: the conversion between byte streams and frames.
+"""Framings: conversion between byte streams and frames.
 
-Pure. This module has the table of framings and builds one from its declaration; a family is
-imported on first use. `urc.protocol.framing.base` has the interfaces.
+Pure. This module contains the table of framings, and builds a framing from its declaration. Each
+family is imported on first use. The interfaces are in `urc.protocol.framing.base`.
 """
 
 from typing import NamedTuple
@@ -22,20 +22,20 @@ class AsymmetricFraming(NamedTuple):
     received: Framing
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame, or raise `FramingError`."""
+        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
         return self.sent.encode(payload)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
-        """Return a new decoder."""
+        """Return a new decoder for received bytes."""
         return self.received.decoder(stream)
 
     def reversed(self) -> "AsymmetricFraming":
-        """Return the same framings for the other end of the connection."""
+        """Return the framing for the other end of the connection."""
         return AsymmetricFraming(self.received.reversed(), self.sent.reversed())
 
 
 def build_framing(spec: FramingSpec) -> Framing:
-    """Return the framing that `spec` declares."""
+    """Return the framing declared by `spec`."""
     framing = _of_type(spec)
     if spec.timeout_s is not None or spec.strips_ansi:
         from urc.protocol.framing.timeout import TimeoutFraming
@@ -48,7 +48,7 @@ def build_framing(spec: FramingSpec) -> Framing:
 
 
 def _of_type(spec: FramingSpec) -> Framing:
-    """Return the framing of the table; with byte stuffing of all bytes, an `EscapedFraming`."""
+    """Return the framing from the table, or an `EscapedFraming` if the whole content is stuffed."""
     if isinstance(spec.options.get("escape"), EscapeSpec):
         from urc.protocol.framing.escaped import EscapedFraming
 

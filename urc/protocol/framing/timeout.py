@@ -1,9 +1,9 @@
-"""Timeout and removal of escape sequences, for any framing.
+"""Timeouts and removal of terminal escape sequences, for any framing.
 
-Theory of operation. An incomplete frame blocks all later ones: a corrupted length field may demand
-bytes that never arrive. With a timeout, silence after the newest byte ends the wait. The beginning
-of the frame is then dropped byte by byte, and the frames in the remaining bytes are reported.
-Terminal escape sequences are removed before framing, so that they split neither markers nor texts.
+Theory of operation. An incomplete frame blocks all later frames: a corrupted length field may
+require bytes that never arrive. With a timeout, silence after the newest byte ends the wait. The
+first bytes are then dropped one by one, until the remaining bytes contain valid frames. Terminal
+escape sequences are removed before framing, because a sequence could split a marker or a text.
 """
 
 import re
@@ -19,55 +19,57 @@ _SEQUENCE: Final = re.compile(
     rb"\x1b(?:\[[0-?]{0,64}[ -/]{0,8}[@-~]|\][^\x07\x1b]{0,256}(?:\x07|\x1b\\)"
     rb"|[ -/]{0,8}[0-Z\\^-~])"
 )
-"""ECMA-48: a control sequence, a command to the terminal such as its title, or a single escape."""
+"""ECMA-48 escape sequence: a control sequence, an operating system command such as a title, or a
+single escape."""
 _MOST_TRIES: Final = 4096
-"""Limit of attempts to find the beginning of another frame; each may scan all remaining bytes."""
+"""Maximum number of attempts to find the start of the next frame; each attempt may scan all
+remaining bytes."""
 _LONGEST: Final = 300
-"""Longest incomplete escape sequence, in bytes."""
+"""Maximum length of an incomplete escape sequence, in bytes."""
 
 
 class TimeoutFraming(NamedTuple):
-    """A framing with a timeout within frames, or with removal of escape sequences."""
+    """A framing with a timeout for incomplete frames, or without terminal escape sequences."""
 
     framing: Framing
     timeout_s: float | None
     strips_ansi: bool
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame, or raise `FramingError`."""
+        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
         return self.framing.encode(payload)
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
-        """Return a new decoder."""
+        """Return a new decoder for received bytes."""
         return _PatientDecoder(ReceiveBuffer() if stream is None else stream, self)
 
     def reversed(self) -> "TimeoutFraming":
-        """Return the same framing for the other end of the connection."""
+        """Return the framing for the other end of the connection."""
         return self._replace(framing=self.framing.reversed())
 
 
 class _PatientDecoder:
-    """Delegates to another decoder and adds the timeout."""
+    """A decoder that adds a timeout to another decoder."""
 
     def __init__(self, stream: ReceiveBuffer, framing: TimeoutFraming) -> None:
         self._stream = stream
         self._framing = framing
         self._decoder = framing.framing.decoder(stream)
         self._newest: float | None = None
-        """Time of the newest byte; None before the first one."""
+        """Time of the newest byte; None before the first byte."""
         self._told: list[bytes | FrameFault] = []
-        """Frames and violations that the timeout has released."""
+        """Frames and violations found after the timeout."""
         self._held = b""
-        """Beginning of an incomplete escape sequence."""
+        """Received bytes of an incomplete escape sequence."""
 
     @property
     def pending(self) -> int:
-        """Bytes held back."""
+        """Number of buffered bytes of an incomplete frame."""
         return self._decoder.pending + len(self._held)
 
     @property
     def deadline(self) -> float | None:
-        """End of the timeout, or the deadline of the framing itself."""
+        """Time of the timeout, or the deadline of the framing if earlier."""
         if self._told:
             return float("-inf")
         own, timeout = self._decoder.deadline, self._framing.timeout_s
@@ -77,7 +79,7 @@ class _PatientDecoder:
         return ends if own is None else min(own, ends)
 
     def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
-        """Append bytes and return the completed frames, in order."""
+        """Append received bytes; return the completed frames and violations in order."""
         self.push(data, now)
         frames: list[bytes | FrameFault] = []
         while (frame := self.next(now)) is not None:
@@ -85,7 +87,7 @@ class _PatientDecoder:
         return frames
 
     def push(self, data: bytes, now: float = 0.0) -> None:
-        """Append bytes for `next`."""
+        """Append received bytes for `next` to decode."""
         self._discard(now)
         if self._framing.strips_ansi:
             data = self._stripped(data)
@@ -93,7 +95,7 @@ class _PatientDecoder:
         self._newest = now
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Return one frame or violation, or None if incomplete."""
+        """Remove and return the next frame or violation; return None if incomplete."""
         if self._newest is None and len(self._stream):
             self._newest = now  # bytes left by another decoder
         if self._told:
@@ -101,14 +103,14 @@ class _PatientDecoder:
         return self._decoder.next(now)
 
     def tick(self, now: float) -> list[bytes | FrameFault]:
-        """Return the frames that the silence until `now` has completed or released."""
+        """Return the frames and violations after silence until `now`."""
         frames = self._decoder.tick(now)
         self._discard(now)
         told, self._told = self._told, []
         return told + frames
 
     def _discard(self, now: float) -> None:
-        """Drop the beginning of a stalled frame; record the frames after it."""
+        """After the timeout, drop the incomplete frame and record the following frames."""
         timeout, stream = self._framing.timeout_s, self._stream
         if timeout is None or self._newest is None or now < self._newest + timeout:
             return

@@ -1,9 +1,10 @@
 """The framing ``xml``: consecutive XML elements.
 
-Theory of operation. A stream of elements has no root, so each top-level element is a frame. Only
-tags, comments and the like determine its end; quoted attribute values may contain markup
-characters. The scan jumps from marker to marker and scans every byte once. Blanks, comments and
-declarations may separate frames. At a mismatched closing tag, everything up to it is dropped.
+Theory of operation. A stream of elements has no root, so each top-level element is a frame. Tags,
+comments, declarations and CDATA determine the end of an element. Quoted attribute values may
+contain markup characters. The scan jumps from marker to marker, and reads every byte once. Blanks,
+comments and declarations may separate frames. At a mismatched closing tag, all data up to the tag
+is dropped.
 """
 
 import re
@@ -18,14 +19,14 @@ __all__ = ["XmlFraming"]
 _NESTING_MOST: Final = 100
 _BETWEEN: Final = b" \t\r\n"
 _SPECIAL: Final = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>"}
-"""Beginning of a section without tags → its end."""
+"""Terminators of sections without tags, by their first characters."""
 _IN_TAG: Final = re.compile(rb"[\"'<>]")
 _NAME: Final = re.compile(rb"</?([^\s/<>\"'=]+)")
 _WAIT, _BAD = 0, -1
 
 
 class XmlFraming(NamedTuple):
-    """One XML element is one frame; `tx` follows each sent frame."""
+    """Frames of one XML element each; `tx` follows each sent frame."""
 
     tx: bytes
     max_bytes: int
@@ -37,7 +38,7 @@ class XmlFraming(NamedTuple):
         return cls(cast("bytes", spec.options.get("tx", b"")), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the bytes of one frame, or raise `FramingError`."""
+        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
         if len(payload) > self.max_bytes:
             raise FramingError(f"a frame of {len(payload)} bytes is longer than {self.max_bytes}")
         found = _XmlDecoder(None, b"", self.max_bytes).feed(payload)
@@ -47,11 +48,11 @@ class XmlFraming(NamedTuple):
         return payload if self.is_reversed else payload + self.tx
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
-        """Return a new decoder."""
+        """Return a new decoder for received bytes."""
         return _XmlDecoder(stream, self.tx if self.is_reversed else b"", self.max_bytes)
 
     def reversed(self) -> "XmlFraming":
-        """Return the same framing for the other end of the connection."""
+        """Return the framing for the other end of the connection."""
         return self._replace(is_reversed=not self.is_reversed)
 
 
@@ -62,23 +63,23 @@ class _XmlDecoder(StreamDecoder):
         self._begin()
 
     def restart(self) -> None:
-        """Reset the state: a `switch` begins a frame here."""
+        """Reset the state for a new frame, selected by a `switch`."""
         super().restart()
         self._begin()
 
     def _begin(self) -> None:
         self._open: list[bytes] = []
-        """Names of the open elements."""
+        """Names of the open elements, outermost first."""
         self._looked = 0
         """Number of scanned bytes of the stream."""
         self._tag = -1
-        """Offset of the incomplete tag; -1 outside of tags."""
+        """Offset of an incomplete tag; -1 outside of tags."""
         self._quote = b""
         self._until = b""
-        """Terminator of the present comment, declaration or plain text."""
+        """Terminator of the current comment, declaration or plain text."""
 
     def next(self, now: float = 0.0) -> bytes | FrameFault | None:
-        """Return one frame or violation, or None if incomplete."""
+        """Remove and return the next frame or violation; return None if incomplete."""
         stream = self._stream
         while True:
             if not self._looked:
@@ -108,7 +109,7 @@ class _XmlDecoder(StreamDecoder):
         return self._skip(start - stream.at) if start > stream.at else None
 
     def _to_end(self) -> int:
-        """Return the end of the element or of the section before it; else `_WAIT` or `_BAD`."""
+        """Return the end of the element or of a preceding section; otherwise `_WAIT` or `_BAD`."""
         while True:
             if self._until:
                 step = self._through_special()
@@ -188,7 +189,7 @@ class _XmlDecoder(StreamDecoder):
         return 1 if len(self._open) <= _NESTING_MOST else _BAD
 
     def _taken(self, size: int) -> bytes | FrameFault | None:
-        """Remove an element from the stream and return it; None for a section between elements."""
+        """Remove and return the next element; return None for a section between elements."""
         stream = self._stream
         piece = bytes(stream.data[stream.at : stream.at + size])
         stream.at += size
