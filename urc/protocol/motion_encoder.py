@@ -1,8 +1,8 @@
-"""Frames of motion: setpoints of held commands, and their stops.
+"""Frames of motion: setpoints and stops of held commands.
 
-Pure. These frames bypass the queue of their connection. The owner of the transport sends the newest
-setpoint, and a stop before any other frame. Frames of motion are subject to all requirements of
-their command.
+Pure. Frames of motion bypass the request queue of the connection. The owner of the transport sends
+only the newest setpoint, and sends a stop before any other frame. Setpoints must meet all
+requirements of the command.
 """
 
 from collections.abc import Callable, Container, Mapping
@@ -26,17 +26,17 @@ from urc.protocol.sequences.commands import is_guarded, why_refused
 __all__ = ["MotionEncoder", "MotionUnavailable"]
 
 _SPARE_STOPS: Final = 24
-"""Numbers that other frames may use before the stops are rendered again."""
+"""Spare counter numbers for other frames, before the stops must be rendered again."""
 
 Check = Callable[[Mapping[str, object]], dict[str, Reading]]
 
 
 class MotionUnavailable(UrcError):
-    """Motion that is refused now; the message gives the reason."""
+    """Motion is not possible now; the message is the reason."""
 
 
 class _Way:
-    """The inputs of the frames of one held command, looked up once because of their rate."""
+    """The encoder of one held command, looked up once because setpoints are frequent."""
 
     __slots__ = ("ask", "check", "command", "is_guarded", "line")
 
@@ -48,7 +48,7 @@ class _Way:
 
 
 class MotionEncoder:
-    """The held commands of one driver."""
+    """The encoder for all held commands of one driver."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class MotionEncoder:
         lines: Mapping[str, Conversation],
         known: SignalState,
     ) -> None:
-        """Use the tables of the engine, without copying them."""
+        """Initialise with the tables of the engine, which are not copied."""
         self._held = {name: one for name, one in commands.items() if one.hold is not None}
         self._ways = {
             name: _Way(one, checks[name], asks[name], lines[one.transport])
@@ -68,11 +68,11 @@ class MotionEncoder:
         self._lines = lines
         self._known = known
         self._counting: dict[str, int] = {}
-        """Connection → number of its controls whose frames have counters, if any."""
+        """Number of held commands with counters, by connection."""
         self._made: dict[str, Made] = {}
-        """Command → its rendered stops."""
+        """Cached stop frames, by command."""
         self._lengths: dict[str, int] = {}
-        """Shared connection → number of stops rendered in advance for each control."""
+        """Number of stops to render in advance for each held command, by shared connection."""
         for one, command in self._held.items():
             line = command.transport
             lines[line].has_motion = True
@@ -82,10 +82,10 @@ class MotionEncoder:
                 self._counting[line] = self._counting.get(line, 0) + 1
 
     def share(self, repeating: Container[str]) -> None:
-        """Share the counters with the sender of motion, which confirms their values.
+        """Share the counters with the sender of motion, which confirms the counter values.
 
         Args:
-            repeating: connections that repeat a stop, because it may be lost.
+            repeating: connections that repeat a stop, because a frame may be lost.
         """
         for line, controls in self._counting.items():
             self._lines[line].counters.is_shared = True
@@ -98,8 +98,8 @@ class MotionEncoder:
 
         Args:
             line: name of the connection.
-            stand: counter → last transmitted number.
-            is_settled: whether all frames of the engine have been transmitted.
+            stand: last transmitted number, by counter.
+            is_settled: whether all frames from the engine have been transmitted.
         """
         if line in self._lengths:
             self._lines[line].counters.set_counters(stand, is_settled=is_settled)
@@ -109,17 +109,18 @@ class MotionEncoder:
     def is_lasting(self, command: str) -> bool:
         """Return whether the stop of `command` always has the same bytes.
 
-        False for a stop with a counter, or with values from the robot or from settings.
+        The result is False for a stop with a counter, or with values from the robot or from
+        settings.
         """
         self._found(command)
         ask = self._asks[command]
         return ask.is_local and not ask.has_counters
 
     def has_stops(self, command: str) -> bool:
-        """Return whether the rendered stops of `command` suffice for now.
+        """Return whether the rendered stops of `command` are still valid.
 
-        They suffice while at least half of the spare numbers are left, and if they depend only on
-        their numbers.
+        Stops are valid while at least half of the spare numbers are left. Stops that depend on
+        other values are never valid.
         """
         made, line = self._made.get(command), self._found(command).transport
         if made is None or not self._asks[command].is_local or line not in self._lengths:
@@ -127,16 +128,16 @@ class MotionEncoder:
         return self._lines[line].counters.is_near(made, _SPARE_STOPS // 2)
 
     def is_ready(self, command: str) -> bool:
-        """Return whether the connection of `command` is open and ready."""
+        """Return whether the connection of `command` is open and its login complete."""
         line = self._lines[self._found(command).transport]
         return line.is_open and line.is_ready
 
     def stop_frame(self, command: str) -> Payload | FrameVariants:
-        """Return the stop of `command`: bytes, framing included, or an envelope.
+        """Return the stop of `command`: bytes including framing, an envelope, or frame variants.
 
-        The stop can be rendered without a connection. A stop with a counter is a series, with one
-        frame for each possible next number. The series is as long as all stops of the connection
-        may need. A robot that moves in steps stops by itself, so its stop is empty.
+        Rendering a stop needs no connection. A stop with a counter is a series with one frame for
+        each possible next number. The series is long enough for all stops of the connection. The
+        stop is empty for a robot that ends each motion step itself.
 
         Raises:
             BadArgument: the command is not held, or the stop cannot be written.
@@ -163,19 +164,20 @@ class MotionEncoder:
         now: float,
         confirmed_by: tuple[str, ...] = (),
     ) -> Payload | CountedFrame:
-        """Return the frame of `command` with these arguments, to be sent now.
+        """Return the frame of `command` with these arguments, for sending now.
 
-        In half duplex, the frame is empty while a reply is outstanding; the next setpoint replaces
-        it.
+        In half duplex, the frame is empty while a reply is pending; the next setpoint follows
+        later.
 
-        On a shared connection, counters are only proposed; `set_counters` confirms their values
-        after the transmission.
+        On a shared connection, the counter numbers are only proposed; `set_counters` confirms the
+        numbers after the transmission.
 
         Args:
             command: name of a held command.
-            arguments: values by name; missing ones take their defaults.
-            now: the time, for requirements over fresh signals.
-            confirmed_by: people who have confirmed the command, for the two-person rule.
+            arguments: values by name; missing arguments have their default values.
+            now: current time in seconds, for requirements over fresh signals.
+            confirmed_by: names of the people who have confirmed the command, for the two-person
+                rule.
 
         Raises:
             BadArgument: the command is not held, or an argument is invalid.
@@ -216,7 +218,7 @@ class MotionEncoder:
         now: float,
         confirmed_by: tuple[str, ...],
     ) -> Numbered | None:
-        """Render a frame of motion again: another frame has used up its numbers."""
+        """Render a frame of motion again after another frame has used its numbers."""
         try:
             made = self.motion_frame(command, arguments, now, confirmed_by)
         except UrcError:

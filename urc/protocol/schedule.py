@@ -22,7 +22,7 @@ from urc.protocol.sequences.sequence_runner import Sink
 __all__ = ["KeepaliveState", "PollState", "PollSchedule"]
 
 Run = Callable[[str, Mapping[str, object], Sink, float], list[LineEvent]]
-"""Function that runs a command: name, arguments, sink of the outcome, time."""
+"""Function that runs a command; the parameters are name, arguments, sink and time."""
 
 
 class PollState:
@@ -33,7 +33,7 @@ class PollState:
     ) -> None:
         self.poll = poll
         self.due: float | None = None
-        """Time of the next request; None while its connection is down."""
+        """Time of the next request, in seconds; None while disconnected."""
         self._ask = ask
         self._line = line
         self._known = known
@@ -51,7 +51,7 @@ class PollState:
         self.due = None
 
     def submit_if_due(self, now: float) -> list[LineEvent]:
-        """Submit the request if it is due, unless the last one is still queued."""
+        """Submit the request if due, unless the previous request is still pending."""
         if self.due is None or self.due > now:
             return []
         every_s = self.poll.every_s
@@ -70,7 +70,7 @@ class PollState:
         return _submit(self._line, self._ask, self, self._names, now)
 
     def ended(self, exchange: Exchange, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Count missed replies; report refusals."""
+        """Count missed replies, and report refusals."""
         if outcome.code == "timed-out" and self.poll.offline is not None:
             self._misses += 1
             if self._misses >= self.poll.offline.after:
@@ -102,10 +102,10 @@ class KeepaliveState:
         """Initialise the keepalive.
 
         Args:
-            keepalive: as declared.
-            line: its connection.
-            ask: its request; None when it runs a command.
-            known: the names of its templates.
+            keepalive: the declaration.
+            line: the connection to keep open.
+            ask: request of the keepalive; None for a keepalive that runs a command.
+            known: state with the names for the templates.
         """
         self._keepalive = keepalive
         self._line = line
@@ -116,7 +116,7 @@ class KeepaliveState:
 
     @property
     def deadline(self) -> float | None:
-        """Time of the next keepalive; None while one is pending or the connection is down."""
+        """Time of the next keepalive; None while a keepalive is pending or while disconnected."""
         if not self._line.is_ready or self._is_asked:
             return None
         # A refused keepalive is not retried at once.
@@ -127,7 +127,7 @@ class KeepaliveState:
         self._is_asked = False
 
     def speak(self, run: Callable[[str], list[LineEvent]], now: float) -> list[LineEvent]:
-        """Send a keepalive if it is due; `run` runs a command and calls `done`."""
+        """Send a keepalive if due; `run` runs a command and calls `done`."""
         due = self.deadline
         if due is None or due > now:
             return []
@@ -137,11 +137,11 @@ class KeepaliveState:
         return _submit(self._line, self._ask, self, self._known.names, now)
 
     def ended(self, exchange: Exchange, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Record that the keepalive was sent."""
+        """Record the outcome of the keepalive request."""
         return self.done(outcome, now)
 
     def done(self, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Record the end of the command; it reports its own failures."""
+        """Record the end of the command, which reports failures itself."""
         self._is_asked = False
         return []
 
@@ -172,7 +172,7 @@ class PollSchedule:
 
     @property
     def next_poll(self) -> float | None:
-        """Time of the next poll."""
+        """Time of the next poll; None without a scheduled poll."""
         first: float | None = None
         for poll in self._polls:
             due = poll.due
@@ -182,7 +182,7 @@ class PollSchedule:
 
     @property
     def next_words(self) -> list[float | None]:
-        """Latest time of the next keepalive of each connection."""
+        """Times of the next keepalives, one for each connection with a keepalive."""
         return [one.deadline for one in self._kept_alive.values()]
 
     def start(self, now: float) -> None:
@@ -192,7 +192,7 @@ class PollSchedule:
                 poll.start(now)
 
     def up(self, line: Conversation, now: float) -> None:
-        """Start polls and keepalive of a ready connection."""
+        """Start the polls and the keepalive of a ready connection."""
         name = line.spec.name
         if name in self._kept_alive:
             self._kept_alive[name].forget()
@@ -214,7 +214,7 @@ class PollSchedule:
             poll.stop()
 
     def submit_due(self, run: Run, now: float) -> Iterator[list[LineEvent]]:
-        """Submit due requests one by one; each is settled before the next."""
+        """Submit the due requests one by one, and yield the events of each request."""
         for poll in self._polls:
             if poll.due is not None and poll.due <= now:
                 yield poll.submit_if_due(now)
@@ -224,7 +224,7 @@ class PollSchedule:
 
 
 def _counting(keepalive: Keepalive, driver: Driver) -> frozenset[str] | None:
-    """Return the labels of requests that count as keepalives; None for all."""
+    """Return the labels of requests that count as keepalives; None for all requests."""
     if not keepalive.after:
         return None
     named = {*keepalive.after, keepalive.run}

@@ -26,7 +26,7 @@ def function_of(
         lines: lines of the function body, indented by at least four spaces.
         scope: global variables of the function, by name.
     """
-    import linecache  # what is made is made late, so that what makes it is imported late
+    import linecache  # imported here, because functions are generated only in live sessions
 
     source = "\n".join([f"def {name}({arguments}):", *lines, ""])
     file = f"<generated {name} {next(_numbers)}>"

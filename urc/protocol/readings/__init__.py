@@ -1,1 +1,1 @@
-"""Signals from decoded fields: conversion, alarms and change filters."""
+"""Conversion of decoded fields to signals, with alarms and change filters."""

@@ -1,8 +1,8 @@
-"""Alarm states of signals, from one sample to the next.
+"""Alarm states of signals over time.
 
-Pure: time is passed in. A value at the limit is past it. The alarm ends at a distance of
-``hysteresis`` inside the limit. With ``for``, the alarm begins when the value has stayed past the
-limit for that time, even without a further sample: `AlarmMonitor.deadline` gives the time.
+Pure: callers pass the time. A value equal to the limit counts as an alarm. The alarm ends when the
+value is inside the limit by ``hysteresis``. With ``for``, the alarm begins after this time beyond
+the limit, even without another sample, at `AlarmMonitor.deadline`.
 """
 
 from urc.model.values import Alarm, AlarmLimits, Reading
@@ -10,7 +10,7 @@ from urc.model.values import Alarm, AlarmLimits, Reading
 __all__ = ["AlarmMonitor"]
 
 _LEVELS: tuple[Alarm, ...] = ("lolo", "hihi", "low", "high")
-"""Alarm levels, the more serious ones first."""
+"""Alarm levels, most serious levels first."""
 _LOWER = ("lolo", "low")
 _DEEPER = {"lolo": "low", "hihi": "high"}
 
@@ -28,16 +28,16 @@ class AlarmMonitor:
             (level, limit) for level in _LEVELS if (limit := getattr(limits, level)) is not None
         ]
         self._due: dict[Alarm, float] = {}
-        """Passed level → time at which its alarm begins."""
+        """Start times of alarms, by exceeded level."""
 
     @property
     def deadline(self) -> float | None:
-        """Time at which `tick` may begin an alarm; None when only a sample can change the state."""
+        """Time at which `tick` may begin an alarm; None if only a sample can change the alarm."""
         active = (self.alarm, _DEEPER.get(self.alarm, ""))
         return min((due for level, due in self._due.items() if level not in active), default=None)
 
     def alarm_monitor(self, value: Reading, now: float) -> Alarm:
-        """Process a value and return its alarm."""
+        """Process a new value, and return its alarm."""
         span = _span(value)
         if span is None:
             self._due.clear()
@@ -60,14 +60,14 @@ class AlarmMonitor:
         return self.tick(now)
 
     def tick(self, now: float) -> Alarm:
-        """Return the alarm of the newest sample at `now`."""
+        """Return the alarm of the newest value at `now`."""
         begun = (level for level in _LEVELS if self._due.get(level, now + 1) <= now)
         self.alarm = next(begun, "")
         return self.alarm
 
 
 def _span(value: Reading) -> tuple[float, float] | None:
-    """Return the smallest and largest number in a value; None without numbers."""
+    """Return the minimum and maximum number in a value; None for a value without numbers."""
     if isinstance(value, bool):
         return None
     if isinstance(value, (int, float)):

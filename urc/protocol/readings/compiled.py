@@ -1,8 +1,7 @@
-"""Generated text decoders: one function per kind of frame, from text to samples.
+"""Generated decoders of text frames: one function per declaration, from text to samples.
 
-As in `urc.protocol.requests.compiled_encode`, the function handles the common case: every field is
-present and a valid value of its signal. In all other cases the closures (`slow`) read the frame
-again. The closures are also the oracle of the tests.
+The function handles only the common case, in which every field is present and valid. In all other
+cases, the closures (`slow`) read the frame again. The tests compare the function with the closures.
 """
 
 from typing import TYPE_CHECKING, Final, cast
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["build_fast_read"]
 
 _KEEPS_ASCII: Final = frozenset(("utf-8", "ascii", "latin-1"))
-"""Encodings that keep the bytes of ASCII text."""
+"""Encodings in which ASCII characters have their ASCII codes."""
 
 
 def build_fast_read(
@@ -30,7 +29,7 @@ def build_fast_read(
     slow: Compiled,
     encoding: str = "utf-8",
 ) -> Compiled | None:
-    """Return the function for frames of `spec`, or None if they are unsupported."""
+    """Return a generated function for frames of `spec`; None if `spec` is not supported."""
     if spec.conversions or spec.sets or spec.when or spec.lines or spec.collects:
         return None
     if spec.form == "regex":
@@ -53,9 +52,10 @@ def build_fast_read(
 
 
 def _head_check(prefix: str, encoding: str) -> list[str]:
-    """Return the lines that reject most frames with another beginning than `prefix`.
+    """Return source lines that reject most frames without `prefix`.
 
-    Leading blanks may be skipped, and other encodings may fail: such frames are read in full.
+    Frames with leading blanks or non-ASCII bytes are not rejected, because decoding may skip blanks
+    or fail.
     """
     if not prefix or encoding not in _KEEPS_ASCII:
         return []
@@ -102,7 +102,7 @@ def _of_regex(
 def _of_pattern(
     holes: tuple[PatternField, ...], tail: str, encoding: str, readings: Readings, slow: Compiled
 ) -> Compiled | None:
-    """Return the function for a pattern in which every word is a field or a literal."""
+    """Return a generated function for a pattern of whole words, each a field or a literal."""
     words = _words(holes, tail)
     kinds = {word.kind for word in words or () if isinstance(word, PatternField)}
     if words is None or "hex" in kinds or encoding not in _KEEPS_ASCII:
@@ -143,7 +143,7 @@ def _of_pattern(
 
 
 def _words(holes: tuple[PatternField, ...], tail: str) -> list[str | PatternField] | None:
-    """Return the words of a pattern, or None when a field is only part of a word."""
+    """Return the words of a pattern; None if a field is only part of a word."""
     words: list[str | PatternField] = []
     for place, hole in enumerate(holes):
         before = hole.before.lstrip() if place == 0 else hole.before
@@ -158,5 +158,5 @@ def _words(holes: tuple[PatternField, ...], tail: str) -> list[str | PatternFiel
 
 
 def _skipped(kind: FieldKind, raw: str) -> str:
-    """Return the check of a skipped field, which rejects other kinds of frames."""
+    """Return the check of a skipped field, which rejects frames that do not match."""
     return {"integer": f"int({raw})", "number": f"float({raw})"}.get(kind, f"{raw}[0]")

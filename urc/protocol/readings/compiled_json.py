@@ -1,8 +1,8 @@
-"""Generated JSON decoders: one function per kind of document, from bytes to samples.
+"""Generated JSON decoders: one function per declaration, from bytes to samples.
 
-Pure. As in `urc.protocol.readings.compiled`, for documents with every field present and of its
-type. A second function for the same paths handles missing or null fields. The closures handle all
-others.
+Pure. The function supports only JSON documents in which every field is present and has the declared
+type. A second function for the same paths supports missing or null fields. The closures read all
+other documents, as in `urc.protocol.readings.compiled`.
 """
 
 from collections.abc import Iterator, Mapping
@@ -22,7 +22,7 @@ __all__ = ["build_fast_json"]
 def build_fast_json(
     spec: ReadSpec, plan: ExtractionPlan, readings: Readings, slow: Compiled
 ) -> Compiled | None:
-    """Return the function, or None if these documents are unsupported."""
+    """Return a generated function for documents of `spec`; None if `spec` is not supported."""
     names = [name for name in spec.fields if not name.startswith("_")]
     values: dict[str, Value] = {}
     for name in names:
@@ -56,7 +56,7 @@ def build_fast_json(
 def _picks(
     want: PathNode, plan: ExtractionPlan, variable: str, raws: Mapping[str, str]
 ) -> Iterator[str]:
-    """Yield the lines that read the fields, assuming that all are present."""
+    """Yield source lines that read the fields, assuming that every field is present."""
     for field in want.fields:
         if field in raws:
             yield f"        {raws[field]} = {variable}"
@@ -73,7 +73,7 @@ def _careful(
     readings: Readings,
     slow: Compiled,
 ) -> object:
-    """Return the function for a decoded document with missing or null fields."""
+    """Return a function for decoded documents with missing or null fields."""
     lines = [f"    {raw} = UNSET" for raw in raws.values()]
     lines += plan.picking("v", lambda field: f"{raws[field]} = " if field in raws else "")
     scope: dict[str, object] = {

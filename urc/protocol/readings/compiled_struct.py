@@ -1,7 +1,7 @@
-"""Generated binary decoders: one function per kind of frame, from bytes to samples.
+"""Generated decoders of binary frames: one function per declaration, from bytes to samples.
 
-Pure. As in `urc.protocol.readings.compiled`, the function handles the common case, and the closures
-all others, such as invalid values. Only frames whose items all have fixed places are supported.
+Pure. Only frames with fixed positions of all items are supported. The closures read frames with
+invalid values, as in `urc.protocol.readings.compiled`.
 """
 
 from typing import cast
@@ -57,7 +57,7 @@ def build_fast_struct(
 
 
 def _numbers(items: tuple[Item, ...]) -> list[Item]:
-    """Return the integers of the outermost level without conversions other than a scale."""
+    """Return the integer items of the outermost level with at most a scale as conversion."""
     return [
         item
         for item in items
@@ -70,7 +70,7 @@ def _numbers(items: tuple[Item, ...]) -> list[Item]:
 
 
 def _is_sure(item: Item | None, value: Value) -> bool:
-    """Return whether the item is always a finite number of the type of the signal."""
+    """Return whether every value of the item is a finite number of the signal's type."""
     if item is None:
         return False
     if value.signal.type == "number":

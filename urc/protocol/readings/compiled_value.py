@@ -1,8 +1,8 @@
-"""Shared parts of the generated decoders: the way from a raw field to a sample.
+"""Shared code of the generated decoders for converting a raw field to a sample.
 
-Each engine assembles the source text once: the conversions of the fields, their checks, and the
-samples. For a value outside the type or range of its signal, the function calls the closures
-(`slow`), which read the frame again.
+Each engine builds the source text once: the field conversions, the checks and the samples. For a
+value of the wrong type or range, the function calls the closures (`slow`), which read the frame
+again.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -18,7 +18,8 @@ __all__ = ["Compiled", "Taken", "Value", "finish", "of_json_type", "value_of"]
 
 Taken = tuple[list[Sample], Sequence[str]]
 Compiled = Callable[[Frame, float], "Taken | None"]
-"""Frame and time → samples and refused values, or None for another kind of frame."""
+"""Function from a frame and the time to samples and refused values; None for a frame that does not
+match."""
 
 _BEGIN: Final = (
     "    payload = frame.payload",
@@ -35,26 +36,26 @@ _JSON_TYPES: Final = {
 
 
 class Value(NamedTuple):
-    """The conversion of one field to a sample, in source text."""
+    """The source text for converting one field to a sample."""
 
     signal: Signal
     convert: str
-    """Expression over the raw text; "" for text as it is."""
+    """Expression over the raw text; "": no conversion."""
     checks: tuple[str, ...]
-    """Checks of the value, over ``{v}``."""
+    """Conditions over the value ``{v}`` for a valid value."""
     raw_checks: tuple[str, ...] = ()
-    """Checks of the raw text, over ``{r}``."""
+    """Conditions over the raw text ``{r}`` for a valid value."""
     is_finite: bool = True
-    """Whether `checks` reject infinity and not-a-number."""
+    """Whether the value is always finite, or `checks` reject infinity and not-a-number."""
 
 
 def of_json_type(type_name: str, raw: str) -> str:
-    """Return the check that a raw value has the type and lies within its bounds."""
+    """Return the condition that a raw value has the JSON type and is within the supported range."""
     return _JSON_TYPES[type_name].format(r=raw)
 
 
 def value_of(signal: Signal, kind: str, is_plain: bool) -> Value | None:
-    """Return the conversion of raw text to a value of `signal`; None when it is not simple."""
+    """Return the conversion of raw text to a value of `signal`; None if not supported."""
     conversion = signal.conversion
     if signal.deadband or signal.debounce_s:
         return None
@@ -94,7 +95,7 @@ def value_of(signal: Signal, kind: str, is_plain: bool) -> Value | None:
 
 
 def _scaled(coefficients: tuple[float, ...], number: str) -> str | None:
-    """Return the source of the arithmetic of `values.convert` for a scale and an offset."""
+    """Return the source of a scale and offset, with the arithmetic of `values.convert`."""
     if len(coefficients) != 2:
         return None
     offset, scale = coefficients
@@ -116,7 +117,7 @@ def finish(
     slow: Compiled,
     skipped: Sequence[str] = (),
 ) -> Compiled:
-    """Add conversions, checks and samples to `lines`, and make the function."""
+    """Add conversions, checks and samples to `lines`; return the compiled function."""
     names: dict[str, Any] = {
         **scope, "slow": slow, "bytes": bytes, "type": type, "float": float, "int": int,
         "new": tuple.__new__, "Sample": Sample,
@@ -139,7 +140,7 @@ def finish(
 
 
 def _conversions(values: Sequence[Value], raws: Sequence[str], shown: Sequence[str]) -> list[str]:
-    """Return the conversions of the raw texts, which may raise."""
+    """Return source lines that convert the raw texts; the lines may raise exceptions."""
     lines = [
         f"{name} = {(one.convert or '{r}').format(r=raw)}"
         for one, raw, name in zip(values, raws, shown, strict=True)
@@ -153,7 +154,7 @@ def _conversions(values: Sequence[Value], raws: Sequence[str], shown: Sequence[s
 
 
 def _checks(values: Sequence[Value], raws: Sequence[str], shown: Sequence[str]) -> list[str]:
-    """Return the checks of the values."""
+    """Return source lines that check the values."""
     checks = [] if all(one.is_finite for one in values) else ["is_finite"]
     for one, raw, name in zip(values, raws, shown, strict=True):
         checks += [check.format(r=raw) for check in one.raw_checks]
@@ -166,7 +167,7 @@ def _checks(values: Sequence[Value], raws: Sequence[str], shown: Sequence[str]) 
 def _samples(
     values: Sequence[Value], shown: Sequence[str], readings: Readings, names: dict[str, Any]
 ) -> list[str]:
-    """Return the lines that make and return the samples; add their helpers to `names`."""
+    """Return source lines that create and return the samples; add helpers to `names`."""
     samples = []
     for one, value in zip(values, shown, strict=True):
         name, alarm = one.signal.name, "''"

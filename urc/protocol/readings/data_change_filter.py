@@ -1,6 +1,7 @@
 """Dead band and debounce of samples.
 
-Pure: time is passed in. See ``deadband`` and ``debounce`` of a signal.
+Pure: callers pass the time. The keys ``deadband`` and ``debounce`` of a signal declare both
+filters.
 """
 
 from urc.model.values import Reading, Sample, Signal
@@ -9,7 +10,7 @@ __all__ = ["DataChangeFilter"]
 
 
 class DataChangeFilter:
-    """The last reported sample of one signal, and the pending one."""
+    """A change filter with the last reported and the pending sample of one signal."""
 
     __slots__ = ("_band", "_pending", "_settle_s", "_since", "_told")
 
@@ -19,15 +20,15 @@ class DataChangeFilter:
         self._told: Sample | None = None
         self._pending: Sample | None = None
         self._since = 0.0
-        """Time of the first sample with the value of `_pending`."""
+        """Time of the first sample with the value of `_pending`, in seconds."""
 
     @property
     def deadline(self) -> float | None:
-        """Time at which `tick` has a sample to report."""
+        """Time at which `tick` reports the pending sample; None without a pending sample."""
         return None if self._pending is None else self._since + self._settle_s
 
     def filter(self, sample: Sample, now: float) -> Sample | None:
-        """Return the sample to report: the new one, an update of the last one, or None."""
+        """Return the sample to report: the new sample, an update of the last sample, or None."""
         told = self._told
         if told is not None and sample.alarm == told.alarm and self._is_same(sample, told):
             self._pending = None
@@ -41,7 +42,7 @@ class DataChangeFilter:
         return self.tick(now)
 
     def tick(self, now: float) -> Sample | None:
-        """Return the pending sample if its value has lasted long enough by `now`, else None."""
+        """Return the pending sample if its value has lasted long enough at `now`, else None."""
         due = self.deadline
         if self._pending is None or due is None or now < due:
             return None

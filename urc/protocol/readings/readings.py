@@ -1,7 +1,7 @@
 """Samples of one engine: conversion of fields, alarms, and computed signals.
 
-Pure: time is passed in. Each engine has one `Readings`. A signal that several frames set has one
-alarm state, and a computed signal reads the newest value of each input.
+Pure: callers pass the time. Each engine has one `Readings`. A signal has one alarm state, even if
+several frames set the signal. A computed signal uses the newest value of each input.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -17,7 +17,8 @@ from urc.protocol.values.decode import Convert, build_converter
 __all__ = ["Decode", "Readings"]
 
 Decode = Callable[[Mapping[str, object], float], tuple[list[Sample], list[str]]]
-"""Fields of a frame and the time → samples, and one text for each refused value."""
+"""Function from the fields of a frame and the time to samples, and one message for each refused
+value."""
 
 
 class _Computed(NamedTuple):
@@ -25,9 +26,9 @@ class _Computed(NamedTuple):
     formula: Template
     inputs: tuple[str, ...]
     spare: frozenset[str]
-    """Optional inputs: the formula works without them."""
+    """Names of optional inputs, which have a default in the formula."""
     shortest_s: float
-    """Shortest ``stale_after`` of its inputs, in seconds."""
+    """Minimum ``stale_after`` of the inputs, in seconds."""
     convert: Convert
 
 
@@ -35,8 +36,8 @@ class Readings:
     """The newest values of the inputs of formulas, and the alarm states of all signals.
 
     Args:
-        signals: as loaded: no computed signal depends on itself.
-        names: names for formulas besides signals, such as ``settings``.
+        signals: loaded signals by name; no computed signal depends on itself.
+        names: additional names for formulas, such as ``settings``.
     """
 
     def __init__(
@@ -57,16 +58,16 @@ class Readings:
         }
         self._timed = tuple(name for name in self._alarm_monitors if signals[name].limits.for_s > 0)
         self._last: dict[str, Sample] = {}
-        """Newest sample of each input of a formula, and of each signal in `_timed`."""
+        """Newest samples of formula inputs and of signals in `_timed`, by signal."""
         self._namespace: dict[str, object] = dict(names)
         self._computed = tuple(self._in_order())
         inputs = (name for one in self._computed for name in one.inputs)
         self._kept = frozenset((*inputs, *self._timed))
 
     def decoder(self, fields: Iterable[str]) -> Decode:
-        """Return the function that converts the fields of one kind of frame to samples.
+        """Return a function that converts the given fields of a frame to samples.
 
-        Fields whose name starts with ``_`` are private to the document and give no samples.
+        Fields with a leading ``_`` in the name are private to the document, and are not converted.
         """
         converters = {name: self._converter(name) for name in fields if not name.startswith("_")}
 
@@ -95,7 +96,7 @@ class Readings:
     def set_values(
         self, values: Mapping[str, object], now: float
     ) -> tuple[list[Sample], list[str]]:
-        """Convert values from another source than a frame, as a decoder converts fields."""
+        """Convert values from a source other than a frame, like fields."""
         return self.decoder(values)(values, now)
 
     def alarm(self, name: str, value: Reading, now: float) -> Alarm:
@@ -104,21 +105,21 @@ class Readings:
         return "" if alarm_monitor is None else alarm_monitor.alarm_monitor(value, now)
 
     def alarm_monitors(self, name: str) -> bool:
-        """Return whether the signal has limits."""
+        """Return whether the signal has alarm limits."""
         return name in self._alarm_monitors
 
     def keeps(self, name: str) -> bool:
-        """Return whether a formula or a timed alarm uses the signal, for `follow`."""
+        """Return whether a formula or a timed alarm uses the signal; if so, `follow` is needed."""
         return name in self._kept
 
     @property
     def is_timed(self) -> bool:
-        """Whether time alone can change a sample."""
+        """Whether a sample can change with time alone."""
         return bool(self._timed or self._change_filter)
 
     @property
     def deadline(self) -> float | None:
-        """Time at which `tick` may have samples; None when only a frame can change them."""
+        """Time at which `tick` may return samples; None if only a frame can change samples."""
         if not self._timed and not self._change_filter:
             return None
         times = [self._alarm_monitors[name].deadline for name in self._timed]
@@ -126,9 +127,9 @@ class Readings:
         return min((time for time in times if time is not None), default=None)
 
     def tick(self, now: float) -> list[Sample]:
-        """Return the samples that time alone has changed until `now`, with their own times.
+        """Return samples that changed with time alone until `now`, with their original times.
 
-        The list has the newest samples of signals with a new alarm, and debounced values.
+        The list contains the newest samples of signals with a new alarm, and debounced samples.
         """
         samples: list[Sample] = []
         if self._change_filter:
@@ -144,7 +145,7 @@ class Readings:
         return samples
 
     def follow(self, samples: list[Sample], refused: list[str], now: float) -> None:
-        """Append to `samples` all signals that are computed from them."""
+        """Compute all signals that depend on `samples`, and append the new samples."""
         changed = set()
         for taken in samples:
             if taken.signal in self._kept:
@@ -166,7 +167,7 @@ class Readings:
                 changed.add(computed.name)
 
     def _report(self, sample: Sample, now: float) -> Sample | None:
-        """Return the sample to report; None while dead band or debounce suppress it."""
+        """Return the sample to report; None while dead band or debounce suppresses the sample."""
         change_filter = self._change_filter.get(sample.signal)
         return sample if change_filter is None else change_filter.filter(sample, now)
 
@@ -176,7 +177,7 @@ class Readings:
             self._namespace[sample.signal] = sample.value
 
     def _compute(self, computed: _Computed, now: float) -> Sample | None:
-        """Return the sample, or None while a required input has never been read."""
+        """Return the sample; None if a required input has never been received."""
         time_s, is_absent = now, False
         for name in computed.inputs:
             sample = self._last.get(name)
@@ -202,7 +203,7 @@ class Readings:
         return self._converters[name]
 
     def _in_order(self) -> Iterable[_Computed]:
-        """Yield the computed signals, each after its inputs."""
+        """Yield the computed signals in dependency order."""
         waiting = {name: one for name, one in self.signals.items() if one.formula is not None}
         while waiting:
             ready = [

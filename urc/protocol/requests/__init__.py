@@ -1,1 +1,1 @@
-"""Requests and replies on one line: queue, rate limit, matching, timeouts."""
+"""Requests and replies on one connection: queue, rate limits, matching and timeouts."""

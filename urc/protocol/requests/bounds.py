@@ -1,6 +1,6 @@
-"""Bounds of a command: its longest duration, and the transports that it uses.
+"""Limits of a command: maximum duration, and transports in use.
 
-Every wait of an engine has a timeout; these functions add them up. Pure.
+Pure. Every wait of an engine has a timeout; the maximum duration is the sum of the timeouts.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,15 +24,15 @@ from urc.model.sequence import (
 __all__ = ["GOOD_BYE_S", "calm_s", "lines_of", "longest_s", "needs_readings", "queue_limit_s"]
 
 GOOD_BYE_S: Final = 2.0
-"""Longest total duration of ``on_close``, in seconds."""
+"""Maximum total duration of ``on_close``, in seconds."""
 
 
 def queue_limit_s(spec: TransportSpec, reply_s: float | None) -> float:
-    """Return the longest time of a request in the queue, in seconds.
+    """Return the maximum time of a request in the queue, in seconds.
 
     Args:
-        spec: the transport.
-        reply_s: timeout of its first reply; None without a reply.
+        spec: transport of the request.
+        reply_s: timeout of the first reply in seconds; None: the default timeout of the transport.
     """
     answer_s = spec.timeouts.reply_s if reply_s is None else reply_s
     steps_s = _steps_s(spec.on_connect, lambda step: _step_s(step, spec))
@@ -42,15 +42,15 @@ def queue_limit_s(spec: TransportSpec, reply_s: float | None) -> float:
 
 
 def longest_s(driver: Driver, name: str) -> float:
-    """Return the longest duration of the command or sequence `name`, in seconds."""
+    """Return the maximum duration of the command or sequence `name`, in seconds."""
     command = driver.commands.get(name)
     return 0.0 if command is None else _command_s(command, driver, frozenset())
 
 
 def calm_s(driver: Driver) -> float:
-    """Return the shortest delay to a deadline that a frame or a command may set; 0 for none.
+    """Return the minimum delay to a deadline after any frame or command, in seconds; 0 if unknown.
 
-    Replies, polls and stale connections set deadlines. Sequences and framing timeouts are not
+    Deadlines come from replies, polls and stale connections. Sequences and framing timeouts are not
     considered.
     """
     if any(one.verify or one.rate_per_s for one in driver.commands.values()):
@@ -92,7 +92,7 @@ def _command_s(command: Command, driver: Driver, outer: frozenset[str]) -> float
 
 
 def _steps_s(steps: tuple[Step, ...], one_s: Callable[[Step], float]) -> float:
-    """Return the longest duration of `steps`, counting every round and both branches."""
+    """Return the maximum duration of `steps` in seconds, counting every round and both branches."""
     total_s = 0.0
     for step in steps:
         total_s += one_s(step)
@@ -134,7 +134,7 @@ def _line_of(step: Step, transports: Mapping[str, TransportSpec]) -> TransportSp
 
 
 def _step_s(step: Step, spec: TransportSpec | None) -> float:
-    """Return the longest duration of one step, without its branches and commands."""
+    """Return the maximum duration of one step in seconds, without branches and commands."""
     if isinstance(step, WaitStep):
         return step.seconds
     if isinstance(step, UntilStep):
@@ -149,7 +149,7 @@ def _step_s(step: Step, spec: TransportSpec | None) -> float:
 
 
 def lines_of(name: str, driver: Driver) -> frozenset[str]:
-    """Return the transports that a sequence uses directly, including nested sequences."""
+    """Return the names of the transports that a sequence and its nested sequences use."""
     found: set[str] = set()
     names, seen = [name], set[str]()
     while names:
@@ -168,7 +168,7 @@ def lines_of(name: str, driver: Driver) -> frozenset[str]:
 
 
 def needs_readings(driver: Driver) -> bool:
-    """Return whether any part of a driver depends on earlier samples."""
+    """Return whether any condition or step of a driver depends on earlier samples."""
     specs = driver.transports.values()
     return (
         any(

@@ -1,8 +1,8 @@
-"""Generated encoders: one function per command, from arguments to bytes.
+"""Generated encoders: one function per command, which encodes arguments to bytes.
 
-The function handles the common case: every argument is a number of its type. All other cases go to
-the closures of `urc.protocol.requests.encode`, which are also the oracle of the tests. Only sums,
-products and ``fixed`` over numbers are supported.
+The function handles only the common case, in which every argument is a number of the declared type.
+The closures of `urc.protocol.requests.encode` handle all other cases. The tests compare the
+function with the closures. Only sums, products and ``fixed`` over numbers are supported.
 """
 
 import ast
@@ -28,14 +28,14 @@ _OPERATORS: Final[Mapping[str, ast.operator]] = {
     "_div": ast.Div(),
 }
 _IN_NUMBERS: Final = frozenset(b"0123456789+-.einfa")
-"""Bytes that a written number may contain."""
+"""Bytes that may occur in a written number."""
 _MOST_DIGITS: Final = 20
 _LARGEST: Final = 1e308
-"""Bound for finite values, as in `urc.protocol.requests.encode`."""
+"""Maximum finite value, as in `urc.protocol.requests.encode`."""
 
 
 class _Unsupported(Exception):
-    """Part of a template without a translation."""
+    """A part of a template cannot be translated."""
 
 
 def build_fast_encode(
@@ -45,7 +45,7 @@ def build_fast_encode(
     encoding: str,
     slow: Encode,
 ) -> Encode | None:
-    """Return the function from namespace to bytes, or None for an unsupported template."""
+    """Return a function from a namespace to bytes; None for an unsupported template."""
     if type(framing) is not DelimiterFraming or framing.codec is not None:
         return None
     names = sorted(template.names)
@@ -73,7 +73,7 @@ def _text_of(
     tx: bytes,
     encoding: str,
 ) -> str | None:
-    """Return the format string of a frame as source text, or None if unsupported."""
+    """Return the format string of a frame as source text; None for an unsupported template."""
     whole = frozenset(variables[name] for name, kind in kinds.items() if kind == "integer")
     try:
         pieces = _pieces(ast.parse(template.python, mode="eval").body, variables, whole)
@@ -86,7 +86,7 @@ def _text_of(
 
 
 def _written(checks: list[str], text: str, encoding: str) -> list[str]:
-    """Return the lines that write `text` if all of `checks` hold."""
+    """Return source lines that write `text` if all `checks` are true."""
     return [
         f"    if {' and '.join(checks)}:",
         "        try:",
@@ -99,7 +99,7 @@ def _written(checks: list[str], text: str, encoding: str) -> list[str]:
 def build_fast_check(
     arguments: Mapping[str, Argument], slow: Callable[[Mapping[str, object]], dict[str, Reading]]
 ) -> Callable[[Mapping[str, object]], dict[str, Reading]]:
-    """Return the check of the arguments; it calls `slow` for missing or non-numeric ones."""
+    """Return a function that checks numeric arguments, and calls `slow` in all other cases."""
     kinds = {one.type for one in arguments.values()}
     if not arguments or kinds - {"number", "integer"}:
         return slow
@@ -119,7 +119,7 @@ def build_fast_check(
 
 
 def _range(variable: str, argument: Argument) -> str:
-    """Return the check that a variable is a valid value of the argument."""
+    """Return the condition that a variable is a valid value of the argument."""
     low = -_LARGEST if argument.min is None else argument.min
     high = _LARGEST if argument.max is None else argument.max
     whole = f"type({variable}) is int"
@@ -134,7 +134,7 @@ def _check(variable: str, kind: str) -> str:
 
 
 def _tail(pieces: list[ast.expr], tx: bytes, encoding: str) -> str:
-    """Return the delimiter as text, unless the content of the frame may contain it."""
+    """Return the delimiter as text; None if the frame content may contain the delimiter."""
     literals = [one.value for one in pieces if isinstance(one, ast.Constant)]
     texts = [text.encode(encoding) for text in literals if isinstance(text, str)]
     if any(tx and tx in text for text in texts) or not _IN_NUMBERS.isdisjoint(tx):
@@ -146,7 +146,7 @@ def _tail(pieces: list[ast.expr], tx: bytes, encoding: str) -> str:
 
 
 def _pieces(node: ast.expr, variables: Mapping[str, str], whole: frozenset[str]) -> list[ast.expr]:
-    """Return the parts of a format string: texts and inserted numbers."""
+    """Return the parts of a format string: literal texts and numbers."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         return [node]
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
@@ -166,7 +166,7 @@ def _pieces(node: ast.expr, variables: Mapping[str, str], whole: frozenset[str])
 
 
 def _number(node: ast.expr, variables: Mapping[str, str]) -> ast.expr:
-    """Return a Python expression for a number: arguments, constants, sums and products."""
+    """Return a Python expression for a number, using arguments, constants, sums and products."""
     if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
         return ast.Name(variables[str(node.slice.value)])  # only `ns[NAME]` has this form
     if isinstance(node, ast.Constant) and type(node.value) in (int, float):

@@ -1,6 +1,6 @@
-"""State of the robot, as the namespace of conditions.
+"""State of the robot as the namespace of conditions.
 
-Pure. A stale reading counts as unknown: a condition over a stale or never read signal is false.
+Pure. A condition over a signal that is stale or was never received is false.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -12,20 +12,20 @@ __all__ = ["SignalState", "ConditionScope"]
 
 
 class SignalState:
-    """The newest sample of every signal."""
+    """The newest samples of all signals, and the latched STOP."""
 
     def __init__(self, signals: Mapping[str, Signal], names: Mapping[str, object]) -> None:
         self._signals = signals
         self.names = names
-        """Names in addition to the signals: ``settings``."""
+        """Additional names in conditions, such as ``settings``."""
         self.latched = ""
-        """Reason for refusing autonomous motion; "" if it is allowed."""
+        """Reason for refusing autonomous motion; "" if motion is allowed."""
         self.stops = 0
-        """Number of stops. Motion that was requested before a stop is not sent."""
+        """Number of stops. A motion request from before a stop is not sent."""
         self._last: dict[str, Sample] = {}
 
     def latch(self, reason: str) -> None:
-        """Record a stop, or its reset with ""."""
+        """Record the reason of a stop; "" resets the stop."""
         self.latched = reason
         self.stops += reason != ""
 
@@ -35,7 +35,7 @@ class SignalState:
             self._last[sample.signal] = sample
 
     def reading(self, name: str, now: float, since: float) -> Sample | None:
-        """Return the newest sample, unless it is stale at `now` or older than `since`."""
+        """Return the newest sample; None if stale at `now` or older than `since`."""
         sample = self._last.get(name)
         if sample is None or sample.time_s < since:
             return None
@@ -52,9 +52,9 @@ class SignalState:
         """Return a namespace of fresh signals.
 
         Args:
-            now: the time.
-            names: names with precedence over signals, such as arguments.
-            since: time of the oldest valid sample.
+            now: current time, in seconds.
+            names: values with precedence over signals, such as arguments, by name.
+            since: minimum time of valid samples, in seconds.
         """
         return ConditionScope(self, now, names, since)
 
@@ -66,7 +66,7 @@ class SignalState:
         *,
         since: float = float("-inf"),
     ) -> bool:
-        """Return whether `condition` is true; False if it cannot be evaluated."""
+        """Return whether `condition` is true; False if the evaluation fails."""
         try:
             return bool(condition.evaluate(self.view(now, names, since=since)))
         except ExpressionError:
@@ -74,7 +74,7 @@ class SignalState:
 
 
 class ConditionScope(Mapping[str, object]):
-    """A namespace: given names first, then settings, then fresh signals."""
+    """A namespace of given names, settings and fresh signals, in this order of precedence."""
 
     __slots__ = ("_known", "_names", "_now", "_since")
 

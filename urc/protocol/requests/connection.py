@@ -1,4 +1,4 @@
-"""State of the connection of one transport: opening, readiness, and closing.
+"""Connection state of one transport: opening, login, readiness and closing.
 
 Pure. See `urc.protocol.requests.conversation` for the theory of operation.
 """
@@ -28,39 +28,40 @@ __all__ = ["Connection"]
 
 
 class Connection:
-    """The parts of a conversation, and their handling of an opened or closed transport."""
+    """Base class of a conversation: its parts, and the handling of opened and closed transports."""
 
     def __init__(self, spec: TransportSpec, messages: list[Matcher]) -> None:
         self.spec = spec
         self.is_per_request = spec.connection == "per_request"
-        """Whether each request opens its own connection."""
+        """Whether each request opens a new connection."""
         self.framing: Framing = build_framing(spec.framing)
         self.state: Literal["closed", "opening", "open"] = "closed"
         self.is_ready = False
-        """Whether all requests may be sent; otherwise only those of the login and of the close."""
+        """Whether all requests may be sent; otherwise, only requests of the login and the close may
+        be sent."""
         self.last_sent = float("-inf")
-        """Time of the last sent frame that resets the watchdog of the robot."""
+        """Time of the last sent frame that resets the robot's watchdog, in seconds."""
         self.counting: frozenset[str] | None = None
-        """Labels of requests that reset the watchdog of the robot; None: all."""
+        """Labels of requests that reset the robot's watchdog; None: all requests."""
         self.counters = Counters()
         self.learnt: dict[str, object] = {}
-        """Names read by the steps of this connection: ``_name`` → value."""
+        """Values of private fields that the login has read, by name."""
         self.has_motion = False
-        """Whether it has held commands, whose frames are sent elsewhere."""
+        """Whether the connection has held commands; their frames bypass the queue."""
         self._pending_replies = PendingReplies()
         self._request_queue = RequestQueue(spec, self._pending_replies, self._size_of)
         self.receiver = FrameReceiver(spec, self.framing, messages)
         self.held = HoldReplies()
-        """Replies to hold-to-run commands."""
+        """Handler of the replies to held commands."""
         self.is_behind = False
-        """Whether received frames wait for `process_frames`."""
+        """Whether received frames wait for a call of `process_frames`."""
         self._askers: dict[object, object] = {}
-        """Numbers of requests made by steps → owner of the expected reply, if any."""
+        """Sequences that made numbered requests, by request number."""
         self._is_leaving = False
         self._misses = 0
-        """Missing replies in a row."""
+        """Number of consecutive missing replies."""
         self._silent_at: float | None = None
-        """Time at which the connection counts as stale."""
+        """Time at which the connection becomes stale; None: not watched, or already stale."""
 
     @property
     def is_open(self) -> bool:
@@ -69,11 +70,11 @@ class Connection:
 
     @property
     def is_silent(self) -> bool:
-        """Whether the robot has been silent for longer than `stale_after`."""
+        """Whether the robot has sent nothing for longer than `stale_after`."""
         return self.is_open and self.spec.stale_after_s is not None and self._silent_at is None
 
     def opened(self, now: float) -> list[LineEvent]:
-        """Record a new connection, on which nothing has been received yet."""
+        """Record that the transport is connected."""
         events = (
             self._lose("the connection was replaced by a new one") if self.state == "open" else []
         )
@@ -85,7 +86,7 @@ class Connection:
         return events + self._pump(now)
 
     def ready(self, now: float) -> list[LineEvent]:
-        """Allow all requests: the login is complete."""
+        """Record that the login is complete, and allow all requests."""
         return [*self._get_ready(), Ready(self.spec.name), *self._pump(now)]
 
     def _get_ready(self) -> list[LineEvent]:
@@ -105,7 +106,7 @@ class Connection:
         return events + self._pump(now)
 
     def fail(self, reason: str, now: float) -> list[LineEvent]:
-        """Close the connection for a reason; its requests fail."""
+        """Close the connection with a reason; all pending requests fail."""
         if self.state == "closed":
             return []
         reason = self.receiver.secrets.hide(reason)
@@ -114,7 +115,7 @@ class Connection:
         return events + self._pump(now)
 
     def leave(self, now: float) -> list[LineEvent]:
-        """Begin an orderly close: run ``on_close`` if declared, otherwise close at once."""
+        """Begin an orderly close: run ``on_close`` if declared, otherwise close immediately."""
         if self.state != "open":
             return []
         if self.spec.on_close:
@@ -127,12 +128,12 @@ class Connection:
         return self.shut(now)
 
     def shut(self, now: float) -> list[LineEvent]:
-        """Close after the steps of ``on_close``."""
+        """Close the connection after the steps of ``on_close``."""
         events = self._lose("the connection was closed")
         return [*events, Close(self.spec.name), *self._pump(now)]
 
     def _lose(self, reason: str) -> list[LineEvent]:
-        """Discard the connection, and fail its requests."""
+        """Discard the connection; all pending requests fail."""
         lost = self._lost()
         for exchange in tuple(self._request_queue):
             if exchange.is_privileged:
@@ -141,7 +142,7 @@ class Connection:
         return _disconnected(lost, self.receiver.secrets.hide(reason))
 
     def _lost(self) -> list[Exchange]:
-        """Remove the requests that end with this connection, and return them."""
+        """Remove and return the requests that fail with this connection."""
         lost = self._pending_replies.drain()
         if not self.is_per_request:
             return lost + self._request_queue.drain()
@@ -173,7 +174,7 @@ class Connection:
         return rendered_size(exchange, self.counters, self.learnt)
 
     def _as_sent(self, exchange: Exchange, number: int | None) -> Payload:
-        """Return the payload of a request, and register its secrets for redaction."""
+        """Return the payload of a request, registering secrets for redaction."""
         data = exchange.data
         assert data is not None  # noqa: S101 - it was made just before
         if exchange.is_secret:
@@ -183,7 +184,7 @@ class Connection:
         return data
 
     def _pump(self, now: float) -> list[LineEvent]:
-        """Send queued requests, as far as the state of the connection allows."""
+        """Send queued requests, if allowed in the current state of the connection."""
         raise NotImplementedError
 
 

@@ -1,18 +1,18 @@
 """The conversation on one transport: queued requests, requests in flight, and received frames.
 
-Theory of operation. A connection is closed, opening or open. An open connection becomes *ready*
-after the steps of ``on_connect``, and stops being ready before those of ``on_close``. A connection
-that is not ready sends only the privileged exchanges of these steps. The session opens a persistent
-connection. A per-request conversation asks for a connection (`Open`) when a request waits, and for
-its end (`Close`) afterwards. All of this is pure: time is passed in.
+Theory of operation. A connection is closed, opening or open. An open connection is *ready* after
+the steps of ``on_connect`` and until the steps of ``on_close``. A connection that is not ready
+sends only the privileged exchanges of these steps. The session opens persistent connections. A
+per-request conversation requests a connection (`Open`) for each request, and closes the connection
+afterwards (`Close`). The module is pure: callers pass the time.
 
-Requests in flight are kept in the order of sending. A received frame is offered to each of them,
-the oldest first. A request with a correlation takes its own reply only. Of the other requests, only
-the oldest may take the frame, because replies arrive in order; real-time requests have an order of
-their own. A request whose reply is overdue stays in flight as *late* for one more reply time. A
-frame that matches it is dropped, so that the next request does not take it. Until the late reply
-arrives or times out, requests with confusable replies wait. After `MISSES_UNTIL_CLOSED` missing
-replies in a row the connection is closed and opened again.
+Requests in flight are kept in the order of sending. A received frame is offered to all requests in
+flight, oldest first. A request with a correlation accepts only its own reply. Of the other
+requests, only the oldest accepts the frame, because replies arrive in order. Real-time requests
+have a separate order. After a timeout, a request stays in flight as *late* for another reply
+timeout. A late reply is dropped, so the next request does not accept the late reply. Until the late
+reply arrives or times out, requests with similar replies wait. After `MISSES_UNTIL_CLOSED`
+consecutive missing replies, the connection is closed and reopened.
 """
 
 from collections.abc import Mapping, Sequence
@@ -48,11 +48,11 @@ from urc.protocol.values.payload import Frame
 __all__ = ["Conversation"]
 
 new = tuple.__new__
-"""Makes a named tuple faster than its class does, for events of every command."""
+"""Fast constructor of named tuples, used for every command."""
 MISSES_UNTIL_CLOSED = 3
-"""Missing replies in a row after which the connection is closed."""
+"""Number of consecutive missing replies after which the connection is closed."""
 MOST_IN_FLIGHT = 256
-"""Largest number of pending replies, including late and real-time ones."""
+"""Maximum number of pending replies, including late and real-time replies."""
 
 
 class Conversation(Connection):
@@ -62,17 +62,17 @@ class Conversation(Connection):
         super().__init__(spec, messages)
         self._gap_s = spec.min_gap_s
         self.is_scripted = False
-        """Whether a sequence is running, which may wait for the next frame."""
+        """Whether a sequence is running that may wait for the next frame."""
         self._free_at = float("-inf")
-        """Earliest time of the next request, once the reply to motion has arrived."""
+        """Earliest time of the next request after the reply to motion."""
         self._may_recut = False
-        """Whether a reply has a framing of its own, or had one before the last bytes."""
+        """Whether the framing may have to change for a pending reply or step."""
         self._number = 0
-        """Number of the last envelope with a reply; never reused."""
+        """Number of the last envelope that expects a reply; numbers are never reused."""
 
     @property
     def deadline(self) -> float | None:
-        """Time at which `tick` has work, or None."""
+        """Time of the next deadline for `tick`; None without a deadline."""
         pending_replies = self._pending_replies
         due = (
             None
@@ -92,7 +92,7 @@ class Conversation(Connection):
         return soonest(times)
 
     def has(self, label: str) -> bool:
-        """Return whether a request with that label is queued or in flight."""
+        """Return whether a request with this label is queued or in flight."""
         if not (self._pending_replies or self._request_queue):
             return False
         return self._pending_replies.has(label) or self._request_queue.has(label)
@@ -100,14 +100,14 @@ class Conversation(Connection):
     # -- motion, whose frames bypass the queue
 
     def motion_must_wait(self, now: float) -> bool:
-        """Return whether a frame of motion has to wait for an outstanding reply."""
+        """Return whether a frame of motion must wait for a pending reply."""
         if not self.spec.is_half_duplex:
             return False
         is_owed = any(not one.is_late for one in self._pending_replies)
         return self.held.must_wait(now, is_owed=is_owed)
 
     def gave_motion(self, command: str, names: Mapping[str, object], now: float) -> None:
-        """Record that a frame of motion is sent, with its `names`."""
+        """Record the sending of a frame of motion with the values `names`."""
         self.held.gave(command, names, now)
         if self.spec.is_half_duplex and now < self.held.owed_until_s:
             self._free_at = now + self._gap_s
@@ -118,7 +118,7 @@ class Conversation(Connection):
     # -- sending
 
     def submit(self, exchange: Exchange, now: float) -> list[LineEvent]:
-        """Queue a request, or send it at once if possible."""
+        """Send a request immediately if possible; otherwise queue the request."""
         is_shared = self.is_ready and not self.is_per_request
         if is_shared and self._request_queue.is_free(exchange, now):
             return self._send(exchange, now)
@@ -155,7 +155,7 @@ class Conversation(Connection):
         return ""  # it waits in the queue for the login
 
     def _pump(self, now: float) -> list[LineEvent]:
-        """Send the requests that are due; open and close a per-request connection as needed."""
+        """Send all due requests; open and close per-request connections as needed."""
         events: list[LineEvent] = []
         if self.is_behind:
             return events
@@ -226,7 +226,7 @@ class Conversation(Connection):
         return sent
 
     def _count_again(self, exchange: Exchange, number: int | None) -> Numbered | None:
-        """Render the frame of a request again: another frame has used up its numbers."""
+        """Render the frame of a request again after another frame has used its numbers."""
         try:
             made = written(exchange, self.counters, self.learnt)
         except BadArgument:
@@ -236,9 +236,9 @@ class Conversation(Connection):
     # -- receiving
 
     def listen(self, expectation: Expectation, now: float) -> list[LineEvent]:
-        """Add an expectation for frames that are no replies, with its own framing if it has one.
+        """Add an expectation for frames other than replies, which may have a different framing.
 
-        Remaining bytes of the connection may be whole frames in that framing.
+        Remaining bytes of the connection may be complete frames in the framing of the expectation.
         """
         self.receiver.listen(expectation)
         if expectation.answer.framing is None:
@@ -262,9 +262,9 @@ class Conversation(Connection):
         return self.process_frames(now)
 
     def process_frames(self, now: float) -> list[LineEvent]:
-        """Process received frames, up to the first that a sequence may have waited for.
+        """Process received frames, up to the first frame that a sequence may have expected.
 
-        Later frames may belong to the next step, which has to register its expectation first.
+        Later frames may belong to the next step, which must first register an expectation.
         """
         receiver = self.receiver
         events: list[LineEvent] = []
@@ -292,8 +292,8 @@ class Conversation(Connection):
     def _ahead(self, now: float) -> list[LineEvent]:
         """Process messages at the front of the stream, and report their samples together.
 
-        Frame by frame, a flood of short frames costs almost twice as much (decision 27). The batch
-        ends with the expected reply, with a refused value, or before a frame that is no message.
+        Processing many short frames one by one takes almost twice as long (decision 27). The batch
+        ends with the expected reply, with a refused value, or before a frame that is not a message.
         """
         receiver, decoder, pending = (
             self.receiver,
@@ -331,7 +331,7 @@ class Conversation(Connection):
         return events
 
     def _recut(self) -> None:
-        """Choose the framing: a pending reply or a step may have its own."""
+        """Select the framing of a pending reply or a step, or the framing of the connection."""
         framing = (
             self._pending_replies.framing() if self._pending_replies else None
         ) or self.receiver.framing
@@ -339,7 +339,7 @@ class Conversation(Connection):
         self.receiver.cut_by(framing or self.framing)
 
     def tick(self, now: float) -> list[LineEvent]:
-        """Process every deadline up to `now`."""
+        """Process all deadlines up to `now`."""
         events: list[LineEvent] = []
         if self.state == "open":
             for frame in self.receiver.decoder.tick(now):
@@ -387,9 +387,9 @@ class Conversation(Connection):
         return self.receiver.publish(frame, now) if of_motion is None else of_motion
 
     def _plain(self, pending: PendingReply, frame: Frame, now: float) -> list[LineEvent]:
-        """Process a frame while the only pending reply consists of samples.
+        """Process a frame if the only pending reply contains only samples.
 
-        Most requests are of this kind. `_answer` processes the replies of all others.
+        Most replies contain only samples. `_answer` processes all other replies.
         """
         matcher = pending.exchange.ask.plain
         taken = None if matcher is None else matcher.take(frame, now)
@@ -447,7 +447,7 @@ class Conversation(Connection):
         return self._motion_refused(self.held.refuse(frame, reason, now), frame, now)
 
     def _of_motion(self, frame: Frame, now: float) -> list[LineEvent] | None:
-        """Return the events of a reply to motion, or None for other frames."""
+        """Return the events of a reply to motion; None for other frames."""
         owed_until_s = self.held.owed_until_s
         told = self._told_of_motion(frame, now)
         if self.held.owed_until_s < owed_until_s and self.spec.is_half_duplex:
@@ -488,8 +488,8 @@ class Conversation(Connection):
     ) -> list[LineEvent]:
         """Return the events of a frame with the match result `offer` for a request.
 
-        A provisional reply may be a message as well. Without a `frame`, the message has already
-        been reported.
+        A provisional reply may also be a message. Without a `frame`, the message has already been
+        reported.
         """
         exchange = pending.exchange
         events: list[LineEvent] = self.receiver.dropped(offer) if offer.dropped else []
@@ -539,7 +539,7 @@ class Conversation(Connection):
     def _late_answer(
         self, pending: PendingReply, offer: MatchResult, now: float
     ) -> list[LineEvent] | None:
-        """Return the events of a late answer, or None if it answers a retransmission as well."""
+        """Return the events of a late reply; None if the reply also answers a retransmission."""
         exchange = pending.exchange
         again = self._pending_replies.again(exchange)
         if again is not None:

@@ -18,14 +18,15 @@ from urc.protocol.values.payload import CodecContext, NotWritable
 __all__ = ["BadArgument", "Encode", "build_check", "build_encode", "check_arguments"]
 
 Encode = Callable[[Mapping[str, object]], Payload]
-"""Namespace → bytes on the wire, framing included, or an envelope. Raises `BadArgument`."""
+"""Function that encodes a namespace to bytes including framing, or to an envelope; raises
+`BadArgument`."""
 
 _LARGEST = 1e308
-"""Bound for finite values; not-a-number and infinity fail the comparison."""
+"""Maximum finite value; the comparison also rejects infinity and not-a-number."""
 
 
 class BadArgument(UrcError):
-    """An invalid command argument; the message names it."""
+    """An invalid command argument, with the name of the argument in the message."""
 
 
 def build_encode(
@@ -34,9 +35,9 @@ def build_encode(
     context: CodecContext,
     arguments: Mapping[str, Argument] = NOTHING,
 ) -> Encode:
-    """Return the function that writes and frames `send`; constant frames are made once.
+    """Return a function that encodes and frames `send`; constant frames are encoded once.
 
-    Several frames are sent as one piece, so that none is sent alone.
+    The frames of a group are joined, so all frames are sent together.
     """
     if send.form == "frames":
         return _together([build_encode(one, framing, context, arguments) for one in each_of(send)])
@@ -83,7 +84,7 @@ def build_check(
 
 
 def check_arguments(command: Command, given: Mapping[str, object]) -> dict[str, Reading]:
-    """Return the arguments with defaults filled in; raise `BadArgument` for an invalid one."""
+    """Return the checked arguments including defaults; raise `BadArgument` if invalid."""
     for name in given:
         if name not in command.arguments:
             known = ", ".join(command.arguments) or "none"
@@ -104,7 +105,7 @@ def _checked(argument: Argument, value: object) -> Reading:
 
 
 def _elements(argument: Argument, value: object) -> tuple[Value, ...]:
-    """Return the elements of an array, each checked as a single value."""
+    """Return the checked elements of an array."""
     name, wanted = argument.name, argument.size
     if not isinstance(value, (list, tuple)):
         raise BadArgument(f"{name}: expected a list, found {quoted(value)}")

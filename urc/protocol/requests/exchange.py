@@ -1,8 +1,8 @@
-"""One request, from its owner to its outcome.
+"""Requests and their execution, from submission to outcome.
 
-Pure. An `CompiledRequest` is a request, compiled once. An `Exchange` is one execution of it, from
-the queue to its end. `urc.protocol.requests.reply_match.CompiledReply` describes the expected
-reply.
+Pure. A `CompiledRequest` is a request, compiled once. An `Exchange` is one execution of a request,
+from the queue to the outcome. `urc.protocol.requests.reply_match.CompiledReply` describes the
+expected reply.
 """
 
 import re
@@ -38,7 +38,7 @@ class ExchangeOutcome(NamedTuple):
     """The result of a request."""
 
     code: str = ""
-    """"" on success; otherwise a code of `urc.protocol.events.Failed`."""
+    """"" for success; otherwise a code of `urc.protocol.events.Failed`."""
     message: str = ""
     values: Mapping[str, Reading] = NOTHING
 
@@ -46,11 +46,11 @@ class ExchangeOutcome(NamedTuple):
 DONE: Final = ExchangeOutcome()
 _MISSING: Final = re.compile(r"'[A-Za-z_][A-Za-z0-9_]*' has no value here")
 new = tuple.__new__
-"""Makes a named tuple faster than its class does; every command needs one."""
+"""Fast constructor of named tuples, used for every command."""
 
 
 def untold(error: Exception) -> str:
-    """Return why a secret frame is not sent, without revealing the secret."""
+    """Return the reason why a secret frame is not sent, without revealing the secret."""
     text = str(error)
     if _MISSING.fullmatch(text):
         return text  # only the name of a missing value, and no secret
@@ -58,46 +58,48 @@ def untold(error: Exception) -> str:
 
 
 class CompiledRequest(NamedTuple):
-    """A request, compiled once."""
+    """A compiled request of a command, poll, keepalive or step."""
 
     label: str
-    """Label in messages: ``polls.0`` or the name of the command."""
+    """Label of the request in messages: the name of the command, or ``polls.0``."""
     encode: Encode
     answers: tuple[CompiledReply, ...] = ()
-    """Expected reply of each stage; () without a reply."""
+    """Expected replies, one for each stage; (): no reply."""
     match: Template | None = None
     framing: Framing | None = None
-    """Framing of its replies; None: that of the connection."""
+    """Framing of the replies; None: the framing of the connection."""
     rank: int = 2
     is_latest_only: bool = False
     bucket: GcraLimiter | None = None
     retries: int = 0
-    """Largest number of retries."""
+    """Maximum number of retries of the request."""
     is_repeated: bool = False
-    """Whether a missing reply causes a retry, not only a request by the robot."""
+    """Whether a missing reply also causes a retry, not only a retransmission request by the
+    robot."""
     retry: Retry = Retry()
-    """Waits before the retries."""
+    """Delays before the retries."""
     has_counters: bool = False
     is_motion: bool = False
-    """Whether it moves the robot. Motion fails on a connection that is not ready, instead of
-    waiting."""
+    """Whether the request moves the robot. On a connection that is not ready, motion requests fail
+    immediately."""
     learnt: frozenset[str] = frozenset()
-    """Names in its templates that the login reads."""
+    """Names in the templates that the login reads."""
     is_fresh: bool = False
-    """Whether it contains the time or a nonce."""
+    """Whether the request contains the time or a nonce."""
     is_local: bool = False
-    """Whether its templates use only its arguments and counters."""
+    """Whether the templates use only arguments and counters."""
     queue_s: float = 0.0
-    """Longest time in the queue, in seconds."""
+    """Maximum time in the queue, in seconds."""
     plain: Matcher | None = None
-    """Reader of its only reply, if that consists of samples alone."""
+    """Reader of the only reply, if the reply contains only samples; otherwise None."""
     is_miss_harmless: bool = False
-    """Whether missing replies say nothing about the connection, because the poll counts them."""
+    """Whether a missing reply does not count as a fault of the connection, because the poll counts
+    missing replies."""
     is_numbered: bool = False
-    """Whether it is an envelope with a number, which its reply repeats."""
+    """Whether the request is an envelope with a number that the reply repeats."""
 
     def render(self, names: Mapping[str, object]) -> Payload | None:
-        """Return the payload, or None if it is rendered when it is sent.
+        """Return the payload; None if the payload must be rendered at the time of sending.
 
         Raises:
             BadArgument: the payload cannot be written with these names.
@@ -111,36 +113,36 @@ class CompiledRequest(NamedTuple):
 
     @property
     def is_in_order(self) -> bool:
-        """Whether only the order of replies identifies the reply to this request."""
+        """Whether the reply to this request is identified only by the order of replies."""
         return self.match is None and not self.is_numbered
 
 
 class RequestOwner(Protocol):
-    """The owner of a request."""
+    """The owner of a request, which receives the outcome."""
 
     def ended(
         self, exchange: "Exchange", outcome: ExchangeOutcome, now: float
     ) -> "list[LineEvent]":
-        """Record the outcome; return the resulting events."""
+        """Process the outcome of a request; return the resulting events."""
 
 
 class Exchange:
-    """One request, from the queue to its outcome."""
+    """One execution of a request, from the queue to the outcome."""
 
     # Rarely set attributes are class attributes, because every command makes an instance.
     numbers: Mapping[str, int] = NOTHING
-    """Counter → number in the last rendered frame."""
+    """Numbers in the last rendered frame, by counter."""
     is_privileged = False
-    """Whether it belongs to the login or the close, and may be sent before the connection is
-    ready."""
+    """Whether the request belongs to the login or the close, and may be sent on a connection that
+    is not ready."""
     is_secret = False
-    """Whether its text must not appear in any message."""
+    """Whether the payload is secret, and must not appear in any message."""
     condition: Callable[[float], str] | None = None
-    """Check before sending: returns why the request is not allowed, or ""."""
+    """Check before sending: function that returns why the request is not allowed, or ""."""
     unless: Callable[[], str] | None = None
-    """Check before sending: returns why the request is obsolete, or ""."""
+    """Check before sending: function that returns why the request is obsolete, or ""."""
     waits_until = float("-inf")
-    """Earliest time of a retry."""
+    """Earliest time of a retry, in seconds."""
     on_sent: Callable[[Payload], None] | None = None
     """Callback for each sent payload."""
 
@@ -155,14 +157,15 @@ class Exchange:
         self.ask = ask
         self.owner = owner
         self.namespace = namespace
-        """Names of its templates, without counters."""
+        """Values for the templates by name, without counters."""
         self.data = data
-        """Rendered payload; None if it is rendered when it is sent, see `CompiledRequest.made`."""
+        """Rendered payload; None if rendered at the time of sending, see
+        `CompiledRequest.render`."""
         self.gives_up_at = gives_up_at
-        """Time at which it fails in the queue."""
+        """Time at which a queued request fails, in seconds."""
         self.tries_left = ask.retries
         self.sent_at = gives_up_at
-        """Time of the last transmission."""
+        """Time of the last transmission, in seconds."""
 
     def mark(
         self,
@@ -173,7 +176,7 @@ class Exchange:
         on_sent: Callable[[Payload], None] | None = None,
         unless: Callable[[], str] | None = None,
     ) -> "Exchange":
-        """Set the rare attributes, and return the exchange."""
+        """Set the rarely used attributes, and return the exchange."""
         self.on_sent = on_sent
         self.is_privileged = is_privileged
         self.is_secret = is_secret
@@ -182,7 +185,7 @@ class Exchange:
         return self
 
     def why_not(self, now: float) -> str:
-        """Return why it is not sent, or ""."""
+        """Return the reason why the request must not be sent, or ""."""
         unwanted = self.unless() if self.unless is not None else ""
         return unwanted or (self.condition(now) if self.condition is not None else "")
 
@@ -193,12 +196,12 @@ class Exchange:
 
     @property
     def latest_key(self) -> str:
-        """Label, if a newer request replaces it in the queue; otherwise ""."""
+        """Label of requests that replace each other in the queue; "": no replacement."""
         return self.ask.label if self.ask.is_latest_only else ""
 
     @property
     def is_realtime(self) -> bool:
-        """Whether it bypasses the queue."""
+        """Whether the request bypasses the queue."""
         return self.ask.rank == REALTIME
 
 
@@ -210,7 +213,7 @@ class ExchangeEnded(NamedTuple):
 
 
 class ConnectionClosing(NamedTuple):
-    """Internal event of the engine: the conversation starts the steps of its close."""
+    """Internal event of the engine: the conversation is ready for the steps of ``on_close``."""
 
     transport: str
 
@@ -219,7 +222,7 @@ LineEvent = Event | ExchangeEnded | Matched | ConnectionClosing
 
 
 class ReplySink:
-    """The sink for the outcome of a request, and the owner of a plain exchange."""
+    """A sink that returns the outcome of a request as an event, and owns a plain exchange."""
 
     __slots__ = ("_request",)
 
@@ -244,5 +247,5 @@ class ReplySink:
 
 
 def expires_at(ask: CompiledRequest, now: float) -> float:
-    """Return the time at which a new request fails in the queue."""
+    """Return the time at which a new request fails if still queued."""
     return now + ask.queue_s

@@ -1,4 +1,4 @@
-"""Received frames of one connection that are no replies.
+"""Received frames of one connection, except for replies to requests.
 
 Pure. See `urc.protocol.requests.conversation` for the theory of operation.
 """
@@ -35,11 +35,12 @@ __all__ = ["FrameReceiver"]
 _HIDDEN: Final = "•••"
 _MOST_SECRETS: Final = 8
 _SHORTEST: Final = 3
-"""Shorter secrets would redact parts of many words, so the whole message is hidden."""
+"""Minimum length of a secret for partial redaction. Shorter secrets occur in many words, so the
+whole message is hidden."""
 
 
 class SentSecrets:
-    """Secrets sent on a connection, hidden even when the robot echoes them."""
+    """Secrets that were sent on a connection, for redaction if the robot echoes a secret."""
 
     __slots__ = ("_texts",)
 
@@ -53,7 +54,7 @@ class SentSecrets:
             self._texts.append(text)
 
     def hide(self, text: str) -> str:
-        """Return a message with its secrets redacted."""
+        """Return a message with redacted secrets."""
         for secret in self._texts:
             if secret in text:
                 text = text.replace(secret, _HIDDEN) if len(secret) >= _SHORTEST else _HIDDEN
@@ -61,14 +62,14 @@ class SentSecrets:
 
 
 new = tuple.__new__
-"""Makes a named tuple faster than its class does; every frame needs one."""
+"""Fast constructor of named tuples, used for every frame."""
 _SHOWN_BYTES = 20
-"""Bytes of an unknown frame that messages show."""
+"""Number of bytes of an unknown frame in a message."""
 _NO_MATCH = "nothing declared matches "
 
 
 class FrameReceiver:
-    """The received stream of one connection: framing, messages and expectations."""
+    """The receiving side of one connection: framing, messages and expectations."""
 
     def __init__(self, spec: TransportSpec, framing: Framing, messages: list[Matcher]) -> None:
         self._spec = spec
@@ -79,9 +80,9 @@ class FrameReceiver:
         self._cut(framing)
         self.secrets = SentSecrets()
         self.replies = Acknowledgements()
-        """Acknowledgements of messages that wait to be sent."""
+        """Acknowledgements to send."""
         self.collectors: list[Collector] = []
-        """Collectors of messages, cleared with the connection."""
+        """Collectors of values from several messages, cleared with the connection."""
         self._expectations: list[Expectation] = []
         self._prompt: tuple[Pattern, Expectation] | None = None
         self.is_listening = False
@@ -91,7 +92,8 @@ class FrameReceiver:
     def reset(self, *, is_new: bool) -> None:
         """Clear the state of a connection.
 
-        Secrets stay until the next connection, for late messages.
+        Secrets are kept until the next connection, because late messages may still contain a
+        secret.
         """
         self._stream = ReceiveBuffer()
         self._cut(self._framing)
@@ -105,23 +107,23 @@ class FrameReceiver:
             self.secrets = SentSecrets()
 
     def cut_by(self, framing: Framing) -> None:
-        """Use `framing` from now on, beginning with the remaining bytes."""
+        """Switch to `framing`, starting with the remaining bytes."""
         if framing is not self._cut_by:
             self._cut(framing)
 
     @property
     def has_more(self) -> bool:
-        """Whether bytes remain that may contain frames."""
+        """Whether undecoded bytes remain."""
         return self._stream.at < len(self._stream.data)
 
     def _cut(self, framing: Framing) -> None:
         self._cut_by = framing
         self.decoder: Decoder = framing.decoder(self._stream)
         self.is_timed = getattr(type(self.decoder), "deadline", None) is not StreamDecoder.deadline
-        """Whether a timeout alone may complete a frame."""
+        """Whether a timeout may complete a frame."""
 
     def publish(self, frame: Frame, now: float) -> list[LineEvent]:
-        """Return the events of a frame that is no reply."""
+        """Return the events of a frame that is not a reply."""
         heard = self._listeners(frame, now) if self._expectations else None
         told = self.message(frame, now)
         if heard is None and told is None:
@@ -131,11 +133,11 @@ class FrameReceiver:
         return told or [] if heard is None else heard + (told or [])
 
     def came_since(self, since: float, instead: str) -> str:
-        """Return an addition to "no answer": the frame that arrived instead, or "".
+        """Return an addition to "no answer" with the unexpected frame; "" if no frame arrived.
 
         Args:
-            since: start of the wait.
-            instead: end of the sentence "which is …", such as "no answer to home".
+            since: start time of the wait, in seconds.
+            instead: end of the text "which is …", such as "no answer to home".
         """
         time_s, text = self._stray
         if time_s < since:
@@ -144,13 +146,13 @@ class FrameReceiver:
         return f"; {shown} came, which is {instead}" if shown != text else f"; {text}"
 
     def listen(self, expectation: Expectation) -> None:
-        """Add an expectation for frames that are no replies."""
+        """Add an expectation for frames other than replies."""
         self._expectations.append(expectation)
         self.is_listening = True
 
     @property
     def framing(self) -> Framing | None:
-        """Framing of the expectations; None: that of the connection."""
+        """Framing of the expectations; None: the framing of the connection."""
         return next(
             (
                 expectation.answer.framing
@@ -161,7 +163,7 @@ class FrameReceiver:
         )
 
     def look_for(self, pattern: Pattern, expectation: Expectation) -> list[LineEvent]:
-        """Look for `pattern` in the text after the last whole frame, for `expectation`."""
+        """Search the text after the last complete frame for the prompt of `expectation`."""
         self._prompt = (pattern, expectation)
         self.is_listening = True
         return self.find_prompt()
@@ -179,7 +181,7 @@ class FrameReceiver:
         return self._prompt is not None
 
     def find_prompt(self) -> list[LineEvent]:
-        """Look for the expected prompt."""
+        """Search for the expected prompt; return the events of a match."""
         if self._prompt is None:
             return []
         pattern, expectation = self._prompt
@@ -194,7 +196,7 @@ class FrameReceiver:
         return [Matched(expectation, MatchResult({}))]
 
     def message(self, frame: Frame, now: float) -> list[LineEvent] | None:
-        """Return the events of a declared message, or None for other frames."""
+        """Return the events of a declared message; None for other frames."""
         taken = self.messages.decode(frame, now)
         return None if taken is None else self.events_of(*taken)
 
@@ -218,13 +220,13 @@ class FrameReceiver:
         return events
 
     def answered(self, asker: object, frame: Frame, refusal: str, now: float) -> list[LineEvent]:
-        """Return the events of a reply to a request of `asker`, for the step that expects it.
+        """Return the events of a reply to a request of `asker`, for the expecting step.
 
         Args:
-            asker: the sequence that made the request; only it receives the reply.
+            asker: the sequence that made the request, and alone receives the reply.
             frame: the reply.
-            refusal: the refusal of the robot; "" for none.
-            now: the time.
+            refusal: the robot's refusal as text; "": no refusal.
+            now: current time, in seconds.
         """
         expectation = next((one for one in self._expectations if one.owner is asker), None)
         if expectation is None:
@@ -238,11 +240,11 @@ class FrameReceiver:
         return self._match(expectation, offer, now)
 
     def dropped(self, offer: MatchResult) -> list[LineEvent]:
-        """Return the events for collected lines that were no reply."""
+        """Return the violation for collected lines that did not match the reply."""
         return [Violation(self._spec.name, "no-match", offer.dropped)] if offer.dropped else []
 
     def _unknown(self, frame: Frame) -> Violation:
-        """Return the violation for an unknown frame."""
+        """Return the violation for a frame that matches no declaration."""
         fault = getattr(frame, "fault", "")
         if fault:
             return Violation(self._spec.name, "bad-value", self.secrets.hide(fault))
@@ -268,7 +270,7 @@ class FrameReceiver:
     def events_of(self, samples: list[Sample], refused: Sequence[str]) -> list[LineEvent]:
         """Return the events for samples and refused values.
 
-        A valid frame without values gives an event, too: it shows that the robot is alive.
+        A valid frame without values also causes an event, as a sign that the robot is alive.
         """
         if not refused and not self.replies:
             return [new(Samples, (self._name, tuple(samples)))]

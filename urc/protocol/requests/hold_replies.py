@@ -1,14 +1,15 @@
 """Replies to frames of motion: acknowledgements and refusals.
 
-Pure. Frames of motion bypass the queue of their connection, so they have no pending reply. A robot
-that replies to each frame is handled here: an acknowledgement is no stray frame, and a refusal ends
-the motion. An unsolicited refusal counts as well, such as that of a controller with an open guard.
+Pure. Frames of motion bypass the queue of the connection, so frames of motion have no pending
+reply. This module handles robots that reply to each frame: an acknowledgement is expected, and a
+refusal ends the motion. An unsolicited refusal also ends the motion, such as a refusal because of
+an open safety guard.
 
-In half duplex, frames of motion wait for an outstanding reply, and queued requests wait for the
-replies to motion. These waits are short, because a lost reply must not prevent motion. A stop
-bypasses this module and never waits.
+In half duplex, frames of motion wait for a pending reply, and queued requests wait for replies to
+motion. These waits are short, because a lost reply must not prevent motion. A stop bypasses this
+module and never waits.
 
-A command expects replies from its first frame on, until the reply timeout of the newest frame.
+A command expects replies from the first frame until the reply timeout of the newest frame.
 """
 
 from collections.abc import Mapping
@@ -22,19 +23,19 @@ from urc.protocol.values.wire_text import WireText
 __all__ = ["LONGEST_WAIT_S", "HoldReplies", "HoldRejected"]
 
 LONGEST_WAIT_S: Final = 0.1
-"""Longest wait for an outstanding reply in half duplex, in seconds."""
+"""Maximum wait for a pending reply in half duplex, in seconds."""
 _NOTHING: Mapping[str, object] = {}
 
 
 class HoldRejected(NamedTuple):
-    """A refusal of a held command by the robot."""
+    """The robot has refused a held command."""
 
     command: str
     offer: MatchResult
 
 
 class _Listening:
-    """The newest frame of one held command."""
+    """The expected replies to the newest frame of one held command."""
 
     __slots__ = ("_match", "expectation", "names", "until_s")
 
@@ -47,7 +48,7 @@ class _Listening:
         self.until_s = float("-inf")
 
     def is_mine(self, fields: Fields) -> bool:
-        """Return whether the fields of a frame belong to this command."""
+        """Return whether a frame with `fields` belongs to this command."""
         if self._match is None:
             return True
         names: dict[str, object] = dict(self.names)
@@ -61,21 +62,21 @@ class _Listening:
 
 
 class HoldReplies:
-    """The held commands of one connection that have replies."""
+    """The held commands with replies on one connection."""
 
     def __init__(self) -> None:
         self._all: dict[str, _Listening] = {}
         self._until_s = float("-inf")
         self.owed_until_s = float("-inf")
-        """End of the wait for a reply to motion."""
+        """Time until which a reply to motion is pending, in seconds."""
         self._waits_since_s: float | None = None
 
     def add(self, command: str, answer: CompiledReply, match: Template | None) -> None:
-        """Expect the replies to a command, once it has been sent."""
+        """Register the expected reply to a held command."""
         self._all[command] = _Listening(answer, match)
 
     def gave(self, command: str, names: Mapping[str, object], now: float) -> None:
-        """Record that a frame of a command is sent, with its `names`."""
+        """Record the sending of a frame of a command with the values `names`."""
         one = self._all.get(command)
         if one is not None:
             self.owed_until_s = now + min(one.expectation.answer.timeout_s, LONGEST_WAIT_S)
@@ -91,11 +92,11 @@ class HoldReplies:
             one.until_s = float("-inf")
 
     def must_wait(self, now: float, *, is_owed: bool) -> bool:
-        """Return whether a frame of motion has to wait in half duplex.
+        """Return whether a frame of motion must wait in half duplex.
 
         Args:
-            now: the time.
-            is_owed: whether another reply is outstanding.
+            now: current time, in seconds.
+            is_owed: whether a reply to another request is pending.
         """
         if not is_owed and now >= self.owed_until_s:
             self._waits_since_s = None
@@ -123,14 +124,14 @@ class HoldReplies:
         return found
 
     def refuse(self, frame: Frame, reason: str, now: float) -> list[HoldRejected]:
-        """Return the refusals of a known error reply, with the texts of the driver."""
+        """Return the refusals by an error response, with the driver's texts if declared."""
         plain = [
             HoldRejected(name, MatchResult(refusal=reason)) for name, _ in self._listening(now)
         ]
         return self.refusals(frame, now) or plain
 
     def accepted(self, frame: Frame, now: float) -> tuple[CompiledReply, MatchResult] | None:
-        """Return the match result of an acknowledgement, or None for other frames."""
+        """Return the match result of an acknowledgement; None for other frames."""
         for _, one in self._listening(now):
             offer = one.expectation.offer(frame, one.is_mine)
             if offer is not None:

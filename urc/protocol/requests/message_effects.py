@@ -1,6 +1,6 @@
-"""Effects of messages besides their samples: collection over several frames, and acknowledgement.
+"""Additional effects of messages: values from several frames, and acknowledgements.
 
-Pure. Both effects belong to the step from fields to samples, which runs exactly once per message.
+Pure. Both effects occur during the conversion from fields to samples, exactly once per message.
 Collected values are cleared with the connection. Acknowledgements wait in `Acknowledgements` until
 the conversation has reported the frame.
 """
@@ -19,7 +19,7 @@ from urc.protocol.values.convert import Unusable
 __all__ = ["Collector", "Acknowledgements", "answering", "collecting"]
 
 MOST_REPLIES: Final = 256
-"""Largest number of pending acknowledgements; each frame makes at most one."""
+"""Maximum number of pending acknowledgements; each frame causes at most one."""
 
 
 class Acknowledgements(list[Payload | CountedFrame]):
@@ -27,7 +27,7 @@ class Acknowledgements(list[Payload | CountedFrame]):
 
 
 class Collector:
-    """One value that is collected from several frames."""
+    """A collector of one value from several frames."""
 
     def __init__(self, spec: Collect) -> None:
         self._spec = spec
@@ -36,12 +36,12 @@ class Collector:
         self.forget()
 
     def forget(self) -> None:
-        """Reset for a new connection: without ``begin``, the first frame is the first part."""
+        """Reset the collector; without ``begin``, the next frame is the first part of a value."""
         self._parts = [] if self._spec.begin is None else None
         self._size = 0
 
     def add(self, names: Mapping[str, object]) -> object:
-        """Process the fields of a frame; return the complete value, or None."""
+        """Process the fields of a frame; return a complete value, or None."""
         spec, whole = self._spec, None
         if spec.begin is not None and _holds(spec.begin, names):
             if spec.end is None and self._parts is not None:
@@ -75,7 +75,7 @@ def _holds(condition: Template | None, names: Mapping[str, object]) -> bool:
 
 
 def _joined(parts: list[object]) -> object:
-    """Return bytes joined, lists joined, and other values as a list."""
+    """Return the concatenation of bytes or lists, or a list of other values."""
     if parts and all(isinstance(part, bytes) for part in parts):
         return b"".join(part for part in parts if isinstance(part, bytes))
     whole: list[object] = []
@@ -108,14 +108,15 @@ def answering(
     replies: Acknowledgements,
     decode: Decode,
 ) -> Decode:
-    """Return a variant of `decode` that also makes the acknowledgement of the frame.
+    """Return a variant of `decode` that also renders the acknowledgement of the frame.
 
     Args:
-        encode: renders the acknowledgement.
-        names: returns the namespace for a time and fields.
-        counters: counters of the connection; None without counters in the frame.
-        replies: receives the acknowledgement.
-        decode: converts the fields to samples.
+        encode: function that renders the acknowledgement.
+        names: function that returns the namespace for a time and fields.
+        counters: function that returns the connection's counters; None for a frame without
+            counters.
+        replies: list that receives the acknowledgement.
+        decode: function that converts the fields to samples.
     """
 
     def decode_answered(found: Mapping[str, object], now: float) -> tuple[list[object], list[str]]:

@@ -1,6 +1,6 @@
 """Declared messages of one connection. Pure.
 
-The first declared message that accepts a frame takes it.
+A frame belongs to the first declared message that matches.
 """
 
 from collections.abc import Sequence
@@ -13,15 +13,15 @@ __all__ = ["Messages"]
 
 
 class Messages:
-    """The messages of one connection, in the order of the document."""
+    """The declared messages of one connection, in document order."""
 
     def __init__(self, declared: Sequence[Matcher]) -> None:
         self.declared = tuple(declared)
 
     def decode(self, frame: Frame, now: float) -> Taken | None:
-        """Return the samples and refused values of a frame, or None when it is no message.
+        """Return the samples and refused values of a frame; None if no message matches.
 
-        `Frame.fault` is set when a message recognised the frame but rejected its content.
+        `Frame.fault` is set if a message matches the frame but rejects a value.
         """
         for one in self.declared:
             taken = one.take(frame, now)

@@ -1,7 +1,7 @@
 """Pending replies: the requests in flight on one connection.
 
-A `PendingReply` is one transmission of a request. Pure. See `urc.protocol.requests.conversation`
-for the theory of operation.
+A `PendingReply` is one transmission of a request that waits for a reply. Pure. See
+`urc.protocol.requests.conversation` for the theory of operation.
 """
 
 from collections.abc import Mapping
@@ -39,24 +39,23 @@ class PendingReply:
         self.stage = 0
         self._expectation: Expectation | None = None
         self.due = now + ask.answers[0].timeout_s
-        """Time at which its reply is overdue. For a late transmission, time at which it is
-        removed."""
+        """Time at which the reply is overdue. A late transmission is removed at this time."""
         self.size = 0
-        """Size in the receive buffer of the robot, in bytes."""
+        """Size of the request in the robot's receive buffer, in bytes."""
         self.since = now
-        """Start of the wait for the present reply."""
+        """Start time of the wait for the current reply, in seconds."""
         self.is_extended = False
         """Whether the robot has extended the timeout."""
         self.is_late = False
-        """Whether it has timed out. The late reply may still arrive, and must not match another
-        request."""
+        """Whether the reply has timed out. A late reply may still arrive, and must not match
+        another request."""
         self.values: dict[str, Reading] = {}
         self.number: int | None = None
-        """Number that its reply repeats; None: its reply has no number."""
+        """Number that the reply repeats; None: the reply has no number."""
 
     @property
     def expectation(self) -> Expectation:
-        """Expectation of the present reply, created on demand, since a plain reply needs none."""
+        """Expectation of the current reply, created on demand."""
         if self._expectation is None:
             self._expectation = Expectation(self.exchange.ask.answers[self.stage])
         return self._expectation
@@ -69,14 +68,14 @@ class PendingReply:
         return offer
 
     def refused(self, frame: Frame, reason: str) -> MatchResult:
-        """Return the refusal of the robot, with the text of the driver if it declares one."""
+        """Return the robot's refusal, with the driver's text if declared."""
         offer = self.expectation.offer(frame)
         return offer if offer is not None and offer.refusal else MatchResult(refusal=reason)
 
     def offer(self, frame: Frame, *, is_message: bool = False) -> MatchResult | None:
-        """Return the match result of a frame, or None when it belongs to another request.
+        """Return the match result of a frame; None for a frame of another request.
 
-        With `is_message`, only provisional and error replies count.
+        With `is_message`, only provisional and error replies can match.
         """
         if self.number is not None:
             return None  # its reply would carry the number, see `answer`
@@ -88,14 +87,14 @@ class PendingReply:
         )
 
     def extend(self, now: float) -> None:
-        """Extend the timeout by one reply time, within the limit of the driver."""
+        """Extend the timeout by another reply timeout, within the driver's limit."""
         answer = self.expectation.answer
         self.is_extended = True
         late_s = answer.timeout_s if self.is_late else 0.0
         self.due = min(now + answer.timeout_s, self.since + answer.extend_s + late_s)
 
     def waited(self, now: float) -> str:
-        """Return the elapsed timeout as text for people."""
+        """Return the elapsed timeout as text for messages."""
         answer = self.expectation.answer
         if not self.is_extended:
             return f"within {answer.timeout_s:g} s"
@@ -114,7 +113,7 @@ class PendingReply:
         return True
 
     def add(self, fields: Fields, samples: list[Sample]) -> None:
-        """Keep the samples and private fields of a reply."""
+        """Store the samples and private fields of a reply."""
         for name, raw in fields.items():
             if name.startswith("_"):
                 self.values[name[1:]] = _plain(raw)
@@ -135,12 +134,15 @@ class PendingReply:
 
 
 class PendingReplies(list[PendingReply]):
-    """Transmissions in the order of sending. Late transmissions stay until their deadline."""
+    """Pending transmissions in the order of sending.
+
+    Late transmissions stay until their deadline.
+    """
 
     __slots__ = ()
 
     def drain(self) -> list[Exchange]:
-        """Remove all; return the requests that still waited for a reply."""
+        """Remove all transmissions; return the requests that were still waiting for a reply."""
         waited = [pending.exchange for pending in self if not pending.is_late]
         self.clear()
         return waited
@@ -154,7 +156,7 @@ class PendingReplies(list[PendingReply]):
 
     @property
     def size(self) -> int:
-        """Unacknowledged bytes, which may still be in the receive buffer of the robot."""
+        """Number of unacknowledged bytes, which may still be in the robot's receive buffer."""
         return sum(pending.size for pending in self if not pending.exchange.is_realtime)
 
     @property
@@ -165,9 +167,9 @@ class PendingReplies(list[PendingReply]):
         return min((pending.due for pending in self), default=None)
 
     def may_confuse(self, exchange: Exchange) -> bool:
-        """Return whether a late reply could be taken for the reply to this request.
+        """Return whether a late reply could be mistaken for the reply to this request.
 
-        A late reply to an earlier transmission of the same request is as good as a new one.
+        A late reply to an earlier transmission of the same request is acceptable.
         """
         if not (exchange.ask.answers and exchange.ask.is_in_order):
             return False
@@ -180,42 +182,42 @@ class PendingReplies(list[PendingReply]):
         )
 
     def again(self, exchange: Exchange) -> PendingReply | None:
-        """Return the pending transmission of `exchange`, or None."""
+        """Return the pending transmission of `exchange`; None if there is no such transmission."""
         return next((one for one in self if one.exchange is exchange and not one.is_late), None)
 
     def has(self, label: str) -> bool:
-        """Return whether a request with that label awaits its reply."""
+        """Return whether a request with this label waits for a reply."""
         return any(pending.exchange.ask.label == label and not pending.is_late for pending in self)
 
     def overdue(self, now: float) -> list[PendingReply]:
-        """Return the transmissions whose timeout has passed."""
+        """Return the transmissions with an expired timeout."""
         return [pending for pending in self if pending.due <= now] if self else []
 
     def framing(self) -> Framing | None:
-        """Return the framing of a pending reply that declares its own, or None."""
+        """Return the framing that a pending reply declares; None without such a reply."""
         for pending in self:
             if pending.exchange.ask.framing is not None:
                 return pending.exchange.ask.framing
         return None
 
     def collects_lines(self) -> bool:
-        """Return whether any frame at all may be part of a reply."""
+        """Return whether any frame may be part of a pending multi-frame reply."""
         return any(pending.expectation.answer.lines is not None for pending in self)
 
     def plain(self) -> PendingReply | None:
-        """Return the only transmission, if its reply is pending and consists of samples alone."""
+        """Return the only transmission if its pending reply contains only samples, else None."""
         if len(self) != 1 or self[0].is_late or self[0].exchange.ask.plain is None:
             return None
         return self[0]
 
     def numbered(self, number: object) -> PendingReply | None:
-        """Return the transmission whose reply carries `number`."""
+        """Return the transmission that expects a reply with `number`, or None."""
         return next((one for one in self if one.number is not None and one.number == number), None)
 
     def offer(
         self, frame: Frame, *, is_message: bool = False
     ) -> tuple[PendingReply, MatchResult] | None:
-        """Return the transmission that the frame answers, with the match result; or None."""
+        """Return the transmission that the frame answers, and the match result; or None."""
         if len(self) == 1:
             only = self[0].offer(frame, is_message=is_message)
             return None if only is None else (self[0], only)
@@ -245,7 +247,7 @@ class PendingReplies(list[PendingReply]):
 
 
 def _plain(raw: object) -> Reading:
-    """Return a raw value as a valid reply value."""
+    """Return the plain value of a raw field, for a reply."""
     if isinstance(raw, (list, tuple)):
         return tuple(map(_plain, raw))
     if raw is None or isinstance(raw, (bool, int, float, str, bytes, Mapping)):

@@ -1,6 +1,6 @@
 """Admission of frames: the queue of a connection, rate limits, counters.
 
-Pure. Everything is bounded, and dropped requests are returned so that they can be reported.
+Pure. All queues are bounded, and dropped requests are returned for reporting.
 """
 
 from bisect import insort, insort_left
@@ -13,15 +13,15 @@ from urc.model.payload import Count, FrameVariants, Numbered, Payload
 __all__ = ["RANKS", "REALTIME", "GcraLimiter", "Counters", "FrameCounters", "Made", "PriorityQueue"]
 
 RANKS: Final[dict[Priority, int]] = {"realtime": 0, "high": 1, "normal": 2, "low": 3}
-"""Priority → rank; the lower rank is sent first."""
+"""Ranks of the priorities; lower ranks are sent first."""
 REALTIME: Final = 0
 
 
 class GcraLimiter:
     """A rate limiter: the generic cell rate algorithm, with one period of tolerance.
 
-    After a pause, two calls may pass at once; the long-term rate stays constant. A minimum gap
-    would lower the rate: a call slightly too early would lose half a period.
+    After a pause, two calls may pass immediately; the long-term rate stays constant. A minimum gap
+    would reduce the rate, because a call that is slightly early would have to wait.
     """
 
     __slots__ = ("_next_s", "_period_s")
@@ -29,11 +29,11 @@ class GcraLimiter:
     def __init__(self, rate_per_s: float) -> None:
         self._period_s = 1 / rate_per_s
         self._next_s = float("-inf")
-        """Time at which the next call is due by the rate itself."""
+        """Time at which the next call is due at a constant rate, in seconds."""
 
     @property
     def free_at(self) -> float:
-        """Earliest time of the next call."""
+        """Earliest time of the next call, in seconds."""
         return self._next_s - self._period_s
 
     def count(self, now: float) -> None:
@@ -42,22 +42,22 @@ class GcraLimiter:
 
 
 Stand = tuple[tuple[str, int], ...]
-"""Last numbers of the counters, as pairs sorted by name."""
+"""Last numbers of all counters, as pairs sorted by name."""
 Made = dict[Stand, Numbered]
 
 
 class FrameCounters:
-    """The counters of one frame; the same counter always gives the same number."""
+    """The counter numbers of one frame; repeated use of a counter returns the same number."""
 
     __slots__ = ("_last", "values")
 
     def __init__(self, last: Mapping[str, int]) -> None:
         self._last = last
         self.values: dict[str, int] = {}
-        """Counter → number in the frame."""
+        """Numbers in the frame, by counter."""
 
     def __call__(self, name: str, low: int, high: int) -> int:
-        """Return the number after the last sent one; `low` follows `high`."""
+        """Return the next number of a counter; `low` follows `high`."""
         if name not in self.values:
             last = self._last.get(name, high)
             self.values[name] = last + 1 if low <= last < high else low
@@ -73,28 +73,28 @@ class FrameCounters:
 class Counters:
     """The counters of one connection.
 
-    Numbers are assigned in the order of transmission. A connection with the engine as its only
-    writer has that order by itself. A connection on which the guard sends motion is *shared*: the
-    engine only proposes numbers, and learns the true values later.
+    Numbers are assigned in the order of transmission. If the engine is the only sender, this order
+    is certain. If the guard also sends motion, the counters are *shared*: the engine only proposes
+    numbers, and receives the actual numbers later.
     """
 
     __slots__ = ("_known", "_last", "ahead", "is_shared")
 
     def __init__(self) -> None:
         self._last: Mapping[str, int] = {}
-        """Counter values once all frames have been transmitted."""
+        """Counter values after the transmission of all pending frames."""
         self._known: Mapping[str, int] = {}
         """Last confirmed counter values."""
         self.ahead = 0
-        """Frames counted since the last confirmation."""
+        """Number of frames counted since the last confirmation."""
         self.is_shared = False
 
     def draw(self) -> FrameCounters:
-        """Return the numbers of the next frame without counting it."""
+        """Return the numbers of the next frame, without counting the frame."""
         return FrameCounters(self._last)
 
     def draw_urgent(self) -> FrameCounters:
-        """Return the numbers of a frame that overtakes all pending ones."""
+        """Return the numbers of a frame that overtakes all pending frames."""
         return FrameCounters(self._known)
 
     def count(self, draw: FrameCounters) -> None:
@@ -111,7 +111,7 @@ class Counters:
         """Update shared counters with confirmed values.
 
         Args:
-            stand: counter → last transmitted number.
+            stand: last transmitted number, by counter.
             is_settled: whether all counted frames have been transmitted.
         """
         self._known = dict(stand)
@@ -121,12 +121,12 @@ class Counters:
     def series(
         self, encode: Callable[[FrameCounters], Payload], length: int, made: Made
     ) -> FrameVariants:
-        """Render a frame for each of the next numbers, and for the first of a new connection.
+        """Render a frame for each of the next numbers, and for a new connection's first numbers.
 
         Args:
-            encode: renders a frame.
-            length: number of frames.
-            made: cache of rendered frames; receives those of this series.
+            encode: function that renders a frame with the given numbers.
+            length: number of frames to render.
+            made: cache of rendered frames, which receives the frames of this series.
         """
         frames: dict[Stand, Numbered] = {}
         for begin, most in ((self._known, length + self.ahead), ({}, length)):
@@ -144,13 +144,13 @@ class Counters:
         return FrameVariants(tuple(frames.values()))
 
     def is_near(self, made: Made, most: int) -> bool:
-        """Return whether at most `most` numbers have been used since the series was rendered."""
+        """Return whether fewer than `most` numbers have been used since the series was rendered."""
         key = tuple(sorted(self._known.items()))
         place = next((at for at, one in enumerate(made) if one == key), most)
         return place + self.ahead < most
 
     def reset(self) -> None:
-        """Reset the counters for a new connection. Shared counters wait for their confirmation."""
+        """Reset the counters for a new connection. Shared counters wait for confirmed values."""
         if not self.is_shared:
             self._last = self._known = {}
 
@@ -164,7 +164,7 @@ class Prioritized(Protocol):
 
     @property
     def latest_key(self) -> str:
-        """Key of requests that replace each other; "" for no replacement."""
+        """Key of requests that replace each other; "": no replacement."""
 
 
 Item = TypeVar("Item", bound=Prioritized)
@@ -180,7 +180,7 @@ class PriorityQueue(list[Item]):
         self._depth = depth
 
     def push(self, item: Item) -> Item | None:
-        """Add `item`; return the item that was displaced, possibly `item` itself."""
+        """Add `item`; return the displaced item, which may be `item`, or None."""
         if item.latest_key:
             for place, other in enumerate(self):
                 if other.latest_key == item.latest_key:
@@ -195,7 +195,7 @@ class PriorityQueue(list[Item]):
         return crowded_out
 
     def put_back(self, item: Item) -> None:
-        """Add a request for a retry, in front of its rank."""
+        """Add a request for a retry, before other requests of equal rank."""
         insort_left(self, item, key=_rank)
 
     def drain(self) -> list[Item]:

@@ -1,8 +1,8 @@
-"""Expected replies, and the collection of their frames.
+"""Expected replies: matching, and collection of several frames.
 
-Pure. A `Matcher` reads one kind of frame. An `CompiledReply` is the reply that a request expects.
-An `Expectation` collects the frames of one reply: the conversation of the transport
-(`urc.protocol.requests.conversation`) offers it each received frame.
+Pure. A `Matcher` decodes one kind of frame. A `CompiledReply` is the reply that a request expects.
+An `Expectation` collects the frames of one reply. The conversation of the transport
+(`urc.protocol.requests.conversation`) offers each received frame to the expectation.
 """
 
 from collections.abc import Callable, Mapping
@@ -29,23 +29,23 @@ __all__ = [
 ]
 
 Fields = Mapping[str, object]
-"""Fields of a frame: name → raw value."""
+"""Raw values of a frame's fields, by name."""
 
 _MOST_COLLECTED: Final = 1 << 20
-"""Largest size of a reply of several frames, in bytes."""
+"""Maximum size of a multi-frame reply, in bytes."""
 
 
 Aside = Literal["resend", "extend"]
-"""A provisional reply: it asks for a retransmission, or for more time."""
+"""Kind of a provisional reply: a request for retransmission, or for more time."""
 
 
 class Matcher:
-    """A reader of one kind of frame, with the decoder of its fields.
+    """A reader for one kind of frame, with a decoder for the fields.
 
     Args:
-        reader: reads the fields of a frame.
-        decode: converts fields to samples, and lists the refused values.
-        compiled: a generated function that does both for the most common frames.
+        reader: reader for the fields of a frame.
+        decode: function that returns the samples and the refused values of fields.
+        compiled: generated function that reads and decodes the most common frames.
     """
 
     __slots__ = ("decode", "reader", "take")
@@ -56,14 +56,15 @@ class Matcher:
         self.reader = reader
         self.decode = decode
         self.take: Compiled = compiled or self._take
-        """Return samples and refused values, or None for another kind of frame."""
+        """Function that returns samples and refused values; None for a frame that does not
+        match."""
 
     def _take(self, frame: Frame, now: float) -> Taken | None:
         found = self.read(frame)
         return None if found is None else self.decode(found, now)
 
     def read(self, frame: Frame) -> Fields | None:
-        """Return the fields, or None for another kind of frame or undecodable text."""
+        """Return the fields; None for a frame that does not match, or undecodable text."""
         try:
             return self.reader.read(frame)
         except BadItem as error:
@@ -74,7 +75,7 @@ class Matcher:
 
 
 class CompiledReply(NamedTuple):
-    """One expected reply, compiled."""
+    """A compiled expected reply."""
 
     matcher: Matcher
     timeout_s: float
@@ -82,39 +83,40 @@ class CompiledReply(NamedTuple):
     faults: tuple[tuple[Matcher, Template | None], ...] = ()
     lines: int | Pattern | None = None
     framing: Framing | None = None
-    """Framing of the stream while a step waits; None: that of the connection or of the request."""
+    """Framing of the stream while a step waits; None: the framing of the connection or the
+    request."""
     asides: tuple[tuple[Aside, Matcher], ...] = ()
-    """Provisional replies: the kind of each, and the matcher that recognises it."""
+    """Provisional replies, as pairs of kind and matcher."""
     extend_s: float = 0.0
-    """Longest total extension of the timeout, in seconds."""
+    """Maximum total extension of the timeout, in seconds."""
     is_silence: bool = False
     """Whether silence until the timeout counts as success."""
     takes_redirects: bool = False
-    """Whether the reply reads the target of a redirect, so that a redirect is no failure."""
+    """Whether the reply reads the target of a redirect; a redirect is then not a failure."""
 
 
 class MatchResult(NamedTuple):
-    """The result of offering a frame to an expectation."""
+    """The result of matching a frame with an expectation."""
 
     fields: Fields | None = None
-    """Fields of a complete reply; None: the reply is incomplete, or a refusal."""
+    """Fields of a complete reply; None for an incomplete reply or a refusal."""
     refusal: str = ""
-    """Refusal of the robot, as text for people."""
+    """The robot's refusal, as a message for people; "": no refusal."""
     told: tuple[Matcher, Fields] | None = None
-    """Matcher and fields of a provisional or error reply, for signals."""
+    """Matcher and fields of a provisional or error reply, for updating signals."""
     aside: Aside | None = None
-    """Provisional reply: a request for retransmission, or for more time."""
+    """Kind of the provisional reply; None for other frames."""
     dropped: str = ""
-    """Report of collected lines that were dropped, as text for people."""
+    """Report of dropped lines, as a message for people; "": no dropped lines."""
 
 
 _MORE: Final = MatchResult()
 IsMine = Callable[[Fields], bool]
-"""Predicate over fields: whether the frame belongs to the pending request."""
+"""Function that returns whether a frame with these fields belongs to the pending request."""
 
 
 class Expectation:
-    """Collects the frames of one reply."""
+    """A collector for the frames of one reply."""
 
     __slots__ = ("_lines", "_size", "answer", "owner")
 
@@ -125,7 +127,7 @@ class Expectation:
         self._size = 0
 
     def offer(self, frame: Frame, is_mine: IsMine | None = None) -> MatchResult | None:
-        """Return the match result of a frame, or None when it is no part of the reply."""
+        """Return the match result of a frame; None if the frame is not part of the reply."""
         beside = self.beside(frame, is_mine)
         if beside is not None:
             return beside
@@ -137,9 +139,9 @@ class Expectation:
         return MatchResult(found)
 
     def beside(self, frame: Frame, is_mine: IsMine | None = None) -> MatchResult | None:
-        """Return the match result of a provisional or error reply, or None for other frames.
+        """Return the match result of a provisional or error reply; None for other frames.
 
-        A frame that names no request belongs to the oldest pending one.
+        A frame without a correlation belongs to the oldest pending request.
         """
         for kind, matcher in self.answer.asides:
             fields = matcher.read(frame)
@@ -148,7 +150,7 @@ class Expectation:
         return self._refusal(self._so_far(frame), is_mine)
 
     def _so_far(self, frame: Frame) -> Frame:
-        """Return the text that is searched for a refusal: all frames so far of a counted reply."""
+        """Return the text to search for a refusal: all frames so far of a counted reply."""
         if not (self._lines and isinstance(self.answer.lines, int)):
             return frame
         if not isinstance(frame.payload, bytes):
@@ -156,7 +158,7 @@ class Expectation:
         return Frame(b"\n".join((*self._lines, frame.payload)), frame.encoding)
 
     def _refusal(self, frame: Frame, is_mine: IsMine | None) -> MatchResult | None:
-        """Return the refusal of the robot, or None."""
+        """Return the robot's refusal; None if the frame is not an error reply."""
         for matcher, text in self.answer.faults:  # first: these give more detail
             fields = matcher.read(frame)
             if fields is not None and _is_about(fields, is_mine):
@@ -196,10 +198,10 @@ class Expectation:
 
 
 class ExpectationOwner(Protocol):
-    """The owner of an expectation."""
+    """The owner of an expectation, which receives the match results."""
 
     def matched(self, expectation: Expectation, offer: MatchResult, now: float) -> None:
-        """Process the match result."""
+        """Process the match result of a frame."""
 
 
 class Matched(NamedTuple):
@@ -210,7 +212,7 @@ class Matched(NamedTuple):
 
 
 def _is_about(fields: Fields, is_mine: IsMine | None) -> bool:
-    """Return whether a frame with `fields` belongs to the request; a frame without fields does."""
+    """Return whether a frame with `fields` belongs to the request; True without fields."""
     return is_mine is None or not fields or is_mine(fields)
 
 
@@ -236,7 +238,7 @@ def _told(text: Template | None, fields: Fields, frame: Frame) -> str:
 
 
 def shown(frame: Frame) -> str:
-    """Return a frame for messages to people: its text, or its first bytes."""
+    """Return the text or the first bytes of a frame, for messages to people."""
     try:
         return quoted(frame.text, most=80)
     except BadText:

@@ -1,4 +1,4 @@
-"""Compiles the declared requests of a driver, once for each engine. Pure."""
+"""Compiler for the declared requests of a driver, used once per engine. Pure."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -29,11 +29,11 @@ __all__ = ["RequestCompiler"]
 
 
 class RequestCompiler:
-    """Compiles the requests of one driver.
+    """A compiler for the requests of one driver.
 
     Raises:
-        BadArgument: from every method, when a constant frame contains its own delimiter or cannot
-            be encoded.
+        BadArgument: a constant frame contains its own delimiter, or cannot be encoded (from every
+            method).
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class RequestCompiler:
         matchers: list[Matcher],
         context: CodecContext,
     ) -> None:
-        """Wrap the matchers of messages that are acknowledged or collected."""
+        """Wrap the matchers of messages with acknowledgements or collected values."""
         replies, kept = Acknowledgements(), list[Collector]()
         framing, name = build_framing(spec.framing), spec.name
         for place, (one, matcher) in enumerate(zip(messages, matchers, strict=True)):
@@ -87,7 +87,7 @@ class RequestCompiler:
         line.receiver.replies, line.receiver.collectors = replies, kept
 
     def _view(self, line: str, now: float, found: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the namespace of an acknowledgement: fields, signals and names of the login."""
+        """Return the namespace of an acknowledgement: fields, signals and fields from the login."""
         return self._known.view(now, {**self.lines[line].learnt, **found})
 
     def command(self, command: Command) -> CompiledRequest:
@@ -111,18 +111,18 @@ class RequestCompiler:
         return ask._replace(rank=RANKS[poll.priority], is_miss_harmless=poll.offline is not None)
 
     def plain(self, label: str, transport: str, send: WriteSpec) -> CompiledRequest:
-        """Return a request that expects no reply."""
+        """Return a compiled request without a reply."""
         return self._compile(label, transport, send, None)
 
     def compile_step(self, label: str, step: SendStep) -> CompiledRequest:
-        """Return the request of a step.
+        """Return the compiled request of a step.
 
-        The normal rank keeps the order of the steps.
+        All steps have normal rank, so the requests keep the order of the steps.
         """
         return self.plain(label, step.transport, step.send)._replace(rank=RANKS["normal"])
 
     def expected(self, step: ExpectStep) -> CompiledReply:
-        """Return the reply that a step expects."""
+        """Return the compiled reply that a step expects."""
         stage = Stage(step.read, step.errors, step.faults, step.timeout_s)
         answer = self._answer(step.transport, stage)
         return answer._replace(framing=step.framing and build_framing(step.framing))
@@ -217,7 +217,7 @@ class RequestCompiler:
 
 
 def _is_plain(reply: Reply) -> bool:
-    """Return whether a reply is a single frame with samples and nothing else."""
+    """Return whether a reply is a single frame that contains only samples."""
     read = reply.read
     has_own = any(name.startswith("_") for name in read.fields)
     has_more = reply.errors or reply.faults or reply.stages or reply.match or reply.framing

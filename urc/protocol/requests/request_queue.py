@@ -18,7 +18,7 @@ __all__ = ["RequestQueue", "render_retry", "rendered_size", "written"]
 
 
 class RequestQueue(PriorityQueue[Exchange]):
-    """The queue of one connection, with its shortest gap and its limit of requests in flight."""
+    """The request queue of one connection, with a minimum gap and a limit of requests in flight."""
 
     __slots__ = ("_limit", "_pending_replies", "_spec", "next_send", "size_of")
 
@@ -35,10 +35,10 @@ class RequestQueue(PriorityQueue[Exchange]):
         """Function that returns the size of a request on the wire, in bytes."""
         self._limit = spec.queue.in_flight if spec.connection == "persistent" else 1
         self.next_send = float("-inf")
-        """End of the shortest gap after the last request."""
+        """End time of the minimum gap after the last request, in seconds."""
 
     def submit(self, exchange: Exchange) -> tuple[Exchange, ExchangeOutcome] | None:
-        """Queue a request; return the displaced one with its outcome, or None."""
+        """Queue a request; return the displaced request with its outcome, or None."""
         gone = self.push(exchange)
         if gone is None:
             return None
@@ -50,11 +50,11 @@ class RequestQueue(PriorityQueue[Exchange]):
         return gone, ExchangeOutcome("queue-full", text)
 
     def has(self, label: str) -> bool:
-        """Return whether a request with that label is queued."""
+        """Return whether a request with this label is queued."""
         return any(exchange.ask.label == label for exchange in self)
 
     def sent(self, exchange: Exchange, now: float) -> None:
-        """Record that a request is sent now."""
+        """Record the sending of a request."""
         self.next_send = now + self._spec.min_gap_s
         if exchange.ask.bucket is not None:
             exchange.ask.bucket.count(now)
@@ -63,8 +63,9 @@ class RequestQueue(PriorityQueue[Exchange]):
         """Return the next request to send, without removing it.
 
         Args:
-            now: the time.
-            is_ready: whether the connection is ready; otherwise only privileged requests count.
+            now: current time, in seconds.
+            is_ready: whether the connection is ready; otherwise, only privileged requests may be
+                sent.
         """
         if not self:
             return None
@@ -79,27 +80,27 @@ class RequestQueue(PriorityQueue[Exchange]):
         return None
 
     def _has_room(self, exchange: Exchange) -> bool:
-        """Return whether the request fits into the buffer of the robot."""
+        """Return whether the request fits into the robot's receive buffer."""
         most = self._spec.queue.most_bytes
         return most is None or self._pending_replies.size + self.size_of(exchange) <= most
 
     def is_free(self, exchange: Exchange, now: float) -> bool:
-        """Return whether `exchange` may bypass the empty queue."""
+        """Return whether `exchange` may be sent immediately, without queueing."""
         if self or self._pending_replies or now < self.next_send:
             return False
         return self._has_room(exchange) and _free_at(exchange) <= now
 
     def wants_line(self, now: float) -> bool:
-        """Return whether a request waits only for a connection."""
+        """Return whether a queued request needs only a connection."""
         return any(_free_at(exchange) <= now for exchange in self)
 
     def may_send_at(self, *, is_ready: bool) -> float | None:
-        """Return the time at which a request may be sent; None when it waits for a reply."""
+        """Return the earliest time for the next request; None while waiting for a reply."""
         if not self or self._pending_replies.waiting >= self._limit:
             return None
         first: float | None = None
         barred_from = float("inf")
-        """A request without room in the buffer blocks those behind it once it is due."""
+        """Time from which a due request without room in the buffer blocks later requests."""
         for exchange in self:
             if not (is_ready or exchange.is_privileged) or self._pending_replies.may_confuse(
                 exchange
@@ -114,21 +115,21 @@ class RequestQueue(PriorityQueue[Exchange]):
 
 
 def _free_at(exchange: Exchange) -> float:
-    """Return the earliest time by its rate limit and by the wait before a retry."""
+    """Return the earliest time for sending, according to the rate limit and the retry delay."""
     bucket = exchange.ask.bucket
     return exchange.waits_until if bucket is None else max(bucket.free_at, exchange.waits_until)
 
 
 def written(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]) -> Numbered:
-    """Render a frame with the next numbers of its counters; a retry keeps its numbers.
+    """Render a frame with the next counter numbers; a retry keeps the numbers.
 
     Args:
-        exchange: a request that is rendered when it is sent.
+        exchange: a request to render at the time of sending.
         counters: counters of the connection.
-        learnt: names read by the login.
+        learnt: values that the login has read, by name.
 
     Raises:
-        BadArgument: the frame cannot be written; its numbers are used up nevertheless.
+        BadArgument: the frame cannot be encoded; its numbers are still used.
     """
     draw = counters.draw()
     count = Count({}, {})
@@ -150,7 +151,7 @@ def render_retry(exchange: Exchange, counters: Counters, learnt: Mapping[str, ob
 
 
 def rendered_size(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]) -> int:
-    """Return the size of a request in bytes, without using up a number of a counter."""
+    """Return the size of a request in bytes, without using counter numbers."""
     if exchange.data is not None:
         return size_of(exchange.data)
     try:

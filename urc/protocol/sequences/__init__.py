@@ -1,1 +1,1 @@
-"""Sequences of steps, and the commands that run them."""
+"""Sequences of steps, and their execution as commands."""

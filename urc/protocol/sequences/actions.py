@@ -1,4 +1,4 @@
-"""Actions of sequence steps: each kind of `Step` becomes a function for a `SequenceRunner`.
+"""Compilation of sequence steps: each `Step` becomes a function for a `SequenceRunner`.
 
 Pure. See `urc.protocol.sequences.sequence_runner` for the theory of operation.
 """
@@ -36,7 +36,7 @@ def build_program(
 def programs_of_lines(
     driver: Driver, builder: RequestCompiler, key: Literal["on_connect", "on_close"]
 ) -> dict[str, CompiledSequence]:
-    """Compile the login or the close sequence of each transport that declares one."""
+    """Compile the login or close sequences of all transports that declare such a sequence."""
     return {
         name: build_program(f"{name}.{key}", getattr(spec, key), frozenset((name,)), builder)
         for name, spec in driver.transports.items()
@@ -214,7 +214,7 @@ def _prompted(step: sequence.PromptStep, builder: RequestCompiler) -> CompiledRe
 
 
 class _Nothing:
-    """A reader for prompts, which are text outside of frames. It reads nothing."""
+    """A placeholder reader for prompts, which are text outside of frames. It reads nothing."""
 
     def read(self, frame: Frame) -> None:
         return None

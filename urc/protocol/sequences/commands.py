@@ -31,9 +31,9 @@ __all__ = [
 ]
 
 _MOST: Final = 256
-"""Largest number of commands that await verification."""
+"""Maximum number of commands that wait for verification."""
 _BOTH: Final = 2
-"""Number of people for the two-person rule."""
+"""Required number of people under the two-person rule."""
 
 
 def why_not_allowed(
@@ -44,14 +44,14 @@ def why_not_allowed(
     *,
     stops: int | None = None,
 ) -> str:
-    """Return the first unmet requirement of a command as text, or "".
+    """Return the text of the first unmet requirement of a command; "" if all are met.
 
     Args:
-        command: as declared.
-        known: state of the robot.
-        values: its checked arguments.
-        now: the time.
-        stops: number of stops when the command was requested; None: the request is new.
+        command: the declared command.
+        known: state of the robot, for conditions.
+        values: checked arguments, by name.
+        now: current time, in seconds.
+        stops: number of stops at the time of the request; None for a new request.
     """
     is_of_before = stops is not None and stops != known.stops
     if (known.latched or is_of_before) and command.moves_with(values):
@@ -69,8 +69,8 @@ def questions(command: Command, values: Mapping[str, object]) -> tuple[Confirm, 
     """Return the confirmation questions of `command` with these arguments.
 
     Args:
-        command: as declared.
-        values: its arguments, defaults included; for an array, each of its elements counts.
+        command: the declared command.
+        values: arguments including defaults, by name; each element of an array counts.
     """
     asked = [] if command.confirm is None else [command.confirm]
     for name, argument in command.arguments.items():
@@ -84,7 +84,7 @@ def questions(command: Command, values: Mapping[str, object]) -> tuple[Confirm, 
 
 
 def is_guarded(command: Command) -> bool:
-    """Return whether `why_refused` can ever refuse the command."""
+    """Return whether `why_refused` may refuse the command."""
     asked = [one for argument in command.arguments.values() for one in argument.confirm.values()]
     asked += [] if command.confirm is None else [command.confirm]
     return command.moves or bool(command.requires) or any(one.is_two_person for one in asked)
@@ -97,7 +97,7 @@ def why_refused(
     confirmed_by: tuple[str, ...],
     now: float,
 ) -> ExchangeOutcome | None:
-    """Return why a command is not sent: an unmet requirement or a missing confirmation."""
+    """Return the failure for an unmet requirement or missing confirmation; None if allowed."""
     why_not = why_not_allowed(command, known, values, now)
     if why_not:
         return ExchangeOutcome("not-allowed", why_not)
@@ -118,19 +118,19 @@ def exchange_of(
     known: SignalState,
     verifications: "Verifications",
 ) -> Exchange:
-    """Return one run of a command, ready for the queue of its transport.
+    """Return an exchange that runs a command, for the queue of the transport.
 
     Args:
-        command: a command that is no sequence.
-        ask: its compiled request.
-        values: its checked arguments.
-        sink: receives the outcome.
-        now: the time.
-        known: state of the robot.
-        verifications: receives the run if the command is verified after the reply.
+        command: the command, which must not be a sequence.
+        ask: compiled request of the command.
+        values: checked arguments, by name.
+        sink: function that receives the outcome.
+        now: current time, in seconds.
+        known: state of the robot, for conditions.
+        verifications: collection that receives a run with verification after the reply.
 
     Raises:
-        BadArgument: the frame cannot be written with these arguments.
+        BadArgument: the frame cannot be encoded with these arguments.
     """
     names = values if ask.is_local else {**known.names, **values}
     exchange = Exchange(
@@ -150,7 +150,7 @@ def exchange_of(
 
 
 def _written(value: object) -> str:
-    """Return a value in the form of a document key."""
+    """Return a value in the notation of a document key."""
     if isinstance(value, bool):
         return "true" if value else "false"
     return f"{value:g}" if isinstance(value, float) else str(value)
@@ -164,22 +164,22 @@ class _Waiting(NamedTuple):
 
 
 class Verifications:
-    """Commands that have their reply and await their verification."""
+    """Commands that have received their reply and wait for verification."""
 
     def __init__(self, known: SignalState) -> None:
         self._known = known
         self._waiting: list[_Waiting] = []
         self.has_news = False
-        """Whether a new sample justifies another check."""
+        """Whether new samples require another check."""
 
     @property
     def is_waiting(self) -> bool:
-        """Whether any waits."""
+        """Whether any command waits for verification."""
         return bool(self._waiting)
 
     @property
     def is_full(self) -> bool:
-        """Whether no further verification can be added."""
+        """Whether the maximum number of verifications is reached."""
         return len(self._waiting) >= _MOST
 
     @property
@@ -188,14 +188,14 @@ class Verifications:
         return min((one.due for one in self._waiting), default=None)
 
     def add(self, run: "VerifiedRun", outcome: ExchangeOutcome, since: float, now: float) -> None:
-        """Wait for samples after `since`, the time of sending, to verify `run`."""
+        """Add a run to verify with samples received after `since`, the time of sending."""
         if run.verify is not None:
             due = now + run.verify.within_s
             self._waiting.append(_Waiting(run, since, due, outcome))
             self.has_news = True
 
     def check(self, now: float) -> list[LineEvent]:
-        """Return the events of the verified commands."""
+        """Return the events of all newly verified commands."""
         events: list[LineEvent] = []
         if not self.has_news:
             return events
@@ -210,7 +210,7 @@ class Verifications:
         return events
 
     def tick(self, now: float) -> list[LineEvent]:
-        """Return the events of the verifications that have timed out."""
+        """Return the events of verified commands and of verification timeouts."""
         events = self.check(now)
         for one in tuple(self._waiting):
             if one.due <= now and one.run.verify is not None:
@@ -222,21 +222,21 @@ class Verifications:
 
 
 class UnverifiedRun:
-    """One run of a command without verification."""
+    """The execution of a command without verification."""
 
     __slots__ = ("_sink",)
 
     def __init__(self, sink: Sink) -> None:
-        """Initialise with `sink`, which receives the outcome."""
+        """Initialise with a `sink` for the outcome."""
         self._sink = sink
 
     def ended(self, exchange: Exchange, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Tell the outcome."""
+        """Report the outcome."""
         return self._sink(outcome, now)
 
 
 class VerifiedRun:
-    """One run of a command with verification."""
+    """The execution of a command with verification."""
 
     __slots__ = ("_verifications", "sink", "values", "verify")
 
@@ -247,14 +247,14 @@ class VerifiedRun:
         sink: Sink,
         verifications: Verifications,
     ) -> None:
-        """Initialise with `sink`, which receives the outcome after reply and verification."""
+        """Initialise with a `sink` for the outcome after reply and verification."""
         self.verify = verify
         self.values = values
         self.sink = sink
         self._verifications = verifications
 
     def ended(self, exchange: Exchange, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Deliver the outcome of a failure; otherwise wait for the verification."""
+        """Report a failure immediately; otherwise, wait for the verification."""
         if outcome.code or self.verify is None:
             return self.sink(outcome, now)
         self._verifications.add(self, outcome, exchange.sent_at, now)

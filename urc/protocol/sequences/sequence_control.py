@@ -1,6 +1,6 @@
-"""Control of a running sequence: pause, single step, resume, abort.
+"""Control of a running sequence: pause, single step, resume and abort.
 
-Pure. Requests may arrive at any time. The sequence obeys between two steps, so that no step is
+Pure. Requests may arrive at any time. A request takes effect between two steps, so no step is
 interrupted.
 """
 
@@ -9,36 +9,36 @@ from typing import Final, Literal
 __all__ = ["PAUSE_S", "Pull", "SequenceControl"]
 
 PAUSE_S: Final = 600.0
-"""Longest pause, in seconds: a paused sequence blocks other sequences."""
+"""Maximum duration of a pause, in seconds, because a paused sequence blocks other sequences."""
 
 Pull = Literal["pause", "step", "resume", "abort"]
-"""A request of the operator. ``step`` runs one outermost step and pauses again. Before the start,
-``step`` makes the sequence start paused."""
+"""A control request of the operator. ``step`` runs one outermost step and then pauses. With
+``step`` before the start, the sequence pauses before the first step."""
 
 
 class SequenceControl:
-    """The control state of one sequence, which runs once at a time."""
+    """The control state of one sequence, for at most one run at a time."""
 
     __slots__ = ("_halt", "count", "is_aborted", "is_paused", "is_running", "of", "place", "reason")
 
     def __init__(self, of: int) -> None:
-        """Initialise at rest; `of` is the number of outermost steps."""
+        """Initialise the state of an idle sequence with `of` outermost steps."""
         self.of = of
         self.place = 0
-        """Number of started steps."""
+        """Number of outermost steps that have started."""
         self.is_running = False
         self.is_paused = False
         self.is_aborted = False
         self.reason = ""
-        """Reason of a failure; "" otherwise."""
+        """Reason for the failure; "" without a failure."""
         self.count = 0
-        """Change counter of all attributes above."""
+        """Counter of changes to the public attributes."""
         self._halt: Literal["", "now", "next", "outer"] = ""
-        """Place of the next pause. The value ``now`` means before any step, ``outer`` before an
-        outermost one, and ``next`` after one more outermost step."""
+        """Position of the next pause: ``now`` before any step, ``outer`` before the next outermost
+        step, ``next`` after one more outermost step; "": no pause."""
 
     def pull(self, what: Pull) -> None:
-        """Apply a request of the operator."""
+        """Apply a control request of the operator."""
         match what:
             case "pause":
                 self._halt = "now" if self.is_running else ""
@@ -52,26 +52,26 @@ class SequenceControl:
     # -- for the runner
 
     def start(self) -> None:
-        """Record the start."""
+        """Record the start of a run."""
         self.place, self.reason = 0, ""
         self.is_running, self.is_paused, self.is_aborted = True, False, False
         self.count += 1
 
     def begin_step(self) -> None:
-        """Record the start of another outermost step."""
+        """Record the start of the next outermost step."""
         self.place += 1
         self.count += 1
         if self._halt == "next":
             self._halt = "outer"
 
     def end(self, reason: str) -> None:
-        """Record the end."""
+        """Record the end of a run."""
         self._halt, self.reason = "", reason
         self.is_running, self.is_paused, self.is_aborted = False, False, False
         self.count += 1
 
     def halts(self, *, is_outermost: bool) -> bool:
-        """Return whether the next step must wait; if so, the sequence is paused."""
+        """Return whether the next step must wait; if so, mark the sequence as paused."""
         is_over = is_outermost and self.place == self.of
         is_wanted = self._halt == "now" or (self._halt == "outer" and is_outermost)
         if is_over or not is_wanted:
@@ -81,7 +81,7 @@ class SequenceControl:
         return True
 
     def goes_on(self) -> bool:
-        """Return whether a pause has just ended."""
+        """Return whether a pause must end; if so, mark the sequence as running."""
         if not self.is_paused or self._halt not in ("", "next"):
             return False
         self.is_paused = False

@@ -1,9 +1,9 @@
 """Execution of sequences: ordered steps on the connections of one engine.
 
-Pure. Each step becomes a function when the engine is built. A `SequenceRunner` calls them in order
-until one must wait: for a reply, a frame, a prompt, a condition, or time. The engine settles the
-events and calls `advance` again. Every loop is bounded and every wait has a timeout, so every
-sequence ends.
+Pure. Each step becomes a function when the engine is built. A `SequenceRunner` calls the functions
+in order, until a step must wait for a reply, a frame, a prompt, a condition or a delay. The engine
+handles the events and calls `advance` again. Every loop is bounded and every wait has a timeout, so
+every sequence ends.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -21,13 +21,13 @@ from urc.protocol.sequences.sequence_control import PAUSE_S, SequenceControl
 __all__ = ["Action", "SequenceHost", "CompiledSequence", "SequenceRunner", "Sink", "Unless"]
 
 Sink = Callable[[ExchangeOutcome, float], list[LineEvent]]
-"""Receives the outcome and the time; returns the resulting events."""
+"""Function that receives an outcome and the time, and returns the resulting events."""
 Unless = Callable[[], str]
-"""Returns why the request is obsolete, or ""."""
+"""Function that returns why a request is obsolete; "" if not obsolete."""
 
 
 class SequenceHost(Protocol):
-    """The interface of the engine for sequences."""
+    """The interface between sequences and the engine."""
 
     lines: Mapping[str, Conversation]
     known: SignalState
@@ -44,26 +44,26 @@ class SequenceHost(Protocol):
         confirmed_by: tuple[str, ...],
         unless: Unless,
     ) -> list[LineEvent]:
-        """Run a command or sequence; its outcome goes to `sink`."""
+        """Run a command or sequence, and report the outcome to `sink`."""
 
 
 Action = Callable[["SequenceRunner", float], list[LineEvent]]
-"""One step, compiled."""
+"""A compiled step."""
 
 
 class CompiledSequence(NamedTuple):
-    """A sequence, compiled."""
+    """A compiled sequence."""
 
     label: str
     actions: tuple[Action, ...]
     transports: frozenset[str]
-    """Transports that the sequence uses directly."""
+    """Names of the transports that the sequence uses."""
     sequence_control: SequenceControl
-    """Control state; only one run at a time uses it."""
+    """Control state of the sequence, for at most one run at a time."""
 
 
 class SequenceRunner:
-    """One run of a sequence."""
+    """The execution of a sequence."""
 
     def __init__(
         self,
@@ -79,19 +79,21 @@ class SequenceRunner:
         Args:
             host: the engine.
             program: the compiled sequence.
-            sink: receives the outcome, once.
-            privileged_on: name of the transport for a login or close sequence; "" for others.
-            confirmed_by: people who have confirmed the sequence and thus all its commands.
-            ends_at: deadline of the whole run; None for no deadline.
+            sink: function that receives the outcome, exactly once.
+            privileged_on: name of the transport of a login or close sequence; "" for other
+                sequences.
+            confirmed_by: names of the people who have confirmed the sequence, including its
+                commands.
+            ends_at: deadline of the whole run, in seconds; None: no deadline.
         """
         self.host = host
         self.program = program
         self.privileged_on = privileged_on
         self.confirmed_by = confirmed_by
         self.variables: dict[str, object] = {}
-        """Fields of replies, as ``_field``."""
+        """Values of private fields and of replies, by ``_name``."""
         self.due: float | None = None
-        """End of the present wait."""
+        """End time of the current wait, in seconds; None: no time limit."""
         self.ends_at = ends_at
         self.is_waiting = False
         self._sink: Sink | None = sink
@@ -103,30 +105,30 @@ class SequenceRunner:
         self._otherwise: tuple[Action, ...] | None = None
         self._late_text = ""
         self._logins: list[Conversation] = []
-        """Connections whose logins must complete before the first step."""
+        """Connections that must complete their logins before the first step."""
         program.sequence_control.start()
 
     @property
     def is_over(self) -> bool:
-        """Whether the outcome has been delivered."""
+        """Whether the outcome has been reported."""
         return self._sink is None
 
     @property
     def can_go_on(self) -> bool:
-        """Whether `advance` has work."""
+        """Whether `advance` can make progress."""
         if self._logins and all(line.is_ready for line in self._logins):
             return not self.is_over
         return not self.is_over and (self._outcome is not None or not self.is_waiting)
 
     @property
     def deadline(self) -> float | None:
-        """Time for the next `expire`."""
+        """Time for the next call of `expire`; None without a timeout."""
         if self.due is None or self.ends_at is None:
             return self.ends_at if self.due is None else self.due
         return min(self.due, self.ends_at)
 
     def advance(self, now: float) -> list[LineEvent]:
-        """Run steps until one must wait or all are done."""
+        """Run steps until a step must wait, or the sequence is complete."""
         events: list[LineEvent] = []
         if self._logins and all(line.is_ready for line in self._logins):
             self._logins = []
@@ -153,7 +155,7 @@ class SequenceRunner:
         return events
 
     def wait_for_logins(self, now: float) -> None:
-        """Wait for the logins of all open connections, no longer than a queued command would."""
+        """Wait for the logins of all open connections, up to the queue limit of a command."""
         lines = (self.host.lines[name] for name in self.program.transports)
         self._logins = [
             line
@@ -167,7 +169,7 @@ class SequenceRunner:
             self.sleep(now + limit_s)
 
     def _obey(self) -> None:
-        """Apply the requests of the operator."""
+        """Apply the control requests of the operator."""
         sequence_control = self.program.sequence_control
         if sequence_control.is_aborted:
             self.stop("aborted", "somebody ended it")
@@ -175,7 +177,7 @@ class SequenceRunner:
             self._resume()
 
     def expire(self, now: float) -> None:
-        """Handle the end of the present wait."""
+        """Handle the timeout of the current wait."""
         if self.ends_at is not None and self.ends_at <= now:
             self.stop("timed-out", "it took too long")
             return
@@ -200,19 +202,19 @@ class SequenceRunner:
         self._resume()
 
     def stop(self, code: str, reason: str) -> None:
-        """End without success."""
+        """End the run with a failure."""
         self._stop_listening()
         if self._outcome is None:
             self._outcome = ExchangeOutcome(code, reason)
 
     def why_over(self) -> str:
-        """Return why its further frames are obsolete, or ""."""
+        """Return the reason why further frames of the run are obsolete, or ""."""
         return self._outcome.message if self._outcome is not None else ""
 
     # -- called by the engine
 
     def check_conditions(self, now: float) -> None:
-        """Check the awaited condition after new samples, or at the start of the wait."""
+        """Check the awaited condition, after new samples or at the start of the wait."""
         if self._awaited is not None and self.host.known.holds(self._awaited, now, self.variables):
             self._awaited = None
             self._resume()
@@ -242,11 +244,11 @@ class SequenceRunner:
     # -- for the actions
 
     def names(self, now: float) -> Mapping[str, object]:
-        """Return the namespace of the expressions."""
+        """Return the namespace for the expressions of the steps."""
         return self.host.known.view(now, self.variables)
 
     def push(self, actions: Iterator[Action]) -> None:
-        """Do these next."""
+        """Run `actions` next."""
         self._stack.append(actions)
 
     def sleep(self, due: float) -> None:
@@ -254,7 +256,7 @@ class SequenceRunner:
         self.is_waiting, self.due = True, due
 
     def wait(self) -> None:
-        """Wait for the call of `done`."""
+        """Wait until `done` is called."""
         self.is_waiting = True
 
     def listen(

@@ -1,1 +1,1 @@
-"""The binary form: fixed and variable fields in a frame."""
+"""The form ``struct``: binary frames with fixed and variable fields."""

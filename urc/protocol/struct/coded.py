@@ -1,9 +1,9 @@
-"""Numbers of a struct with special encodings: variable lengths, decimal digits, odd widths.
+"""Struct numbers with special encodings: variable lengths, decimal digits and odd widths.
 
-Pure. ``varint`` is LEB128 as in Protocol Buffers, ``zigzag`` their signed form. ``bcd`` has a
-decimal digit in each half of a byte. ``f32cdab`` has swapped words of 16 bits, and ``u14by7le``
-seven bits in each byte. Packed arrays have consecutive numbers of any width, across byte
-boundaries. All numbers are bounded to 64 bits.
+Pure. ``varint`` is LEB128 as in Protocol Buffers, and ``zigzag`` is its signed form. ``bcd`` has
+two decimal digits per byte. ``f32cdab`` has swapped 16-bit words, and ``u14by7le`` has seven bits
+per byte. Packed arrays have consecutive numbers of any width, across byte boundaries. All numbers
+have at most 64 bits.
 """
 
 from collections.abc import Callable, Mapping
@@ -30,15 +30,15 @@ Out = dict[str, Any]
 Step = Callable[[bytes, int, int, Out], int]
 
 FAULT: Final = ""
-"""Key of the first invalid item in `out`; no item has this name."""
+"""Key in `out` for the error of the first invalid item; no item has this name."""
 
 
 class OtherFrame(Exception):
-    """The bytes are another kind of frame."""
+    """The bytes do not match the declared frame."""
 
 
 def note(out: Out, name: str, meaning: Callable[[Any], Any], raw: Any) -> None:
-    """Put the decoded value of `raw` into `out`, or its error."""
+    """Store the decoded value of `raw` in `out`, or the first error."""
     try:
         out[name] = meaning(raw)
     except BadItem as error:
@@ -46,7 +46,7 @@ def note(out: Out, name: str, meaning: Callable[[Any], Any], raw: Any) -> None:
 
 
 def coded_reader(number: Number) -> Callable[[bytes, int, int], tuple[Any, int]]:
-    """Return the function from data, begin and end to the raw number and its end.
+    """Return a function that reads a raw number within bounds, and returns the number and its end.
 
     The function raises `OtherFrame` for an invalid number.
     """
@@ -54,7 +54,7 @@ def coded_reader(number: Number) -> Callable[[bytes, int, int], tuple[Any, int]]
 
 
 def coded_writer(number: Number, name: str) -> Callable[[Any], bytes]:
-    """Return the function from a raw number, which must fit, to its bytes."""
+    """Return a function that encodes a raw number within the range of the type."""
     if number.kind == "float" and number.are_words_swapped:
         write = number_writer(number._replace(are_words_swapped=False), name)
         return lambda raw: words_turned(write(raw))
@@ -62,7 +62,7 @@ def coded_writer(number: Number, name: str) -> Callable[[Any], bytes]:
 
 
 def coded_step(item: Item) -> Step:
-    """Return the step that reads such a number."""
+    """Return the step that reads a number with a special encoding."""
     read, meaning, const, name = coded_reader(item.number), meaning_of(item), item.const, item.id
 
     def step(data: bytes, at: int, end: int, out: Out) -> int:
@@ -78,7 +78,7 @@ def coded_step(item: Item) -> Step:
 
 
 def packed_step(item: Item, count: Extent) -> Step:
-    """Return the step that reads an array of numbers of any width."""
+    """Return the step that reads a packed array of numbers."""
     size, shifts = packed_size(item.number, count), _shifts(item, count)
     order = "little" if item.is_lsb_first else "big"
     mask = (1 << item.number.bits) - 1
@@ -104,7 +104,7 @@ def _shifts(item: Item, count: Extent) -> list[int]:
 
 
 def packed_writer(item: Item, count: Extent) -> Callable[[Mapping[str, Any], bool], bytes]:
-    """Return the function from a scope, and whether missing values are zero, to the array."""
+    """Return a function that encodes a packed array; parameters: scope, missing values are zero."""
     size, shifts = packed_size(item.number, count), _shifts(item, count)
     checked, mask, name = checked_raw(item), (1 << item.number.bits) - 1, item.id
     zero = (

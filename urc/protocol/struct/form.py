@@ -16,20 +16,20 @@ __all__ = ["StructReader", "StructWriter"]
 
 
 class StructReader:
-    """Reads the items of a frame as fields; writes a frame from some of its fields."""
+    """A reader for the items of a frame, which also writes frames from fields."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._items = cast("tuple[Item, ...]", spec.options["items"])
         self._names = frozenset(names_of(self._items))
         self._encoding = context.encoding
         self.read = generate_read(self._items, context.encoding)
-        """Generated function: returns the fields, None for another frame, or raises `BadItem`."""
+        """Generated function that returns the fields, or None for no match; raises `BadItem`."""
         self._steps = build_write_steps(self._items, context.encoding, is_lenient=True)
         # A reply carries the number of its request, which `match` supplies.
         self._outer = {"settings": context.settings, COUNTERS: lambda name, low, high: low}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return the frame, with zeros for missing fields."""
+        """Return a frame with `fields`, and zeros for missing fields."""
         known = {name: value for name, value in fields.items() if name in self._names}
         data = write_frame(self._steps, {**known, **self._outer})
         try:
@@ -42,18 +42,18 @@ class StructReader:
 
 
 class StructWriter:
-    """Writes the items of a frame from arguments; reads them back."""
+    """A writer for the items of a frame, which also reads the arguments back."""
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         items = cast("tuple[Item, ...]", spec.options["items"])
         self.write = generate_write(items, context.encoding)
-        """Generated function: returns the frame, or raises `NotWritable`."""
+        """Generated function that returns the frame; raises `NotWritable`."""
         named, counters = _with_counters(items)
         self._names = {name: name for name in names_of(items, sent=True)} | counters
         self._read = generate_read(named, context.encoding)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the arguments of a frame, or None for another kind of frame.
+        """Return the arguments in a frame; None for a frame that does not match.
 
         The number of a counter has the key ``seq.NAME``.
         """
@@ -68,7 +68,7 @@ class StructWriter:
 
 
 def _with_counters(items: tuple[Item, ...]) -> tuple[tuple[Item, ...], dict[str, str]]:
-    """Return the items with an id for each counter, and a mapping of id to ``seq.NAME``."""
+    """Return the items with an id for each counter, and ``seq.NAME`` by id."""
     named, counters = list(items), dict[str, str]()
     for place, item in enumerate(items):
         counter = counter_in(item.value.source) if item.value is not None else ""

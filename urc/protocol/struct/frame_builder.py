@@ -1,4 +1,4 @@
-"""A binary frame under construction, with gaps that are filled in later. Pure."""
+"""Builder for binary frames, with gaps for numbers that are computed later. Pure."""
 
 from typing import Any, NamedTuple
 
@@ -12,20 +12,20 @@ __all__ = ["GAP", "LARGEST_FRAME", "Backpatch", "FrameBuilder", "Scope", "evalua
 
 Scope = dict[str, Any]
 LARGEST_FRAME = 1 << 20
-"""Largest frame in bytes, equal to the limit of the framings."""
+"""Maximum size of a frame in bytes, equal to the limit of the framings."""
 
 
 GAP = "gap of "
-"""Prefix of the scope key of a gap, before the item id; ids contain no space."""
+"""Prefix of a gap's key in the scope, before the item id; ids contain no space."""
 
 
 class Backpatch(NamedTuple):
-    """A number that is filled in later."""
+    """The gap for a number that is filled in later."""
 
     at: int
     item: Item
     container: Number
-    """Number type of the bytes that contain it, at `shift`."""
+    """Type of the number that contains the gap's number, at `shift`."""
     shift: int = 0
 
 
@@ -37,16 +37,16 @@ class FrameBuilder:
     def __init__(self) -> None:
         self.bytes = bytearray()
         self.late: list[tuple[Backpatch, Template, Scope]] = []
-        """Computed items that need the whole frame."""
+        """Gaps of computed items that depend on the size of the whole frame."""
 
     def append(self, data: bytes) -> None:
-        """Append bytes; raise `NotWritable` when the frame becomes too long."""
+        """Append bytes; raise `NotWritable` if the frame becomes too long."""
         if len(self.bytes) + len(data) > LARGEST_FRAME:
             raise NotWritable(f"the frame would have more than {LARGEST_FRAME} bytes")
         self.bytes += data
 
     def insert(self, at: int, data: bytes, scope: Scope) -> None:
-        """Insert bytes at `at`; later gaps move with their bytes."""
+        """Insert bytes at offset `at`, and move later gaps."""
         self.bytes[at:at] = data
         self.late = [(_moved(gap, at, len(data)), one, inner) for gap, one, inner in self.late]
         for name, value in scope.items():
@@ -70,7 +70,7 @@ def _moved(gap: Backpatch, at: int, by: int) -> Backpatch:
 
 
 def evaluate(template: Template, scope: Scope) -> Any:
-    """Return the value of an expression over a scope; raise `NotWritable` on an error."""
+    """Evaluate an expression over a scope; raise `NotWritable` on an error."""
     try:
         return template.evaluate(scope)
     except ExpressionError as error:
@@ -78,7 +78,7 @@ def evaluate(template: Template, scope: Scope) -> Any:
 
 
 def solved(expression: Template, only: str, number: int, name: str) -> int:
-    """Return the value of `only` for which the linear `expression` equals `number`."""
+    """Solve the linear equation `expression` = `number` for the variable `only`."""
     at_zero = evaluate(expression, {only: 0})
     slope = evaluate(expression, {only: 1}) - at_zero
     solution = round((number - at_zero) / slope) if slope else 0

@@ -1,11 +1,11 @@
-"""Struct items read by closures: bytes → fields.
+"""Closures that read struct items from bytes to fields.
 
 Pure. The module is the readable version of `urc.protocol.struct.read_source`, which is faster for
-runs of fixed items. Tests compare the two. Theory of operation: every item becomes a step ``(data,
-at, end, out) -> after``. A step reads its bytes from `at`, never at or behind `end`, and puts its
-value into `out`. A step raises `OtherFrame` for another kind of frame. An invalid value is recorded
-under the name "", and the rest is still read: only a frame that matches to its end counts as
-invalid.
+runs of fixed items. Tests compare the results of both modules. Theory of operation: every item
+becomes a step ``(data, at, end, out) -> after``. A step reads bytes from `at` to at most `end`, and
+stores the value in `out`. A step raises `OtherFrame` for a frame that does not match. The first
+invalid value is recorded under the key `FAULT`, and reading continues: only a frame that matches to
+its end counts as invalid.
 """
 
 from collections.abc import Callable, Mapping
@@ -45,17 +45,17 @@ __all__ = [
 Out = dict[str, Any]
 Step = Callable[[bytes, int, int, Out], int]
 Amount = Callable[[bytes, int, int, Out], tuple[int, int]]
-"""Returns a number of units and the start of the counted data; -1: up to the end."""
+"""Function that returns a size or count (-1: up to the end) and the start of the data."""
 
 BitPart = tuple[Item, int, int, int, Callable[[Any], Any]]
-"""A part of ``bits``: shift, mask, sign bit or 0, and decoding function."""
+"""A part of ``bits``: item, shift, mask, sign bit (0 for unsigned) and decoding function."""
 
 
 def read_frame(steps: tuple[Step, ...], data: object) -> Mapping[str, object] | None:
-    """Return the fields of `data`, or None for another kind of frame.
+    """Return the fields of `data`; None for a frame that does not match.
 
     Raises:
-        BadItem: the frame matches, but has an invalid value.
+        BadItem: the frame matches, but contains an invalid value.
     """
     if not isinstance(data, bytes):
         return None
@@ -74,12 +74,12 @@ def read_frame(steps: tuple[Step, ...], data: object) -> Mapping[str, object] | 
 
 
 def build_steps(items: tuple[Item, ...], encoding: str) -> tuple[Step, ...]:
-    """Return the steps of the items of one level."""
+    """Return the steps for the items of one level."""
     return tuple(build_step(item, encoding) for item in items)
 
 
 def build_step(item: Item, encoding: str) -> Step:
-    """Return the step of one item, its condition and its array included."""
+    """Return the step for one item, including its condition and array."""
     single = item._replace(condition=None)
     if item.times is not None:
         step = _array_step(single, item.times, encoding)
@@ -130,7 +130,7 @@ def _number_step(item: Item, encoding: str) -> Step:
 
 
 def const_of(item: Item) -> Any:
-    """Return the constant as it is read: 0.1 in 32 bits is not exactly 0.1."""
+    """Return the constant after reading back, because 0.1 in 32 bits is not exactly 0.1."""
     if item.const is None or item.kind != "number":
         return item.const
     return plain_reader(item.number)(number_writer(item.number, item.id)(item.const), 0)
@@ -160,7 +160,7 @@ def _bits_step(item: Item, encoding: str) -> Step:
 
 
 def bit_parts(item: Item) -> list[BitPart]:
-    """Return each part of ``bits``: shift, mask, sign bit (0: none), decoding function."""
+    """Return the parts of ``bits``."""
     parts = []
     left = item.number.bits
     for part in item.items:
@@ -212,7 +212,7 @@ def _padding_step(item: Item, encoding: str) -> Step:
 
 
 def build_amount(extent: Extent | None, name: str) -> Amount:
-    """Return the function that computes a size or count from earlier items."""
+    """Return a function that computes a size or count from earlier items."""
     if extent is None or extent.kind == "rest":
         return lambda data, at, end, out: (-1, at)
     if extent.kind == "fixed":
@@ -243,7 +243,7 @@ def _prefix_amount(extent: Extent) -> Amount:
 def _array_step(item: Item, count: Extent, encoding: str) -> Step:
     """Read consecutive items.
 
-    Each takes at least one byte, so the size of the frame bounds them.
+    Each item takes at least one byte, so the size of the frame limits the number of items.
     """
     single = item._replace(times=None)
     if item.kind == "packed":
@@ -332,7 +332,7 @@ def _body(steps: tuple[Step, ...]) -> Step:
 
 
 def _windowed(steps: tuple[Step, ...], item: Item) -> Step:
-    """Read a struct that must fill its window, except for trimmed bytes."""
+    """Return the step for a struct that must fill its window, except for trimmed bytes."""
     body, amount = _body(steps), build_amount(item.size, item.id)
     trim, full = item.trim, least_size(item.items)
 

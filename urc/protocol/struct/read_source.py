@@ -1,8 +1,8 @@
-"""Struct items read by one generated function per declaration.
+"""Generated functions that read struct items, one per declaration.
 
-Pure. Each run of fixed items becomes one `struct.Struct` and straight-line Python. The closures of
-`urc.protocol.struct.read` read all other items. The closures are also the oracle of the tests,
-which require the same result for the same bytes.
+Pure. Each run of fixed items becomes one `struct.Struct` and straight-line Python code. The
+closures of `urc.protocol.struct.read` read all other items. Tests compare the results of the
+function and the closures for the same bytes.
 """
 
 from collections.abc import Callable, Mapping
@@ -22,9 +22,9 @@ Read = Callable[[Frame], Mapping[str, object] | None]
 
 
 def generate_read(items: tuple[Item, ...], encoding: str) -> Read:
-    """Return the function from a frame to its fields, or to None for another kind of frame.
+    """Return a function that reads the fields of a frame, or returns None for no match.
 
-    The function raises `BadItem` for a matching frame with an invalid value.
+    The function raises `BadItem` if a matching frame contains an invalid value.
     """
     source = SourceBuilder()
     source.scope |= {"FAULT": FAULT, "not_valid": not_valid, "BadItem": BadItem}
@@ -52,13 +52,13 @@ def _is_open_end(item: Item) -> bool:
 def add_fixed(
     source: SourceBuilder, items: tuple[Item, ...], encoding: str, data: str
 ) -> tuple[list[str], dict[str, str]] | None:
-    """Add the unpacking of a frame whose items all have fixed places, or return None.
+    """Add source for unpacking a frame of items with fixed positions, or return None.
 
     Args:
-        source: the function, which returns None for another kind of frame.
+        source: builder of the function, which returns None for a frame that does not match.
         items: items of the frame.
         encoding: default encoding of texts.
-        data: the variable that holds the frame.
+        data: name of the variable that contains the frame.
 
     Returns:
         The lines that follow, and field → expression that is valid after these lines.
@@ -92,7 +92,7 @@ def _variables(place: int, number: int, leaf: FixedField) -> list[str]:
 
 
 def _add_unpack(source: SourceBuilder, run: FixedRun, place: int, where: str) -> None:
-    """Add the unpacking of a run, and the check of its constants."""
+    """Add source for unpacking a run and checking its constants."""
     names = [
         name for number, leaf in enumerate(run.leaves) for name in _variables(place, number, leaf)
     ]
@@ -126,7 +126,7 @@ def _add_leaf(
     lines: list[str],
     fields: list[str],
 ) -> None:
-    """Add the lines and the ``'name': value`` pairs of one item."""
+    """Add the source lines and the ``'name': value`` pairs of one item."""
     item = leaf.item
     if item.kind == "bits":
         for part, shift, mask, sign, _ in leaf.bit_parts():
@@ -194,7 +194,7 @@ def _scaled(item: Item, raw: str) -> str:
 def _add_mixed(
     source: SourceBuilder, parts: list[FixedRun | Item], encoding: str, has_open_end: bool
 ) -> None:
-    """Unpack fixed runs directly; call the closures for the items between them."""
+    """Add source that unpacks fixed runs directly, and calls the closures for other items."""
     source.scope["OtherFrame"] = OtherFrame
     source.add("if type(data) is not bytes: return None")
     source.add("end = len(data)")
@@ -224,7 +224,7 @@ def _add_mixed(
 
 
 def _add_noted(source: SourceBuilder, lines: list[str], fields: list[str]) -> None:
-    """Add the value of one item; an error is kept until the whole frame has matched."""
+    """Add source for the value of one item; errors wait until the whole frame has matched."""
     if not fields:
         return
     depth = 1

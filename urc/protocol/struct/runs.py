@@ -1,6 +1,6 @@
-"""Runs of fixed struct items, each of which one `struct.Struct` unpacks.
+"""Runs of fixed struct items, each unpacked by one `struct.Struct`.
 
-Pure; for the generators of `urc.protocol.struct.read_source` and `.struct_source_write`.
+Pure. The generators `urc.protocol.struct.read_source` and `.write_source` use the runs.
 """
 
 from collections.abc import Iterator
@@ -14,24 +14,24 @@ from urc.protocol.struct.read import BitPart, bit_parts
 __all__ = ["FixedField", "FixedRun", "runs_of"]
 
 MOST_IN_A_RUN = 256
-"""Largest number of values of one `struct.Struct`; closures read longer arrays."""
+"""Maximum number of values in one `struct.Struct`; closures read longer arrays."""
 
 
 class FixedField(NamedTuple):
-    """One fixed item in a run."""
+    """A fixed item in a run."""
 
     item: Item
     name: str
-    """Name of its field, including outer structs; "" for none."""
+    """Name of the field, including outer structs; "": no field."""
     outer: str
-    """Name of the structs around it."""
+    """Joined name of the outer structs."""
     code: str
-    """Format characters for `struct`; "x" takes no value."""
+    """Format characters for `struct`; "x" has no value."""
     endian: Literal["", "big", "little"] = ""
     values: int = 1
 
     def bit_parts(self) -> list[BitPart]:
-        """Return the parts of ``bits``, with the names of their fields."""
+        """Return the parts of ``bits`` with their field names."""
         outer = self.outer
         return [
             (part._replace(id=joined_name(outer, part.id) if part.id else ""), at, mask, sign, told)
@@ -40,7 +40,7 @@ class FixedField(NamedTuple):
 
 
 class FixedRun(NamedTuple):
-    """Consecutive fixed items of one byte order."""
+    """A run of consecutive fixed items with the same byte order."""
 
     leaves: tuple[FixedField, ...]
 
@@ -53,7 +53,7 @@ class FixedRun(NamedTuple):
 
 
 def _leaves(item: Item, outer: str) -> list[FixedField] | None:
-    """Return the parts of a fixed item, or None for other items."""
+    """Return the parts of a fixed item; None for other items."""
     if item.condition is not None or item.switch is not None:
         return None
     name = joined_name(outer, item.id) if item.id else ""
@@ -90,7 +90,7 @@ def _all_leaves(items: tuple[Item, ...], outer: str) -> list[FixedField] | None:
 
 
 def runs_of(items: tuple[Item, ...]) -> Iterator[FixedRun | Item]:
-    """Yield runs of fixed items, and the items between them."""
+    """Yield the runs of fixed items and all other items, in order."""
     run: list[FixedField] = []
     endian = ""
     for item in items:

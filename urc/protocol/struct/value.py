@@ -1,8 +1,8 @@
-"""Conversion between the raw form of one struct item and its value.
+"""Conversion between raw forms and values of struct items.
 
-Pure. The closures and the slow paths of the generator share this conversion. The raw form is the
-one in the frame. The value is that of fields and arguments: scaled, and a word if the item has an
-enum.
+Pure. The closures and the slow paths of generated functions share this conversion. The raw form is
+the number or the bytes in the frame. The value is the field or argument: a scaled number, a word of
+an enum, or a text.
 """
 
 import struct
@@ -29,7 +29,7 @@ __all__ = [
 
 
 def meaning_of(item: Item) -> Callable[[Any], Any]:
-    """Return the function from raw form to value; it raises `BadItem` for an invalid value."""
+    """Return a function that converts raw form to value, or raises `BadItem` if invalid."""
     words, scale, offset, valid = dict(item.enum), item.scale, item.offset, item.valid
     divisor = divisor_of(scale)
 
@@ -49,14 +49,14 @@ def meaning_of(item: Item) -> Callable[[Any], Any]:
 
 
 def not_valid(name: str, value: object, valid: tuple[float, float]) -> BadItem:
-    """Return the error for a value outside its ``valid`` range."""
+    """Return the error for a value outside the item's ``valid`` range."""
     return BadItem(f"{name}: expected {valid[0]:g} to {valid[1]:g}, found {quoted(value)}")
 
 
 def raw_of(item: Item) -> Callable[[Any], Any]:
-    """Return the function from value to raw form; it raises `NotWritable`.
+    """Return a function that converts value to raw form, or raises `NotWritable`.
 
-    Whole numbers are rounded to the nearest one, halves to the even one.
+    Numbers are rounded to the nearest whole number, and halves to the even number.
     """
     numbers = {word: number for number, word in item.enum}
     number, valid, scale, offset = item.number, item.valid, item.scale, item.offset
@@ -88,7 +88,7 @@ def raw_of(item: Item) -> Callable[[Any], Any]:
 
 
 def fitting(number: Number, value: int | float, name: str) -> int | float | bool:
-    """Return `value` in the type of `number`; raise `NotWritable` if it does not fit."""
+    """Return `value` in the type `number`; raise `NotWritable` for a value outside the range."""
     if number.kind == "float":
         try:
             return float(value)
@@ -119,7 +119,7 @@ def _wanted(item: Item) -> str:
 
 
 def checked_raw(item: Item) -> Callable[[Any], tuple[Any, Any]]:
-    """Return the function from a value to the raw number and its value after reading back."""
+    """Return a function from a value to the raw number and the value after reading back."""
     raw_from, meaning = raw_of(item), meaning_of(item)
 
     def checked(value: Any) -> tuple[Any, Any]:
@@ -147,7 +147,7 @@ def number_writer(number: Number, name: str) -> Callable[[Any], bytes]:
 
 
 def text_of_bytes(item: Item, encoding: str) -> Callable[[bytes], object]:
-    """Return the function from the bytes of a text or bytes item to its value."""
+    """Return a function that converts the bytes of a text or bytes item to a value."""
     if item.kind == "bytes":
         return bytes
     codec, name = item.encoding or encoding, item.id
@@ -168,7 +168,7 @@ def text_of_bytes(item: Item, encoding: str) -> Callable[[bytes], object]:
 
 
 def bytes_of_text(item: Item, encoding: str) -> Callable[[object], bytes]:
-    """Return the function from a value to the bytes of a text or bytes item, without padding."""
+    """Return a function that converts a value to the bytes of a text or bytes item, unpadded."""
     codec, name = item.encoding or encoding, item.id or item.kind
 
     def encode(value: object) -> bytes:
@@ -192,7 +192,7 @@ def bytes_of_text(item: Item, encoding: str) -> Callable[[object], bytes]:
 
 
 def fixed_bytes(item: Item) -> Callable[[bytes], bytes]:
-    """Return the function that pads bytes to their fixed size."""
+    """Return a function that pads bytes to the fixed size of the item."""
     assert item.size is not None  # noqa: S101  # checked by the caller
     name, size, pad = item.id or item.kind, item.size.number, bytes((item.pad,))
     ends_at_nul = item.kind == "text" and not item.pad
@@ -208,7 +208,7 @@ def fixed_bytes(item: Item) -> Callable[[bytes], bytes]:
 
 
 def hex_bytes(text: str, name: str) -> bytes:
-    """Return the bytes of a string of hex digits."""
+    """Return the bytes of a text of hex digits."""
     try:
         return bytes.fromhex(text)
     except ValueError:

@@ -1,9 +1,9 @@
-"""Struct items written by closures: values → bytes.
+"""Closures that write struct items from values to bytes.
 
 Pure. The module is the reverse of `urc.protocol.struct.read`. Theory of operation: every item
 becomes a step ``(pen, scope)`` that appends its bytes. Two kinds of values leave a gap that is
-filled in later. The `Backpatch` of the size of a following text waits in the scope. Values that
-depend on the size of the whole frame are in `FrameBuilder.late`.
+filled in later. The `Backpatch` for the size of a later item waits in the scope. Values that depend
+on the size of the whole frame wait in `FrameBuilder.late`.
 """
 
 from collections.abc import Callable, Mapping
@@ -53,25 +53,25 @@ WriteStep = Callable[[FrameBuilder, Scope], None]
 
 
 class StructWriteScope(NamedTuple):
-    """Shared context of the steps of one scope."""
+    """The shared context of all steps in one scope."""
 
     encoding: str
     derived: Mapping[str, Template]
-    """Items whose values are derived from the data → formula of the size or count."""
+    """Formulas for sizes and counts, by the name of the item that contains the number."""
     is_lenient: bool
-    """Whether missing values are zero, for an emulated robot that sets only some of them."""
+    """Whether missing values are zero, for an emulated robot that sets only some values."""
 
 
 def build_write_steps(
     items: tuple[Item, ...], encoding: str, *, is_lenient: bool
 ) -> tuple[WriteStep, ...]:
-    """Return the steps of a separate scope."""
+    """Return the steps for the items of a separate scope."""
     rules = StructWriteScope(encoding, derived_sizes(items), is_lenient)
     return tuple(_build(item, rules) for item in items)
 
 
 def write_frame(steps: tuple[WriteStep, ...], namespace: Mapping[str, object]) -> bytes:
-    """Return the frame with the values of `namespace`; raise `NotWritable` if impossible."""
+    """Return a frame with the values in `namespace`; raise `NotWritable` if impossible."""
     builder = FrameBuilder()
     scope: Scope = dict(namespace)
     for step in steps:
@@ -111,7 +111,7 @@ def _conditional(
 
 
 def _given(item: Item, scope: Scope, rules: StructWriteScope, zero: object) -> Any:
-    """Return the value of `item`: computed, given, or zero."""
+    """Return the value of `item`, which is computed, given or zero."""
     # A reply repeats the number of its request, which only the request computes.
     is_repeated = rules.is_lenient and bool(item.id) and scope.get(item.id) is not None
     if item.value is not None and not is_repeated:
@@ -125,7 +125,7 @@ def _given(item: Item, scope: Scope, rules: StructWriteScope, zero: object) -> A
 
 
 def _raw_number(item: Item, rules: StructWriteScope) -> Callable[[Scope], Any]:
-    """Return the function from a scope to the raw number; it stores the value in the scope."""
+    """Return a function that returns the raw number, and stores the value in the scope."""
     checked, zero, name = checked_raw(item), _zero_of(item), item.id
 
     def raw_number(scope: Scope) -> Any:
@@ -140,7 +140,7 @@ def _raw_number(item: Item, rules: StructWriteScope) -> Callable[[Scope], Any]:
 def _deferral(
     item: Item, rules: StructWriteScope
 ) -> Callable[[FrameBuilder, Scope, Backpatch], None] | None:
-    """Return the handler for the gap of a number that is known only later, or None."""
+    """Return the handler for the gap of a number that is computed later, or None."""
     value = item.value
     if value is None and item.id in rules.derived:
         return lambda builder, scope, gap: scope.__setitem__(GAP + item.id, gap)
@@ -176,7 +176,7 @@ def _coded_step(item: Item, rules: StructWriteScope) -> WriteStep:
 
 
 def _zero_of(item: Item) -> float:
-    """Return zero, or the nearest valid value."""
+    """Return zero, or the valid value nearest to zero."""
     zero = item.offset if item.id else 0
     if item.valid is None:
         return zero
@@ -222,7 +222,7 @@ def _text_step(item: Item, rules: StructWriteScope) -> WriteStep:
 
 
 def _finisher(item: Item, rules: StructWriteScope) -> Callable[[FrameBuilder, Scope, Any], None]:
-    """Return the function that writes bytes in their size: padded, counted or terminated."""
+    """Return a function that writes bytes with padding, size field or terminator."""
     name, size = item.id or item.kind, item.size
     if size is None or item.const is not None:
         return lambda builder, scope, raw: builder.append(raw + item.until)
@@ -245,7 +245,7 @@ def _put_size(
     name: str,
     rules: StructWriteScope,
 ) -> None:
-    """Write `number` where the reader expects it, or check a constant size."""
+    """Write the size or count `number`, or check `number` against the declared size."""
     if extent.prefix is not None:
         builder.append(coded_writer(extent.prefix, name)(int(fitting(extent.prefix, number, name))))
     elif extent.kind == "fixed":
@@ -310,10 +310,10 @@ def _array_step(item: Item, count: Extent, rules: StructWriteScope) -> WriteStep
 
 
 def _records_step(item: Item, count: Extent, rules: StructWriteScope) -> WriteStep:
-    """Write nameless structs, one for each record of a list with its own signals.
+    """Return the step for a list of nameless structs with different signals.
 
-    Each case with a complete set of fields gives one struct; without a switch, the record gives
-    exactly one.
+    Each case with a complete set of fields becomes one struct. Without a switch, there is at most
+    one struct.
     """
     own = rules._replace(derived={**rules.derived, **derived_sizes(item.items)})
     body = _struct_step(item._replace(times=None), own)
@@ -356,12 +356,12 @@ def _struct_step(item: Item, rules: StructWriteScope) -> WriteStep:
 
 
 def _outer(scope: Scope) -> Scope:
-    """Return the names of an outer scope that a struct may use."""
+    """Return the values of an outer scope that a struct may use, by name."""
     return {name: scope[name] for name in OUTER_NAMES if name in scope}
 
 
 def _windowed(body: WriteStep, item: Item, size: Extent, rules: StructWriteScope) -> WriteStep:
-    """Write a struct and its window: the size in front, without trimmed bytes."""
+    """Return the step for a struct with a size field, without trimmed bytes."""
     full, name = least_size(item.items), item.id or "a struct"
     is_variable = size.prefix is not None and size.prefix.is_variable
     gap = bytes(size.prefix.size) if size.prefix and not is_variable else b""

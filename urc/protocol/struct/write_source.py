@@ -1,4 +1,4 @@
-"""Struct items written by one generated function per declaration.
+"""Generated functions that write struct items, one per declaration.
 
 Pure. The module is the reverse of `urc.protocol.struct.read_source`. Generated writers support only
 declarations of fixed items; closures handle all other items and all invalid values.
@@ -30,10 +30,10 @@ Write = Callable[[Mapping[str, object]], bytes]
 
 
 def generate_write(items: tuple[Item, ...], encoding: str) -> Write:
-    """Return the function from arguments to the frame; it raises `NotWritable`.
+    """Return a function that encodes arguments to a frame, or raises `NotWritable`.
 
-    The generated lines expect valid values. After an error, the closures try again: they round,
-    convert, and name the invalid value.
+    The generated code expects valid values. After an error, the closures repeat the encoding with
+    rounding and conversion, and report an invalid value.
     """
     steps = build_write_steps(items, encoding, is_lenient=False)
 
@@ -61,7 +61,7 @@ def generate_write(items: tuple[Item, ...], encoding: str) -> Write:
 
 
 def _is_quick(leaf: FixedField) -> bool:
-    """Return whether an item can be written independently of the others."""
+    """Return whether an item can be written independently of other items."""
     item = leaf.item
     inner = item.items if item.kind == "bits" else (item,)
     if any(one.value is not None for one in inner):
@@ -70,7 +70,7 @@ def _is_quick(leaf: FixedField) -> bool:
 
 
 def _written(source: SourceBuilder, leaf: FixedField, encoding: str) -> list[str]:
-    """Return the arguments of ``pack`` for one item."""
+    """Return the source of the arguments of ``pack`` for one item."""
     item = leaf.item
     if item.kind == "padding":
         return []

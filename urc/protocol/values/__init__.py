@@ -1,1 +1,1 @@
-"""Raw values to typed values, and back."""
+"""Conversion between raw values and typed values."""

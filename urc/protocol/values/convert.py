@@ -1,7 +1,7 @@
-"""Conversions of raw values to values, and back for the emulated robot.
+"""Conversion of raw values to values, and the inverse for the emulated robot.
 
-Pure. A conversion is a chain of small functions, built once for each engine. Each takes a raw value
-and returns the next one; None means "not available" and ends the chain.
+Pure. A conversion is a chain of small functions, built once for each engine. Each function converts
+the result of the previous function; None means "not available" and ends the chain.
 """
 
 import math
@@ -28,17 +28,17 @@ __all__ = [
 Step = Callable[[object], object]
 
 _LARGEST: Final = sys.float_info.max
-"""Largest magnitude of whole numbers in conversions."""
+"""Maximum magnitude of whole numbers in conversions."""
 _DIGITS: Final = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _ALL_ONES: Final = frozenset((1 << 8 * size) - 1 for size in range(1, 9))
 
 
 class BadValue(ValueError):
-    """An invalid raw value; the message gives the found and the expected value."""
+    """An invalid raw value, with the found and the expected value in the message."""
 
 
 class Unusable:
-    """A marker for a field that could not be converted; its user reports the reason."""
+    """A marker for a field that could not be converted, with the reason."""
 
     __slots__ = ("why",)
 
@@ -50,9 +50,9 @@ class Unusable:
 
 
 def build_conversion(conversion: Conversion) -> Step | None:
-    """Return the function from a raw value to a converted one, or None for no conversion.
+    """Return a function that converts raw values; None without a conversion.
 
-    The function raises `BadValue`.
+    The function raises `BadValue` for an invalid raw value.
     """
     steps: list[Step] = []
     if conversion.base:
@@ -69,9 +69,9 @@ def build_conversion(conversion: Conversion) -> Step | None:
 
 
 def build_inverse(conversion: Conversion) -> Step | None:
-    """Return the function from a converted value to a raw one, or None for no conversion.
+    """Return a function that converts values back to raw values; None without a conversion.
 
-    The function raises `BadValue` for a value without a raw counterpart.
+    The function raises `BadValue` for a value without a corresponding raw value.
     """
     steps: list[Step] = []
     if conversion.states:
@@ -96,7 +96,7 @@ def build_inverse(conversion: Conversion) -> Step | None:
 
 
 def whole_of(raw: object) -> int:
-    """Return a raw value as a whole number; raise `BadValue` for any other value."""
+    """Return a raw value as a whole number; raise `BadValue` if impossible."""
     if isinstance(raw, int) and not isinstance(raw, bool):
         return raw
     if isinstance(raw, float) and raw.is_integer():
@@ -110,7 +110,7 @@ def whole_of(raw: object) -> int:
 
 
 def number_of(raw: object) -> float:
-    """Return a raw value as a number; raise `BadValue` for any other value."""
+    """Return a raw value as a number; raise `BadValue` if impossible."""
     if isinstance(raw, float):
         return raw
     if isinstance(raw, int) and not isinstance(raw, bool) and -_LARGEST <= raw <= _LARGEST:
@@ -124,7 +124,7 @@ def number_of(raw: object) -> float:
 
 
 def spelt(raw: object) -> str:
-    """Return a raw value as documents write it: ``true``, ``3``, ``2.5``."""
+    """Return a raw value in the notation of documents: ``true``, ``3``, ``2.5``."""
     if isinstance(raw, bool):
         return "true" if raw else "false"
     if isinstance(raw, float) and raw.is_integer():
@@ -133,7 +133,7 @@ def spelt(raw: object) -> str:
 
 
 def _is_plain(text: str) -> bool:
-    """Return whether a number is plain ASCII; Python also accepts '1_0' and foreign digits."""
+    """Return whether a number is plain ASCII; Python also accepts '1_0' and non-ASCII digits."""
     return text.isascii() and "_" not in text
 
 
@@ -183,7 +183,7 @@ def _to_base(base: int) -> Step:
 
 
 def _absent(values: tuple[Value, ...]) -> Step:
-    """Return the step that gives None for each of `values`, including named special numbers."""
+    """Return the step that converts each of `values` to None, including NaN and infinity."""
     texts = {value for value in values if isinstance(value, str)}
     booleans = {value for value in values if isinstance(value, bool)}
     numbers = {
@@ -247,7 +247,7 @@ def _line(offset: float, scale: float) -> Step:
 
 
 def divisor_of(scale: float) -> int:
-    """Return n when `scale` is 1/n, else 0: 3 / 10 is exactly 0.3, but 3 * 0.1 is not."""
+    """Return n if `scale` is 1/n, else 0. Division is exact: 3 / 10 is 0.3, but 3 * 0.1 is not."""
     if not 1e-15 < abs(scale) < 1:
         return 0
     divisor = round(1 / scale)
@@ -275,7 +275,7 @@ def _line_back(coefficients: tuple[float, ...]) -> Step:
 
 
 def _tidy(number: float) -> float:
-    """Return the nearest whole number if `number` differs only by rounding, else `number`."""
+    """Return `number`, or the nearest whole number if only rounding errors differ."""
     if not math.isfinite(number):
         return number
     nearest = round(number)

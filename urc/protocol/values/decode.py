@@ -1,7 +1,7 @@
 """Decoding of raw fields into typed values.
 
 Pure. Each engine builds the converters once per signal. A value of the wrong type or range is a
-counted violation and never a sample. A wrong number on the screen is worse than an old one.
+counted violation and never a sample. A wrong number on the screen is worse than an old number.
 """
 
 import math
@@ -30,7 +30,7 @@ _BOTH = frozenset(("true", "false"))
 
 
 def build_converter(signal: Signal) -> Convert:
-    """Return the function from a raw field to a value of `signal`; it raises `BadValue`."""
+    """Return a function from a raw field to a value of `signal`, which may raise `BadValue`."""
     if signal.type == "object":
         return _usable(object_converter)
     if signal.type in ("image", "blob"):
@@ -42,7 +42,7 @@ def build_converter(signal: Signal) -> Convert:
 
 
 def build_raw(signal: Signal) -> Callable[[object], object]:
-    """Return the function from a value of `signal` back to a raw field, for the emulated robot.
+    """Return a function from a value of `signal` to a raw field, for the emulated robot.
 
     The function raises `BadValue` for a value without a raw counterpart.
     """
@@ -67,7 +67,7 @@ def _usable(convert: Callable[[object], Reading]) -> Convert:
 
 
 def _element_converter(signal: Signal) -> Callable[[object], Value]:
-    """Return the function for a single value, or for one element of an array."""
+    """Return the converter for a single value or one element of an array."""
     kind = signal.items if signal.type == "array" else signal.type
     conversion = build_conversion(signal.conversion)
     typed = _typed_converter(signal, kind, rounds=bool(conversion))
@@ -109,7 +109,7 @@ def _states_converter(states: Mapping[str, str], *, is_number: bool) -> Callable
 
 
 def _as_number(text: str) -> str:
-    """Return ``03`` as ``3``: robots may pad numbers, documents do not."""
+    """Return a number without leading zeros (``03`` as ``3``), because only robots pad numbers."""
     try:
         return spelt(number_of(text))
     except BadValue:

@@ -1,7 +1,7 @@
 """Interfaces of readers and writers, and their context.
 
-Pure. A form is one notation for the content of a frame. A form works in both directions, so that
-the emulated robot uses the same declaration; `urc.protocol.forms.table` has the table of all forms.
+Pure. A form is one notation for the content of a frame. A form works in both directions, so the
+emulated robot can use the same declaration. `urc.protocol.forms.table` contains all forms.
 """
 
 from collections.abc import Mapping
@@ -25,41 +25,41 @@ __all__ = [
 
 
 class BadText(ValueError):
-    """A frame that is not text in the encoding of the connection; the message says where."""
+    """The frame is not valid text in the connection's encoding; the message has the position."""
 
 
 class BadItem(BadText):
-    """A matching frame with an invalid value; the message names the item."""
+    """The frame matches but contains an invalid value; the message names the item."""
 
 
 class NotWritable(UrcError):
-    """Values that do not fit into this frame; the message names the invalid one."""
+    """The values cannot be encoded in this frame; the message names the invalid value."""
 
 
 class Frame:
-    """One received frame; its text is decoded once, on first use."""
+    """A received frame; the text is decoded once, on first use."""
 
     __slots__ = ("_text", "attributes", "encoding", "fault", "payload", "topic", "was_text_wanted")
 
     fault: str
-    """Why a reader rejected a frame of its kind; unset without a reason."""
+    """Reason why a reader rejected a matching frame; unset without a reason."""
     was_text_wanted: bool
-    """Whether a reader needed the text of an undecodable frame; unset before that."""
+    """Whether a reader needed the text of an undecodable frame; unset if never needed."""
 
     def __init__(self, payload: Payload, encoding: str) -> None:
         self.payload = payload
         self.encoding = encoding
         self._text: str | None = None
         self.topic: str | None = None
-        """Source topic, on a transport that carries messages."""
+        """Source topic of the frame; None on transports without topics."""
         self.attributes: Mapping[str, object] = NOTHING
-        """Attributes of the envelope that contained it: status, headers."""
+        """Attributes of the frame's envelope, such as status and headers."""
         # `fault` stays unset until needed, because a connection makes thousands of frames per
         # second.
 
     @property
     def text(self) -> str:
-        """The frame as text; raises `BadText` when it is not text."""
+        """Text of the frame; raises `BadText` if undecodable."""
         text = self._text
         if text is None:
             text = self._text = self._decoded()
@@ -81,21 +81,22 @@ class CodecContext(NamedTuple):
 
     encoding: str = "utf-8"
     settings: Mapping[str, object] = NOTHING
-    """Values of the settings of the profile, for ``when`` and ``set``."""
+    """Values of the profile's settings, for ``when`` and ``set``."""
     fresh: TimeAndNonce = FIXED
-    """Sources of times and nonces for written frames."""
+    """Source of times and nonces for sent frames."""
     is_compiled: bool = False
-    """Whether to generate functions for messages and commands, worthwhile only in live sessions."""
+    """Whether to generate functions for messages and commands, which saves time only in live
+    sessions."""
 
 
 class PayloadReader(Protocol):
-    """Reads the fields of a frame."""
+    """A reader for the fields of a frame."""
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields, or None for another kind of frame; may raise `BadText`."""
+        """Return the fields; None for a frame that does not match. May raise `BadText`."""
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return a frame that reads as `fields`; raise `NotWritable` if there is no such frame."""
+        """Return a frame with `fields`; raise `NotWritable` if impossible."""
 
 
 class PayloadWriter(Protocol):
@@ -105,4 +106,4 @@ class PayloadWriter(Protocol):
         """Return the frame; raise `NotWritable` or `ExpressionError`."""
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the values of the root names that give this frame, or None if impossible."""
+        """Return the values of the root names that result in this frame; None if impossible."""

@@ -1,4 +1,4 @@
-"""Text forms of values, for every form that writes text."""
+"""Text notation of values, for all forms that write text."""
 
 import re
 from collections.abc import Mapping
@@ -13,13 +13,13 @@ _COUNTER = re.compile(r"\s*seq\s*\(\s*['\"]([a-z][a-z0-9_]*)['\"][^()]*\)\s*")
 
 
 def counter_in(expression: str) -> str:
-    """Return the name of the counter if the expression is a single counter, else ""."""
+    """Return the counter's name if an expression is a single counter, else ""."""
     found = _COUNTER.fullmatch(expression)
     return found[1] if found else ""
 
 
 def field_text(value: object) -> str:
-    """Return a value as text forms write it: ``true``, ``3``, ``2.5``; lists with blanks."""
+    """Return a value as text: ``true``, ``3``, ``2.5``; lists are separated by blanks."""
     if value is None:
         return ""
     if isinstance(value, (list, tuple)):
@@ -28,7 +28,7 @@ def field_text(value: object) -> str:
 
 
 def encoded(text: str, encoding: str) -> bytes:
-    """Return the text in the given encoding; raise `NotWritable` if it cannot be encoded."""
+    """Return the text in the given encoding; raise `NotWritable` if impossible."""
     try:
         return text.encode(encoding)
     except UnicodeEncodeError as error:
@@ -36,7 +36,7 @@ def encoded(text: str, encoding: str) -> bytes:
 
 
 def written_differently(fields: Mapping[str, object], found: Mapping[str, object] | None) -> str:
-    """Return the first of `fields` that a written frame does not read back, or ""."""
+    """Return the first of `fields` that differs after reading back a written frame, or ""."""
     for name, value in fields.items():
         if found is None or field_text(found.get(name)) != field_text(value):
             return name

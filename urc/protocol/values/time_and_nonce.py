@@ -1,7 +1,7 @@
-"""Times and nonces of sent frames.
+"""Times and nonces for sent frames.
 
-Pure. Times and nonces come from injected sources: a clock and a generator for a robot, fixed ones
-for tests. The same document then always gives the same frames in tests.
+Pure. Times and nonces have injected sources: a clock and a random generator for a robot, fixed
+sources for tests. In tests, a document therefore always results in the same frames.
 """
 
 from collections.abc import Callable
@@ -19,12 +19,12 @@ class TimeAndNonce(NamedTuple):
     """The sources of time and randomness."""
 
     unix_s: Callable[[], float]
-    """Function that returns the seconds since 1970, UTC."""
+    """Function that returns the Unix time, in seconds."""
     random: Callable[[int], bytes]
-    """Size → random bytes that never repeat."""
+    """Function that returns a given number of random bytes, different for each call."""
 
     def names(self) -> dict[str, object]:
-        """Return the namespace of one frame, with a constant time and nonce."""
+        """Return the namespace of one frame, with the same time and nonce for all uses."""
         made: dict[int, bytes] = {}
 
         def nonce(size: int) -> bytes:
@@ -36,7 +36,7 @@ class TimeAndNonce(NamedTuple):
 
 
 def fixed_bytes(size: int) -> bytes:
-    """Return 00 01 02 …, for tests."""
+    """Return the bytes 00 01 02 …, for tests."""
     return bytes(range(size))
 
 

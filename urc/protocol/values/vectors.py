@@ -1,8 +1,7 @@
-"""Composite values: arrays, objects, and bytes such as images.
+"""Composite values: arrays, objects, and binary data such as images.
 
-Pure. The input is JSON-like data, bytes, or text. The elements of an array in text are separated by
-blanks, commas or semicolons; bytes in text are base64. The size of the frame bounds the size of the
-values.
+Pure. The input is JSON-like data, bytes, or text. In text, blanks, commas or semicolons separate
+the elements of an array, and bytes are base64. The size of the frame limits the size of the values.
 """
 
 import re
@@ -19,9 +18,9 @@ __all__ = ["MAX_BYTES", "MAX_ELEMENTS", "array_converter", "bytes_converter", "b
 __all__ += ["elements_of", "object_converter"]
 
 MAX_ELEMENTS = 65536
-"""Largest number of elements in one array."""
+"""Maximum number of elements in an array."""
 MAX_BYTES = 1 << 24
-"""Largest image or blob without a declared ``size``, in bytes."""
+"""Maximum size of an image or blob without a declared ``size``, in bytes."""
 _BETWEEN = re.compile(r"[\s,;]+")
 _AROUND = " \t\r\n[]()"
 
@@ -29,7 +28,7 @@ _AROUND = " \t\r\n[]()"
 def array_converter(
     signal: Signal, element: Callable[[object], Value]
 ) -> Callable[[object], Reading]:
-    """Return the function from raw elements to a tuple of values, each converted by `element`."""
+    """Return a function from raw elements to a tuple of values, using `element` for each."""
     wanted = signal.size
 
     def convert(raw: object) -> Reading:
@@ -52,7 +51,7 @@ def array_converter(
 
 
 def elements_of(raw: object) -> list[object] | tuple[object, ...]:
-    """Return the elements of a list, of bytes, or of separated text."""
+    """Return the elements of a list, bytes or separated text."""
     if isinstance(raw, (list, tuple)):
         return raw
     if isinstance(raw, (bytes, bytearray)):
@@ -64,14 +63,14 @@ def elements_of(raw: object) -> list[object] | tuple[object, ...]:
 
 
 def object_converter(raw: object) -> Reading:
-    """Return a mapping unchanged; raise `BadValue` for any other value."""
+    """Return a mapping unchanged; raise `BadValue` for other types."""
     if raw is None or isinstance(raw, Mapping):
         return raw
     raise BadValue(f"{quoted(raw)} is not a mapping")
 
 
 def bytes_converter(signal: Signal) -> Callable[[object], Reading]:
-    """Return the function from raw bytes, or their base64, to bytes."""
+    """Return a function that checks raw bytes, or decodes base64 to bytes."""
     most = signal.size or MAX_BYTES
 
     def convert(raw: object) -> Reading:
@@ -96,7 +95,7 @@ def bytes_converter(signal: Signal) -> Callable[[object], Reading]:
 
 
 def bytes_text(data: bytes) -> str:
-    """Return bytes as base64."""
+    """Return bytes as base64 text."""
     return b2a_base64(data, newline=False).decode("ascii")
 
 

@@ -1,10 +1,10 @@
-"""Received text in a correlation. Pure."""
+"""Received text for comparisons in a correlation. Pure."""
 
 __all__ = ["WireText"]
 
 
 class WireText(str):
-    """Received text that equals the number it spells, so that ``_id == id`` works."""
+    """Received text that also equals the number in the text, so ``_id == id`` works."""
 
     __slots__ = ()
 
