@@ -44,7 +44,7 @@ def test_a_frame_is_sent_again_three_times_where_nothing_else_is_said() -> None:
         talk.says("Resend:1")
     assert talk.sent == ["N1 G0"] * 4
     assert talk.outcomes == {1: "refused"}
-    assert talk.messages[-1] == "the robot asks for move again after 4 transmissions"
+    assert talk.messages[-1] == "the robot requested move again after 4 transmissions"
 
 
 def test_retries_bound_how_often_a_frame_is_sent_again() -> None:
@@ -105,7 +105,7 @@ def test_a_robot_that_is_busy_for_ever_has_not_answered() -> None:
     for tenth in range(1, 21):
         talk.at(tenth / 10).says("busy")
     assert talk.outcomes == {1: "timed-out"}
-    text = "no answer to home within 2 s, for which the robot was busy"
+    text = "no answer to home within 2 s, while the robot was busy"
     assert talk.messages[-1].startswith(text)
     talk.run("other")
     assert talk.at(2.9).sent == ["HOME"]

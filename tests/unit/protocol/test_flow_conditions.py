@@ -89,7 +89,7 @@ def test_a_command_whose_purpose_does_not_come_true_has_failed() -> None:
     assert talk.outcomes == {}
     talk.at(2.0)
     assert talk.outcomes == {1: "not-verified"}
-    assert talk.messages == ["'speed == v' did not come true within 2 s"]
+    assert talk.messages == ["'speed == v' did not become true within 2 s"]
 
 
 def test_release_gives_the_bytes_that_stop_the_motion() -> None:

@@ -353,7 +353,7 @@ sequences: { dock: [{ expect: '^DOCKED$' }] }
     talk.says("OK")
     talk.at(0.6)
     assert talk.messages[-1] == (
-        "no answer to home within 0.5 s; 'OK' came, which is no answer to home"
+        "no answer to home within 0.5 s; received 'OK', which is no answer to home"
     )
     talk.at(2.0).run("wait")
     talk.at(2.5)
@@ -362,8 +362,8 @@ sequences: { dock: [{ expect: '^DOCKED$' }] }
     talk.says("DOCKING")
     talk.at(4.5)
     assert talk.messages[-1] == (
-        "dock.0: the expected frame did not come within 0.5 s; 'DOCKING' came, which is not what"
-        " it expects"
+        "dock.0: the expected frame did not arrive within 0.5 s; received 'DOCKING', which is not"
+        " the expected frame"
     )
 
 
@@ -382,8 +382,8 @@ commands:
     talk.says("A1")
     talk.at(0.5)
     assert any(
-        one == "no answer to volts within 0.5 s; 'A1' came, which is no answer to volts; replies"
-        " in another order than their requests need 'match'"
+        one == "no answer to volts within 0.5 s; received 'A1', which is no answer to volts;"
+        " if replies arrive in a different order than requests, declare 'match'"
         for one in talk.messages
     ), talk.messages
 

@@ -62,7 +62,7 @@ def test_a_condition_that_was_true_between_two_frames_is_seen(frames: tuple[str,
 @pytest.mark.parametrize(
     ("name", "outcome", "sent", "message"),
     [
-        ("wait", "timed-out", [], "wait.0: \"mode == 'ready'\" did not come true within 2 s"),
+        ("wait", "timed-out", [], "wait.0: \"mode == 'ready'\" did not become true within 2 s"),
         ("patient", "timed-out", [], "it is never ready"),
         ("otherwise", "done", ["HELP", "GO"], ""),
     ],

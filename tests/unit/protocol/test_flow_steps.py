@@ -112,7 +112,7 @@ commands: { ping: { send: PING } }
 @pytest.mark.parametrize(
     ("chunks", "until", "reason"),
     [
-        ((), 0.5, "close wire: wire.on_connect.0: the expected frame did not come within 0.5 s"),
+        ((), 0.5, "close wire: wire.on_connect.0: the expected frame did not arrive within 0.5 s"),
         ((b"login: ",), 2.0, "close wire: it asks for no password"),
         (
             (b"login: ", b"password: ", b"DENIED s3cret-word\n"),

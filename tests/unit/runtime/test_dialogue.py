@@ -171,7 +171,7 @@ PASSES = {
         """
         steps:
           - { feed: { wire: "Login:\\n" } }
-          - { wait: 2s, fails: did not come within 1 s, closed: wire }
+          - { wait: 2s, fails: did not arrive within 1 s, closed: wire }
         """,
         set(),
     ),

@@ -278,7 +278,7 @@ commands:
   ask: { send: "ask", reply: { json: { volts: "max(cells)" } } }
 """
     line = EmulatedRobot(profile_of(tmp_path, body), {}).line("wire")
-    why = "no reply can be built as json: nothing to write, or two paths exclude each other"
+    why = "no reply can be built as json: no values to write, or conflicting paths"
     for asked, label, trigger in (
         (b"volts?", "polls.0", "match: …"),
         (b"cells?", "cells", "poll: cells"),

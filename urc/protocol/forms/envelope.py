@@ -74,7 +74,7 @@ def _path(text: str, is_whole: bool) -> str:
     """Return a value in the form for a URL path."""
     parts = text.split("/") if is_whole else [text]
     if any(part in _UP for part in parts):
-        raise NotWritable(f"{quoted(text)} would lead to another path")
+        raise NotWritable(f"{quoted(text)} would change the path")
     return quote(text, safe="/" if is_whole else "")
 
 
@@ -82,9 +82,7 @@ def _name(text: str, is_whole: bool, *, what: str) -> str:
     """Return a value in the form for the name of a topic, service or action."""
     for sign in (*_WILD, *(() if is_whole else ("/",))):
         if sign in text:
-            raise NotWritable(
-                f"{quoted(text)} would lead to another {what}: {sign!r} may not be in it"
-            )
+            raise NotWritable(f"{quoted(text)} would change the {what}: {sign!r} is not allowed")
     return text
 
 

@@ -64,7 +64,7 @@ class JsonReader:
         """Return a JSON document with `fields` at their paths."""
         root: dict[str, Any] = {}
         for name in fields.keys() & self._finders.keys() - self._paths.keys():
-            raise NotWritable(f"{name}: a search in a document cannot be inverted")
+            raise NotWritable(f"{name}: a JMESPath expression cannot be inverted")
         for name, path in self._paths.items():  # in order: some readers need the kind first
             if name in fields:
                 _put(root, path, fields[name])
@@ -74,7 +74,7 @@ class JsonReader:
             raise NotWritable(f"these values cannot be written as JSON: {error}") from None
         found = self.read(Frame(payload, self._encoding))
         if found is None or not fields.keys() <= found.keys():
-            raise NotWritable("nothing to write, or two paths exclude each other")
+            raise NotWritable("no values to write, or conflicting paths")
         return payload
 
     def _document(self, frame: Frame) -> object:

@@ -155,7 +155,7 @@ class StreamDecoder:
         first = stream.data[stream.at : stream.at + 1]
         stream.at += count
         return self._lost(
-            "no-frame", f"bytes from {first.hex()} on begin no frame; skipped up to the next frame"
+            "no-frame", f"no frame begins with {first.hex()}; bytes before the next frame skipped"
         )
 
     def _lost(self, code: str, message: str, *, closes: bool = False) -> FrameFault | None:

@@ -254,7 +254,7 @@ class _LengthDecoder(StreamDecoder):
         there = bytes(self._stream.data[at : at + len(self._end)])
         if there == self._end:
             return ()
-        return None if self._end.startswith(there) else ("no-frame", "a frame without its end")
+        return None if self._end.startswith(there) else ("no-frame", "wrong end bytes; skipped")
 
     def _to_start(self) -> FrameFault | None:
         """Advance to the next start bytes, or to incomplete start bytes at the end."""

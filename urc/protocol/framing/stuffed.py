@@ -120,7 +120,7 @@ def _from_cobs(stuffed: bytes) -> bytes:
         block = stuffed[at + 1 : at + code]
         if len(block) != code - 1:
             raise BadFrame(
-                "bad-stuffing", f"the code {code:02x} of COBS points beyond its frame; dropped"
+                "bad-stuffing", f"the COBS code {code:02x} points beyond the frame; dropped"
             )
         pieces.append(block)
         at += code

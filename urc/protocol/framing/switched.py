@@ -58,8 +58,8 @@ class SwitchFraming(NamedTuple):
             frame = self.otherwise.encode(payload)
             if not any(frame.startswith(first) for first, _ in self.cases):
                 return frame
-            refused = "the frame would be taken for another case of the framing"
-        raise FramingError(refused or f"no case of the framing begins like {payload[:40]!r}")
+            refused = "the frame would match another case of the framing"
+        raise FramingError(refused or f"no case of the framing matches {payload[:40]!r}")
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder for received bytes."""

@@ -208,4 +208,4 @@ class _XmlDecoder(StreamDecoder):
         if is_long:
             text = f"an element has more than {self._max_bytes} bytes; dropped"
             return self._lost("frame-too-long", text)
-        return self._lost("bad-xml", "tags that are not XML; dropped up to there")
+        return self._lost("bad-xml", "invalid XML tags; dropped up to the error")

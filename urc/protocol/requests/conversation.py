@@ -133,7 +133,7 @@ class Conversation(Connection):
             return self._send(exchange, now) + self._pump(now)
         most = self.spec.queue.most_bytes
         if most is not None and not exchange.is_realtime and self._size_of(exchange) > most:
-            text = f"it has {self._size_of(exchange)} bytes, and the robot takes {most} at a time"
+            text = f"the request has {self._size_of(exchange)} bytes, the robot accepts {most}"
             return [
                 ExchangeEnded(exchange, ExchangeOutcome("bad-argument", f"{text} (queue.bytes)"))
             ]
@@ -510,7 +510,7 @@ class Conversation(Connection):
         if offer.aside == "resend" and exchange.tries_left:
             exchange.tries_left -= 1
             self._pending_replies.remove(pending)
-            text = f"the robot asked for {exchange.ask.label} again"
+            text = f"the robot requested a retransmission of {exchange.ask.label}"
             return [
                 *events,
                 Violation(self.spec.name, "sent-again", text),
@@ -518,7 +518,7 @@ class Conversation(Connection):
             ]
         if offer.aside:
             times = 1 + exchange.ask.retries
-            text = f"the robot asks for {exchange.ask.label} again after {times} transmissions"
+            text = f"the robot requested {exchange.ask.label} again after {times} transmissions"
             outcome = ExchangeOutcome("refused", text)
         elif offer.fields is None:
             outcome = ExchangeOutcome("refused", self.receiver.secrets.hide(offer.refusal))
@@ -580,7 +580,7 @@ class Conversation(Connection):
         came = self.receiver.came_since(exchange.sent_at, f"no answer to {exchange.ask.label}")
         text += came
         if came and exchange.ask.match is None and len(self._pending_replies) > 1:
-            text += "; replies in another order than their requests need 'match'"
+            text += "; if replies arrive in a different order than requests, declare 'match'"
         events: list[LineEvent] = [Violation(self.spec.name, "reply-timeout", text)]
         pending.is_late = True
         pending.due = now + reply_s

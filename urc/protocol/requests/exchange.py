@@ -54,7 +54,7 @@ def untold(error: Exception) -> str:
     text = str(error)
     if _MISSING.fullmatch(text):
         return text  # only the name of a missing value, and no secret
-    return "it cannot be written; the reason is secret"
+    return "the frame cannot be encoded; the reason contains a secret"
 
 
 class CompiledRequest(NamedTuple):

@@ -143,7 +143,7 @@ class FrameReceiver:
         if time_s < since:
             return ""
         shown = text.removeprefix(_NO_MATCH)
-        return f"; {shown} came, which is {instead}" if shown != text else f"; {text}"
+        return f"; received {shown}, which is {instead}" if shown != text else f"; {text}"
 
     def listen(self, expectation: Expectation) -> None:
         """Add an expectation for frames other than replies."""
@@ -291,5 +291,5 @@ class FrameReceiver:
         data = frame.payload if isinstance(frame.payload, bytes) else b""
         text = data.decode(self._spec.encoding, "replace")
         if self.secrets.hide(text) != text:
-            return f"{len(data)} bytes, with a secret among them"
+            return f"{len(data)} bytes that contain a secret"
         return data[:_SHOWN_BYTES].hex(" ") + (" …" if len(data) > _SHOWN_BYTES else "")

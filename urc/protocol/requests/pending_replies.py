@@ -99,8 +99,8 @@ class PendingReply:
         if not self.is_extended:
             return f"within {answer.timeout_s:g} s"
         if now >= self.since + answer.extend_s:
-            return f"within {answer.extend_s:g} s, for which the robot was busy"
-        return f"within {answer.timeout_s:g} s after the robot said that it was busy"
+            return f"within {answer.extend_s:g} s, while the robot was busy"
+        return f"within {answer.timeout_s:g} s after the robot reported that it was busy"
 
     def next_stage(self, now: float) -> bool:
         """Start the wait for the next reply; return False after the last one."""

@@ -43,9 +43,7 @@ class RequestQueue(PriorityQueue[Exchange]):
         if gone is None:
             return None
         if gone is not exchange and gone.latest_key and gone.latest_key == exchange.latest_key:
-            return gone, ExchangeOutcome(
-                "superseded", "a newer request replaced it before it was sent"
-            )
+            return gone, ExchangeOutcome("superseded", "replaced by a newer request before sending")
         text = f"{self._spec.queue.depth} requests already wait on {self._spec.name}"
         return gone, ExchangeOutcome("queue-full", text)
 

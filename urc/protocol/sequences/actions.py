@@ -94,7 +94,7 @@ def _chosen(
 def _awaiting(label: str, step: sequence.UntilStep, builder: RequestCompiler) -> Action:
     otherwise = _otherwise(label, step.otherwise, builder)
     text = step.text or (
-        f"{label}: {step.condition.source!r} did not come true within {step.timeout_s:g} s"
+        f"{label}: {step.condition.source!r} did not become true within {step.timeout_s:g} s"
     )
 
     def wait(runner: SequenceRunner, now: float) -> list[LineEvent]:
@@ -192,7 +192,7 @@ def _expecting(
         else _prompted(step, builder)
     )
     otherwise = _otherwise(label, step.otherwise, builder)
-    text = step.text or f"{label}: the expected frame did not come within {answer.timeout_s:g} s"
+    text = step.text or f"{label}: the expected frame did not arrive within {answer.timeout_s:g} s"
 
     def expect(runner: SequenceRunner, now: float) -> list[LineEvent]:
         line = runner.host.lines[step.transport]

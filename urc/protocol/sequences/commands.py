@@ -216,7 +216,7 @@ class Verifications:
             if one.due <= now and one.run.verify is not None:
                 self._waiting.remove(one)
                 source, within_s = one.run.verify.condition.source, one.run.verify.within_s
-                text = f"{source!r} did not come true within {within_s:g} s"
+                text = f"{source!r} did not become true within {within_s:g} s"
                 events += one.run.sink(ExchangeOutcome("not-verified", text), now)
         return events
 

@@ -182,7 +182,7 @@ class SequenceRunner:
             self.stop("timed-out", "it took too long")
             return
         if self.program.sequence_control.is_paused:
-            self.stop("timed-out", f"it was paused for {PAUSE_S:g} s")
+            self.stop("timed-out", f"the sequence was paused for {PAUSE_S:g} s")
             return
         if self._logins:
             self.stop("timed-out", self._late_text)
@@ -192,7 +192,9 @@ class SequenceRunner:
             return
         receiver = self._listening[0].receiver if self._listening else None
         came = (
-            "" if receiver is None else receiver.came_since(self._began_at, "not what it expects")
+            ""
+            if receiver is None
+            else receiver.came_since(self._began_at, "not the expected frame")
         )
         self._stop_listening()
         if self._otherwise is None:

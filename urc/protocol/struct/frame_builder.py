@@ -58,7 +58,7 @@ class FrameBuilder:
         raw = raw_of(gap.item)(value)
         container, end = gap.container, gap.at + gap.container.size
         if end > len(self.bytes):
-            raise NotWritable(f"{gap.item.id or 'a computed number'}: it was trimmed away")
+            raise NotWritable(f"{gap.item.id or 'a computed number'}: its bytes were trimmed")
         if container != gap.item.number:
             mask = (1 << gap.item.number.bits) - 1
             raw = plain_reader(container)(bytes(self.bytes), gap.at) | (raw & mask) << gap.shift

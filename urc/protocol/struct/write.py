@@ -258,7 +258,7 @@ def _put_size(
             scope[only] = solved(extent.expression, only, number, name)
             builder.fill(gap, scope[only])
         elif evaluate(extent.expression, scope) != number:
-            wanted = f"{extent.expression.source.strip()!r} says otherwise"
+            wanted = f"{extent.expression.source.strip()!r} gives another length"
             raise NotWritable(f"{name}: it is {number} long, but {wanted}")
 
 
