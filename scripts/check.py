@@ -1,9 +1,9 @@
-"""The command `./dev test`: lint, types and every test, with one summary.
+"""The command `./dev test`: run lint, type checks and all tests, then print a summary.
 
-`./dev test quick` leaves out the tests with real servers and browsers; it needs only Node. Its
-steps run in parallel, and the others follow. A failed step does not stop later steps. Exit code 0
-when all passed, 1 otherwise. A test without its program is left out by name; with ``CI=true`` that
-is a failure.
+`./dev test quick` skips the tests with real servers and browsers, and needs only Node. The quick
+steps run in parallel, before all other steps. A failed step does not stop later steps. The exit
+code is 0 if all steps pass, otherwise 1. If a required program is missing, its tests are skipped
+and listed; with ``CI=true``, a skipped test is a failure.
 """
 
 import asyncio
@@ -31,7 +31,7 @@ NODE_MODULES = ROOT / "node_modules"
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A program that must exit with 0."""
+    """A step of `./dev test`: a program that must exit with 0."""
 
     name: str
     command: tuple[str, ...]
@@ -44,7 +44,7 @@ class Outcome:
 
     name: str
     fault: str
-    """Empty after a pass."""
+    """Reason of the failure; empty if the step passed."""
     seconds: float
 
 
@@ -59,10 +59,10 @@ PYTEST = (PYTHON, "-m", "pytest")
 
 
 def halves(tests: str, *half: str, timeout_s: float) -> tuple[Step, Step]:
-    """Return two steps: the tests in `half` of the folder, and all others.
+    """Return two steps: the tests in the folders `half` of `tests`, and all other tests.
 
-    Their processes do not communicate. A third one that distributed thousands of small tests would
-    need a fifth of the processors.
+    The processes of the two steps do not communicate. A third process to distribute thousands of
+    small tests would take a fifth of the processor time.
     """
     name = f"tests {tests.rpartition('/')[2]}"
     chosen = tuple(f"{tests}/{one}" for one in half)
@@ -127,7 +127,7 @@ def main() -> int:
 
 
 def javascript_step() -> tuple[Step | None, str]:
-    """Return the type check of URC's JavaScript, or None and the reason why it cannot run."""
+    """Return the type check of URC's JavaScript, or None and the reason for its absence."""
     node = node_executable()
     if node is None:
         return None, "the type check of the JavaScript: no Node"
@@ -152,7 +152,7 @@ def install_checkers() -> None:
             command, cwd=ROOT, capture_output=True, text=True, timeout=NPM_TIMEOUT_S, check=False
         )
     except subprocess.TimeoutExpired as error:
-        raise VendorError(f"npm gave no answer within {NPM_TIMEOUT_S} s") from error
+        raise VendorError(f"npm did not finish within {NPM_TIMEOUT_S} s") from error
     if done.returncode != 0:
         raise VendorError(f"npm failed: {done.stderr.strip()}")
     stamp.write_text(lock, encoding="utf-8")
@@ -161,7 +161,8 @@ def install_checkers() -> None:
 def run(steps: Sequence[Step], environment: Mapping[str, str]) -> list[Outcome]:
     """Run the steps in parallel, one for each processor, and end all processes that they started.
 
-    A single step shows its output at once; one of several shows its output at its end.
+    A single step shows its output immediately; with several steps, each shows its output when it
+    ends.
     """
     return asyncio.run(_run_all(steps, environment))
 
@@ -221,7 +222,7 @@ async def _end_group(process: asyncio.subprocess.Process) -> None:
 
 
 def summarise(outcomes: list[Outcome], brought: Brought, not_checked: str, seconds: float) -> int:
-    """Print a line for each step, then the left-out tests and the result; return the exit code."""
+    """Print a line for each step, then the skipped tests and the result; return the exit code."""
     print(f"\n== summary, after {seconds:.0f} s", flush=True)
     for outcome in outcomes:
         word = "FAILED" if outcome.fault else "ok"
@@ -231,15 +232,15 @@ def summarise(outcomes: list[Outcome], brought: Brought, not_checked: str, secon
     for text in left_out:
         print(f"LEFT OUT  {text}")
     if brought.left_out:
-        print(f"          to install it: {brought.remedy}")
+        print(f"          to install: {brought.remedy}")
     failed = [outcome.name for outcome in outcomes if outcome.fault]
     if failed:
         print(f"{len(failed)} of {len(outcomes)} steps failed: {', '.join(failed)}")
         return 1
     if left_out and os.environ.get("CI") == "true":
-        print("all that ran passed, but with CI=true nothing may be left out")
+        print("all executed steps passed, but with CI=true no test may be skipped")
         return 1
-    print("all passed" if not left_out else "all that ran passed")
+    print("all passed" if not left_out else "all executed steps passed")
     return 0
 
 

@@ -1,16 +1,18 @@
-"""A comparison of two commits' results for the same documents, through the table of renames.
+"""A comparison of two commits' results for the same documents, apart from renamed words.
 
     python -m scripts.compare_reports COMMIT            that commit and this tree
     python -m scripts.compare_reports COMMIT --list     every difference, not the first of each kind
 
-The documents of the commit are read by its own code and, migrated, by the code of this tree.
-Later changes of a document, such as its comments, thus make no difference. Two comparisons:
+The commit's own code reads the documents of the commit. This tree's code reads the same documents
+after migration. So later changes of a document, such as new comments, make no difference. The
+script compares:
 
-- reports: file, line, column, severity and code of every problem of the broken documents. A
-  renamed key moves the columns behind it, and no line;
-- resolved profiles: `urc resolve` of each robot, migrated on the side of the commit.
+- reports: file, line, column, severity and code of every problem of the broken documents. A renamed
+  key shifts the columns after the key, but no lines;
+- resolved profiles: the output of `urc resolve` for each robot; the commit's output is migrated
+  first.
 
-The exit code is 1 after a difference that no rename explains.
+The exit code is 1 if a difference is not explained by a rename.
 """
 
 import argparse
@@ -73,14 +75,14 @@ for path in sorted(Path("robots").glob("*.yaml")):
     resolved[path.name] = resolve(path.as_posix(), shelf, profile).text
 print(json.dumps({"reports": reports, "resolved": resolved}))
 """
-"""Program that runs in the tree of a commit, with the code of that commit."""
+"""Source of a program that runs in the commit's tree with the commit's code."""
 
 Problem = tuple[str, int, int, str, str]
-"""File, line, column, severity and code."""
+"""A problem: file, line, column, severity and code."""
 
 
 def main() -> int:
-    """Compare; return 1 after a difference that no rename explains."""
+    """Compare a commit with this tree; return 1 if a difference is not explained by a rename."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
@@ -119,7 +121,7 @@ def unpack(commit: str, folder: Path) -> None:
 
 
 def recorded(root: Path) -> dict[str, Any]:
-    """Return the reports and resolved profiles of a tree, computed by the code of that tree."""
+    """Return the reports and resolved profiles of a tree, computed by the tree's own code."""
     done = subprocess.run(
         [sys.executable, "-c", RECORD],
         cwd=root,
@@ -132,12 +134,12 @@ def recorded(root: Path) -> dict[str, Any]:
 
 
 def without_title(text: str) -> str:
-    """Return a resolved profile without its first line, which is a comment."""
+    """Return a resolved profile without the comment in its first line."""
     return text.partition("\n")[2]
 
 
 class Comparison:
-    """The differences from a tree, counted."""
+    """Counts of the differences between an old tree and this tree."""
 
     def __init__(self, old: Path, tell: Callable[[str], None] | None) -> None:
         self.old = old
@@ -157,8 +159,8 @@ class Comparison:
             moved = Counter(self.moved(tuple(one)) for one in old)
             found = Counter(tuple(one) for one in after[name])
             self.counts["problems compared"] += moved.total()
-            self.counts["of them under a new code"] += sum(one[4] in CODES for one in old)
-            self.counts["of them in a new column"] += sum(
+            self.counts["problems with a new code"] += sum(one[4] in CODES for one in old)
+            self.counts["problems in a new column"] += sum(
                 self.moved(tuple(one))[2] != one[2] for one in old
             )
             for one in moved - found:
@@ -179,14 +181,17 @@ class Comparison:
             if old == new:
                 self.counts["resolved robots equal"] += 1
                 continue
-            self.differs(f"{name}: resolves otherwise", "resolved robots that differ")
+            self.differs(f"{name}: resolved profile differs", "resolved robots that differ")
             for one, other in zip(old.splitlines(), new.splitlines(), strict=False):
                 if one != other:
                     print(f"  - {one}\n  + {other}")
                     break
 
     def differs(self, text: str, kind: str) -> None:
-        """Count a difference; print the first of each kind, or all differences."""
+        """Count a difference.
+
+        Print only the first difference of each kind, or all with `--list`.
+        """
         self.is_different = True
         self.counts[kind] += 1
         if self.counts[kind] == 1:
@@ -195,7 +200,7 @@ class Comparison:
             self.tell(text)
 
     def migrated(self, file: str) -> Migrated | None:
-        """Return a migrated broken document of the old tree, or None for an invalid one."""
+        """Return a migrated broken document of the old tree, or None if it can't be migrated."""
         if file not in self._migrated:
             try:
                 self._migrated[file] = migrate(str(self.old / BROKEN / file))
@@ -204,7 +209,10 @@ class Comparison:
         return self._migrated[file]
 
     def moved(self, problem: Problem) -> Problem:
-        """Return a problem of the old tree at its expected place; no rename changes a line."""
+        """Return a problem of the old tree with its expected new column and code.
+
+        Renames never change lines.
+        """
         file, line, column, severity, code = problem
         migrated = self.migrated(file) if (self.old / BROKEN / file).is_file() else None
         changes = migrated.changes if migrated is not None else ()

@@ -1,6 +1,6 @@
 """The command `./dev docs`: check that every link and picture of the Markdown files exists.
 
-The check follows only links inside the tree, so it needs no network.
+The check follows only links to files in the tree, so the check needs no network.
 """
 
 import re
@@ -19,7 +19,7 @@ SCHEME = re.compile(r"[a-z][a-z0-9+.-]*:", re.IGNORECASE)
 
 
 def main() -> int:
-    """Print a line for each broken link; return 1 if there is any."""
+    """Print a line for each broken link; return 1 if any link is broken."""
     pages = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
     faults = [fault for page in pages for fault in faults_of(page)]
     for fault in faults:
@@ -42,11 +42,11 @@ def faults_of(page: Path) -> Iterator[str]:
 
 
 def fault_of(page: Path, target: str) -> str:
-    """Return the fault of a link inside the tree, or ""."""
+    """Return the error of a link to a file in the tree, or "" if the link is valid."""
     path, _, anchor = target.partition("#")
     file = (page.parent / path).resolve() if path else page
     if not file.is_relative_to(ROOT):
-        return "leads out of the tree"
+        return "points outside the tree"
     if not file.exists():
         return "no such file"
     if anchor and file.suffix == ".md" and anchor not in anchors_of(file):

@@ -1,4 +1,4 @@
-"""Mutants with their results, as stored by mutmut; and the explained survivors."""
+"""Mutants with their results, as stored by mutmut, and the explanations of surviving mutants."""
 
 import json
 import re
@@ -28,19 +28,19 @@ _STATUS = {
     152: "timeout",
     255: "timeout",
 }
-"""Exit code of mutmut → status; all others are odd."""
+"""Exit code of mutmut → status; the status of any other code is `odd`."""
 STATUSES = ("killed", "timeout", "survived", "no tests", "odd", "waiting")
 DEAD = ("killed", "timeout")
-"""Statuses of mutants that a test noticed by a failure or a hang."""
+"""Statuses of detected mutants: a test failed or timed out."""
 Change = tuple[str, str]
 """Removed and inserted code of a mutant."""
 
 
 class Mutant:
-    """One small change of one function."""
+    """A mutant: one small change of one function."""
 
     def __init__(self, folder: Path, module: str, name: str, status: str) -> None:
-        """Return its name in mutmut: ``urc.guard.motion_scheduler.xǁReinsǁtick__mutmut_3``."""
+        # mutmut names are like ``urc.guard.motion_scheduler.xǁMotionSchedulerǁtick__mutmut_3``.
         self._folder = folder
         self.module = module
         self.name = name
@@ -48,7 +48,7 @@ class Mutant:
 
     @property
     def function(self) -> str:
-        """Its place: ``urc.guard.motion_scheduler.MotionScheduler.tick``."""
+        """Changed function, such as ``urc.guard.motion_scheduler.MotionScheduler.tick``."""
         inner = self.name.removeprefix(f"{self.module}.").partition("__mutmut_")[0]
         plain = inner.replace("ǁ", ".").removeprefix("x.").removeprefix("x_")
         return f"{self.module}.{plain.removesuffix(PLAIN)}"
@@ -66,7 +66,7 @@ class Mutant:
 
     @property
     def shown(self) -> str:
-        """The change with the surrounding lines."""
+        """The change as a diff with the surrounding lines."""
         return f"  {self.function}\n" + "\n".join(f"  {line}" for line in self._diff())
 
     def _diff(self) -> list[str]:
@@ -85,21 +85,21 @@ class Mutant:
 
 
 class Kind(NamedTuple):
-    """A group of mutants that are harmless for the same reason."""
+    """A category of mutants that are harmless for the same reason."""
 
     before: re.Pattern[str]
-    """Pattern of the whole removed code."""
+    """Pattern that must match the entire removed code."""
     after: str
-    """Inserted code, with references to the groups of `before`."""
+    """Template of the inserted code, with references to the groups of `before`."""
 
     def fits(self, change: Change) -> bool:
-        """Return whether a change is of this kind."""
+        """Return whether a change belongs to this category."""
         found = self.before.fullmatch(change[0])
         return found is not None and found.expand(self.after) == change[1]
 
 
 class Explained(NamedTuple):
-    """Surviving mutants, with the reasons why no test has to kill them."""
+    """Explanations of surviving mutants: reasons why no test needs to kill the mutant."""
 
     reasons: dict[tuple[str, Change], str]
     """Function and change → reason."""
@@ -111,7 +111,7 @@ class Explained(NamedTuple):
         return known or any(kind.fits(mutant.change) for kind in self.kinds)
 
     def unused(self, mutants: list[Mutant]) -> Iterator[str]:
-        """Yield the reasons without a surviving or waiting mutant."""
+        """Yield the explanations that match no surviving or untested mutant."""
         lives = {(one.function, one.change) for one in mutants if one.status not in DEAD}
         for function, (before, after) in sorted(self.reasons.keys() - lives):
             yield f"{function}: {before} -> {after}"
@@ -150,7 +150,7 @@ def mutants_in(copy: Path, settings: Settings) -> list[Mutant]:
 
 
 def table(mutants: list[Mutant], explained: Explained) -> Iterator[str]:
-    """Yield a line for each module, and a line with the totals."""
+    """Yield a line of the table for each module, then a line with the totals."""
     heads = [*STATUSES[:3], "explained", *STATUSES[3:]]
     yield f"{'':<28}" + "".join(f"{head:>10}" for head in [*heads, "all", "killed %"])
     modules = sorted({one.module for one in mutants})

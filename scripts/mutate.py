@@ -1,10 +1,10 @@
-"""The command `./dev mutate`: break the code in thousands of small ways; a test must notice each.
+"""The command `./dev mutate`: break the code in thousands of small ways; a test must detect each.
 
 mutmut generates the mutants and runs the tests, as configured in `[tool.mutmut]` of pyproject.toml,
-in a copy of the tree under `.mutate`. The results stay there, so an interrupted run can continue,
-and only mutants affected by a change run again. `tests/mutants.toml` explains the mutants that no
-test can kill. Exit code 0: all mutants are killed or explained, and 90 % are killed. 1: some are
-not. 3: some are still waiting. Decision record:
+in a copy of the tree under `.mutate`. The results are stored in the copy, so an interrupted run can
+continue, and only mutants affected by a change run again. `tests/mutants.toml` explains the mutants
+that no test can kill. The exit code is 0 if all mutants are killed or explained and 90 % are
+killed, 3 if mutants are untested, and 1 otherwise. Decision record:
 docs/decisions/0024-mutants-by-mutmut.md.
 """
 
@@ -22,15 +22,15 @@ ROOT = Path(__file__).resolve().parents[1]
 COPY = ROOT / ".mutate"
 EXPLAINED = ROOT / "tests" / "mutants.toml"
 WANTED = 0.9
-"""Share of the mutants that the tests must kill."""
+"""Minimum share of killed mutants."""
 UNFINISHED = 3
 _END_S = 30
 _TEST_S = 20
-"""Limit of a test, in seconds, for mutants that hang; the longest test takes two."""
+"""Timeout of a test in seconds, for mutants that hang; the slowest test takes 2 s."""
 
 
 def main() -> int:
-    """Run the waiting mutants; print the summary; return the exit code."""
+    """Run the untested mutants; print the summary; return the exit code."""
     options = _options()
     if os.name == "nt":
         print("mutate: mutmut needs fork, which Windows lacks; use WSL", file=sys.stderr)
@@ -56,17 +56,20 @@ def _options() -> argparse.Namespace:
         "names",
         nargs="*",
         metavar="NAME",
-        help="run these again, such as 'urc.guard.motion_scheduler.*'",
+        help="test the mutants with these names again, such as 'urc.guard.motion_scheduler.*'",
     )
     add("--minutes", type=float, metavar="N", help="time limit in minutes; the next run continues")
     add("--workers", type=int, default=2, metavar="N", help="number of workers, 2 by default")
-    add("--timeouts", action="store_true", help="run those again that hit the time limit")
-    add("--report", action="store_true", help="run no mutants; show the known results")
+    add("--timeouts", action="store_true", help="test mutants with timeouts again")
+    add("--report", action="store_true", help="show the stored results and test no mutants")
     return parser.parse_args()
 
 
 def _run(names: list[str], workers: int, minutes: float | None) -> bool:
-    """Run mutmut until its end or the time limit; return False if it failed."""
+    """Run mutmut until all mutants are tested or the time limit is reached.
+
+    Return False if mutmut failed.
+    """
     mutmut = Path(sys.executable).with_name("mutmut")
     command = [str(mutmut), "run", "--max-children", str(workers), *names]
     # The copy comes before the checkout, also for programs that a test starts.
@@ -90,24 +93,24 @@ def _run(names: list[str], workers: int, minutes: float | None) -> bool:
 
 
 def hung(mutants: list[Mutant]) -> list[str]:
-    """Return the names of mutants that hit the time limit, perhaps only on a busy machine."""
+    """Return the names of mutants with a timeout, which may be due to a busy machine."""
     return [one.name for one in mutants if one.status == "timeout"]
 
 
 def summarise(mutants: list[Mutant], explained: Explained, *, is_part: bool) -> int:
-    """Print a line for each module, then each unexplained survivor."""
+    """Print a line for each module, then each unexplained surviving mutant."""
     print("\n".join(table(mutants, explained)))
     lives = [one for one in mutants if one.status not in (*DEAD, "waiting")]
     new = [one for one in lives if not explained.covers(one)]
     for one in new:
         print(f"\n{one.status}: {one.name}\n{one.shown}")
     for entry in explained.unused(mutants):
-        print(f"\n{EXPLAINED.name}: no surviving mutant matches any more: {entry}")
+        print(f"\n{EXPLAINED.name}: no surviving mutant matches this explanation: {entry}")
     killed = sum(one.status in DEAD for one in mutants)
     waiting = sum(one.status == "waiting" for one in mutants)
-    print(f"\n{len(new)} survivors are neither killed nor explained")
+    print(f"\n{len(new)} surviving mutants are not explained")
     if waiting:
-        print(f"{waiting} mutants wait: run ./dev mutate again")
+        print(f"{waiting} mutants are untested: run ./dev mutate again")
         return UNFINISHED
     return 0 if not new and (is_part or killed >= WANTED * len(mutants)) else 1
 

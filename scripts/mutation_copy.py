@@ -1,8 +1,8 @@
-"""The copy of the tree for mutmut, and the validity of stored results.
+"""The copy of the source tree for mutmut, and the invalidation of stored results.
 
-The sources are copied with one change. mutmut skips decorated functions, but many properties of
-URC decide whether a robot stops. So the copy turns each property into a plain method, with a
-generated property under the old name.
+The sources are copied with one change: each property becomes a plain method, with a generated
+property under the old name. The reason is that mutmut skips decorated functions, but many
+properties of URC decide whether a robot stops.
 """
 
 import ast
@@ -23,10 +23,10 @@ __all__ = [
 ]
 
 PLAIN = "_as_method"
-"""Suffix of a method that was a property."""
+"""Suffix of a plain method that was a property in the original."""
 STAMP = "urc-mutate.json"
 SETTLED = (1, 3, -1, -15, 24, -24, 36, 152, 255)
-"""Exit codes of mutmut for killed mutants and for hangs."""
+"""Exit codes of mutmut for killed mutants and for timeouts."""
 
 
 class Settings(NamedTuple):
@@ -37,7 +37,7 @@ class Settings(NamedTuple):
     spared: tuple[str, ...]
     """Patterns of files to leave out."""
     copied: tuple[str, ...]
-    """Files and folders that the tests need."""
+    """Files and folders to copy because the tests need them."""
 
     @classmethod
     def of(cls, root: Path) -> "Settings":
@@ -47,15 +47,15 @@ class Settings(NamedTuple):
         return cls(tuple(told["only_mutate"]), tuple(told.get("do_not_mutate", ())), tuple(named))
 
     def is_mutated(self, name: str) -> bool:
-        """Return whether a file is mutated."""
+        """Return whether the settings select a file for mutation."""
         is_named = any(fnmatch(name, pattern) for pattern in self.mutated)
         return is_named and not any(fnmatch(name, pattern) for pattern in self.spared)
 
 
 def bring_up_to_date(root: Path, copy: Path, settings: Settings) -> bool:
-    """Update `copy` from the tree; return whether anything changed.
+    """Update `copy` from the tree at `root`; return whether a file has changed.
 
-    An unchanged file keeps its time, which tells mutmut that its mutants are still valid.
+    An unchanged file keeps its modification time, so mutmut keeps the results of its mutants.
     """
     digest = hashlib.sha256()
     names = set()
@@ -91,7 +91,7 @@ def _files(root: Path, named: tuple[str, ...]) -> Iterator[str]:
 
 
 def forget_open_questions(copy: Path) -> None:
-    """Mark all survivors for another run, because a new test may kill them.
+    """Mark all surviving mutants as untested, because a new test may kill them.
 
     A killed mutant stays killed until its function changes, which mutmut detects.
     """
@@ -106,7 +106,7 @@ def forget_open_questions(copy: Path) -> None:
 
 
 def with_plain_properties(source: str) -> str:
-    """Return `source` with a plain method in place of each property."""
+    """Return `source` with each property split into a plain method and a generated property."""
     lines = source.splitlines(keepends=True)
     for node in ast.walk(ast.parse(source)):
         if not isinstance(node, ast.ClassDef):

@@ -1,7 +1,7 @@
-"""The programs that the tests need in addition to Python, and their installation.
+"""The programs that tests need in addition to Python, and the installation of these programs.
 
-With root, they come from apt; a browser also comes from npm, without root. Missing programs are
-returned and never ignored: the summary of ``./dev test`` lists them.
+With root, the programs are installed by apt. Without root, only a browser can be installed, from
+npm. The summary of ``./dev test`` lists all missing programs.
 """
 
 import os
@@ -28,28 +28,28 @@ LANGUAGE_SERVER = (
     / "yaml-language-server"
 )
 _SYSTEM_PATH = f"{os.environ.get('PATH', os.defpath)}{os.pathsep}/usr/sbin{os.pathsep}/sbin"
-"""Search path with the folders of servers, which only root has by default."""
+"""Search path including the folders of servers, which only root has in `PATH` by default."""
 
 
 @dataclass(frozen=True, slots=True)
 class Need:
-    """A program: its name in ``needs(...)`` of a test, its executables, its Debian package."""
+    """A required program: its name in ``needs(...)`` of tests, executables and Debian package."""
 
     name: str
     executables: tuple[str, ...]
-    """Alternative executables; one is enough."""
+    """Alternative executables; one of them is sufficient."""
     package: str
-    """Debian packages, separated by spaces; "" for a program from npm."""
+    """Debian packages, separated by spaces; "" if npm installs the program."""
     purpose: str
     variable: str = ""
-    """Environment variable with the path of another executable, if any."""
+    """Environment variable that overrides the path of the executable; "" if none."""
     other: Callable[[], str | None] | None = None
-    """Finds a program that is not on the search path."""
+    """Function that returns the path of a program outside the search path, or None."""
     is_of_root: bool = False
-    """Whether the program needs root, so that no installation helps."""
+    """Whether the program only works as root, so that installing it does not help other users."""
 
     def find(self) -> str | None:
-        """Return the path in the variable, else the first existing executable."""
+        """Return the program's path, from the environment variable or the search path, or None."""
         named = os.environ.get(self.variable) if self.variable else None
         found = named or next(
             (path for name in self.executables if (path := shutil.which(name))), None
@@ -106,7 +106,7 @@ NEEDS = (
         name="netns",
         executables=(),
         package="iproute2",
-        purpose="test of a robot with fixed ports, as root only",
+        purpose="tests of a robot with fixed ports, as root only",
         other=lambda: shutil.which("ip", path=_SYSTEM_PATH) if _is_root() else None,
     ),
     Need(
@@ -213,7 +213,7 @@ NEEDS = (
         name="roslib",
         executables=(),
         package="",
-        purpose="test of the emulated rosbridge against its browser client, roslib",
+        purpose="tests of the emulated rosbridge against its browser client, roslib",
         other=lambda: os.fspath(ROSLIB) if ROSLIB.is_dir() else None,
     ),
     Need(
@@ -228,7 +228,7 @@ NEEDS = (
 
 @dataclass(slots=True)
 class Brought:
-    """Installed and missing programs, for the tests."""
+    """Environment of the tests after the installation, and the programs still missing."""
 
     environment: dict[str, str] = field(default_factory=dict)
     left_out: list[Need] = field(default_factory=list)
@@ -246,13 +246,13 @@ class Brought:
         return " && ".join(commands)
 
     def look_again(self) -> None:
-        """Check the missing programs again after an installation."""
+        """Search for the missing programs again after an installation."""
         self.left_out = [need for need in self.left_out if need.find() is None]
         self.environment["URC_LEFT_OUT"] = ",".join(need.name for need in self.left_out)
 
 
 def bring(needs: Sequence[Need] = NEEDS) -> Brought:
-    """Find or install each of these needs; report the missing ones."""
+    """Find or install each required program; report missing programs."""
     missing = [need for need in needs if need.find() is None]
     if any(need.package for need in missing) and _is_root() and shutil.which("apt-get"):
         _apt_install([name for need in missing for name in need.package.split()])
@@ -267,7 +267,7 @@ def bring(needs: Sequence[Need] = NEEDS) -> Brought:
 
 
 def _shell_of(needs: Sequence[Need]) -> str | None:
-    """Return the fallback for the missing browser without windows."""
+    """Return a browser to use instead of the missing headless shell, or None."""
     whole = next(
         (path for need in needs if need.name == "chromium" and (path := need.find())), None
     )
@@ -281,7 +281,7 @@ def _shell_of(needs: Sequence[Need]) -> str | None:
 
 
 def _apt_install(packages: list[str]) -> None:
-    """Install Debian packages; a failure is printed, and the program stays missing."""
+    """Install Debian packages; after a failure, print the error."""
     print(f"installing {' '.join(packages)} ...", flush=True)
     _apt("update")
     if not _apt("install", "--no-install-recommends", *packages) and len(packages) > 1:
@@ -298,7 +298,7 @@ def _apt(*arguments: str) -> bool:
             timeout=APT_TIMEOUT_S, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        print(f"{' '.join(command)}: no end within {APT_TIMEOUT_S} s", flush=True)
+        print(f"{' '.join(command)}: not finished within {APT_TIMEOUT_S} s", flush=True)
         return False
     if done.returncode != 0:
         print(f"{' '.join(command)}:\n{done.stdout[-2000:]}{done.stderr[-2000:]}", flush=True)

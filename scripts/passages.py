@@ -1,7 +1,7 @@
-"""The prose of the tree: documentation, docstrings, and strings that people read.
+"""The extraction of prose from the tree: documentation, docstrings, and strings for people.
 
-The draw of sentences and the check of prose share it, so both have the same definition of prose.
-Generated pages (docs/reference, docs/robots), tests, code blocks and licences are left out.
+`scripts/sentences.py` and `scripts/prose.py` use this module, so both have the same definition of
+prose. Generated pages (docs/reference, docs/robots), tests, code blocks and licences are excluded.
 """
 
 import ast
@@ -18,17 +18,17 @@ GENERATED = ("docs/reference/", "docs/robots/")
 CODE_FOLDERS = ("urc/", "bench/", "scripts/")
 YAML_FOLDERS = ("robots/", "widgets/")
 PROSE_KEYS = ("title", "summary", "description", "help", "notes", "why")
-"""Keys of schemas and documents whose values are prose."""
+"""Keys of schemas and documents with prose as values."""
 FEWEST_WORDS = 4
-"""Fewest words of a sentence in code; a shorter string is a name or a label."""
+"""Minimum number of words of a sentence in code; a shorter string is a name or a label."""
 
 _FENCE = re.compile(r"^\s*(```|~~~)")
 _ITEM = re.compile(r"^\s*(?:[-*+]|\d+\.)\s+|^\s*#+\s+|^\s*>\s?")
 _SECTIONS = ("Args:", "Attributes:", "Raises:", "Returns:", "Yields:")
 _ENTRY = re.compile(r"^\s+\*{0,2}\w+(?: \([^)]*\))?: ")
-"""Start of an entry under `Args:` or `Raises:`."""
+"""Pattern of the start of an entry under `Args:` or `Raises:`."""
 _QUERY = re.compile(r"(?:CREATE TABLE|DELETE FROM|INSERT INTO|PRAGMA|SELECT|WHERE)\b")
-"""The beginning of an SQL statement, which is not prose."""
+"""Pattern of the start of an SQL statement, which is not prose."""
 _LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")
 _MARKED = re.compile(r"""\b(?:t|mark|phrase)\(\s*(?:"((?:[^"\\\n]|\\.)*)"|'((?:[^'\\\n]|\\.)*)')""")
 _WORD = re.compile(
@@ -38,18 +38,18 @@ _END = re.compile(r"[.!?][)\"”*]*\s+(?=[\"“(*`A-Z0-9])")
 
 
 class Passage(NamedTuple):
-    """A paragraph, a list item, a table cell or a string."""
+    """A passage of prose: a paragraph, a list item, a table cell or a string."""
 
     path: str
     line: int
     kind: str
     """`docs`, `docstring` or `string`."""
     text: str
-    """Text with its line breaks, which locate each sentence."""
+    """Text including line breaks, to compute the line of each sentence."""
 
 
 class Sentence(NamedTuple):
-    """One sentence with its position."""
+    """One sentence with its path, line and kind."""
 
     path: str
     line: int
@@ -58,7 +58,7 @@ class Sentence(NamedTuple):
 
 
 def is_read(path: str) -> bool:
-    """Return whether the file has prose to check."""
+    """Return whether a file is searched for prose."""
     if path.startswith(GENERATED):
         return False
     if path.endswith(".md"):
@@ -73,7 +73,7 @@ def is_read(path: str) -> bool:
 
 
 def passages(files: Mapping[str, str]) -> Iterator[Passage]:
-    """Yield every passage of `files`, a mapping of path to text, in the order of the paths."""
+    """Yield every passage of prose in `files`, a mapping of path to text, sorted by path."""
     for path in sorted(files):
         text = files[path]
         if path.endswith(".md"):
@@ -130,7 +130,7 @@ def _paragraph(path: str, kind: str, lines: list[tuple[int, str]]) -> Iterator[P
 def _of_python(path: str, text: str) -> Iterator[Passage]:
     tree = ast.parse(text)
     apart: set[ast.AST] = set()
-    """Strings that another node has already yielded."""
+    """Nodes of strings that were already yielded as part of another node."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             apart.add(node.value)

@@ -5,9 +5,10 @@
     python -m scripts.prose --update        write the baseline after hits were reworded or moved
 
 The rules keep sentences short and plain: subject and verb first, nouns instead of relative clauses,
-and the words of docs/glossary.md. The baseline has the remaining hits, by file and rule. The
-baseline can only shrink. `--update` refuses a rule with a larger total, so hits may move between
-files, but new text has none. After a merge conflict in the baseline, `--update` restores it.
+and the words of docs/glossary.md. The baseline contains the number of remaining hits, by file and
+rule. The baseline can only shrink: `--update` refuses a larger total of a rule, so hits may move
+between files, but the total can't grow. `--update` also repairs the baseline after a merge
+conflict.
 """
 
 import argparse
@@ -41,7 +42,7 @@ RULES: Mapping[str, re.Pattern[str]] = {
     "who-subject": re.compile(r"^[(\"“*]*(?:Who|What|Whose|Of which|Of whom)\s(?!.*\?)"),
     "what-clause": re.compile(rf"(?<!^)\bwhat (?:{_VERBS})\b(?!.*\?)"),
 }
-"""Rule → its pattern. The rules `long` and `glossary` have no pattern."""
+"""Rule → pattern of a hit; the rules `long` and `glossary` have no pattern."""
 
 _CODE = re.compile(r"(`+).+?\1")
 _LETTER = re.compile(r"[A-Za-z0-9{]")
@@ -49,7 +50,7 @@ _ROW = re.compile(r"^(\S+) (\S+) (\d+)$", re.MULTILINE)
 
 
 class Hit(NamedTuple):
-    """A sentence that breaks a rule."""
+    """A hit: a sentence that breaks a rule."""
 
     rule: str
     sentence: Sentence
@@ -60,7 +61,7 @@ class Hit(NamedTuple):
 
 
 def main() -> int:
-    """Check, list or update; return the exit code."""
+    """Check the prose, list hits or update the baseline; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m scripts.prose", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("paths", nargs="*", help="list every hit below these paths")
@@ -87,13 +88,13 @@ def read_files() -> dict[str, str]:
 
 
 def words_of(glossary: str) -> list[str]:
-    """Return the replaced words in the glossary's last table."""
+    """Return the words that the glossary's last table replaces."""
     table = glossary.partition("| instead of |")[2]
     return re.findall(r"^\| ([^|-][^|]*?) \|", table, re.MULTILINE)
 
 
 def hits(files: Mapping[str, str], replaced: Iterable[str]) -> Iterator[Hit]:
-    """Yield every hit in the files, in the order of the paths."""
+    """Yield every hit in the files, sorted by path."""
     words = "|".join(re.escape(word) for word in replaced)
     glossary = re.compile(rf"\b(?:{words})s?\b", re.IGNORECASE) if words else None
     for passage in passages(files):
@@ -109,7 +110,7 @@ def hits(files: Mapping[str, str], replaced: Iterable[str]) -> Iterator[Hit]:
 
 
 def check(found: list[Hit], allowed: Counter[tuple[str, str]]) -> int:
-    """Print the files with more hits than their baseline; return the exit code."""
+    """Print the files with more hits than in the baseline; return the exit code."""
     counted = counts(found)
     over = {key for key, count in counted.items() if count > allowed[key]}
     for hit in found:
@@ -119,19 +120,21 @@ def check(found: list[Hit], allowed: Counter[tuple[str, str]]) -> int:
         print(f"{path}: {rule}: {counted[path, rule]} hits, {allowed[path, rule]} in the baseline")
     fewer = (allowed - counted).total()
     remedy = "; python -m scripts.prose --update lowers the baseline" if fewer and not over else ""
-    print(f"prose: {len(found)} hits, {fewer} fewer than the baseline has in places{remedy}")
+    print(
+        f"prose: {len(found)} hits, {fewer} fewer than the baseline allows in single files{remedy}"
+    )
     return 1 if over else 0
 
 
 def update(found: list[Hit], allowed: Counter[tuple[str, str]] | None) -> int:
-    """Write the baseline unless the total of a rule has grown; return the exit code."""
+    """Write the baseline, unless the total of a rule has increased; return the exit code."""
     totals = Counter(hit.rule for hit in found)
     before: Counter[str] = Counter()
     for (_, rule), count in (allowed or {}).items():
         before[rule] += count
     grown = {} if allowed is None else {rule: totals[rule] - before[rule] for rule in totals}
     for rule in sorted(rule for rule, more in grown.items() if more > 0):
-        print(f"prose: {rule}: {grown[rule]} hits more than in the baseline", file=sys.stderr)
+        print(f"prose: {rule}: {grown[rule]} more hits than in the baseline", file=sys.stderr)
     if any(more > 0 for more in grown.values()):
         return 1
     rows = (f"{path} {rule} {count}\n" for (path, rule), count in sorted(counts(found).items()))
@@ -145,7 +148,10 @@ def counts(found: Iterable[Hit]) -> Counter[tuple[str, str]]:
 
 
 def counts_in(baseline: str) -> Counter[tuple[str, str]]:
-    """Return the counts of a baseline; of two rows left by a merge, the larger number counts."""
+    """Return the counts in a baseline.
+
+    If a merge left two rows for a file and rule, use the larger count.
+    """
     found: Counter[tuple[str, str]] = Counter()
     for path, rule, count in _ROW.findall(baseline):
         found[path, rule] = max(found[path, rule], int(count))

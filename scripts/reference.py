@@ -1,7 +1,7 @@
 """The generator of the language reference, docs/reference/*.md, from the schemas.
 
-``python -m scripts.reference`` writes the pages; a test fails if they are out of date. The same
-schema gives the same bytes on every machine.
+``python -m scripts.reference`` writes the pages; a test fails if a page is outdated. The same
+schema produces the same bytes on every machine.
 """
 
 import json
@@ -47,7 +47,7 @@ _WORDS_OF_YAML = frozenset(("true", "false", "null", "yes", "no", "on", "off", "
 
 
 def main() -> int:
-    """Write every page; print the changed ones."""
+    """Write every page, and print the names of changed pages."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     for kind in KINDS:
         file, text = FOLDER / f"{kind}.md", page(kind)
@@ -65,7 +65,7 @@ def read_schema(name: str) -> Schema:
 
 
 def page(kind: str) -> str:
-    """Return the page of a kind of document."""
+    """Return the reference page of a kind of document."""
     file = f"{kind}.schema.json"
     schema = read_schema(file)
     lines = [
@@ -83,7 +83,7 @@ def page(kind: str) -> str:
 
 
 def missing() -> list[str]:
-    """Return every property without a description or an example."""
+    """Return the paths of all properties without a description or an example."""
     found = []
     for kind in KINDS:
         file = f"{kind}.schema.json"
@@ -113,14 +113,14 @@ def _keys(file: str, owner: str, schema: Schema) -> Iterator[str]:
 
 
 def _required_when_whole(schema: Schema) -> list[str]:
-    """Return the keys that only parts, and documents with a parent, may leave out."""
+    """Return the keys that may be missing only in a part or in a document with a parent."""
     otherwise = schema.get("else", {})
     inner: list[str] = list(otherwise.get("required", ()))
     return inner + _required_when_whole(otherwise) if otherwise else inner
 
 
 def _described(file: str, schema: Any, required: str = "") -> Iterator[str]:
-    """Yield the description of one value, its type, its allowed values, and an example."""
+    """Yield the description, type, allowed values and example of one value."""
     whole = _whole(file, schema)
     yield from _paragraph(whole.get("description", ""))
     facts = [("type", _type(file, schema))]
@@ -144,13 +144,13 @@ def _described(file: str, schema: Any, required: str = "") -> Iterator[str]:
 
 
 def _paragraph(text: str) -> list[str]:
-    """Return one sentence per line, and an empty line."""
+    """Return the text with one sentence per line, followed by an empty line."""
     sentences = re.sub(r"(?<=[a-z)`'\"}\]]\.) (?=[A-Z{`])", "\n", text)
     return [*sentences.split("\n"), ""] if text else []
 
 
 def _whole(file: str, schema: Any) -> dict[str, Any]:
-    """Return a schema merged with its references; its own keys take precedence."""
+    """Return a schema merged with its references; the schema's own keys take precedence."""
     whole: dict[str, Any] = dict(schema) if isinstance(schema, Mapping) else {}
     while "$ref" in whole:
         file, target = _target(file, whole.pop("$ref"))
@@ -224,7 +224,7 @@ def _link(file: str, reference: str) -> str:
 
 
 def _allowed(schema: Schema) -> str:
-    """Return the allowed words or the range of a value."""
+    """Return the allowed words or the allowed range of a value."""
     words = [f"`{_yaml(word)}`" for word in schema.get("enum", ())]
     bounds = [_bound(key, schema[key]) for key in _BOUNDS if key in schema]
     return ", ".join(words + bounds)

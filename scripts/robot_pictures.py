@@ -1,11 +1,11 @@
-"""The generator of the robots' pages: pictures, and manual pages around them.
+"""The generator of the robots' pictures and manual pages.
 
     python -m scripts.robot_pictures             all shipped robots
     python -m scripts.robot_pictures NAME ...    only these
     python -m scripts.robot_pictures --text      only the pages, with the existing pictures
 
 ``docs/images/robots/NAME.png`` shows the default interface on a tablet. ``docs/robots/NAME.md`` is
-the output of `urc docs` with that picture below its first lines.
+the output of `urc docs` with the robot's picture below its first lines.
 """
 
 import argparse
@@ -34,7 +34,7 @@ IMAGES = DOCS / "images" / "robots"
 TABLET = {"width": 1024, "height": 768}
 COLOURS = 128
 SETTLED_MS = 3000
-"""Time for slow values, in milliseconds; even slower ones are shown as they are."""
+"""Longest wait for values before a picture is taken, in milliseconds."""
 READY_MS = 60_000
 
 
@@ -47,7 +47,7 @@ def with_picture(page: str, name: str) -> str:
 
 
 async def take(browser: Browser, address: str, name: str) -> None:
-    """Write the picture of one robot."""
+    """Write the picture of one robot's default interface."""
     context = await browser.new_context(
         viewport=TABLET,  # type: ignore[arg-type]  # a mapping with the right keys
         locale=LOCALE,
@@ -70,14 +70,14 @@ async def take(browser: Browser, address: str, name: str) -> None:
 
 
 async def pictures(names: list[str]) -> None:
-    """Take the pictures one after another."""
+    """Take the pictures of all robots one after another."""
     IMAGES.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:  # without a latched stop of the user
         await pictures_of(names, {"URC_DATA_DIR": folder})
 
 
 async def pictures_of(names: list[str], environment: Mapping[str, str]) -> None:
-    """Take the pictures from a demo in an environment."""
+    """Take the pictures from `urc demo`, started with an environment."""
     demo = UrcProcess(("demo", "--no-browser", "--port", "0"), environment)
     try:
         address = (await demo.wait_for_async(r"dashboard (http://\S+)", READY_MS / 1000))[1]
@@ -89,14 +89,16 @@ async def pictures_of(names: list[str], environment: Mapping[str, str]) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Take the pictures, and write the pages."""
+    """Take the pictures and write the manual pages."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("names", nargs="*", metavar="NAME")
-    parser.add_argument("--text", action="store_true", help="write only the pages")
+    parser.add_argument(
+        "--text", action="store_true", help="write only the pages, with the existing pictures"
+    )
     given = parser.parse_args(arguments)
     known = sorted(file.stem for file in shipped("robots").glob("*.yaml"))
     if unknown := sorted(set(given.names) - set(known)):
-        print(f"there is no robot {unknown[0]!r}", file=sys.stderr)
+        print(f"unknown robot {unknown[0]!r}", file=sys.stderr)
         return 2
     names = given.names or known
     if not given.text:

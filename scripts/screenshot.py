@@ -1,8 +1,8 @@
 """The generator of the README's picture of the dashboard: `python -m scripts.screenshot`.
 
 The demo runs in a separate process. A real Chromium takes the picture when the battery shows the
-charge that the README mentions. With ``--all FOLDER`` it takes every screen and theme instead, for
-work on the design.
+charge that the README mentions. ``--all FOLDER`` instead takes pictures of every screen and theme,
+for work on the design.
 """
 
 import argparse
@@ -20,7 +20,10 @@ from tests.e2e.processes import UrcProcess
 
 PICTURE = Path(__file__).resolve().parents[1] / "docs" / "images" / "dashboard.png"
 CHARGE = "74"
-"""Charge in percent; the emulated battery reaches it once in 100 s."""
+"""Battery charge in the picture, in percent.
+
+The emulated battery reaches each charge once in 100 s.
+"""
 WAIT_MS = 110_000
 MAX_BYTES = 150_000
 THEMES = ("light", "dark", "sunlight", "night")
@@ -37,7 +40,7 @@ class Shot:
     height: int = 800
     theme: str = "light"
     charge: str = ""
-    """Required text of the battery; "" accepts any value."""
+    """Text that the battery must show before the picture is taken; "" for any text."""
 
 
 def main() -> int:
@@ -60,7 +63,7 @@ def main() -> int:
 
 
 def every_shot(folder: Path) -> list[Shot]:
-    """Return the shots of the menu and the GUI for each screen and theme."""
+    """Return the planned pictures of the menu and the dashboard for each screen and theme."""
     pages = {"menu": "", "gui": "robots/puppet/"}
     return [
         Shot(folder / f"{name}-{size}-{theme}.png", page, width, height, theme)
@@ -71,7 +74,7 @@ def every_shot(folder: Path) -> list[Shot]:
 
 
 async def take(address: str, shots: Sequence[Shot]) -> None:
-    """Take the pictures one after the other, each on a new page."""
+    """Take the pictures one after another, each on a new page."""
     async with running_browser() as browser:
         for shot in shots:
             await take_one(browser, address, shot)

@@ -1,11 +1,11 @@
-"""A random draw of sentences from the prose of a commit, for a reader who judges the English.
+"""A random sample of sentences from the prose of a commit, for a reader who judges the English.
 
     python -m scripts.sentences             60 sentences of HEAD
     python -m scripts.sentences COMMIT      of another commit
 
-The seed is the hash of the commit. So the same commit gives the same sentences on every machine,
-and no one can choose them. Each sentence of at least four words is equally likely, and copies count
-once. `scripts/passages.py` defines prose.
+The seed is the hash of the commit. So the same commit produces the same sentences on every machine,
+and no one can select favourable sentences. Each sentence of at least four words has the same
+probability; identical sentences count once. `scripts/passages.py` defines prose.
 """
 
 import argparse
@@ -23,10 +23,10 @@ COUNT = 60
 
 
 def main() -> int:
-    """Print the sentences with their places; return the exit code."""
+    """Print the sampled sentences with path and line; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m scripts.sentences", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("commit", nargs="?", default="HEAD", help="the commit to draw from")
+    parser.add_argument("commit", nargs="?", default="HEAD", help="the commit with the sentences")
     commit = _git("rev-parse", "--verify", f"{parser.parse_args().commit}^{{commit}}")
     name = commit.decode().strip()
     found = candidates(files_of(name))
@@ -39,7 +39,7 @@ def main() -> int:
 
 
 def candidates(files: dict[str, str]) -> list[Sentence]:
-    """Return every sentence of the draw, in the order of the files."""
+    """Return all sentences that can be sampled, sorted by file."""
     found: dict[str, Sentence] = {}
     for passage in passages(files):
         for one in sentences(passage):
@@ -49,7 +49,7 @@ def candidates(files: dict[str, str]) -> list[Sentence]:
 
 
 def draw(found: list[Sentence], seed: str, count: int = COUNT) -> list[Sentence]:
-    """Return `count` of the sentences, chosen by the seed."""
+    """Return a random sample of `count` sentences, determined by the seed."""
     return random.Random(seed).sample(found, min(count, len(found)))  # noqa: S311  no secret
 
 

@@ -1,18 +1,18 @@
-"""Measurements of the code's structure: its size, and its division into parts.
+"""Metrics of the code's structure: its size, and its division into modules and functions.
 
     python -m scripts.structure             this tree
-    python -m scripts.structure ROOT        another one, such as a worktree of an older commit
+    python -m scripts.structure ROOT        another tree, such as a worktree of an older commit
 
-Compare the figures before and after a change; no figure is a goal by itself. `--names` lists the
-modules, classes and functions behind the counts. How each is counted:
+Compare the metrics before and after a change; no metric is a goal by itself. `--names` lists the
+modules, classes and functions behind the counts. Definitions of the metrics:
 
-- modules with one importer: modules of `urc` that exactly one other module imports, at any level,
-  or by an entry `"urc.module:name"` of a table; packages and `__main__` do not count;
-- class names used more than once: the same name defined in two places of `urc`;
-- functions over 60 lines: without decorators, with the docstring;
-- repeated lines: each function is a list of statements, with variable names and constants blanked.
-  A compound statement counts with its head. Four statements in a row that an earlier function also
-  has are repeats, and their lines are counted once.
+- modules with one importer: modules of `urc` imported by exactly one other module, at any level, or
+  named by an entry `"urc.module:name"` of a table; packages and `__main__` do not count;
+- class names used more than once: names that `urc` defines in two or more places;
+- functions over 60 lines: lines include the docstring, but not decorators;
+- repeated lines: a function counts as a list of statements, with variable names and constants
+  blanked. Of a compound statement, only the header counts. Four consecutive statements that also
+  occur in an earlier function are repeated; each line counts once.
 """
 
 import argparse
@@ -33,7 +33,7 @@ _ENTRY = re.compile(r"(urc(?:\.\w+)+):\w+")
 
 @dataclass
 class Module:
-    """One Python file, parsed."""
+    """A parsed Python file."""
 
     path: str
     name: str
@@ -42,29 +42,29 @@ class Module:
 
     @property
     def is_package(self) -> bool:
-        """Whether it is the file of a package."""
+        """Whether the module is the `__init__.py` of a package."""
         return self.path.endswith("__init__.py")
 
 
 @dataclass
 class Lines:
-    """Lines of Python by kind."""
+    """Numbers of lines of Python code, by kind."""
 
     total: int = 0
     blank: int = 0
     docstring: int = 0
     comments: int = 0
-    """Comments, alone or after code."""
+    """Lines with a comment, alone or after code."""
 
     @property
     def code(self) -> int:
-        """Lines with code or a comment."""
+        """Number of lines with code or a comment."""
         return self.total - self.blank - self.docstring
 
 
 @dataclass
 class Structure:
-    """Every figure, with the names behind it."""
+    """All metrics, with the names of the counted modules, classes and functions."""
 
     lines: Lines = field(default_factory=Lines)
     files: int = 0
@@ -77,11 +77,17 @@ class Structure:
 
 
 def main() -> int:
-    """Print the table, and the names if requested; return the exit code."""
+    """Print the table of metrics, and the names if requested; return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m scripts.structure", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("root", nargs="?", type=Path, default=ROOT, help="the tree to measure")
-    parser.add_argument("--names", action="store_true", help="list the names behind the counts")
+    parser.add_argument(
+        "root", nargs="?", type=Path, default=ROOT, help="root folder of the measured tree"
+    )
+    parser.add_argument(
+        "--names",
+        action="store_true",
+        help="list the names of the counted modules, classes and functions",
+    )
     options = parser.parse_args()
     root: Path = options.root
     found = structure(modules(root, "urc"))
@@ -100,7 +106,7 @@ def main() -> int:
 
 
 def table(found: Structure) -> list[tuple[str, str | int]]:
-    """Return the name and figure of each row about `urc`."""
+    """Return the name and value of each metric of `urc`."""
     lines = found.lines
     return [
         ("lines of Python in urc/", lines.total),
@@ -120,7 +126,7 @@ def table(found: Structure) -> list[tuple[str, str | int]]:
 
 
 def names(found: Structure) -> Iterator[str]:
-    """Yield the names behind the figures."""
+    """Yield the names of the counted modules, classes and functions."""
     yield "\nmodules with one importer"
     yield from (f"  {name}" for name in found.one_importer)
     yield "\nclass names used more than once"
@@ -131,7 +137,7 @@ def names(found: Structure) -> Iterator[str]:
 
 
 def modules(root: Path, folder: str) -> list[Module]:
-    """Return every Python module below a folder, in the order of their paths."""
+    """Return all Python modules below a folder, sorted by path."""
     found = []
     for file in sorted((root / folder).rglob("*.py")):
         path = file.relative_to(root).as_posix()
@@ -142,7 +148,7 @@ def modules(root: Path, folder: str) -> list[Module]:
 
 
 def structure(found: list[Module]) -> Structure:
-    """Return all figures of the modules."""
+    """Return all metrics of the modules."""
     public, private = repeated_names(found)
     return Structure(
         lines=lines_of(found),
@@ -157,7 +163,7 @@ def structure(found: list[Module]) -> Structure:
 
 
 def lines_of(found: list[Module]) -> Lines:
-    """Return the total line counts of the modules."""
+    """Return the sums of the line counts of the modules."""
     counted = Lines()
     for module in found:
         lines = module.text.splitlines()
@@ -193,7 +199,7 @@ def with_one_importer(found: list[Module]) -> list[str]:
 
 
 def imported(module: Module, known: set[str]) -> set[str]:
-    """Return the modules of `known` that a module imports or names in a table."""
+    """Return the modules in `known` that a module imports or names in a table."""
     found: set[str] = set()
     for node in ast.walk(module.tree):
         if isinstance(node, ast.Import):
@@ -207,7 +213,7 @@ def imported(module: Module, known: set[str]) -> set[str]:
 
 
 def classes(found: list[Module]) -> Iterator[tuple[str, str]]:
-    """Yield name and place of each class."""
+    """Yield the name and location of each class."""
     for module in found:
         for node in ast.walk(module.tree):
             if isinstance(node, ast.ClassDef):
@@ -215,7 +221,7 @@ def classes(found: list[Module]) -> Iterator[tuple[str, str]]:
 
 
 def repeated_names(found: list[Module]) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
-    """Return public and private class names with two or more definitions, and their places."""
+    """Return public and private class names with several definitions, and their locations."""
     places: dict[str, list[str]] = defaultdict(list)
     for name, place in classes(found):
         places[name].append(place)
@@ -232,7 +238,7 @@ def functions(module: Module) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef
 
 
 def long_functions(found: list[Module]) -> list[str]:
-    """Return name, place and length of each function over the limit."""
+    """Return name, location and length of each function that exceeds `LONG` lines."""
     return [
         f"{node.name} {module.path}:{node.lineno} ({length} lines)"
         for module in found
@@ -242,7 +248,7 @@ def long_functions(found: list[Module]) -> list[str]:
 
 
 def repeated_lines(found: list[Module]) -> int:
-    """Count the lines in runs of statements that an earlier function also has."""
+    """Count the lines of statement sequences that also occur in an earlier function."""
     seen: set[tuple[str, ...]] = set()
     repeated: set[tuple[str, int]] = set()
     for module in found:
@@ -265,7 +271,7 @@ def repeated_lines(found: list[Module]) -> int:
 
 
 def statements(node: ast.AST) -> Iterator[tuple[range, str]]:
-    """Yield lines and shape of each statement in a function, in reading order."""
+    """Yield the lines and the normalized form of each statement in a function, in source order."""
     for inner in ast.iter_child_nodes(node):
         if isinstance(inner, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             continue  # counted on its own
@@ -280,7 +286,7 @@ def statements(node: ast.AST) -> Iterator[tuple[range, str]]:
 
 
 def shape_of(node: ast.AST) -> str:
-    """Return a statement without its blocks, variable names and constants."""
+    """Return the normalized form of a statement: without blocks, variable names and constants."""
     if isinstance(node, ast.Name | ast.Constant):
         return type(node).__name__
     parts = [type(node).__name__]
@@ -293,7 +299,7 @@ def shape_of(node: ast.AST) -> str:
 
 
 def javascript(folder: Path) -> int:
-    """Count the lines of JavaScript below a folder."""
+    """Count the lines of JavaScript files below a folder."""
     return sum(
         len(file.read_text("utf-8").splitlines())
         for file in folder.rglob("*.js")

@@ -1,11 +1,11 @@
-"""The catalogues of the pages' texts: update from the sources, and compilation.
+"""The catalogues of the pages' texts: update from the sources, check, and compilation.
 
     python -m scripts.translations            update translations/*.po and compile them
     python -m scripts.translations --check    exit 1 if a catalogue is out of date or has gaps
 
 Sources are the page templates, the pages' modules, and the widgets' templates, modules, titles and
-summaries. A message is a text in ``t("...")`` or ``ctx.t("...")``. The catalogues are gettext's PO
-files, which any translation program opens.
+summaries. A message is a text in ``t("...")`` or ``ctx.t("...")``. The catalogues are PO files of
+gettext, which any translation program can open.
 """
 
 import argparse
@@ -33,12 +33,12 @@ IDLE_HEADERS = tuple(
     f'"{name}'
     for name in ("POT-", "PO-", "Project-", "Report-", "Last-", "Language-Team", "Generated-")
 )
-"""Headers of a PO file that would change with the date or the program."""
+"""Headers of a PO file that are removed, because they change with the date or the program."""
 HOLE = re.compile(r"\{[a-z_]+\}")
 
 
 def sources() -> Iterator[tuple[str, Path]]:
-    """Yield (method, file) for every file with text for people."""
+    """Yield Babel's extraction method and the path of every file with texts for people."""
     for pattern, method in (
         ("templates/*.j2", "jinja2"),
         ("widgets/*/*.j2", "jinja2"),
@@ -54,7 +54,7 @@ def sources() -> Iterator[tuple[str, Path]]:
 
 @cache
 def messages() -> Mapping[str, list[str]]:
-    """Return message → its files, in order of appearance."""
+    """Return a mapping of messages to their files, in order of appearance."""
     found: dict[str, list[str]] = {}
     for method, path in sources():
         with path.open("rb") as stream:
@@ -71,7 +71,7 @@ def messages() -> Mapping[str, list[str]]:
 
 
 def updated(tag: str, wanted: Mapping[str, list[str]]) -> Catalog:
-    """Return the catalogue with exactly these messages; existing translations stay."""
+    """Return the updated catalogue with exactly these messages; existing translations stay."""
     place = FOLDER / f"{tag}.po"
     old = read_po(io.BytesIO(place.read_bytes()), tag) if place.is_file() else Catalog(tag)
     new = Catalog(
@@ -86,7 +86,7 @@ def updated(tag: str, wanted: Mapping[str, list[str]]) -> Catalog:
 
 
 def faults(tag: str, catalog: Catalog) -> Iterator[str]:
-    """Yield the faults: gaps, and placeholders that a translation lost or added."""
+    """Yield the errors: missing translations, and missing or additional placeholders."""
     for message in entries(catalog):
         text, said = str(message.id), str(message.string)
         if not said:
@@ -96,12 +96,12 @@ def faults(tag: str, catalog: Catalog) -> Iterator[str]:
 
 
 def entries(catalog: Catalog) -> list[Message]:
-    """Return the messages without the header."""
+    """Return the messages of a catalogue without its header."""
     return [message for message in catalog if message.id]
 
 
 def written(catalog: Catalog) -> dict[Path, str]:
-    """Return the files of one catalogue with their content."""
+    """Return the paths and contents of one language's catalogue files."""
     stream = io.BytesIO()
     write_po(stream, catalog, width=100, omit_header=False, include_lineno=False)
     lines = stream.getvalue().decode().splitlines()
@@ -113,7 +113,7 @@ def written(catalog: Catalog) -> dict[Path, str]:
 
 
 def is_same(place: Path, text: str) -> bool:
-    """Return whether a file has this content, regardless of the layout of a PO file."""
+    """Return whether a file has this content, ignoring the formatting of PO files."""
     if not place.is_file():
         return False
     old = place.read_text(encoding="utf-8")
@@ -125,7 +125,7 @@ def is_same(place: Path, text: str) -> bool:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Update or check the catalogues."""
+    """Update or check the catalogues; return the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--check", action="store_true")
     is_check = parser.parse_args(arguments).check
@@ -137,7 +137,7 @@ def main(arguments: list[str] | None = None) -> int:
         for place, text in written(catalog).items():
             if is_check:
                 if not is_same(place, text):
-                    wrong.append(f"{place.name} is behind its sources: run scripts.translations")
+                    wrong.append(f"{place.name} is outdated: run python -m scripts.translations")
             else:
                 place.write_text(text, encoding="utf-8")
     for line in wrong:

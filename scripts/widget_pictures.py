@@ -3,7 +3,8 @@
     python -m scripts.widget_pictures             all widgets
     python -m scripts.widget_pictures NAME ...    only these
 
-Each shows the first states of the widget's demo in one row, dark, as in the gallery.
+Each picture shows the first states of the widget's demo in one row, in the dark theme, as in the
+gallery.
 """
 
 import argparse
@@ -22,7 +23,7 @@ from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images" / "widgets"
 STATES = 3
-"""Limit of states in one picture."""
+"""Maximum number of states in one picture."""
 WIDTH = 1240
 READY_MS = 30_000
 
@@ -40,7 +41,7 @@ ONLY = """
 
 
 async def take(browser: Browser, address: str, name: str) -> None:
-    """Write the picture of one widget."""
+    """Write the picture of one widget's demo."""
     context = await browser.new_context(
         viewport={"width": WIDTH, "height": 700}, locale=LOCALE, reduced_motion="reduce"
     )
@@ -60,7 +61,7 @@ async def take(browser: Browser, address: str, name: str) -> None:
 
 
 async def run(names: list[str]) -> None:
-    """Take the pictures, one after the other."""
+    """Take the pictures of the widgets one after another."""
     IMAGES.mkdir(parents=True, exist_ok=True)
     async with (
         running_dashboard(FakeRobot(dashboard_profile())) as address,
@@ -77,7 +78,7 @@ def main(arguments: list[str] | None = None) -> int:
     known = WidgetFolder(shipped("widgets")).names()
     wanted = parser.parse_args(arguments).names or known
     if unknown := sorted(set(wanted) - set(known)):
-        print(f"there is no widget {unknown[0]!r}", file=sys.stderr)
+        print(f"unknown widget {unknown[0]!r}", file=sys.stderr)
         return 2
     asyncio.run(run(wanted))
     return 0

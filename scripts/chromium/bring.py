@@ -1,8 +1,8 @@
-"""A Chromium from npm, for Linux x64 machines without a browser and without root.
+"""The installation of Chromium from npm, for Linux x64 machines without a browser and without root.
 
-The package is made for cloud functions: brotli archives of the browser, its libraries, fonts and a
-software renderer. They are unpacked once into the user's cache, together with a launcher that sets
-the paths of libraries and fonts.
+The npm package is intended for cloud functions. It contains brotli archives of the browser, its
+libraries, fonts and a software renderer. The archives are unpacked once into the user's cache,
+together with a launcher that sets the paths of libraries and fonts.
 """
 
 import hashlib
@@ -53,11 +53,11 @@ FONTS_CONF = """<?xml version="1.0"?>
 
 
 class BringError(Exception):
-    """The reason why npm provides no browser, in one line."""
+    """A failed installation of the browser from npm; the message is one line."""
 
 
 def bring_chromium() -> str:
-    """Return the launcher of a Chromium in the user's cache; install it at the first use."""
+    """Return the launcher of Chromium in the user's cache; the first call installs Chromium."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
         raise BringError("the package exists for Linux x64 only")
     folder = cache_folder()
@@ -73,14 +73,14 @@ def bring_chromium() -> str:
 
 
 def cache_folder() -> Path:
-    """Return the folder for the version in the lock file."""
+    """Return the cache folder for the Chromium version in the lock file."""
     lock = hashlib.sha256((HERE / "package-lock.json").read_bytes()).hexdigest()[:12]
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return cache / "urc" / f"chromium-{lock}"
 
 
 def install(work: Path) -> Path:
-    """Download and unpack into `work`; return the folder to keep."""
+    """Download and unpack Chromium into `work`; return the folder with the result."""
     node = node_executable()
     if node is None:
         raise BringError("unpacking needs Node, which is not installed")
@@ -111,19 +111,22 @@ def decompress(node: str, source: Path, target: Path) -> None:
 
 
 def unpack(archive: Path, folder: Path) -> None:
-    """Extract a tar whose hash is in the lock file: plain files and folders inside `folder`."""
+    """Extract a tar archive, pinned by hash in the lock file, into `folder`.
+
+    Only plain files and folders are accepted.
+    """
     with tarfile.open(archive) as tar:
         for member in tar.getmembers():
             target = (folder / member.name).resolve()
             if not target.is_relative_to(folder.resolve()):
-                raise BringError(f"{archive.name} reaches outside its folder: {member.name!r}")
+                raise BringError(f"{archive.name} points outside its folder: {member.name!r}")
         # Debian 12's Python 3.11.2 has no `filter` yet; later ones warn without it.
         options = {"filter": "data"} if hasattr(tarfile, "data_filter") else {}
         tar.extractall(folder, **options)  # type: ignore[arg-type]  # noqa: S202  # checked above
 
 
 def write_launcher(folder: Path) -> None:
-    """Write the launcher and the font configuration, with the paths after the renaming."""
+    """Write the launcher and the font configuration, with the final paths of the cache folder."""
     final = cache_folder()
     (folder / "fonts.conf").write_text(FONTS_CONF.format(folder=final), encoding="utf-8")
     launcher = folder / "chromium"

@@ -26,15 +26,15 @@ WITHOUT_NETCAT = Brought(left_out=[need for need in NEEDS if need.name == "netca
         ([OK], COMPLETE, "", "", 0, "all passed"),
         ([OK], COMPLETE, "", "true", 0, "all passed"),
         ([OK, BAD], COMPLETE, "", "", 1, "1 of 2 steps failed: tests"),
-        ([OK], WITHOUT_NETCAT, "", "", 0, "all that ran passed"),
-        ([OK], COMPLETE, "the type check: no Node", "", 0, "all that ran passed"),
+        ([OK], WITHOUT_NETCAT, "", "", 0, "all executed steps passed"),
+        ([OK], COMPLETE, "the type check: no Node", "", 0, "all executed steps passed"),
         (
             [OK],
             WITHOUT_NETCAT,
             "",
             "true",
             1,
-            "all that ran passed, but with CI=true nothing may be left out",
+            "all executed steps passed, but with CI=true no test may be skipped",
         ),
         (
             [OK],
@@ -42,7 +42,7 @@ WITHOUT_NETCAT = Brought(left_out=[need for need in NEEDS if need.name == "netca
             "the type check: no Node",
             "true",
             1,
-            "all that ran passed, but with CI=true nothing may be left out",
+            "all executed steps passed, but with CI=true no test may be skipped",
         ),
     ],
 )
@@ -217,7 +217,7 @@ def test_a_benchmark_with_a_page_brings_its_browser(name: str) -> None:
         ("x\n\n[a](b.md#two-words)", []),
         ("x\n\n[a](b.md#three)", ["README.md:3: b.md#three: no such heading"]),
         ("```\n[a](missing.md)\n```\n![p](p.png)", ["README.md:4: p.png: no such file"]),
-        ("[a](../outside.md)", ["README.md:1: ../outside.md: leads out of the tree"]),
+        ("[a](../outside.md)", ["README.md:1: ../outside.md: points outside the tree"]),
         ("# Here\n[a](#here)", []),
     ],
 )

@@ -24,7 +24,7 @@ def test_a_problem_behind_a_renamed_key_is_the_same(tmp_path: Path) -> None:
     comparison = compared(tmp_path, MOVED)
     assert not comparison.is_different
     assert comparison.counts["reports equal"] == 1
-    assert comparison.counts["of them in a new column"] == 1
+    assert comparison.counts["problems in a new column"] == 1
 
 
 def test_another_place_severity_or_code_is_a_difference(tmp_path: Path) -> None:

@@ -186,7 +186,7 @@ def test_what_is_explained_is_not_told(tmp_path: Path, capsys: pytest.CaptureFix
     """By its own change, or by its kind. But 90 % are to be killed."""
     code, said = summary(tmp_path, capsys, EXPLAINED, _1=0, _2=0)
     assert "survived:" not in said
-    assert "0 survivors are neither killed nor explained" in said
+    assert "0 surviving mutants are not explained" in said
     assert code == 1
 
 
@@ -196,7 +196,7 @@ def test_a_survivor_is_told_with_its_change(
     code, said = summary(tmp_path, capsys, "", _1=1, _2=0)
     assert f"survived: {TICK}2" in said
     assert "  -        self.moves = True\n  +        self.moves = None" in said
-    assert "1 survivors are neither killed nor explained" in said
+    assert "1 surviving mutants are not explained" in said
     assert code == 1
 
 
@@ -205,7 +205,7 @@ def test_an_explanation_that_is_not_needed_is_told(
 ) -> None:
     code, said = summary(tmp_path, capsys, EXPLAINED, _1=1, _2=36)
     assert (
-        "mutants.toml: no surviving mutant matches any more: "
+        "mutants.toml: no surviving mutant matches this explanation: "
         "urc.guard.motion_scheduler.MotionScheduler.tick" in said
     )
     assert code == 0
@@ -215,7 +215,7 @@ def test_a_run_that_was_stopped_says_that_there_is_more(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     code, said = summary(tmp_path, capsys, "", _1=1, _2=None)
-    assert "1 mutants wait: run ./dev mutate again" in said
+    assert "1 mutants are untested: run ./dev mutate again" in said
     assert code == 3
 
 
