@@ -339,7 +339,7 @@ class GuardedConnection:
         try:
             self._credit -= self._emit(messages.BytesReceived(self.name, self._turn, data))
         except UNFIT as fault:
-            raise PeerClosed(f"what the robot sent cannot be passed on ({fault})") from fault
+            raise PeerClosed(f"the received data cannot be passed on ({fault})") from fault
 
     async def _recover(self, reason: str, *, is_abort: bool = False) -> None:
         """Close a broken connection, inform the engine, and reconnect if a stop is pending."""

@@ -358,7 +358,7 @@ class MotionScheduler:
         now = self._clock.now()
         if self._is_stalled(now):
             limit_ms = self._watch.limit_s * 1000
-            self._failed(f"the robot has taken nothing for {limit_ms:.0f} ms while it moved")
+            self._failed(f"the robot has accepted no data for {limit_ms:.0f} ms while moving")
             return
         self.write_due()
 

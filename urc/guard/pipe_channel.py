@@ -39,7 +39,7 @@ _AT_ONCE: Final = 3
 `_AGAIN_S`."""
 _AGAIN_S: Final = 1.0
 _FINISH_S: Final = 3.0
-_DIED: Final = "the guard of this line ended; another one is starting"
+_DIED: Final = "the guard of this connection ended; a new guard is starting"
 
 log = logging.getLogger(__name__)
 
@@ -220,7 +220,7 @@ class PipeChannel:
         if self._is_finishing:
             return
         self._bury()
-        log.error("the guard ended; another one is starting and will stop the robot")
+        log.error("the guard ended; a new guard is starting and will stop the robot")
         loop = asyncio.get_running_loop()
         is_short = loop.time() - self._started_s < _STEADY_S and not self._has_served
         self._short_lives = self._short_lives + 1 if is_short else 0

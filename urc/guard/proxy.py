@@ -305,7 +305,7 @@ class GuardedTransport:
             if numbered is not None or sent.counted is None:
                 again.append((sent, numbered))
                 continue
-            log.warning("%s: a frame cannot be written with the next number", self._address)
+            log.warning("%s: a frame cannot be rendered with the next counter value", self._address)
             sent.counted = sent.left = None  # settled together with the next frame that is sent
         # Stops with the numbers after these frames must reach the guard before the frames do.
         self._stands(self._name, said.stand, False)

@@ -58,15 +58,15 @@ class Freshness:
             of: the control. Each control has an independent order of numbers.
         """
         if given.epoch != epoch:
-            return f"it belongs to lease {given.epoch}, and this is {epoch}"
+            return f"the input belongs to lease {given.epoch}, but the present lease is {epoch}"
         if given.number <= self._newest.get(of, -1):
-            return "it is not newer than the last one"
+            return "the input is not newer than the last one"
         back = self._number - given.echo
         if not 0 <= back < len(self._issued):
-            return "it answers no tick of this server"
+            return "the input echoes no beat of this server"
         issued_at = self._issued[-1 - back]
         if now - issued_at > OLDEST_S:
-            return f"it is {(now - issued_at) * 1000:.0f} ms old"
+            return f"the input is {(now - issued_at) * 1000:.0f} ms old"
         self._newest[of] = given.number
         return ""
 

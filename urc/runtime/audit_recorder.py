@@ -48,7 +48,7 @@ def _harmless(
             take(self, *args, **named)
         except Exception:  # supervisor: motion and STOP must go on
             if not self.is_faulty:
-                log.exception("the audit log lacks an event of %s", self.robot)
+                log.exception("an event is missing in the audit log of %s", self.robot)
             self.is_faulty = True
 
     return taken

@@ -59,11 +59,13 @@ async def ros_topics(transport: Transport, timeout_s: float) -> list[RosTopic]:
     finally:
         await transport.close()
     if said.attributes.get("ok") is not True:
-        raise TransportError(f"{transport.address}: no rosapi ({said.attributes.get('reason')})")
+        raise TransportError(
+            f"{transport.address}: rosapi is not available ({said.attributes.get('reason')})"
+        )
     values = said.body if isinstance(said.body, Mapping) else NOTHING
     names, types = values.get("topics"), values.get("types")
     if not isinstance(names, list) or not isinstance(types, list):
-        raise TransportError(f"{transport.address}: rosapi's reply has no topics")
+        raise TransportError(f"{transport.address}: the reply of rosapi contains no topics")
     types += [""] * (len(names) - len(types))
     return sorted(RosTopic(str(name), str(kind)) for name, kind in zip(names, types, strict=False))
 

@@ -103,7 +103,7 @@ class PendingCommands:
         now = self._clock.now()
         for number, (_, due_s, name) in list(self._all.items()):
             if due_s <= now:
-                text = f"no outcome within {self._limits_s[name]:g} s"
+                text = f"the command has not finished within {self._limits_s[name]:g} s"
                 self.settle(Failed(number, name, "timed-out", text))
         first_s = min((due_s for _, due_s, _ in self._all.values()), default=None)
         if first_s is not None:
@@ -318,7 +318,7 @@ class Dispatcher:
         if self._is_stopped:
             return Failed(request.id, request.command, "disconnected", "the session is closed")
         if self._waiting.is_full:
-            text = f"{MAX_WAITING} commands are waiting already; this one was dropped"
+            text = f"{MAX_WAITING} commands are already waiting; the new command was dropped"
         else:
             text = "the robot accepts no more bytes at the moment; the command was dropped"
         return Failed(request.id, request.command, "queue-full", text)

@@ -311,7 +311,7 @@ class Link:
         else:
             # A robot that accepts connections but sends nothing stays silent across reconnects.
             state: LinkState = "silent" if self._is_overdue else "lost"
-            self._lose(state, asked or reason or "the line was closed")
+            self._lose(state, asked or reason or "the connection was closed")
             if not self._is_persistent:
                 # The engine's own pace (polls, timeouts) is slow enough for the robot.
                 self._retry_s = self._clock.now() + self._spec.backoff.initial_s

@@ -183,7 +183,7 @@ class MotionController:
         elif verb == "reset":
             outcome = lease.reset(who)
         else:
-            return f"the controls know no {verb!r}"
+            return f"unknown lease request {verb!r}"
         if isinstance(outcome, LeaseRefused):
             return outcome.message
         self._settle(outcome)

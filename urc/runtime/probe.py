@@ -123,16 +123,16 @@ async def _opened_alone(session: Session, names: list[str], table: Table) -> dic
     for name in names:
         spec, transport = driver.transports[name], made[name].transport
         if spec.tunnel:
-            text = f"is opened through {spec.tunnel} when a command needs it; it was not tried"
+            text = f"is opened through {spec.tunnel} on demand, and was not tested"
             tried[name] = ProbeResult(name, spec.type, transport.address, "opens", text, "")
             continue
         try:
             async with asyncio.timeout(spec.timeouts.connect_s + 1):
                 await transport.open(spec.timeouts.connect_s)
-            text = "can be opened; commands open it as needed"
+            text = "can be opened; commands open the connection on demand"
             tried[name] = ProbeResult(name, spec.type, transport.address, "opens", text, "")
         except (TransportError, TimeoutError) as error:
-            text = str(error) or f"not open within {spec.timeouts.connect_s:g} s"
+            text = str(error) or f"not opened within {spec.timeouts.connect_s:g} s"
             tried[name] = _failed(spec, transport.address, text)
         finally:
             with suppress(TimeoutError):
@@ -143,17 +143,17 @@ async def _opened_alone(session: Session, names: list[str], table: Table) -> dic
 
 def _told(spec: TransportSpec, status: LinkStatus | None) -> ProbeResult:
     if status is None:
-        return _failed(spec, "", "it was not tried in time")
+        return _failed(spec, "", "the test ended before this transport was tried")
     if status.state == "live":
         return ProbeResult(spec.name, spec.type, status.address, "answers", "answers", "")
     if _is_connected(status) and not status.attempts:
-        text = status.detail or "connected, and an answer is overdue"
+        text = status.detail or "connected, but a reply is overdue"
         advice = (
-            "the replies do not fit this driver: check the port, and"
-            " whether it is this robot; many robots serve one program at a time"
+            "the replies do not match this driver: check the port and"
+            " the robot; many robots serve only one program at a time"
         )
         return ProbeResult(spec.name, spec.type, status.address, "opens", text, advice)
-    return _failed(spec, status.address, status.detail or "not connected in time")
+    return _failed(spec, status.address, status.detail or "not connected before the time limit")
 
 
 def _failed(spec: TransportSpec, address: str, text: str) -> ProbeResult:
@@ -163,12 +163,12 @@ def _failed(spec: TransportSpec, address: str, text: str) -> ProbeResult:
 _ADVICE: Final = (
     (
         ("refused",),
-        "the machine responds, but nothing listens on that port: check the port, and that the"
-        " robot's program runs",
+        "the machine responds, but nothing listens on that port: check the port, and whether"
+        " the robot's program is running",
     ),
     (
         ("name or service", "no address", "not known", "resolve", "look up", "no such host"),
-        "the name cannot be resolved: check its spelling, or write the address in numbers",
+        "the host name cannot be resolved: check the spelling, or use a numeric address",
     ),
     (
         ("unreachable", "no route"),
@@ -176,16 +176,19 @@ _ADVICE: Final = (
     ),
     (
         ("timed out", "within", "time-out", "timeout"),
-        "no reply from that address: check the address, that the robot is on, and the network",
+        "no reply from that address: check the address, the network, and whether the robot is on",
     ),
-    (("host key", "fingerprint"), "look at the robot's key, then trust it with urc trust"),
+    (
+        ("host key", "fingerprint"),
+        "compare the robot's host key, then trust the key with 'urc trust'",
+    ),
     (
         ("authenticat", "password", "permission denied", "login", "publickey", "401", "403"),
         "the robot rejects the login: check user, password and key file",
     ),
     (
         ("no such file", "could not open port", "no such device"),
-        "the file or device is not there: check its path, and that it is plugged in",
+        "the file or device does not exist: check the path, and whether the device is plugged in",
     ),
     (("certificate", "tls", "ssl"), "check the certificate, and whether the port speaks TLS"),
 )
@@ -197,4 +200,4 @@ def advice(text: str) -> str:
     for words, what in _ADVICE:
         if any(word in lower for word in words):
             return what
-    return "check the settings of this line"
+    return "check the settings of this transport"

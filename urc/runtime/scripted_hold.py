@@ -123,8 +123,8 @@ async def _stop_is_out(
     until = _now() + _STOP_OUT_S
     while not (controller.rests(name) and backend.is_open(name)):
         if _now() >= until:
-            text = f"the stop has not reached the robot: its line took none for {_STOP_OUT_S:g} s"
-            raise CommandFailed("disconnected", text)
+            text = f"the connection accepted no data for {_STOP_OUT_S:g} s"
+            raise CommandFailed("disconnected", f"the stop has not reached the robot: {text}")
         await asyncio.sleep(_LOOK_S)
     if is_lossy(driver, driver.commands[name].transport):
         await asyncio.sleep(STOP_FOR_S + _WORKED_OFF_S)

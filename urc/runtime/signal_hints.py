@@ -17,15 +17,15 @@ __all__ = ["SignalHints"]
 
 _SHOWN: Final = 40
 _WAITED_FOR: Final = {
-    "length": "for the rest of its length",
-    "fixed": "for the rest of a frame",
-    "idle": "for the silence that ends it",
-    "slip": "for the byte that ends it",
-    "cobs": "for the byte that ends it",
-    "brackets": "for the bracket that ends it",
+    "length": "for the rest of the declared length",
+    "fixed": "for the rest of the frame",
+    "idle": "for the silence after the frame",
+    "slip": "for the end byte of the frame",
+    "cobs": "for the end byte of the frame",
+    "brackets": "for the closing bracket",
     "json": "for the end of the JSON",
     "xml": "for the end of the XML element",
-    "regex": "for bytes that complete the pattern",
+    "regex": "for bytes that match the pattern",
 }
 """Framing type → the missing part of an incomplete frame."""
 
@@ -83,7 +83,7 @@ class SignalHints:
         if framing.type == "delimiter":
             end = framing.options.get("rx")
             return f"{text} waits for the delimiter {end!r} (write it in double quotes)"
-        what = _WAITED_FOR.get(framing.type, "for the end of its frame")
+        what = _WAITED_FOR.get(framing.type, "for the end of the frame")
         passes = " (write wait: after it)" if framing.type == "idle" and self._in_steps else ""
         return f"{text} waits {what}{passes}"
 

@@ -60,9 +60,9 @@ def check_values(
         age = "stale" if age_s > longest_s else "fresh"
         if state.age and state.age != age:
             if state.age == "never":
-                yield f"{name}: it should never be set, found {shown(sample.value)}"
+                yield f"{name}: expected no value, found {shown(sample.value)}"
             else:
-                told = f"it was set {age_s:g} s ago, and is stale after {longest_s:g} s"
+                told = f"the value is {age_s:g} s old, and stale after {longest_s:g} s"
                 yield f"{name}: it should be {state.age}, but {told}"
 
 
@@ -103,7 +103,7 @@ def check_reply(
     """Yield the mismatches of the first finished command, and discard its result."""
     place = next((place for place, one in enumerate(ended) if of in ("", one.command)), None)
     if place is None:
-        yield f"{of or 'the command'} should be done, but is not: no answer, or no command was run"
+        yield f"{of or 'the command'} should be done, but no reply arrived or no command was run"
         return
     one = ended.pop(place)
     if isinstance(one, Failed):

@@ -38,7 +38,7 @@ __all__ = ["Exercised", "Kind", "TestEngine", "encoded"]
 Kind = Literal["command", "poll", "message"]
 Exercised = tuple[Kind, str]
 """Kind and name of a part of a driver that a test can use."""
-_TWO_PEOPLE: Final = ("who wrote the test", "who runs it")
+_TWO_PEOPLE: Final = ("author of the test", "operator")
 """Confirmations for every command, because tests check the bytes on the wire."""
 _BRINGS_OBJECTS: Final = frozenset(("ros",))
 """Transport types with objects as messages; all other types carry bytes."""
@@ -161,7 +161,7 @@ class TestEngine:
             return
         data = made.numbered.data if isinstance(made, CountedFrame) else made
         if data == b"":
-            text = "it waits for an outstanding reply"
+            text = "the command waits for an outstanding reply"
             self._failed(Failed(number, name, "not-allowed", text))
             return
         self.perform([Send(command.transport, data), Replied(number, name, {})])
@@ -190,7 +190,7 @@ class TestEngine:
         if piece.verb in ("response", "feedback"):
             numbers = self._numbers.get(transport, [])
             if not numbers:
-                raise UrcError(f"{transport}: no request waits for this {piece.verb}")
+                raise UrcError(f"{transport}: no pending request for this {piece.verb}")
             number = numbers.pop(0) if piece.verb == "response" else numbers[0]
             attributes = {"ok": True, **attributes, "id": number}
         return Envelope(piece.verb, attributes, body)

@@ -67,7 +67,7 @@ class AddressLookup:
                 fault = fault or TimeoutError(errno.ETIMEDOUT, "timed out")
             except OSError as refused:
                 fault = refused
-        raise fault or OSError("the name has no address")
+        raise fault or OSError("the host name has no address")
 
 
 def _look_up(host: str, port: int, kind: socket.SocketKind) -> asyncio.Future[list[Address]]:

@@ -105,7 +105,7 @@ class HttpTransport:
         """
         if not isinstance(data, Envelope) or data.verb != "request":
             what = f"{data.verb} anything" if isinstance(data, Envelope) else "send bare bytes"
-            raise TransportError(f"http makes requests; it cannot {what}")
+            raise TransportError(f"http can only send requests; it cannot {what}")
         if self._talk is None:
             raise PeerClosed(CLOSED)
         await self._talk.send(data)

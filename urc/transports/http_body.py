@@ -22,7 +22,7 @@ async def read_body(response: httpx2.Response, max_bytes: int) -> bytes:
     Raises:
         HttpFault: the body exceeds `max_bytes`, compressed or not, or has an unknown encoding.
     """
-    too_long = f"the answer is longer than {max_bytes} bytes"
+    too_long = f"the response is longer than {max_bytes} bytes"
     if int(response.headers.get("content-length") or 0) > max_bytes:
         raise HttpFault(too_long)
     body = bytearray()
@@ -34,17 +34,17 @@ async def read_body(response: httpx2.Response, max_bytes: int) -> bytes:
     if packing in ("identity", "") or not body:
         return bytes(body)
     if packing not in _FORMATS:
-        raise HttpFault(f"the answer has the encoding {packing[:40]!r}, which was not requested")
+        raise HttpFault(f"the response has the encoding {packing[:40]!r}, which was not requested")
     unpacker = zlib.decompressobj(_FORMATS[packing])
     try:
         # One byte more than the limit reveals a longer body, and limits the decompression.
         plain = unpacker.decompress(body, max_bytes + 1)
     except zlib.error as fault:
-        raise HttpFault(f"the answer is not valid {packing} ({fault})") from fault
+        raise HttpFault(f"the response is not valid {packing} ({fault})") from fault
     if len(plain) > max_bytes:
         raise HttpFault(too_long)
     if not unpacker.eof:
-        raise HttpFault("the answer was cut short")
+        raise HttpFault("the response ended too early")
     return plain
 
 

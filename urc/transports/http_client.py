@@ -100,7 +100,9 @@ class HttpClient:
         """
         if leads_up(path):
             base = self._base.removeprefix(self._origin)
-            raise HttpFault(f"{method} {path[:80]!r} would leave {base or '/'}: no '..' in a path")
+            raise HttpFault(
+                f"{method} {path[:80]!r} would leave {base or '/'}: a path must not contain '..'"
+            )
         return self._built(method, f"{self._base}/{path.lstrip('/')}", headers, body)
 
     def follow(
@@ -123,7 +125,9 @@ class HttpClient:
             b"",
         ):
             where = f"{self._place.authority}"
-            raise HttpFault(f"{one_line(reference)!r} is not on {where}: only the robot is asked")
+            raise HttpFault(
+                f"{one_line(reference)!r} is not on {where}: requests go only to the robot"
+            )
         return self._built(method, str(url.copy_with(fragment=None)), headers, body)
 
     @property
@@ -200,16 +204,16 @@ class HttpClient:
         if isinstance(fault, httpcore2.ConnectError | httpcore2.ConnectTimeout):
             return HttpFault(str(fault), is_unreachable=True)
         if isinstance(fault, httpcore2.PoolTimeout):
-            return HttpFault(f"all connections to {where} are taken by other requests")
+            return HttpFault(f"all connections to {where} are in use by other requests")
         if isinstance(fault, httpcore2.TimeoutException):
             return HttpFault(late(where, waited_s), is_unanswered=True)
         if isinstance(fault, httpcore2.RemoteProtocolError | httpx2.ProtocolError):
             if "without sending" in str(fault):
-                text = "the robot closed the connection without an answer"
+                text = "the robot closed the connection without a response"
                 return HttpFault(text, is_unanswered=True)
             return HttpFault(f"{where} does not speak HTTP ({_short(fault)})")
         if isinstance(fault, httpcore2.LocalProtocolError | NotImplementedError):
-            return HttpFault(f"this request cannot be made ({_short(fault)})")
+            return HttpFault(f"the request cannot be sent ({_short(fault)})")
         return HttpFault(_short(fault), is_unanswered=True)
 
 

@@ -36,7 +36,7 @@ def boundary_of(content_type: str) -> bytes:
     header["content-type"] = content_type
     if header.get_content_maintype() != "multipart":
         found = content_type or "no Content-Type"
-        raise MultipartFault(f"the answer is {found}, not multipart/x-mixed-replace")
+        raise MultipartFault(f"the response is {found}, not multipart/x-mixed-replace")
     named = header.get_param("boundary", "")
     core = (named if isinstance(named, str) else "").strip().lstrip("-")
     if not core:

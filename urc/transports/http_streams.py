@@ -66,16 +66,18 @@ def streams_of(subscriptions: Sequence[TopicSubscription]) -> list[StreamSpec]:
             words = "mjpeg, stills, sse or lines"
             raise TransportError(f"http needs {words} as stream of {topic!r}, not {kind!r}")
         if event and kind != "sse":
-            raise TransportError(f"http has named events only in streams of sse: {topic!r}")
+            raise TransportError(
+                f"http supports named events only in streams of type sse: {topic!r}"
+            )
         if not isinstance(every_s, int | float) or not 0.01 <= every_s <= 3600:
-            raise TransportError(f"http needs every from 10ms to 1h for {topic!r}, not {every_s!r}")
+            raise TransportError(f"http needs 10ms to 1h as every of {topic!r}, not {every_s!r}")
         spec = StreamSpec(str(kind), path, float(every_s), frozenset({topic}))
         known = found.setdefault(path, spec)
         if (known.kind, known.every_s) != (spec.kind, spec.every_s):
-            raise TransportError(f"http cannot listen to {path!r} in two ways")
+            raise TransportError(f"http cannot listen to {path!r} with two kinds of stream")
         found[path] = known._replace(topics=known.topics | {topic})
     if len(found) > MAX_STREAMS:
-        raise TransportError(f"http listens to at most {MAX_STREAMS} paths")
+        raise TransportError(f"http supports at most {MAX_STREAMS} paths")
     return list(found.values())
 
 
@@ -174,7 +176,7 @@ class HttpStream:
                 return
             kind = response.headers.get("content-type", "no Content-Type")
             if not kind.startswith("text/event-stream"):
-                raise HttpFault(f"the answer is {kind[:80]}, not text/event-stream")
+                raise HttpFault(f"the response is {kind[:80]}, not text/event-stream")
             cutter = EventStreamParser(MAX_EVENT_BYTES, self._last_id)
             async for piece in response.aiter_raw():
                 for event in cutter.feed(piece):

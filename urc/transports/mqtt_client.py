@@ -204,7 +204,7 @@ class _Session:
         except (ValueError, UnicodeEncodeError) as problem:
             raise TransportError(f"mqtt cannot publish to {topic!r} ({problem})") from problem
         if done.rc == MQTTErrorCode.MQTT_ERR_QUEUE_SIZE:
-            text = f"the broker has not acknowledged {MAX_UNACKNOWLEDGED} messages; dropped"
+            text = f"message dropped: {MAX_UNACKNOWLEDGED} earlier messages lack an acknowledgement"
             raise TransportError(text)
         while self._client.want_write() and self.queue.ended is None:
             await self._until_writable()

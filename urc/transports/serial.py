@@ -116,7 +116,7 @@ def explain(port: str, shown: str, fault: BaseException) -> str:
     if code in (errno.ENOTTY, errno.EISDIR):
         return f"{shown} is not a serial port"
     if code == errno.EINVAL:
-        return f"{shown} cannot be set up as asked; check baud, data_bits, parity and stop_bits"
+        return f"{shown} cannot be configured; check baud, data_bits, parity and stop_bits"
     words = fault.args[1] if code is not None and len(fault.args) > 1 else reason(fault)
     return f"cannot open {shown} ({str(words).lower()})"
 

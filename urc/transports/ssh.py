@@ -110,7 +110,7 @@ def _text(options: Mapping[str, object], name: str) -> str:
     if value is None:
         return ""
     if not isinstance(value, str):
-        raise TransportError(f"ssh: {name} is text; put it in quotation marks")
+        raise TransportError(f"ssh: {name} must be text; put the value in quotation marks")
     return value
 
 
@@ -132,7 +132,9 @@ def _environment(value: object) -> tuple[tuple[str, str], ...]:
         if not isinstance(name, str) or not _NAME.fullmatch(name):
             raise TransportError(f"ssh: {name!r} is not a name of an environment variable")
         if not isinstance(text, str):
-            raise TransportError(f"ssh: environment.{name} is text; put it in quotation marks")
+            raise TransportError(
+                f"ssh: environment.{name} must be text; put the value in quotation marks"
+            )
         pairs.append((name, text))
     return tuple(pairs)
 
@@ -186,7 +188,7 @@ class SshTransport:
         if self._connection is None:
             raise PeerClosed(CLOSED)
         if self._channel is None:
-            raise PeerClosed("this connection only tunnels others ('mode: forward')")
+            raise PeerClosed("this connection only tunnels other connections ('mode: forward')")
         await self._channel.write(bytes_of(data))
 
     async def close(self) -> None:
@@ -318,7 +320,7 @@ def from_setup(setup: TransportSetup) -> SshTransport:
         TransportError: an option is missing or invalid.
     """
     if setup.tunnel is not None and not isinstance(setup.tunnel, SshTransport):
-        raise TransportError("ssh can be tunnelled only through another ssh")
+        raise TransportError("ssh can be tunnelled only through another ssh transport")
     return SshTransport(read_target(setup), read_program(setup), setup.tunnel)
 
 

@@ -170,7 +170,7 @@ def _explain(target: SshTarget, client: _Client, fault: Exception) -> str:
         case asyncssh.HostKeyNotVerifiable():
             return f"the host key of {place} is not trusted ({_first(fault.reason)})"
         case asyncssh.KeyExchangeFailed():
-            hint = "" if login.legacy else "; 'legacy: true' allows old ones"
+            hint = "" if login.legacy else "; 'legacy: true' permits old algorithms"
             return f"{place} offers no algorithm that URC accepts{hint} ({_first(fault.reason)})"
         case asyncssh.ConnectionLost():
             return f"{place} closed the connection before the login was done"
@@ -195,9 +195,9 @@ def _explain_key(target: SshTarget, offer: OfferedHostKey) -> str:
     if offer.expected == "revoked":
         return f"the host key of {place} is revoked: found {shown}"
     if target.keys.is_pinned:
-        remedy = "put the new one into host_key"
+        remedy = "put the new key into host_key"
     else:
-        remedy = f"{command} trusts the new one"
+        remedy = f"{command} trusts the new key"
     return (
         f"the host key of {place} has changed: expected {offer.expected}, found {shown}; "
         f"the connection may be intercepted. If the robot was reinstalled, {remedy}"

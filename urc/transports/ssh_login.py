@@ -110,7 +110,7 @@ async def _private_key(login: Login) -> asyncssh.SSHKey:
     try:
         return await asyncio.to_thread(_read_key, login)
     except asyncssh.KeyEncryptionError as fault:
-        wrong = "the passphrase does not fit" if login.passphrase else "it needs a passphrase"
+        wrong = "the passphrase is wrong" if login.passphrase else "it needs a passphrase"
         raise ConnectFailed(f"cannot use {_shown(login.key)}: {wrong}") from fault
     except asyncssh.KeyImportError as fault:
         if "passphrase" in str(fault).lower():

@@ -209,7 +209,7 @@ class TcpListener(StreamTransport):
         if stream is None or self._newer is None:
             return
         if isinstance(stream, SupportsEnd):
-            stream.end(f"another robot has replaced it ({self._newer[1]})")
+            stream.end(f"another robot has replaced this connection ({self._newer[1]})")
 
     def _stay_open(self) -> None:
         if self._shut is not None:
@@ -316,7 +316,7 @@ def from_setup(setup: TransportSetup) -> Transport:
     port = _options.port("tcp", options)
     if mode == "connect":
         if "bind" in options or "from" in options:
-            raise TransportError("tcp takes bind and from with mode: listen only")
+            raise TransportError("tcp accepts bind and from only with mode: listen")
         host = _options.host("tcp", options)
         tls = Tls.of("tcp", options.get("tls"))
         return TcpTransport(host, port, tunnel=setup.tunnel, tls=tls)
@@ -326,6 +326,6 @@ def from_setup(setup: TransportSetup) -> Transport:
     only = _options.text("tcp", options, "host")
     who = _options.choice("tcp", options, "from", ("any", "host"), "host" if only else "any")
     if who == "host" and not only:
-        raise TransportError("tcp listens for one host only, and needs it as host")
+        raise TransportError("tcp needs the permitted robot as host with from: host")
     tls = Tls.of("tcp", options.get("tls"), is_server=True)
     return TcpListener(bind, port, only=only if who == "host" else "", tls=tls)

@@ -84,7 +84,7 @@ class TelnetTransport(StreamTransport):
         except (OSError, UnicodeError) as fault:
             raise ConnectFailed(self._address.explain(fault)) from fault
         except PeerClosed as closed:
-            raise ConnectFailed(f"{place} closed the connection at once") from closed
+            raise ConnectFailed(f"{place} closed the connection immediately") from closed
         finally:
             if inner is not None:
                 await inner.abort()
@@ -162,7 +162,7 @@ def from_setup(setup: TransportSetup) -> TelnetTransport:
     terminal = _options.text("telnet", options, "terminal", "VT100")
     if len(terminal) > _LONGEST_NAME or not (terminal.isascii() and terminal.isprintable()):
         raise TransportError(
-            f"telnet takes as terminal a name of up to {_LONGEST_NAME} letters, not {terminal!r}"
+            f"telnet needs a name of up to {_LONGEST_NAME} letters as terminal, not {terminal!r}"
         )
     negotiate = _options.choice("telnet", options, "negotiate", ("full", "passive"), "passive")
     wishes = TelnetOptions(

@@ -110,7 +110,7 @@ class UdpTransport:
         except TimeoutError as fault:
             is_known = self._line is not None
             await self.close()
-            what = "no datagram has reached" if is_known else "no answer about the host of"
+            what = "no datagram has reached" if is_known else "no answer to the address lookup of"
             raise ConnectFailed(f"{what} {self.address} within {timeout_s:g} s") from fault
         except BaseException:
             await self.close()
@@ -298,7 +298,7 @@ def from_setup(setup: TransportSetup) -> Transport:
     if not host and (port or who == "host" or is_broadcast):
         raise TransportError("udp needs a host name or address as host")
     if not listen and not (host and port):
-        raise TransportError("udp needs host and port of the robot, or an own port as listen")
+        raise TransportError("udp needs the host and port of the robot, or a local port as listen")
     return UdpTransport(
         host,
         port,

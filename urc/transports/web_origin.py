@@ -124,7 +124,7 @@ class OptionReader:
         if parts.scheme not in (plain, f"{plain}s") or not host or not _HOST.fullmatch(host):
             raise TransportError(wanted)
         if parts.username is not None or parts.password is not None:
-            message = f"{self.kind} takes user and password under auth, not in the url"
+            message = f"{self.kind} needs user and password under auth, not in the url"
             raise TransportError(message)
         if parts.fragment or port == 0 or not _PATH.fullmatch(parts.path + parts.query):
             raise TransportError(wanted)
@@ -139,12 +139,12 @@ class OptionReader:
             text = str(value).strip()
             # The value may be a secret: it is not shown.
             if not _TOKEN.fullmatch(name) or not text.isprintable() or not text.isascii():
-                raise TransportError(f"{self.kind} cannot send the header {name[:40]!r} as it is")
+                raise TransportError(f"{self.kind} cannot send the header {name[:40]!r}")
             if is_reserved(name) or name.lower() in _OURS:
                 raise TransportError(f"{self.kind} sets the header {name} itself")
             found[name] = text
         if len(found) > MAX_HEADERS:
-            raise TransportError(f"{self.kind} takes at most {MAX_HEADERS} headers")
+            raise TransportError(f"{self.kind} accepts at most {MAX_HEADERS} headers")
         return found
 
     def credentials(self, kinds: tuple[str, ...]) -> "Credentials | None":
@@ -171,7 +171,7 @@ class OptionReader:
         if place.is_secure:
             return Tls.of(self.kind, option or True)
         if option:
-            raise TransportError(f"{self.kind} was given tls, but its url says that it has none")
+            raise TransportError(f"{self.kind} has tls options, but its url is without TLS")
         return None
 
 

@@ -110,7 +110,7 @@ class WebSocketTransport:
             try:
                 message.decode()
             except UnicodeDecodeError as fault:
-                text = "a text message must be UTF-8, and these bytes are not; use send_as: binary"
+                text = "a text message must be valid UTF-8; use send_as: binary for other bytes"
                 raise TransportError(text) from fault
         try:
             await self._socket.send(message, text=self._is_text)
@@ -272,7 +272,7 @@ def _end(ended: ConnectionClosed) -> str:
         said = f" ({theirs.code} {one_line(theirs.reason)})" if theirs.code != _NORMAL else ""
         return f"{HUNG_UP}{said}".replace(" )", ")")
     if ours is not None and ours.code == CloseCode.INTERNAL_ERROR and "ping" in ours.reason:
-        return "the robot answered no ping"
+        return "the robot did not reply to a ping"
     if ours is not None and ours.code != _NORMAL:
         return f"the robot sent invalid data ({ours.code} {one_line(ours.reason)})"
     if isinstance(cause, OSError) and cause.args:

@@ -107,7 +107,7 @@ async def test_method_query_headers_and_body_arrive(web: Server) -> None:
         ("/moved", "robot redirected to http://127.0.0.1:1/elsewhere; redirects are not followed"),
         ("/basic/state.json", "401 Unauthorized"),
         ("/a\nb", "GET '/a\\nb' is not a valid request"),
-        ("/flood.cgi", "the answer is longer than 100000 bytes"),
+        ("/flood.cgi", "the response is longer than 100000 bytes"),
     ],
 )
 async def test_bad_answer_is_one_line(web: Server, path: str, reason: str) -> None:
@@ -170,7 +170,7 @@ async def test_a_url_that_leads_elsewhere_is_not_asked_for(web: Server, url: str
         assert answer.attributes["ok"] is False
         assert "status" not in answer.attributes
         reason = str(answer.attributes["reason"])
-        assert "only the robot is asked" in reason or "is not a URL" in reason
+        assert "requests go only to the robot" in reason or "is not a URL" in reason
 
 
 @WEB

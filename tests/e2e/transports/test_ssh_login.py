@@ -55,7 +55,7 @@ async def test_locked_key_needs_its_passphrase(sshd: Sshd, tmp_path: Path) -> No
         == f"cannot use the key {key}: it needs a passphrase"
     )
     wrong = await refusal(line_to(sshd, **options, passphrase=WRONG))
-    assert wrong == f"cannot use the key {key}: the passphrase does not fit"
+    assert wrong == f"cannot use the key {key}: the passphrase is wrong"
     line = line_to(sshd, **options, passphrase=RIGHT)
     await line.open(OPEN_S)
     await line.send(b"ping\n")
@@ -151,7 +151,7 @@ async def test_trusted_host_key_opens_the_line_until_it_changes(sshd: Sshd) -> N
     assert said == (
         f"the host key of 127.0.0.1:{sshd.port} has changed: expected {before}, found "
         f"{sshd.fingerprint} (ssh-ed25519); the connection may be intercepted. If the robot was "
-        "reinstalled, 'urc trust PROFILE gauge' trusts the new one"
+        "reinstalled, 'urc trust PROFILE gauge' trusts the new key"
     )
     assert sshd.said.count("Accepted") == logins
     assert file.read_text("ascii").count("\n") == 1
@@ -164,7 +164,7 @@ async def test_pinned_host_key_is_the_only_one(sshd: Sshd, tmp_path: Path) -> No
     other = fingerprint_of(new_key(tmp_path / "other"))
     said = await refusal(line_to(sshd, host_key=other))
     assert f"expected {other}, found {sshd.fingerprint}" in said
-    assert said.endswith("put the new one into host_key")
+    assert said.endswith("put the new key into host_key")
 
 
 async def test_known_hosts_of_openssh_are_understood(sshd: Sshd, tmp_path: Path) -> None:
@@ -196,7 +196,7 @@ async def test_server_of_2010_needs_legacy(tmp_path_factory: pytest.TempPathFact
     await sshd.start()
     try:
         said = await refusal(line_to(sshd))
-        assert "offers no algorithm that URC accepts; 'legacy: true' allows old ones" in said
+        assert "offers no algorithm that URC accepts; 'legacy: true' permits old algorithms" in said
         line = line_to(sshd, legacy=True, mode="exec", command="echo old")
         await line.open(OPEN_S)
         assert await hears(line, b"\n") == b"old\n"

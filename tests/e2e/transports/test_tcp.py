@@ -206,7 +206,7 @@ async def test_newer_robot_takes_the_place_of_the_older() -> None:
         reader, newer = await asyncio.open_connection("127.0.0.1", transport.port)
         with pytest.raises(PeerClosed) as told:
             await asyncio.wait_for(transport.receive(), WAIT_S)
-        assert str(told.value).startswith("another robot has replaced it (127.0.0.1:")
+        assert str(told.value).startswith("another robot has replaced this connection (127.0.0.1:")
         await transport.close()
         await transport.open(20.0)
         newer.write(b"it is me")
@@ -249,7 +249,7 @@ async def test_emulated_robot_calls_the_driver_that_listens() -> None:
             assert 0 <= (await session.command("ask")).values["battery"] < 100  # type: ignore[operator]
     with pytest.raises(TransportError) as told:
         from_setup(TransportSetup("wire", {"host": "arm", "port": 1, "bind": "0.0.0.0"}))
-    assert str(told.value) == "tcp takes bind and from with mode: listen only"
+    assert str(told.value) == "tcp accepts bind and from only with mode: listen"
 
 
 async def test_port_that_is_taken_is_told() -> None:

@@ -226,8 +226,8 @@ async def test_unknown_host_and_taken_port_are_told() -> None:
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({}, "udp needs host and port of the robot, or an own port as listen"),
-        ({"host": "arm"}, "udp needs host and port of the robot, or an own port as listen"),
+        ({}, "udp needs the host and port of the robot, or a local port as listen"),
+        ({"host": "arm"}, "udp needs the host and port of the robot, or a local port as listen"),
         ({"port": 1}, "udp needs a host name or address as host"),
         ({"listen": 1, "from": "host"}, "udp needs a host name or address as host"),
         ({"listen": 70_000}, "udp needs a port from 1 to 65535 as listen, not 70000"),

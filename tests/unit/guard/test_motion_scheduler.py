@@ -236,7 +236,7 @@ async def test_stalled_line_says_for_how_long(benches: list[Bench]) -> None:
     assert bench.heard() == []
     await bench.clock.advance(0.05)
     assert bench.heard()[0] == messages.LineLost(
-        "wire", 1, "the robot has taken nothing for 1000 ms while it moved"
+        "wire", 1, "the robot has accepted no data for 1000 ms while moving"
     )
 
 

@@ -211,7 +211,9 @@ async def test_next_guard_is_told_what_may_move(house: House) -> None:
         messages.ArmControl("wire", "turn", TURN),
         messages.ArmControl("wire", "lift", TERMS),
     ]
-    with pytest.raises(PeerClosed, match="the guard of this line ended; another one is starting"):
+    with pytest.raises(
+        PeerClosed, match="the guard of this connection ended; a new guard is starting"
+    ):
         await house.guard.transports["wire"].receive()
     house.guard.arm("drive", TERMS)
     house.guard.tick("drive", b"go on")

@@ -245,7 +245,7 @@ async def test_body_that_no_message_carries_ends_the_line(
     bench.robot.arriving.put_nowait(b"strange")
     await settle()
     assert bench.heard()[1:] == [
-        messages.LineLost("wire", 1, "what the robot sent cannot be passed on (a set)")
+        messages.LineLost("wire", 1, "the received data cannot be passed on (a set)")
     ]
 
 

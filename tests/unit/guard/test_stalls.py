@@ -98,7 +98,7 @@ async def test_stalled_line_is_reset_and_the_stop_is_first(rig: Rig) -> None:
     assert robot.aborts == 1
     assert robot.written.index(STOP) == len(robot.written) - 1
     assert robot.opens == 2
-    with pytest.raises(PeerClosed, match="has taken nothing for 220 ms while it moved"):
+    with pytest.raises(PeerClosed, match="has accepted no data for 220 ms while moving"):
         await rig.transport.receive()
     assert await rig.stops() == [("drive", "revoked")]
 

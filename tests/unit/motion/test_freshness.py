@@ -11,13 +11,16 @@ def test_an_input_that_echoes_a_fresh_tick_is_taken_once() -> None:
     fresh = Freshness()
     echo = fresh.issue(10.0)
     assert fresh.refusal(ControlInput(epoch=3, number=1, echo=echo), 3, 10.1) == ""
-    assert fresh.refusal(ControlInput(3, 1, echo), 3, 10.1) == "it is not newer than the last one"
+    assert (
+        fresh.refusal(ControlInput(3, 1, echo), 3, 10.1)
+        == "the input is not newer than the last one"
+    )
 
 
 def test_an_input_that_lay_in_a_buffer_is_refused() -> None:
     fresh = Freshness()
     echo = fresh.issue(10.0)
-    assert fresh.refusal(ControlInput(3, 1, echo), 3, 10.401) == "it is 401 ms old"
+    assert fresh.refusal(ControlInput(3, 1, echo), 3, 10.401) == "the input is 401 ms old"
 
 
 def test_an_input_of_another_lease_is_refused() -> None:
@@ -31,7 +34,10 @@ def test_ticks_are_remembered_in_a_bounded_way() -> None:
     first = fresh.issue(0.0)
     for number in range(1000):
         fresh.issue(number / 1000)
-    assert fresh.refusal(ControlInput(1, 1, first), 1, 0.0) == "it answers no tick of this server"
+    assert (
+        fresh.refusal(ControlInput(1, 1, first), 1, 0.0)
+        == "the input echoes no beat of this server"
+    )
 
 
 def test_everything_recorded_and_played_back_is_refused() -> None:
@@ -94,14 +100,18 @@ def test_control_without_a_name_is_one_control() -> None:
     echo = fresh.issue(1.0)
     assert fresh.refusal(ControlInput(1, 1, echo), 1, 1.0) == ""
     assert (
-        fresh.refusal(ControlInput(1, 1, echo), 1, 1.0, "") == "it is not newer than the last one"
+        fresh.refusal(ControlInput(1, 1, echo), 1, 1.0, "")
+        == "the input is not newer than the last one"
     )
 
 
 def test_number_below_0_is_newer_than_nothing() -> None:
     fresh = Freshness()
     echo = fresh.issue(1.0)
-    assert fresh.refusal(ControlInput(1, -1, echo), 1, 1.0) == "it is not newer than the last one"
+    assert (
+        fresh.refusal(ControlInput(1, -1, echo), 1, 1.0)
+        == "the input is not newer than the last one"
+    )
     assert fresh.refusal(ControlInput(1, 0, echo), 1, 1.0) == ""
 
 
@@ -109,7 +119,8 @@ def test_echo_of_a_tick_before_the_first_is_refused() -> None:
     fresh = Freshness()
     echo = fresh.issue(1.0)
     assert (
-        fresh.refusal(ControlInput(1, 1, echo - 1), 1, 1.0) == "it answers no tick of this server"
+        fresh.refusal(ControlInput(1, 1, echo - 1), 1, 1.0)
+        == "the input echoes no beat of this server"
     )
 
 
@@ -117,4 +128,4 @@ def test_input_is_taken_up_to_its_greatest_age_and_told_how_old_it_is_beyond() -
     fresh = Freshness()
     echo = fresh.issue(0.0)
     assert fresh.refusal(ControlInput(1, 1, echo), 1, OLDEST_S) == ""
-    assert fresh.refusal(ControlInput(1, 2, echo), 1, 2.0) == "it is 2000 ms old"
+    assert fresh.refusal(ControlInput(1, 2, echo), 1, 2.0) == "the input is 2000 ms old"

@@ -115,7 +115,8 @@ def test_a_mistake_in_here_reaches_nobody_and_is_told_once(
     recorder.stopped("go", "released", 2.0)
     recorder.leased(LeaseState(1, ANN), 3.0)
     assert recorder.is_faulty
-    assert [one.getMessage() for one in caplog.records] == ["the audit log lacks an event of rover"]
+    told = [one.getMessage() for one in caplog.records]
+    assert told == ["an event is missing in the audit log of rover"]
 
 
 def test_secrets_that_come_later_are_hidden_too_and_the_longest_first() -> None:

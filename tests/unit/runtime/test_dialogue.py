@@ -237,7 +237,7 @@ def steps(*lines: str, ready: bool = True) -> str:
         (
             steps('feed: { quiet: { hex: "07" } }, expect: { tone: 7 }'),
             "3:9 1: tone: expected 7, but nothing set it:"
-            " 07 waits for the silence that ends it (write wait: after it)",
+            " 07 waits for the silence after the frame (write wait: after it)",
         ),
         (
             steps('feed: { once: "A 3\\n" }', "expect: { load: 3 }"),
@@ -258,7 +258,7 @@ def steps(*lines: str, ready: bool = True) -> str:
         ),
         (
             steps("run: ask", "reply: {}"),
-            "4:9 2: the command should be done, but is not: no answer, or no command was run",
+            "4:9 2: the command should be done, but no reply arrived or no command was run",
         ),
         (
             steps("run: ask", 'feed: { once: "A 3\\n" }, reply: { load: 4, lode: 1 }'),
@@ -271,11 +271,11 @@ def steps(*lines: str, ready: bool = True) -> str:
         ),
         (
             steps('feed: { wire: "HOOK U\\n" }, expect: { hook: { age: never } }'),
-            "3:9 1: hook: it should never be set, found 'U'",
+            "3:9 1: hook: expected no value, found 'U'",
         ),
         (
             steps('feed: { wire: "HOOK U\\n" }', "wait: 9s, expect: { hook: { age: stale } }"),
-            "4:9 2: hook: it should be stale, but it was set 9 s ago, and is stale after 60 s",
+            "4:9 2: hook: it should be stale, but the value is 9 s old, and stale after 60 s",
         ),
         (
             steps("wait: 1s, closed: wire"),
@@ -355,7 +355,7 @@ ODOM = "feed: { ros: { message: { topic: %s, json: { pose: { x: 2 } } } } }, exp
         ),
         (
             steps("feed: { ros: { response: { json: {} } } }", "wait: 1s, sent: { ros: [] }"),
-            "3:9 1: ros: no request waits for this response",
+            "3:9 1: ros: no pending request for this response",
         ),
         (steps(ODOM % "/other"), None),
     ],

@@ -144,7 +144,7 @@ def test_a_test_that_only_feeds_holds_when_all_is_read() -> None:
         ),
         (
             trial(feed={"wire": "ok"}, run="stop"),
-            "stop should be done, but is not: no answer, or no command was run",
+            "stop should be done, but no reply arrived or no command was run",
         ),
         (trial(feed={"wire": "no\n"}, run="stop"), "no-match: nothing declared matches 'no'"),
         (

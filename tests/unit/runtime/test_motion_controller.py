@@ -222,7 +222,7 @@ def test_the_two_controls_of_one_screen_count_for_themselves() -> None:
     assert it.controller.tick("ann", "lift", {}, ControlInput(epoch, 6, echo), it.now) == ""
     assert it.controller.tick("ann", "drive", {}, ControlInput(epoch, 5, echo), it.now) == ""
     assert it.controller.tick("ann", "drive", {}, ControlInput(epoch, 5, echo), it.now) == (
-        "it is not newer than the last one"
+        "the input is not newer than the last one"
     )
 
 
@@ -237,7 +237,8 @@ def test_recorded_ticks_are_refused_by_the_next_connection() -> None:
     it.controller.heartbeat("ann", it.now)
     given = ControlInput(it.controller.lease.state.epoch, 1, echo)
     assert (
-        it.controller.tick("ann", "drive", {}, given, it.now) == "it answers no tick of this server"
+        it.controller.tick("ann", "drive", {}, given, it.now)
+        == "the input echoes no beat of this server"
     )
 
 
@@ -397,7 +398,7 @@ def test_too_many_screens_are_turned_away() -> None:
 
 def test_an_unknown_verb_is_told() -> None:
     """Whoever calls the desk from Python sees it."""
-    assert Scene().drive("ann", "grab") == "the controls know no 'grab'"
+    assert Scene().drive("ann", "grab") == "unknown lease request 'grab'"
 
 
 def test_a_robot_of_which_only_something_moves_by_itself_can_be_stopped_without_movers() -> None:

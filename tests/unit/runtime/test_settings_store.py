@@ -67,7 +67,7 @@ def test_a_failure_to_write_changes_nothing(
         ("10.0.0.5 did not answer within 3 s", "check the address"),
         ("the network is unreachable", "robot's network"),
         ("permission denied (publickey)", "check user, password and key file"),
-        ("something that nobody has seen before", "check the settings of this line"),
+        ("something that nobody has seen before", "check the settings of this transport"),
     ],
 )
 def test_a_failure_comes_with_what_to_do(text: str, what: str) -> None:

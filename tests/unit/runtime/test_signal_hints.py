@@ -13,7 +13,7 @@ WAITING = {
     "regex": (
         FramingSpec("regex", {"pattern": "[0-9]+;"}),
         "4",
-        "for bytes that complete the pattern",
+        "for bytes that match the pattern",
     ),
 }
 

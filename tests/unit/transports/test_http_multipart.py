@@ -129,8 +129,8 @@ def test_boundary_is_read_as_cameras_write_it(header: str, boundary: bytes) -> N
 @pytest.mark.parametrize(
     ("header", "told"),
     [
-        ("image/jpeg", "the answer is image/jpeg, not multipart/x-mixed-replace"),
-        ("", "the answer is no Content-Type, not multipart/x-mixed-replace"),
+        ("image/jpeg", "the response is image/jpeg, not multipart/x-mixed-replace"),
+        ("", "the response is no Content-Type, not multipart/x-mixed-replace"),
         ("multipart/x-mixed-replace", "the Content-Type names no boundary"),
         ("multipart/x-mixed-replace; boundary=--", "the Content-Type names no boundary"),
         (

@@ -43,7 +43,7 @@ def test_secrets_stay_out_of_what_is_printed() -> None:
         ({"host": ""}, "ssh needs a host name or address as host, not ''"),
         ({"port": 0}, "ssh needs a port from 1 to 65535 as port, not 0"),
         ({"username": None}, "ssh needs a username"),
-        ({"password": 1234}, "ssh: password is text; put it in quotation marks"),
+        ({"password": 1234}, "ssh: password must be text; put the value in quotation marks"),
         ({"mode": "sftp"}, "ssh needs mode: shell | exec | forward, not 'sftp'"),
         ({"mode": "exec"}, "ssh: 'mode: exec' needs a command"),
         ({"command": "cat"}, "ssh: a command needs 'mode: exec', not 'mode: shell'"),
@@ -55,7 +55,10 @@ def test_secrets_stay_out_of_what_is_printed() -> None:
         ({"keepalive_interval": 5}, "ssh: keepalive_interval is a time from 200ms to 1m, not 5"),
         ({"environment": "A=b"}, "ssh: environment is a list of NAME: value"),
         ({"environment": {"A B": "c"}}, "ssh: 'A B' is not a name of an environment variable"),
-        ({"environment": {"A": 1}}, "ssh: environment.A is text; put it in quotation marks"),
+        (
+            {"environment": {"A": 1}},
+            "ssh: environment.A must be text; put the value in quotation marks",
+        ),
         (
             {"host_key": "aa:bb"},
             "ssh: host_key is a fingerprint as 'ssh-keygen -l' prints it, SHA256:…, not 'aa:bb'",
@@ -77,7 +80,7 @@ def test_bad_option_of_ssh_is_told(options: dict[str, object], complaint: str) -
         ({"echo": 1}, "telnet needs true or false as echo, not 1"),
         (
             {"terminal": "VT\x1b"},
-            "telnet takes as terminal a name of up to 40 letters, not 'VT\\x1b'",
+            "telnet needs a name of up to 40 letters as terminal, not 'VT\\x1b'",
         ),
     ],
 )

@@ -96,7 +96,7 @@ RESET = ConnectionResetError(104, "Connection reset by peer")
 async def test_server_without_a_common_algorithm_is_told_so(fault: OSError | None) -> None:
     """Though it has closed the connection before we have read what it offers."""
     said = await refusal(Curt(VERSION + offer(OLD), fault))
-    assert "offers no algorithm that URC accepts; 'legacy: true' allows old ones" in said
+    assert "offers no algorithm that URC accepts; 'legacy: true' permits old algorithms" in said
     assert "received aes128-cbc" in said
 
 

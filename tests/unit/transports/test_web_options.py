@@ -28,7 +28,7 @@ WRONG: list[tuple[str, dict[str, object], str]] = [
     (
         "http",
         {"url": "http://me:secret@robot"},
-        "http takes user and password under auth, not in the url",
+        "http needs user and password under auth, not in the url",
     ),
     (
         "websocket",
@@ -38,13 +38,13 @@ WRONG: list[tuple[str, dict[str, object], str]] = [
 ]
 
 BESIDE: list[tuple[dict[str, object], str]] = [
-    ({"tls": True}, "http was given tls, but its url says that it has none"),
+    ({"tls": True}, "http has tls options, but its url is without TLS"),
     ({"auth": "me"}, "http needs a mapping as auth, not 'me'"),
     ({"auth": {"type": "magic"}}, "http needs basic, bearer or digest as type, not 'magic'"),
     ({"auth": {"type": "bearer"}}, "http needs a token for auth of type bearer"),
     ({"auth": {"type": "basic"}}, "http needs a user for auth of type basic"),
-    ({"headers": {"X Y": "z"}}, "http cannot send the header 'X Y' as it is"),
-    ({"headers": {"X": "a\nHost: b"}}, "http cannot send the header 'X' as it is"),
+    ({"headers": {"X Y": "z"}}, "http cannot send the header 'X Y'"),
+    ({"headers": {"X": "a\nHost: b"}}, "http cannot send the header 'X'"),
     ({"headers": {"Host": "b"}}, "http sets the header Host itself"),
     *(
         ({"headers": {name: "x"}}, f"http sets the header {name} itself")
@@ -110,22 +110,22 @@ STREAMS: list[tuple[list[TopicSubscription], str]] = [
     ),
     (
         [TopicSubscription("/cam#x", {"stream": "mjpeg"})],
-        "http has named events only in streams of sse: '/cam#x'",
+        "http supports named events only in streams of type sse: '/cam#x'",
     ),
     (
         [TopicSubscription("/s", {"stream": "stills", "every": 0.001})],
-        "http needs every from 10ms to 1h for '/s', not 0.001",
+        "http needs 10ms to 1h as every of '/s', not 0.001",
     ),
     (
         [
             TopicSubscription("/s#a", {"stream": "sse"}),
             TopicSubscription("/s", {"stream": "lines"}),
         ],
-        "http cannot listen to '/s' in two ways",
+        "http cannot listen to '/s' with two kinds of stream",
     ),
     (
         [TopicSubscription(f"/{n}", {"stream": "lines"}) for n in range(17)],
-        "http listens to at most 16 paths",
+        "http supports at most 16 paths",
     ),
 ]
 

@@ -31,7 +31,7 @@ from urc.runtime.session import CommandFailed
 __all__ = ["FASTEST", "Player", "REFUSAL"]
 
 FASTEST: Final = 100.0
-REFUSAL: Final = "this is a recording: nothing reaches a robot"
+REFUSAL: Final = "this is a recording: commands are not sent to a robot"
 _REST_S: Final = 0.25
 """Pause between the end and the next start of a repeated recording, in seconds."""
 _AHEAD: Final = 256

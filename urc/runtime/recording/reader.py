@@ -102,7 +102,7 @@ def open_recording(file: Path, *, has_profile: bool = False) -> Recording:
     if not document and not has_profile:
         raise UrcError(f"{file} is not a recording of URC: it contains no {PROFILE}")
     if not times:
-        why = f"{left} bytes of it cannot be read" if left > 0 else "it has only just begun"
+        why = f"{left} bytes cannot be read" if left > 0 else "the recording has only just begun"
         raise UrcError(f"{file} contains nothing to play: {why}")
     unread = 0 if is_whole else left or -1
     return Recording(file, document, min(times), max(times), topics, unread)

@@ -186,7 +186,7 @@ class Recorder:
             data, now_ns = document.encode(), time.time_ns()
             writer.add_attachment(now_ns, now_ns, PROFILE, "application/yaml", data)
         else:
-            text = f"{profile.file} can no longer be loaded: replay this with --profile"
+            text = f"{profile.file} can no longer be loaded: replay the recording with --profile"
             self.record([LogEntry(time.monotonic(), "warning", "recording", text)])
         for channel in channels(profile.driver):
             schema = json.dumps(channel.schema).encode()

@@ -85,8 +85,8 @@ _LINK_STATE: Final = {
 }
 _BYTES: Final = {
     "direction": {"enum": ["sent", "received"]},
-    "text": {"type": "string", "description": "what is text in UTF-8"},
-    "hex": {"type": "string", "description": "what is not"},
+    "text": {"type": "string", "description": "data as text, if it is valid UTF-8"},
+    "hex": {"type": "string", "description": "data in hex, if it is not valid UTF-8"},
 }
 _ENTRY: Final = {
     name: {"type": {str: "string", int: "integer", float: "number"}[kind]}

@@ -174,10 +174,10 @@ class _Plain:
         """Return `value` with null in place of numbers that JSON cannot express."""
         self._room -= 1 + (len(value) if isinstance(value, str | bytes) else 0)
         if self._room < 0:
-            raise ValueError(f"it expands to more than {MAX_BYTES} bytes")
+            raise ValueError(f"the frame expands to more than {MAX_BYTES} bytes")
         self._left -= 1
         if self._left < 0:
-            raise ValueError(f"it expands to more than {self._values} values")
+            raise ValueError(f"the frame expands to more than {self._values} values")
         if isinstance(value, float):
             return value if math.isfinite(value) else None
         if isinstance(value, dict):
@@ -188,12 +188,12 @@ class _Plain:
             return value
         if isinstance(value, int) and value.bit_length() <= 64:
             return value
-        raise ValueError(f"{type(value).__name__} is not a value of a message")
+        raise ValueError(f"{type(value).__name__} cannot be a value in a message")
 
 
 def _key(name: object) -> str:
     if not isinstance(name, str):
-        raise ValueError(f"{type(name).__name__} is not a name of a field")
+        raise ValueError(f"{type(name).__name__} is not a field name")
     return name
 
 
@@ -202,14 +202,14 @@ def _png_text(operation: Mapping[str, Any]) -> bytes:
     try:
         image = base64.b64decode(operation.get("data", ""), validate=True)
     except (binascii.Error, TypeError, ValueError) as problem:
-        raise BadOperation(f"the data of a png is not base64 ({problem})") from problem
+        raise BadOperation(f"the png data is not base64 ({problem})") from problem
     return _pixels(image).rstrip(b"\n\x00")
 
 
 def _pixels(image: bytes) -> bytes:
     """Return the pixel bytes of a non-interlaced 8-bit RGB image, the format of the bridge."""
     if not image.startswith(_PNG_MAGIC):
-        raise BadOperation("the data of a png is not a PNG image")
+        raise BadOperation("the png data is not a PNG image")
     width = height = 0
     packed = bytearray()
     at = len(_PNG_MAGIC)

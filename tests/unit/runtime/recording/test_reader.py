@@ -198,4 +198,6 @@ def test_nothing_recorded_is_told_in_one_line(tmp_path: Path) -> None:
     Recorder(empty, line_profile(), document="urc: 1\n").close()
     with pytest.raises(UrcError) as refused:
         open_recording(empty)
-    assert str(refused.value) == f"{empty} contains nothing to play: it has only just begun"
+    assert (
+        str(refused.value) == f"{empty} contains nothing to play: the recording has only just begun"
+    )

@@ -161,7 +161,9 @@ def test_a_document_that_is_gone_is_told_in_the_recording(file: Path) -> None:
     with pytest.raises(UrcError, match=r"it contains no profile\.yaml"):
         open_recording(file)
     found = list(open_recording(file, has_profile=True).messages(0))
-    assert b"can no longer be loaded: replay this with --profile" in b"".join(m.data for m in found)
+    assert b"can no longer be loaded: replay the recording with --profile" in b"".join(
+        m.data for m in found
+    )
 
 
 class FullDisk(io.BytesIO):
