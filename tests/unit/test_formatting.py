@@ -82,7 +82,7 @@ def test_filters_take_fields_apart(
         ("x | column('v')", {"x": [{"w": 1}]}, "the row {'w': 1} has no column 'v'"),
         ("x | column(5, ',')", {"x": ["a,b"]}, "the row ['a', 'b'] has no column 5"),
         ("x | cut(0, -1)", {"x": [3]}, "expected text or a list, found 3"),
-        ("x | digits(3, 64)", {"x": "0000"}, "4 characters cannot be split into numbers of 3 each"),
+        ("x | digits(3, 64)", {"x": "0000"}, "4 characters cannot be split into groups of 3"),
         ("x | digits(1, 10)", {"x": "A"}, "'A' is not a digit of base 10"),
         ("x | signed(8)", {"x": 256}, "the number must be a whole number from 0 to 255, found 256"),
         (

@@ -51,7 +51,7 @@ def _text(value: object) -> str:
 
 
 def sliced(value: Any, start: Any, stop: Any) -> Any:
-    """Return a slice of text, a list or bytes, from `start` up to `stop`; None for either end."""
+    """Return a slice of text, a list or bytes; None as `start` or `stop` sets no bound."""
     if not isinstance(value, (str, list, tuple, bytes)):
         raise TypeError(f"expected text, a list or bytes, found {_short(value)}")
     for place in (start, stop):

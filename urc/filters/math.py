@@ -50,4 +50,5 @@ GEOMETRY_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] =
     "sqrt": (_of("sqrt", math.sqrt, "expected a number of at least 0"), (0, 0)),
     "tan": (_of("tan", math.tan), (0, 0)),
 }
-"""Filter → function, and its least and largest number of arguments after the subject."""
+"""Each filter with its function, and its minimum and maximum number of arguments after the
+subject."""

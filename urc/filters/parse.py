@@ -89,7 +89,7 @@ def _digits(value: Any, width: Any, base: Any, zero: Any = 48) -> list[int]:
     first = ord(zero) if isinstance(zero, str) and len(zero) == 1 else zero
     least = _whole(first, "the code of the digit zero", 0, 0x10FFFF)
     if len(text) % size:
-        raise ValueError(f"{len(text)} characters cannot be split into numbers of {size} each")
+        raise ValueError(f"{len(text)} characters cannot be split into groups of {size}")
     numbers, number = [], 0
     for place, char in enumerate(text, 1):
         digit = ord(char) - least

@@ -189,7 +189,7 @@ def _fixed(value: Any, digits: Any) -> str:
 def _hex(value: Any, width: Any = 0) -> str:
     number, places = _number(value), int(_number(width))
     if not isinstance(number, int) or number < 0:
-        raise ValueError(f"'hex' takes a whole number from 0, found {_short(value)}")
+        raise ValueError(f"'hex' takes a non-negative whole number, found {_short(value)}")
     if not 0 <= places <= 64:
         raise ValueError(f"'hex' takes a width from 0 to 64, found {places}")
     return f"{number:0{places}X}" if places else f"{number:X}"

@@ -1,4 +1,4 @@
-"""A test of a framing with differently split data."""
+"""A helper that tests a framing with the same data, split in different ways."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol, TypeVar
@@ -34,8 +34,8 @@ def feed_three_ways(
     for place in range(len(data)):
         by_byte += dripping.feed(data[place : place + 1])
     if by_byte != whole:
-        raise AssertionError(f"byte by byte gave {by_byte!r}, whole gave {whole!r}")
+        raise AssertionError(f"decoded byte by byte: {by_byte!r}; decoded whole: {whole!r}")
     trailed = list(decoder().feed(data + trailing))
     if trailed != whole:
-        raise AssertionError(f"with trailing bytes gave {trailed!r}, whole gave {whole!r}")
+        raise AssertionError(f"decoded with trailing bytes: {trailed!r}; without: {whole!r}")
     return whole

@@ -96,7 +96,7 @@ class FakeSession:
 
 
 class FakeMotionBackend:
-    """Real hold-to-run machines with a fake transport, which accepts all data while `is_up`."""
+    """Real hold-to-run state machines with a fake transport that accepts data while `is_up`."""
 
     def __init__(self, clock: Clock, write: Callable[[bytes], None] | None = None) -> None:
         self.written: list[tuple[float, str]] = []

@@ -1,4 +1,4 @@
-"""An in-memory transport, whose robot is played by the test."""
+"""An in-memory transport for tests that play the role of the robot."""
 
 import asyncio
 from collections import deque
@@ -13,8 +13,8 @@ __all__ = ["MemoryTransport", "table_of"]
 class MemoryTransport:
     """A replacement for any transport, in the memory of the test.
 
-    The transport receives bytes from `feed`, and from `answer`, which is called with all sent data
-    and returns the chunks of a reply. `sent` contains the sent data, in its original pieces.
+    The transport receives bytes from `feed`, and from `answer`. The callback `answer` gets all sent
+    data, and returns the chunks of a reply. `sent` contains the sent data, in its original pieces.
     `hang_up` closes the connection, `refuse` rejects connections, and `stall_open` and
     `stall_sends` block.
     """
@@ -109,7 +109,7 @@ class MemoryTransport:
 
 
 def table_of(**transports: Transport) -> Table:
-    """Return a table that yields these transports by name, with any options."""
+    """Return a table of these transports by name; the table ignores options."""
     return _GivenTable(transports)
 
 

@@ -53,7 +53,7 @@ class AccessPage:
     url: str
     """Path of the requested page; "" if only the printed address gives access."""
     is_old: bool
-    """Whether the request had an invalid key; the page then says this first."""
+    """Whether the request had an invalid key, which the page reports first."""
     path: str
     """Path of this page, for the reload link: a link from another site sends no cookie."""
     robots: tuple[Stoppable, ...]

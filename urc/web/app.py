@@ -142,7 +142,7 @@ def _recorder(audit: AuditLog | None, name: str, robot: Robot) -> AuditRecorder 
 
 
 class _Dashboard(Starlette):
-    """Starlette with the page policy as outermost middleware, also for error responses."""
+    """Starlette with the page policy outermost, so that error responses get its headers."""
 
     def __init__(
         self,

@@ -1,7 +1,7 @@
 """The WebSocket of one page: it checks each message, and lets no page wait for another page.
 
 Layer 5. Two tasks of one group read and write. The writer sends the newest state as soon as the
-socket is free, so a slow page skips frames. A page that takes nothing for `STALL_S` is
+socket is free, so a slow page skips frames. A page that reads nothing for `STALL_S` seconds is
 disconnected.
 """
 
@@ -32,8 +32,8 @@ __all__ = ["TokenBucket", "BrowserClient", "FlowControl", "SocketPeer", "ClientS
 
 MESSAGES_PER_S = 100
 TICKS_PER_S = 2000
-"""Maximum rate of ticks of held controls; a higher rate closes the socket. Below this rate, excess
-ticks are thinned instead of refused."""
+"""Maximum rate of ticks of held controls; a higher rate closes the socket. Below this rate, ticks
+above the rate limit are thinned, and the socket stays open."""
 TICK = b'{"t":"tick",'
 """First bytes of a page's tick; ticks in any other form are decoded more slowly."""
 BAD_MESSAGES = 10
@@ -74,7 +74,7 @@ class BrowserClient:
         self.bad_messages = 0
 
     async def serve(self) -> None:
-        """Serve this page from the accepted socket to its end."""
+        """Serve the page over the accepted socket until either side closes."""
         missing = missing_settings(self._service.robot)
         if missing:
             names = ", ".join(setting.name for setting in missing)
@@ -334,7 +334,7 @@ class BrowserClient:
             self._reply(asked, values=replied.values, people=people, sent=_last(sent))
 
     def _limit_s(self, command: str) -> float | None:
-        """Return the time limit of a command, in seconds; None for a sequence."""
+        """Return a command's time limit in seconds; None for a sequence, which has no limit."""
         known = self._service.robot.profile.driver.commands.get(command)
         return None if known is not None and known.steps else COMMAND_TIMEOUT_S
 

@@ -27,7 +27,7 @@ def test_feed_three_ways_gives_the_frames_of_a_sound_decoder() -> None:
 
 def test_feed_three_ways_finds_a_decoder_that_trusts_the_network() -> None:
     """The message shows both results."""
-    with pytest.raises(AssertionError, match="byte by byte gave"):
+    with pytest.raises(AssertionError, match="decoded byte by byte"):
         feed_three_ways(Greedy, b"one")
 
 

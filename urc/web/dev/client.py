@@ -77,7 +77,7 @@ class Backlog:
             self._pop()
 
     def pop(self) -> list[TrafficRow]:
-        """Remove and return the oldest rows, at most as many as one message may contain."""
+        """Remove and return the oldest rows, up to the limit of one message."""
         return [self._pop() for _ in range(min(ROWS_AT_ONCE, len(self._rows)))]
 
     def _pop(self) -> TrafficRow:
@@ -92,7 +92,8 @@ class _Known(NamedTuple):
 
     profile: Profile
     settings: dict[str, Value]
-    """Values of the settings: placeholders for secrets, sample values for missing settings."""
+    """Values of the settings, with placeholders for secrets and sample values for missing
+    settings."""
 
 
 class DevClient:
@@ -136,7 +137,7 @@ class DevClient:
     # -- traffic
 
     async def _follow(self) -> None:
-        """Append the robot's traffic to the backlog, through all its sessions."""
+        """Append the robot's traffic to the backlog, session after session."""
         while True:
             if missing_settings(self._service.robot) or self._service.is_full:
                 await self._clock.sleep(RETRY_S)

@@ -42,7 +42,7 @@ class Preview(NamedTuple):
     """Reason for the refusal; "" if the command is allowed."""
     frames: tuple[PreviewLine, ...] = ()
     questions: tuple[str, ...] = ()
-    """Confirmations that the operator is asked for before the command runs."""
+    """Confirmation questions that the operator answers before the command runs."""
     requires: tuple[str, ...] = ()
     """Interlock conditions on signals of the robot; a preview cannot check them."""
 
@@ -57,7 +57,7 @@ def preview(
 
     Args:
         driver: the loaded driver.
-        settings: value of every setting; for a secret, a placeholder that is shown.
+        settings: value of every setting; a placeholder represents each secret.
         command: its name.
         arguments: values for some arguments of the command; the others take their defaults.
     """

@@ -37,7 +37,7 @@ class TrafficRow(msgspec.Struct, omit_defaults=True):
     time_s: float
     """Monotonic time of the row in seconds; the page receives the age."""
     kind: str
-    """``sent``, ``received`` or ``note``."""
+    """Kind of the row: ``sent``, ``received`` or ``note``."""
     line: str
     """Name of the transport that carried the data."""
     size: int = 0
@@ -58,7 +58,7 @@ class TrafficRow(msgspec.Struct, omit_defaults=True):
 
 
 def traffic_row(traffic: Traffic) -> TrafficRow:
-    """Return the row of sent or received data."""
+    """Return the log row for sent or received data."""
     row = TrafficRow(0, traffic.time_s, traffic.direction, traffic.transport)
     if traffic.envelope is not None:
         fill(row, traffic.envelope)
@@ -68,7 +68,7 @@ def traffic_row(traffic: Traffic) -> TrafficRow:
 
 
 def note_row(note: LogEntry) -> TrafficRow:
-    """Return the row of a fault or a state change."""
+    """Return the log row for a fault or a state change."""
     return TrafficRow(0, note.time_s, "note", note.source, level=note.level, text=cut(note.text))
 
 

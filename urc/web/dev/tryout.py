@@ -38,7 +38,7 @@ class FrameConsumer(NamedTuple):
     """The consumer of a frame."""
 
     kind: str
-    """``message``, ``reply`` or ``refusal`` (an error reply)."""
+    """Kind of the consumer: ``message``, ``reply`` or ``refusal`` (an error reply)."""
     names: tuple[str, ...]
     """Names of the messages or replies; several replies may match one frame."""
     fields: Mapping[str, object]
@@ -60,7 +60,7 @@ class ParsedPiece(NamedTuple):
     """Reason why the bytes are not a frame; "" for a frame."""
     takers: tuple[FrameConsumer, ...] = ()
     reasons: tuple[str, ...] = ()
-    """For a frame that nothing matches: the reason of each candidate."""
+    """Reason why each candidate does not match, if none matches."""
 
 
 class ParseResult(NamedTuple):
@@ -148,7 +148,7 @@ def try_out(
 def _cut(
     spec: TransportSpec, data: bytes
 ) -> tuple[list[tuple[int, int, bytes | FrameFault]], int, int]:
-    """Return frames and faults with positions, and the counts of leftover bytes and frames."""
+    """Cut `data` into frames and faults with their positions; also count the remainder."""
     decoder = build_framing(spec.framing).decoder()
     decoder.push(data, 0.0)
     cut: list[tuple[int, int, bytes | FrameFault]] = []

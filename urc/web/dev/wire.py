@@ -1,7 +1,7 @@
 """Message types of the developer page's WebSocket, without behaviour.
 
 Layer 5. Messages are JSON text in both directions; bytes are encoded as base64. Messages from the
-server to the page, by ``t``::
+server to the page, listed by their tag ``t``::
 
     hello    once, first
     profile  the profile, its state and its problems
@@ -212,7 +212,7 @@ def encode_profile(
     Args:
         driver: the running driver.
         messaging: types of the transports that carry messages.
-        edition: number of changes so far.
+        edition: number of changes to the published state.
         state: ``running``; ``waiting``, while a valid new version is pending; or ``broken``, for a
             file with errors.
         file: path of the robot's document.

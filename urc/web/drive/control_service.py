@@ -35,7 +35,7 @@ echo the numbers."""
 THINNED_S = 0.01
 """Minimum mean interval between two applied ticks of one control, in seconds."""
 PATIENCE_S = 0.25
-"""A late tick is not reported if the control has moved within this time, in seconds."""
+"""Time after a motion of the control within which a late tick is not reported, in seconds."""
 
 
 Offered = Literal["in time", "one more", "no tick"]
@@ -74,7 +74,7 @@ class ControlService:
         self._expiring: Timer | None = None
         self.once = OneShotCommands(driver, lambda: self.controller, clock, self.recorder)
         self.watch = LoopWatchdog(clock, self._held_up)
-        """Detects a blocked event loop; runs while the robot is connected."""
+        """Watchdog for a blocked event loop, active while the robot is connected."""
         self._heed(file)
 
     @property
@@ -90,8 +90,8 @@ class ControlService:
     def renew(self, driver: Driver, file: LatchStore | None) -> None:
         """Switch to another version of the driver, between two sessions.
 
-        A latched STOP stays latched, and a STOP without acknowledgement is still sent. All leases
-        end, and all controls are disarmed.
+        A latched STOP stays latched, and a STOP that the robot has not acknowledged is still sent.
+        All leases end, and all controls are disarmed.
         """
         kept = Latch(self.controller.lease.state, not self.controller.is_confirmed)
         for operator in self._operators.values():
@@ -177,7 +177,7 @@ class ControlService:
         )
 
     def changes(self, operator: OperatorSession) -> list[str]:
-        """Return all messages that the page has not received."""
+        """Return the messages that the page has not received yet."""
         texts: list[str] = []
         is_told = self.controller.can_move or not includes(
             operator.client.role, "drive"
@@ -199,8 +199,8 @@ class ControlService:
     def offer(self, operator: OperatorSession, data: bytes) -> Offered:
         """Accept a tick as raw bytes; return its kind.
 
-        A new tick replaces a pending tick without being decoded. Many such ticks pause the socket,
-        so a flood of ticks costs little time.
+        A new tick replaces a pending tick without being decoded. A flood of ticks pauses the
+        socket, and therefore costs little time.
         """
         if operator.alarms and operator.doubled is None:
             command = wire.command_of(data)

@@ -82,7 +82,7 @@ class OperatorSession:
         self.hold_back: Callable[[bool], None] = _nothing
         """Callback that pauses (True) or resumes (False) reading from the page's socket."""
         self.crowd = 0
-        """Number of ticks since one became pending; too many pause the socket."""
+        """Number of ticks received since one became pending; too many ticks pause the socket."""
         self.dropped = 0
         """Number of pending ticks that a newer tick replaced."""
 
@@ -99,7 +99,7 @@ class OperatorSession:
         )
 
     def is_first(self, about: str, number: int) -> bool:
-        """Return whether a message is the first copy with its number, not a duplicate."""
+        """Return whether a message is new, by its number, and not a duplicate."""
         return self.doubled is None or not number or self.doubled.accept(about, number)
 
     def forget(self, command: str) -> None:

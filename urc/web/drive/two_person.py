@@ -60,7 +60,7 @@ class TwoPersonRule:
     """The pending questions of one robot."""
 
     def __init__(self, operators: Callable[[], tuple[OperatorSession, ...]], clock: Clock) -> None:
-        """Prepare without questions; `operators` returns the pages that watch the robot."""
+        """Start without questions; `operators` returns the pages that watch the robot."""
         self._operators = operators
         self._clock = clock
         self._numbers = count(1)

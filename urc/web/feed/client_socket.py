@@ -15,7 +15,7 @@ __all__ = ["TokenBucket", "FlowControl", "SocketPeer", "ClientSocket", "SocketFl
 
 
 class ClientSocket(Protocol):
-    """The interface of an accepted WebSocket, as far as clients need it."""
+    """The methods of an accepted WebSocket that clients use."""
 
     async def receive(self) -> Message:
         """Return the next ASGI message."""

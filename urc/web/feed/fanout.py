@@ -1,9 +1,9 @@
 """Sends the readings of one robot to every page that shows it, at most once per display frame.
 
-Layer 5. Clients have no queue of their own. A flush wakes every client. As soon as its socket is
-free, each client receives all values newer than its last frame. A frame is encoded once for all
-clients with the same position. A slow client receives the newest values in one frame, and delays no
-other client.
+Layer 5. Clients have no queues. A flush wakes every client. As soon as its socket is free, each
+client receives all values newer than its last frame. A frame is encoded once for all clients with
+the same position. A slow client receives the newest values in one frame, and delays no other
+client.
 """
 
 import asyncio
@@ -24,8 +24,8 @@ __all__ = ["FRAMES_PER_SECOND", "Fanout", "FanoutPosition", "Pacer", "Place"]
 FRAMES_PER_SECOND = 60.0
 LOG_LINES_FOR_NEWCOMERS = 50
 SHARED_FOR_S = 0.005
-"""Time for which an encoded frame is reused, in seconds; the ages in a frame are those at its
-encoding."""
+"""Time for which an encoded frame is reused, in seconds. The ages in a frame are those at the time
+of its encoding."""
 
 
 class FanoutPosition(NamedTuple):
@@ -64,7 +64,7 @@ class Pacer:
     """A rate limiter that passes the first event of a burst immediately, then a steady rate.
 
     The limiter tolerates a jitter of one period, so a source at exactly this rate is never delayed.
-    Within any second, at most one event more than the rate passes.
+    In any second, the number of events exceeds the rate by at most one.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -79,7 +79,7 @@ class Pacer:
 
 
 class Fanout:
-    """The flush that all clients of one open session share."""
+    """The common flush for all clients of an open session."""
 
     def __init__(
         self,
@@ -100,7 +100,7 @@ class Fanout:
         """Hub revision of the last flush; newer values wait for the next flush."""
         self._updates: dict[FanoutPosition, _Update] = {}
         self._encoded_at = -1
-        """Hub revision for which `_updates` were encoded."""
+        """Hub revision at which `_updates` were encoded."""
         self._due: Timer | None = None
         """The next flush."""
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -191,7 +191,7 @@ class Fanout:
         return _Update(after, frames, now_s)
 
     def _without_pictures(self, samples: Sequence[Sample]) -> Sequence[Sample]:
-        """Remove image data, which only pages that show it receive; keep the end of an image."""
+        """Remove images, which are sent separately; keep samples that mark the end of an image."""
         pictures = self._pictures
         if not pictures:
             return samples

@@ -16,8 +16,8 @@ from urc.web.wire.picture import as_frame, encode_picture
 __all__ = ["EncodedImage", "ImageSubscription", "ImageCache", "is_picture"]
 
 SHARED_FOR_S = 0.05
-"""Time for which an encoded image is reused, in seconds. The age in the message is the age at its
-encoding; an error of some milliseconds does not justify another copy of several kilobytes.
+"""Time for which an encoded image is reused, in seconds. The message contains the age at its
+encoding. An error of a few milliseconds does not justify another copy of several kilobytes.
 """
 
 

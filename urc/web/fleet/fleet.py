@@ -41,7 +41,7 @@ class Fleet:
             service: creates the station of a robot.
 
         Raises:
-            UrcError: two robots bring different widgets of one name.
+            UrcError: two robots use different widgets of the same name.
         """
         self._service = service
         self.widgets: Assets = _assets(robots)

@@ -81,8 +81,8 @@ class RobotFactory:
         self._there = self._roots()
         """Packages that were installed at the start of the server."""
         self._begun: dict[str, str] = {}
-        """Maps a robot to its destination at the start, which limits the settings given at the
-        start."""
+        """Maps a robot to its first destination; settings given at the start are valid only for
+        this destination."""
         self._manifests: dict[tuple[str, int, int], Manifest] = {}
         """Manifests by digest and state of the archive, cached because pages often need all of
         them."""

@@ -107,13 +107,13 @@ class SessionLike(MotionSession, Protocol):
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
     ) -> Replied:
-        """Run one command and return its reply; raise `CommandFailed` without one."""
+        """Run a command and return its reply; raise `CommandFailed` if the command fails."""
 
     def pull(self, sequence: str, what: Pull) -> None:
         """Pause, step, resume or end a running sequence."""
 
     def latch(self, reason: str) -> None:
-        """Latch, end sequences and block autonomous motion; "" as reason resets the latch."""
+        """Latch STOP, end sequences and block autonomous motion; a `reason` of "" resets."""
 
 
 Glimpse = bytes | Mapping[str, Reading] | None
@@ -190,7 +190,7 @@ class RobotService:
         latch: LatchStore | None = None,
         recorder: AuditRecorder | None = None,
     ) -> None:
-        """Prepare the station, without a session until the first client.
+        """Prepare the station; the session opens for the first client.
 
         Args:
             robot: the robot.

@@ -1,1 +1,1 @@
-"""Files that pages may load, as tables from URL to file."""
+"""Tables that map URLs to the files that pages may load."""

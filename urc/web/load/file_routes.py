@@ -23,7 +23,7 @@ class FileRoutes:
 
     Args:
         vendor: folder of the third-party modules of the build; None without a build.
-        tiles: folder of map tiles, ``z/x/y.png``, or None.
+        tiles: folder of map tiles, ``z/x/y.png``; None for no tiles.
         widgets: returns the tables of widget files; the first table that contains a file is used.
     """
 
@@ -36,7 +36,7 @@ class FileRoutes:
         self._widgets = widgets
 
     def routes(self) -> list[Route]:
-        """Return the routes, for use after the routes of the widget pages."""
+        """Return the routes, which must follow the routes of the widget pages."""
         return [
             Route("/favicon.ico", self._favicon),
             Route("/app.webmanifest", self._manifest),

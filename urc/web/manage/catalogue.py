@@ -82,7 +82,7 @@ class PackageCatalog:
         return sorted(some, key=lambda entry: entry.number, reverse=True)
 
     def withdrawn(self, lock: Lock) -> list[str]:
-        """Return the withdrawn parts of an installed package for people, one per line."""
+        """Return a line of text for each withdrawn part of an installed package."""
         keys = map(parse_key, lock.packages)
         return withdrawn_lines(lock, [one for key in keys for one, _ in self.found.get(key, ())])
 

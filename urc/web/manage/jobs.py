@@ -1,7 +1,7 @@
 """The installation job: planned, reviewed, approved and done, or cancelled at any step.
 
-Layer 5. Nothing here blocks the loop. Downloads run in a thread that is abandoned on cancellation;
-the package store changes in one step at the end.
+Layer 5. No function of this module blocks the event loop. Downloads run in a thread that is
+abandoned on cancellation; the package store changes in one step at the end.
 """
 
 import asyncio
@@ -336,6 +336,6 @@ def _clean(lines: Iterable[str]) -> tuple[str, ...]:
 
 
 def _line(error: Exception) -> str:
-    """Return a failure in one line; of several problems, the first."""
+    """Return a failure as one line; of several problems, only the first."""
     text = str(error).strip().splitlines()
     return text[0] if text else type(error).__name__

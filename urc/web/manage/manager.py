@@ -46,7 +46,7 @@ class Manager:
         Args:
             factory: creates the robots.
             fleet: the served robots.
-            now: returns the time, in seconds.
+            now: returns the current time, in seconds.
             renew: switches to another version of a robot; may raise `UrcError`.
         """
         self.factory = factory
@@ -221,7 +221,7 @@ class Manager:
         return names_kept(self._kept_folder, meant, left)
 
     async def remove(self, text: str, *, forgets: bool = True) -> list[str]:
-        """Remove a package and the dependencies that become unused; return the names of all.
+        """Remove a package and its unneeded dependencies; return the names of removed packages.
 
         `forgets` also deletes the settings of its robot.
 

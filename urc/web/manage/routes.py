@@ -174,7 +174,7 @@ class ManageRoutes:
 
         Args:
             manager: the operations.
-            ways: the pages of this server, for links.
+            ways: navigation links of this server.
             is_here: returns whether a request has the start key.
             may_manage: returns whether a request may change packages and settings.
         """
@@ -226,7 +226,7 @@ class ManageRoutes:
 
     @_api
     async def cache(self, request: Request) -> Response:
-        """Return the packages that match ``kinds`` and ``words``, without any new request."""
+        """Return the packages that match ``kinds`` and ``words``, from memory."""
         query = request.query_params
         kinds = tuple(one for one in query.get("kinds", "").split(",") if one in _KINDS) or _KINDS
         cache = await asyncio.to_thread(
@@ -302,7 +302,7 @@ class ManageRoutes:
 
     @_api
     async def back(self, request: Request) -> Response:
-        """Restore the version before an update."""
+        """Restore the version of a package before its last update."""
         self.check(request)
         said = await body_of(request, InstallRequest)
         old = await self._manager.back(said.package)
@@ -334,7 +334,7 @@ class ManageRoutes:
 
     @_api
     async def cancel(self, request: Request) -> Response:
-        """Cancel the job; nothing has changed."""
+        """Cancel the job before it changes anything."""
         self.check(request)
         said = await body_of(request, JobDecision)
         return answer(self._manager.jobs.cancel(said.number).news())

@@ -58,7 +58,7 @@ class Field:
     """Value in effect while the field is empty."""
     options: tuple[Option, ...]
     is_given: bool
-    """Whether the value was given at the start of the server, and cannot be changed here."""
+    """Whether the value was given at the start of the server, and therefore cannot be changed."""
     is_set: bool
     """Whether the secret has a value."""
     is_withheld: bool
@@ -116,7 +116,7 @@ def settings_page(
         ways: the pages of this server, for links.
         driver: the name of the package or file in use.
         versions: installed versions of the driver, newest first.
-        may_manage: whether the visitor may change anything.
+        may_manage: whether the visitor may change packages and settings.
         fault: reason why the robot cannot be used; "" if it can.
     """
     title = profile.title or name
@@ -219,5 +219,5 @@ def _about(setting: Setting) -> str:
 
 
 def _text(value: Value) -> str:
-    """Return a value in the form in which a user enters it."""
+    """Return a value as text, in the form in which a user enters it."""
     return str(value).lower() if isinstance(value, bool) else str(value)

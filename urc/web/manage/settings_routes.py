@@ -1,4 +1,4 @@
-"""Routes of a robot's settings, which are entered, tested, stored and then used immediately.
+"""Routes of a robot's settings page, which tests, stores and applies the entered settings.
 
 Layer 5. Settings that fail the test are stored only if the user insists, because a robot may be
 off.
@@ -216,7 +216,7 @@ class SettingsRoutes:
 
 
 def _epoch(service: RobotService | None) -> int:
-    """Return a number that changes with every STOP and every change of the operator."""
+    """Return a number that changes with every STOP and every new operator."""
     return service.controls.controller.lease.state.epoch if service is not None else 0
 
 

@@ -56,7 +56,7 @@ def source_at(path: Path, installed: Sequence[Lock]) -> FileSource:
     """Return the package source at a path on this machine; raise `PackageError`.
 
     The path leads to a package folder, a bundle, an archive, an interface document, or the folder
-    of one.
+    of an interface document.
     """
     bare = path / "interface.yaml" if path.is_dir() else path
     if bare.suffix.lower() not in _DOCUMENTS or (path / MANIFEST).is_file():

@@ -66,7 +66,7 @@ class InstallRequest(ManageMessage, frozen=True):
 
     package: _Short
     yes: bool = False
-    """Whether to perform the removal; if not, it is only listed."""
+    """Whether to perform the removal; if not, the server only lists the packages."""
     forget: bool = True
     """Whether a removal also deletes the robot's settings and secrets."""
 
@@ -101,7 +101,7 @@ class JobNews(ManageMessage, frozen=True):
     """Number of steps; 0 while the number is unknown."""
     is_update: bool = False
     packages: tuple[str, ...] = ()
-    """Origin and signer of each package; for an update, the changes of both."""
+    """Origin and signer of each package; for an update, the changes of origin and signer."""
     may: tuple[str, ...] = ()
     """Permissions of the package, one per line."""
     risks: tuple[str, ...] = ()
@@ -112,7 +112,7 @@ class JobNews(ManageMessage, frozen=True):
     wire: tuple[str, ...] = ()
     """Changes that the update makes to the frames sent to the robot."""
     stays: str = ""
-    """Version that stays in use until the user chooses another version; "" if none does."""
+    """Version that stays in use until the user chooses another version; "" for no such version."""
     notes: tuple[str, ...] = ()
     """Further notes, for example about a repository that does not respond."""
 

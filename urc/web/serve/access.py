@@ -17,10 +17,10 @@ PARAMETER = "key"
 """Name of the query parameter that carries the start key."""
 PREFIX = "urc-start-"
 SESSIONS = 1000
-"""Maximum number of known browsers; above it, the oldest browser is forgotten."""
+"""Maximum number of known browsers; beyond this number, the oldest browser is forgotten."""
 CODES = 16
 OLD_COOKIES = 8
-"""Maximum number of cookies from earlier starts in one browser; above it, all these cookies are
+"""Maximum number of cookies from earlier starts in one browser; beyond this number, all of them are
 deleted."""
 
 Standing = Literal["here", "manager", "stranger"]
@@ -36,7 +36,7 @@ class Visitor(NamedTuple):
     name: str = ""
     """Identifier of the browser or program; "" for an unknown visitor. No secret."""
     is_program: bool = False
-    """Whether the request itself carries the key, which a page of another site cannot send."""
+    """Whether the request itself carries the key, as a page of another site cannot do."""
 
 
 UNKNOWN_VISITOR = Visitor()
@@ -83,7 +83,7 @@ class Access:
         return f"{url}?{PARAMETER}={code}"
 
     def address_of_managers(self, url: str) -> str:
-        """Return the address for remote managers; "" if there is no token."""
+        """Return the address for remote managers; "" without a manager token."""
         return f"{url}?{PARAMETER}={quote(self._token, safe='')}" if self._token else ""
 
     def admit(self, word: str) -> str | None:

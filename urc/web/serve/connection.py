@@ -1,8 +1,8 @@
 """One HTTP connection, with a time limit for requests and with policy headers in every refusal.
 
-Layer 5. A thin layer over uvicorn's protocol, used only by `server`. uvicorn itself refuses invalid
-HTTP, and connections above its limit. Without this layer, these refusals would lack the page
-policy.
+Layer 5. A thin layer over uvicorn's protocol, used only by `server`. By itself, uvicorn refuses
+invalid HTTP, and connections above its limit. Without this layer, refusals by uvicorn would lack
+the page policy.
 """
 
 import asyncio
@@ -20,10 +20,11 @@ from urc.web.serve.policy import REFUSAL_HEADERS
 __all__ = ["CONNECTIONS", "REQUEST_S", "RESERVE", "HttpConnection", "refusal"]
 
 CONNECTIONS = 1024
-"""Maximum number of open connections, including WebSockets. Another connection closes an idle
-connection: the oldest idle one of the address that has most of them."""
+"""Maximum number of open connections, including WebSockets. If the limit is reached, a new
+connection closes an idle connection: the oldest one of the address with the most idle
+connections."""
 RESERVE = 64
-"""Additional connections for STOP only, when no connection is idle."""
+"""Number of additional connections that are reserved for STOP while no connection is idle."""
 REQUEST_S = 5.0
 """Time limit for the arrival of a complete request with its body, in seconds. The time starts at
 the opening of the connection for the first request, and at the first byte for later requests.

@@ -15,7 +15,7 @@ __all__ = ["KNOWN_PLACES", "PLACES", "ConnectionQuota", "is_stop"]
 
 PLACES = 32
 """Maximum number of concurrent requests and sockets from one unknown address. A page uses up to two
-sockets and six requests, so the limit allows several pages, and a few people behind one address."""
+sockets and six requests. So the limit allows several pages, and a few people behind one address."""
 KNOWN_PLACES = 256
 """Maximum number of concurrent requests and sockets of a known browser or program, which may watch
 many robots."""

@@ -1,4 +1,4 @@
-"""Finds WebSocket frames that contain one whole text message; nearly every tick is such a frame.
+"""Finds WebSocket frames that contain one whole text message, such as nearly every tick.
 
 Layer 5, pure. It only reads. The WebSocket library processes all other frames from the same bytes:
 fragments, control frames and protocol errors. This module only counts the bytes of other frames, to

@@ -251,7 +251,7 @@ class _Answer:
 
     A route may set three keys in the state of its request. ``frame_policy`` is the policy of a
     frame in place of the page policy. ``is_code`` marks files that frames may load too. ``is_file``
-    marks third-party content, which must not act as a page of URC when it is opened directly.
+    marks third-party content, which must not act as a page of URC when opened directly.
     """
 
     def __init__(self, scope: Scope, send: Send, nonce: str) -> None:

@@ -56,7 +56,8 @@ async def serve(
         on_ready: called once with the first of `reachable_urls`, such as
             ``http://127.0.0.1:8080/``.
         request_s: time limit for the arrival of a complete request, in seconds.
-        connections: maximum number of open connections; above it, new connections get status 503.
+        connections: maximum number of open connections; beyond this number, new connections get
+            status 503.
 
     Raises:
         UrcError: the server cannot listen on the address.
@@ -144,7 +145,7 @@ class _DashboardSocket(WebSocketsSansIOProtocol):
         self._urc_flow.connected(cast("asyncio.Transport", transport))
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Wake a waiting writer, so that it notices the end of the connection."""
+        """Wake a waiting writer, so that the writer notices the closed connection."""
         super().connection_lost(exc)
         self._urc_flow.lost()
 
@@ -220,7 +221,7 @@ def reachable_urls(host: str, port: int) -> tuple[str, ...]:
 
     For ``0.0.0.0`` and ``::``, these are the addresses of all network interfaces of this machine,
     or else loopback. For any other host, the URL contains `host`. Network addresses precede
-    loopback. The function sends no packet.
+    loopback. No packet is sent for this purpose.
 
     Args:
         host: the address or name on which the server listens.

@@ -37,7 +37,7 @@ class Cards:
         self._stations = stations
 
     def routes(self) -> list[Route]:
-        """Return the only route, that of card contents."""
+        """Return the route for the content of cards."""
         return [Route("/robots/{name}/card", self.card)]
 
     async def card(self, request: Request) -> Response:

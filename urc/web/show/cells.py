@@ -1,7 +1,7 @@
 """One cell of a page: the markup of its widget, and the configuration for the widget's module.
 
-Layer 5. Widget templates come from packages. They run in a sandbox, and a failed template affects
-only its own cell.
+Layer 5. Widget templates come from packages. Widget templates run in a sandbox, and a failed
+template affects only its own cell.
 """
 
 import json
@@ -57,8 +57,8 @@ class Cell:
 class WidgetContext:
     """Context of ``widgets/*/template.html.j2``; its fields are the variables of the template.
 
-    The markup is shown before the widget's module has loaded, so the markup must be understandable
-    without any value.
+    The markup is shown before the widget's module has loaded. Therefore the markup must be
+    understandable without any value.
     """
 
     title: str
@@ -127,7 +127,7 @@ def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -
 def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str, str]) -> str:
     """Return the subject of a widget: its first required signal, else its command.
 
-    An optional output is not the subject: a camera with pan and tilt is still a camera.
+    An optional output is not the subject: a camera widget with pan and tilt still shows a camera.
     """
     needed = [name for name in inputs if widget.inputs[name].is_required]
     about = [inputs[name].title or spoken(inputs[name].name) for name in (*needed, *inputs)]

@@ -28,7 +28,7 @@ _TYPES: Final = [*_ELEMENTS, "array", "object", "image", "blob"]
 
 
 def _mapping(title: str, properties: Mapping[str, Any], *required: str) -> dict[str, Any]:
-    """Return the schema of a mapping with exactly these allowed keys."""
+    """Return the schema of a mapping that allows exactly these keys."""
     return {
         "title": title,
         "type": "object",
@@ -98,8 +98,8 @@ _FOLLOW: Final = dict.fromkeys(
 def check_demo(widget: Widget, document: Document) -> list[Problem]:
     """Return all problems of a demo.
 
-    The states of a demo refer to its bindings, so the options of states are checked only after the
-    bindings are valid.
+    The states of a demo refer to its bindings. Therefore the options of states are checked only if
+    the bindings are valid.
     """
     data = document.data
     problems = check_inline(document, (), data, _demo(widget, data))

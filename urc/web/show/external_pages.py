@@ -1,8 +1,8 @@
 """Routes of the files and third-party pages that a robot's documents name for their widgets.
 
-Layer 5. A document without scripts shows a third-party page in a frame. The policy of the dashboard
-allows only frames from the dashboard's own origin. The document around the third-party page has a
-separate policy, which allows only the origin in the widget's option.
+Layer 5. A document without scripts displays a third-party page in a frame. The policy of the
+dashboard allows only frames from the dashboard's own origin. The document around the third-party
+page has a separate policy, which allows only the origin in the widget's option.
 """
 
 import base64

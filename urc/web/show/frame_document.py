@@ -42,7 +42,7 @@ class FrameDocuments:
     Args:
         modules: import map of the pages.
         has: returns whether a widget with this name exists.
-        place: path below which frames load code.
+        place: path prefix of code for frames.
     """
 
     def __init__(
@@ -64,6 +64,6 @@ class FrameDocuments:
         return HTMLResponse(render("frame.html.j2", page), headers={"cache-control": "no-store"})
 
     def _below(self, modules: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the import map with the path prefix for frames before each URL."""
+        """Return the import map with the path prefix for frames added to each URL."""
         imports = cast("Mapping[str, str]", modules["imports"])
         return {"imports": {name: f"{self._place}{url}" for name, url in imports.items()}}

@@ -1,7 +1,7 @@
 """The gallery: every widget in all states of its demo, without a robot.
 
-Layer 5. The page itself simulates the robot (``gallery.js``), without a socket and without sending
-anything.
+Layer 5. The page itself simulates the robot (``gallery.js``); the page opens no socket and sends
+nothing.
 """
 
 import asyncio
@@ -183,11 +183,11 @@ class Gallery:
     """Pages and files of all widgets in the gallery.
 
     Args:
-        modules: the import map.
+        modules: import map of the pages.
         profiles: returns the profiles of the served robots.
         is_dev: whether pages reload when a file of their widgets is saved.
         ways: navigation links of this server.
-        trust: tells third-party widgets from trusted ones.
+        trust: distinguishes third-party widgets from trusted widgets.
     """
 
     def __init__(
@@ -208,7 +208,7 @@ class Gallery:
         """Files of the shown widgets, including widgets that no robot uses."""
 
     def routes(self) -> list[Route]:
-        """Return the routes of the gallery, for use before the route of the widget files."""
+        """Return the routes of the gallery, which must precede the route of the widget files."""
         return [
             Route("/widgets", self.index),
             Route("/widgets/", self.index),

@@ -68,7 +68,7 @@ def markup_of(wanted: Sequence[tuple[str, Mapping[str, object]]]) -> list[Render
 
 
 def _rendered(jobs: list[str]) -> list[RenderedMarkup]:
-    """Return the markup of some templates; a template that ends the process fails alone."""
+    """Return the markup of some templates; a crash of one does not affect the others."""
     said = _asked(jobs)
     if said is not None:
         return said

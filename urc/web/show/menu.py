@@ -77,7 +77,7 @@ class Card:
     is_looked_at: bool = False
     """Whether a live image is available without a connection."""
     fault: str = ""
-    """Why it cannot be used, or ""."""
+    """Reason why the robot cannot be used; "" if it can."""
     recorded: str = ""
     """Start time of the recording; "" for a robot."""
 

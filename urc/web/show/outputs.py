@@ -140,7 +140,7 @@ def _line(command: Command | None, driver: Driver) -> str:
 def _ranges(
     command: Command | None, port: WidgetPort, given: OutputBinding
 ) -> dict[str, dict[str, object]]:
-    """Return the values that -1 to 1 stand for, for each argument with a range."""
+    """Return minimum, maximum and rest value of each argument that a deflection controls."""
     if command is None:
         return {}
     found: dict[str, dict[str, object]] = {}
@@ -177,7 +177,7 @@ def _release_of(command: Command) -> Mapping[str, Reading]:
 
 
 def mark(text: str) -> str:
-    """Return `text`. The call adds the text to the catalogues; the page translates the text."""
+    """Return `text`, marked for the catalogues; the page translates the text."""
     return text
 
 

@@ -1,6 +1,6 @@
 """The pages of the dashboard: each Jinja template has one context, a dataclass.
 
-Layer 5. Templates receive this dataclass as ``page``, and nothing else. Templates contain only
+Layer 5. Templates receive the dataclass as ``page``, and nothing else. Templates contain only
 ``for`` and ``if``; all other logic is in this module, and `urc.web.show.cells` builds the cells of
 a page.
 """
@@ -119,7 +119,7 @@ def robot_page(
 
     Args:
         nonce: nonce of this response.
-        name: name of the robot in its URL.
+        name: name of the robot in URLs.
         profile: profile of the robot.
         interface: the interface to show.
         modules: the import map.

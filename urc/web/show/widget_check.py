@@ -34,7 +34,7 @@ _ANY: Final = re.compile(r"^export\b.*", re.MULTILINE)
 
 
 def check_widget(widget: Widget, *, with_demo: bool = True) -> list[Problem]:
-    """Return the problems in the files of a widget; its manifest must be valid.
+    """Return the problems in the files of a widget with a valid manifest.
 
     Args:
         widget: the widget, from any source.

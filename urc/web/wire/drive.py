@@ -1,6 +1,6 @@
 """Message types for the controls, without behaviour.
 
-Layer 5. Part of `urc.web.wire.messages`, which lists the direction of each message.
+Layer 5. Part of `urc.web.wire.messages`, which documents the direction of each message.
 """
 
 from typing import Literal
@@ -47,11 +47,11 @@ class _Lease(Outbound, tag="lease", omit_defaults=False, frozen=True):
     left: int
     """Time until the asking page gets the controls, in milliseconds."""
     latched: str
-    """Name of the operator who pressed STOP; "" while nothing is latched."""
+    """Name of the operator who pressed STOP; "" while STOP is not latched."""
     stops: int
     """Number of STOPs in this run of the server."""
     confirmed: bool
-    """Whether the robot's transports have taken the stop."""
+    """Whether all transports of the robot have accepted the stop."""
     drives: bool
     """Whether the page may drive."""
     forces: bool
@@ -115,7 +115,7 @@ decode_tick = msgspec.json.Decoder(Tick).decode
 """Decodes a text that is probably a tick; raises an exception in `NO_TICK` for other texts."""
 NO_TICK = (msgspec.MsgspecError, UnicodeError, RecursionError)
 _TICK_OF = b'{"t":"tick","command":"'
-"""First bytes of a page's tick; a tick in another spelling takes the slower path."""
+"""First bytes of a page's tick; ticks in any other form are decoded more slowly."""
 
 
 def command_of(data: bytes) -> str:

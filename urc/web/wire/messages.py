@@ -4,7 +4,7 @@ Layer 5. Messages are JSON text in both directions. Times are in milliseconds on
 monotonic clock; ages are in milliseconds at the moment of encoding. Values are sent as arrays of
 indexes into the names in `Hello`.
 
-Server → page, by ``t``::
+Messages from the server to the page, listed by their tag ``t``::
 
     hello   once, first: names, meaning of each signal, the server's clock
     v       changed signals: i indexes, v values, a ages (one number if all are equal),
@@ -232,7 +232,7 @@ _decoder: msgspec.json.Decoder[Inbound] = msgspec.json.Decoder(Inbound)
 
 
 def decode(text: str | bytes) -> Inbound:
-    """Return the message; raise `BadMessage` with the reason if it is invalid."""
+    """Return the decoded message; raise `BadMessage` with the reason if the text is invalid."""
     return decoded(_decoder, text)
 
 
