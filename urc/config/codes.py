@@ -23,7 +23,7 @@ class CodePage(NamedTuple):
     example: str
     """Document, or part of a document, with the problem; words if YAML cannot show the problem."""
     instead: str
-    """The same example without the problem, or instructions."""
+    """The example without the problem, or instructions in words."""
 
     def __str__(self) -> str:
         parts = zip(_PARTS, (self.what, self.why, self.example, self.instead), strict=True)

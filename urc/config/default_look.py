@@ -2,7 +2,7 @@
 
 The result depends only on the driver and the available widgets. If a widget is missing or does not
 fit its signal, a simpler widget replaces it. Commands with several arguments get no widget, because
-the developer page has a form for each of these commands.
+the developer page has a form for every command.
 """
 
 import math
@@ -254,7 +254,7 @@ def _output(widget: Widget | None, command: Command, names: Mapping[str, str]) -
 def _with_state(
     use: WidgetUse, argument: Argument, driver: Driver, registry: WidgetFolder
 ) -> WidgetUse:
-    """Bind the signal with the name of the argument or command, if there is one."""
+    """Bind a signal with the same name as the argument or command, if any."""
     widget = registry.get(use.widget)
     port = widget.inputs.get("state") if widget is not None else None
     command = next(iter(use.outputs.values()))
@@ -279,9 +279,9 @@ def _use(widget: Widget, slot: str, inputs: Mapping[str, str], title: str) -> Wi
 def default_interface(slots: Mapping[str, WidgetUse], title: str) -> Interface:
     """Return an interface named ``default`` that shows every slot.
 
-    Displays are at the top, in the order of their size. Steering controls are at the bottom right,
-    near the thumb. Other controls fill the free places. On a phone in landscape, steering controls
-    are in the first rows, at the right and left edge, and other widgets follow below.
+    Displays are at the top, with the largest displays first. Steering controls are at the bottom
+    right, near the thumb. Other controls fill the free places. On a phone in landscape, steering
+    controls are in the first rows, at the right and left edge, and other widgets follow below.
     """
     return Interface(
         name="default",

@@ -24,7 +24,7 @@ __all__ = ["LoadedSources", "gather"]
 
 
 class LoadedSources(NamedTuple):
-    """The result of `gather`."""
+    """The parts and problems of a loaded profile."""
 
     sources: Sources | None
     """The parts of the profile; None after an error, and for a partial document."""
@@ -90,7 +90,7 @@ def _prepared(
 
 
 def _place(problem: Problem) -> tuple[str, str, int, int]:
-    """Return code, file, line and column: the identity of a problem that two passes report."""
+    """Return code, file, line and column, which identify a problem across passes."""
     return problem.code, problem.file, problem.line, problem.column
 
 

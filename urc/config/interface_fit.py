@@ -19,7 +19,7 @@ __all__ = ["InterfaceFit", "fit_interface"]
 
 
 class InterfaceFit(NamedTuple):
-    """The result of `fit_interface`."""
+    """The widgets of a suitable interface, or the reason why the interface does not fit."""
 
     interface: Interface | None
     """The linked interface; None when the interface does not fit."""

@@ -34,7 +34,7 @@ __all__ = ["CheckResult", "WidgetFolder", "check", "load_profile"]
 
 
 class CheckResult(NamedTuple):
-    """The result of `check`."""
+    """The profile and the problems of a checked document."""
 
     profile: Profile | None
     """The profile of a robot or driver without errors; a driver gets the default interface."""
@@ -57,7 +57,7 @@ def load_profile(
     """Return the profile of a robot's or driver's document.
 
     Raises:
-        ProblemsError: the document has errors; contains all errors of the failed pass.
+        ProblemsError: the document has errors, which the exception contains.
     """
     checked = check(path, catalog, registry)
     if checked.profile is not None:

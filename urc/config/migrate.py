@@ -1,4 +1,4 @@
-"""Migration of documents: renames old keys and values, and changes no other byte."""
+"""Migration of documents: replaces old keys and values without any other change."""
 
 import re
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ class Change(NamedTuple):
 
 
 class Migrated(NamedTuple):
-    """The result of `migrate`."""
+    """The migrated content of a document, and its changes."""
 
     content: bytes
     changes: tuple[Change, ...]

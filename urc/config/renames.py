@@ -19,7 +19,7 @@ __all__ = [
 ]
 
 Content = Literal["driver", "interface", "widget", "demo"]
-"""Kind of content; a robot contains a driver and interfaces."""
+"""Kind of a document or of its parts; a robot contains a driver and interfaces."""
 
 _TRANSPORT: Final = "transports/[^/]+"
 _ARRAY: Final = "signals/[^/]+|commands/[^/]+/args/[^/]+"
@@ -41,7 +41,10 @@ class KeyRename(NamedTuple):
     old: str
     new: str
     types: tuple[str, ...] = ()
-    """Values of `type` in mappings with this rename; empty for all. A missing `type` fits."""
+    """Values of `type` in mappings with this rename; empty for all.
+
+    Mappings without `type` always match.
+    """
 
     def applies(self, mapping: Mapping[str, Any]) -> bool:
         """Return whether the rename applies to a mapping."""

@@ -34,7 +34,7 @@ _INLINE_MOST: Final = 60
 
 
 class ResolvedProfile(NamedTuple):
-    """The result of `resolve`."""
+    """A resolved document and its problems."""
 
     text: str
     """The resolved document; "" after errors."""

@@ -2,9 +2,10 @@
 
 The library `jsonschema` is too slow for both speed goals of `urc validate` (decision 4).
 
-This module compiles the keywords of the schemas to closures. A positive result is certain. All
-other cases, including unknown keywords, need `jsonschema`. A contract test compares both checks.
-Each part of a schema is compiled at its first use, so small documents compile few parts.
+This module compiles the keywords of the schemas to closures. A positive result of the fast check is
+always correct. All other cases, including unknown keywords, need `jsonschema`. A contract test
+compares the fast check with `jsonschema`. Each part of a schema is compiled at its first use, so
+small documents compile few parts.
 """
 
 import json
@@ -45,8 +46,8 @@ def shipped_check() -> "QuickCheck":
 def fits(reference: str, value: object) -> bool:
     """Return whether a value certainly matches the schema at ``file#/pointer``.
 
-    Passes before the shape pass call this function before they use a key. They ignore a value that
-    does not match, and the shape pass reports an error.
+    Passes before the shape pass call this function before they use a key. These passes ignore a
+    value that does not match, and the shape pass reports an error.
     """
     return shipped_check().is_valid_at(reference, value)
 

@@ -7,7 +7,7 @@ __all__ = ["did_you_mean", "listed"]
 
 _MOST: Final = 16
 _SPARE: Final = 8
-"""Maximum excess of words in a list that is still complete."""
+"""Maximum number of extra words before a list is shortened."""
 
 
 def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:

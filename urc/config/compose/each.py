@@ -180,7 +180,7 @@ class Expander:
 
 
 class _First:
-    """A reporter of problems in the texts of an item, for its first copy."""
+    """A reporter of problems in the first copy of an item."""
 
     def __init__(self, expander: Expander, path: Path) -> None:
         self._expander = expander
@@ -208,7 +208,7 @@ class _First:
 
 
 class _Rest:
-    """A reporter that ignores all problems, for the copies after the first."""
+    """A reporter that ignores the problems of all later copies of an item."""
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
         """Say nothing."""
@@ -381,7 +381,7 @@ def _has_each(collection: object) -> bool:
 
 
 def _replaced(tree: Tree, path: Path, change: Any, done: Path = ()) -> Tree:
-    """Return `tree` with a changed part at `path`; all other parts are not copied."""
+    """Return `tree` with a changed part at `path`; other parts are shared, not copied."""
     if not path:
         result: Tree = change(tree, done)
         return result

@@ -1,8 +1,8 @@
 """Replacement of names in single braces, such as ``{i}`` of an `each`, or ``{params.id}``.
 
-URC replaces these names in keys and texts while it loads a document. Templates have double braces
-and stay unchanged. A text that consists of one name becomes the value itself, so the result of
-``"{i}"`` may be a number.
+URC replaces names in single braces in all keys and texts while it loads a document. Templates have
+double braces and stay unchanged. A text that consists of one name becomes the value itself, so the
+result of ``"{i}"`` may be a number.
 """
 
 import re
@@ -177,7 +177,7 @@ def _item(tree: Tree, key: str | int, item: object) -> Tree:
 def fill(
     tree: Tree, path: Path, names: Names, budget: ExpansionBudget, listener: PlaceholderReporter
 ) -> Tree:
-    """Return `tree` after the replacement of every name; parts without names are not copied."""
+    """Return `tree` after the replacement of every name; parts without names are shared."""
     return _Filler(names, budget, listener).tree(tree, path)
 
 

@@ -36,7 +36,7 @@ _INCLUDED: Final = {
 
 
 class Composed(NamedTuple):
-    """The result of `compose`."""
+    """A merged document and its sources."""
 
     document: Document | None
     """The merged document; None if a required document is missing or invalid."""
@@ -165,7 +165,7 @@ class _Composer:
         return _without(Tree(found.data, found.mark, found), without)
 
     def _merged_includes(self, parts: list[Tree], settled: object) -> list[Tree]:
-        """Return the includes as a list of at most one tree; report contradictory includes."""
+        """Merge the includes into at most one tree; report contradictory values."""
         if not parts:
             return []
         clashes = _Clashes(settled)

@@ -1,9 +1,9 @@
 """Merge of two trees of data and their marks. The upper tree changes the lower tree.
 
-Mappings are merged by key, and lists of named items by name. All other values are replaced. Rules
-of a simulator are merged by name, and rules without a name are kept. The value ``null`` removes a
-key, and ``remove: true`` removes an item of a list. Every mark in the result keeps its document, so
-every problem keeps its position.
+Mappings are merged by key, and lists of named items by name. The upper tree replaces all other
+values. Rules of a simulator are merged by name, and rules without a name are kept. The value
+``null`` removes a key, and ``remove: true`` removes an item of a list. Every mark in the result
+keeps its document, so every problem keeps its position.
 """
 
 from collections.abc import Callable
@@ -27,7 +27,7 @@ class Tree(NamedTuple):
     value: object
     mark: Mark
     home: Document
-    """The document of this data; inner marks may name another document."""
+    """Document of the data; marks inside the data may name another document."""
 
 
 _Clash = Callable[[Path, Tree, Tree], None]
@@ -84,8 +84,8 @@ def count_nodes(value: object) -> int:
 def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) -> Tree:
     """Return `base` with the changes of `over`.
 
-    The base is not modified. Both trees are at `path`. The callback `clash` receives each replaced
-    value and its replacement.
+    The base is not modified. `path` is the position of both trees in their documents. The callback
+    `clash` receives each replaced value and its replacement.
     """
     if path == ("driver",) and isinstance(over.value, dict):
         base = _driver_in_full(base, over.value)

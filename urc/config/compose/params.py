@@ -30,8 +30,8 @@ def fill_params(
     """Return a driver's document after the replacement of its parameters.
 
     `given` contains the robot's values, and `use` is the robot's reference to the driver. A driver
-    without a robot has neither. In this case, a parameter without a default gets a sample value of
-    its type.
+    without a robot needs neither argument. Its parameters without a default get sample values of
+    their types.
     """
     data = document.data
     if not isinstance(data, dict):

@@ -42,7 +42,7 @@ def check_option(
 ) -> None:
     """Report a setting in `template` with the wrong type for the option at `part`.
 
-    `kind` is the option's definition in the driver's schema, which only built-in transports have.
+    For built-in transports, `kind` is the name of a definition in the driver's schema.
     """
     found = _ONE_SETTING.fullmatch(template.source)
     setting = settings.get(found[1]) if found else None

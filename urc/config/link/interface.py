@@ -131,7 +131,7 @@ def _use(
 
 
 class _Bound(NamedTuple):
-    """The collected bindings of a widget; the fields are those of `WidgetUse`."""
+    """The collected bindings of a widget, with the same fields as in `WidgetUse`."""
 
     inputs: dict[str, str]
     lists: dict[str, tuple[str, ...]]

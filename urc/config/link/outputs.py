@@ -85,7 +85,7 @@ def _given(part: Node, port: WidgetPort, widget: Widget, problems: Problems) -> 
 def _check_hold(
     part: Node, port: WidgetPort, widget: Widget, command: Command, problems: Problems
 ) -> bool:
-    """Return whether output and command are both held or both not; report a mismatch."""
+    """Report a mismatch of hold-to-run outputs and held commands; return whether both match."""
     if port.is_held and command.hold is None:
         problems.error(
             part,
@@ -194,7 +194,7 @@ def _check_nothing(
     given: OutputBinding,
     problems: Problems,
 ) -> None:
-    """Report an output without any value that has an effect."""
+    """Report an output if none of its values has an effect."""
     what = f"{port.name!r} of widget {widget.name!r} gives {listed(port.arguments)}"
     free = [name for name in command.arguments if name not in given.fixed]
     if free:

@@ -148,7 +148,7 @@ def _arguments(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[Arg
 
 
 def _check_order(part: Node, use: WidgetUse, widget: Widget, problems: Problems) -> None:
-    """Report an option that is not smaller than its upper limit, another option."""
+    """Report an option that is not smaller than the option with its limit."""
     own = part.named("options")
     for name, schema in widget.options.items():
         above = schema.get("less_than") if isinstance(schema, Mapping) else None

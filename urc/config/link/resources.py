@@ -1,6 +1,6 @@
 """Checks of files and web pages in a widget's options.
 
-The dashboard serves only the files that a document names for its widgets. These files must be in
+The dashboard serves only the files that a document names for its widgets. Served files must be in
 the document's folder, so that no package can publish other files of the server.
 
 The content security policy of a page contains the host of every embedded web page. The URLs of web

@@ -190,7 +190,7 @@ class _Walk:
 
 
 def _loops(start: str, driver: Driver) -> str:
-    """Return `start`, or the first sequence that it runs, with a loop; "" without a loop."""
+    """Return the first of `start` and its called sequences that has a loop, or ""."""
     waiting, seen = [start], {start}
     while waiting:
         name = waiting.pop(0)

@@ -20,7 +20,8 @@ _OF_NUMBERS: Final = ("base", "scale", "offset", "polynomial", "points")
 def parse_conversion(part: Node, problems: Problems, kind: str = "number") -> Conversion:
     """Return the conversion that the keys of `part` declare, without its states.
 
-    `kind` is the type of the converted value. Strings and booleans have no arithmetic.
+    `kind` is the type of the converted value. Conversions of strings and booleans have no
+    arithmetic.
     """
     if kind not in ("integer", "number"):
         for key in _OF_NUMBERS:

@@ -44,7 +44,7 @@ def _marks(part: Node, layout: FrameLayout, options: Mapping[str, Any]) -> tuple
 
 
 def _one(part: Node, encoding: str, problems: Problems) -> int | None:
-    """Return the one byte at `part`."""
+    """Return the single byte at `part`."""
     found = parse_bytes(part, encoding, problems)
     if found is None or len(found) == 1:
         return None if found is None else found[0]

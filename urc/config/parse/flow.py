@@ -150,7 +150,7 @@ def command_with_flow(command: Command, part: Node, problems: Problems) -> Comma
 
 
 def _refuse_asides(reply: Node | None, problems: Problems) -> None:
-    """Report `resend` and `extend` of a held command: its next value follows anyway."""
+    """Report `resend` and `extend` of a held command, because its next value follows anyway."""
     for inner in [reply, *reply.listed("stages")] if reply is not None else ():
         why = "has no effect with 'hold': the next value follows anyway"
         refuse(inner, ("resend", "extend"), why, problems)
@@ -354,7 +354,7 @@ def parse_choice_questions(part: Node, argument: Argument, problems: Problems) -
 
 
 def _written(value: Value) -> str:
-    """Return a choice in the notation of a key."""
+    """Return a choice as a key of a document."""
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

@@ -56,7 +56,7 @@ class ReadForm(Protocol):
     """A module that parses one form of received frames."""
 
     def parse_read(self, part: Node, problems: Problems, context: FormContext) -> ReadSpec | None:
-        """Return the declaration at `part`, or None when a problem was reported."""
+        """Return the declaration at `part`, or None after a reported problem."""
 
     def place_of(self, part: Node, field: str) -> tuple[Node, dict[str, Any]]:
         """Return the position of `field`, as arguments of `Problems.error`."""
@@ -66,7 +66,7 @@ class WriteForm(Protocol):
     """A module that parses one form of sent frames."""
 
     def parse_write(self, part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:
-        """Return the declaration at `part`, or None when a problem was reported."""
+        """Return the declaration at `part`, or None after a reported problem."""
 
     def templates(self, part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
         """Return every template of the frame, with its position."""

@@ -181,7 +181,7 @@ def _check_case(
     before: list[tuple[bytes, FramingSpec]],
     problems: Problems,
 ) -> None:
-    """Report an unreachable case, and a case with a framing that starts with other bytes."""
+    """Report an unreachable case, and a case with a framing of different start bytes."""
     for other, _ in before:
         if first.startswith(other):
             problems.error(

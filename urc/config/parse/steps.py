@@ -205,7 +205,7 @@ def _timeout_s(part: Node, problems: Problems) -> float | None:
 def _else(
     part: Node, context: StepContext, problems: Problems
 ) -> tuple[tuple[sequence.Step, ...] | None, str]:
-    """Return the steps under ``else`` and None, or the message of the failure."""
+    """Return the steps or the failure message under ``else``."""
     inner = part.get("else")
     if inner is None:
         return None, ""

@@ -1,6 +1,6 @@
 """Rules about traffic: rates, timeouts and secrets.
 
-All rules give warnings, and only about declared values, not about defaults.
+All rules give warnings about declared values, never about defaults.
 """
 
 from collections.abc import Iterator

@@ -195,7 +195,7 @@ def _check_will(
 
 
 def _bearable_ms(excess: float, held: list[tuple[Node, Command, Hold]]) -> int:
-    """Return the shortest period in milliseconds for the line, if all periods grow equally."""
+    """Return the shortest possible period in milliseconds, if all periods grow equally."""
     return math.ceil(min(hold.repeat_s for _, _, hold in held) * excess * 1000 - 1e-6)
 
 

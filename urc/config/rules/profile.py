@@ -141,7 +141,7 @@ def _drawn(part: Node, slot: str) -> tuple[Node, int] | None:
 
 
 def _check_pace(part: Node, poll: Poll, driver: Node, problems: Problems) -> None:
-    """Warn of a poll whose reply timeout is longer than its period.
+    """Warn of a poll with a reply timeout longer than its period.
 
     A declared timeout up to the default causes no warning, because the default causes none.
     """

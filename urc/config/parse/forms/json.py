@@ -1,6 +1,6 @@
 """The form ``json``: fields of a JSON document, addressed by JMESPath expressions.
 
-Plain paths such as ``a.b[0].c`` become tuples for the engine. Only other paths need the JMESPath
+Plain paths such as ``a.b[0].c`` become tuples for the engine. All other paths need the JMESPath
 library.
 """
 

@@ -47,7 +47,7 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
 
 
 def place_of(part: Node, field: str) -> tuple[Node, dict[str, Any]]:
-    """Return the place of the field."""
+    """Return the position of the field."""
     for inner in [*part.listed("first"), *part.named("fields").values()]:
         if inner.data == field:
             return inner, {}

@@ -20,5 +20,5 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
 
 
 def templates(part: Node, spec: WriteSpec) -> Iterable[tuple[Node, Template]]:
-    """Return the only template."""
+    """Return the template of the frame."""
     yield part, cast("Template", spec.options["template"])

@@ -52,7 +52,7 @@ class Scope:
         self.known[name] = item
 
     def check_name(self, part: Node, name: str) -> None:
-        """Report an id that is reserved, or not a valid name."""
+        """Report a reserved or invalid id."""
         if name in FRAME_NAMES or number_of(name) is not None or name == "settings":
             self._problems.error(part, "bad-name", f"{name!r} is a reserved name")
         elif name and not (name.isidentifier() and name.isascii() and name == name.lower()):
