@@ -32,6 +32,7 @@ _STATUS = {
 STATUSES = ("killed", "timeout", "survived", "no tests", "odd", "waiting")
 DEAD = ("killed", "timeout")
 """Statuses of detected mutants: a test failed or timed out."""
+_COMMENT = re.compile(r"  # .*")
 Change = tuple[str, str]
 """Removed and inserted code of a mutant."""
 
@@ -55,13 +56,13 @@ class Mutant:
 
     @cached_property
     def change(self) -> Change:
-        """Removed and inserted code, without indentation."""
+        """Removed and inserted code, without indentation and comments at the end of a line."""
         before, after = [], []
         for line in self._diff():
             if line.startswith("-"):
-                before.append(line[1:].strip())
+                before.append(_COMMENT.sub("", line[1:]).strip())
             elif line.startswith("+"):
-                after.append(line[1:].strip())
+                after.append(_COMMENT.sub("", line[1:]).strip())
         return "\n".join(before), "\n".join(after)
 
     @property

@@ -140,6 +140,17 @@ def test_how_a_run_ended(tmp_path: Path, code: int, status: str) -> None:
     assert statuses(tmp_path) == {"1": status}
 
 
+def test_a_comment_at_the_end_of_a_line_is_no_part_of_a_change(tmp_path: Path) -> None:
+    """So another wording of the comment needs no other explanation."""
+    path = ran(tmp_path, _1=0)
+    commented = MUTATED.replace("True\n", "True  # so far\n").replace(
+        "False\n", "False  # so far\n"
+    )
+    path.write_text(commented, "utf-8")
+    (first,) = mutants_in(tmp_path, SETTINGS)
+    assert first.change == ("self.moves = True", "self.moves = False")
+
+
 def test_a_mutant_says_where_it_is_and_what_it_changes(tmp_path: Path) -> None:
     ran(tmp_path, _1=0, _2=0)
     first, _ = mutants_in(tmp_path, SETTINGS)

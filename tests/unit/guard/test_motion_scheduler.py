@@ -341,3 +341,16 @@ async def test_motion_that_waits_for_a_clear_line_does_not_leave_with_a_used_up_
     assert robot.written == [b"go 1", b"0 poll"]
     told = [said for said in bench.heard() if isinstance(said, messages.CountersAdvanced)]
     assert told == [messages.CountersAdvanced("wire", 1, 1, {"n": 0}, [("drive", 2)])]
+
+
+async def test_the_end_of_a_lease_does_not_wait_for_the_next_look_at_unsent_bytes(
+    benches: list[Bench],
+) -> None:
+    """The looks grow to 20 ms apart while bytes are unsent; the stop comes at its own time."""
+    benches.append(bench := Bench(CountedWire(), stalled_s=1.0))
+    bench.robot.is_stuck = True
+    await bench.drive(TERMS._replace(lease_s=0.25))
+    await bench.clock.advance(0.249)
+    assert STOP not in bench.robot.written
+    await bench.clock.advance(0.002)
+    assert bench.robot.written[-1] == STOP
