@@ -146,7 +146,7 @@ HOSTILE: dict[str, tuple[Answer, str]] = {
     "gone": (says(b"", 404), "the server replied with status 404, not 200"),
     "compressed": (
         says(gzip.compress(bytes(1 << 20)), content_encoding="gzip"),
-        "the server compresses",
+        "the server compressed",
     ),
 }
 
@@ -225,7 +225,7 @@ def test_an_index_that_is_none_is_not_added(index: bytes, person: Person) -> Non
     """And the repository is not remembered."""
     with server(evil(says(b""), index)) as url:
         told = person.refuses("repo", "add", url)
-    assert "this is not an index of a repository" in told
+    assert "this is not the index of a repository" in told
     assert person.does("repo", "list") == ""
 
 
@@ -243,11 +243,15 @@ def test_a_package_that_says_less_than_its_index_is_refused(person: Person) -> N
     ("status", "body", "told"),
     [
         (302, b"", "the server replied with status 302"),
-        (405, b"", "this server accepts no packages (status 405); start one with"),
+        (405, b"", "this server does not accept uploads (status 405); start one with"),
         (409, b'{"error": "listed\\n\\u001b[2J already"}', "listed\\x0a\\x1b[2J already"),
         (500, b"<html>", "the server replied with status 500"),
-        (201, b"{}", "it was accepted, but the server's response is invalid"),
-        (201, b'{"listed": "x", "sha256": "0"}', "the server listed other bytes than were sent"),
+        (201, b"{}", "the upload was accepted, but the server's response is invalid"),
+        (
+            201,
+            b'{"listed": "x", "sha256": "0"}',
+            "the server listed bytes that differ from the sent bytes",
+        ),
         (422, b"x" * 100_000, "more than the expected 65536 bytes"),
     ],
 )

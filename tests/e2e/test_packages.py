@@ -210,7 +210,7 @@ def test_what_is_not_sound_is_not_listed(tmp_path: Path, person: Person) -> None
     assert "drivers/broken/driver.yaml:4:" in told
     assert "robots/nosy/robot.yaml: it refers to" in told
     assert "which is not in this repository" in told
-    assert "9.9.9.zip: the archive is cut off" in told
+    assert "9.9.9.zip: the archive is truncated" in told
     listed = json.loads((lab / "index.json").read_bytes())["packages"]
     assert len(listed) == 4
 
@@ -250,7 +250,7 @@ def test_a_package_may_not_reach_out_or_replace_what_ships(tmp_path: Path, perso
     assert "which is not in the package" in told
     stop = write_package(tmp_path, "widget", "stop")
     told = person.does("install", str(stop), "--yes", code=1)
-    assert "widgets/stop: URC has a widget 'stop', which no package may replace" in told
+    assert "widgets/stop: packages must not replace URC's built-in widget 'stop'" in told
     broken = write_package(tmp_path, "driver", "broken", text="signals: { a: { type: x } }\n")
     assert "error" in person.does("install", str(broken), "--yes", code=1)
     assert person.holds() == {}

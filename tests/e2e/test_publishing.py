@@ -208,7 +208,7 @@ def test_what_is_wrong_is_refused_in_one_line(
     (lab.home / "widgets/dial/notes.txt").write_text("more")
     assert "listed with other bytes" in anna.refuses("publish", dial, *lab.to)
     (lab.home / "widgets/dial/notes.py").write_text("more")
-    assert "files of this kind do not belong" in anna.refuses("publish", dial, *lab.to)
+    assert "files of this type are not allowed" in anna.refuses("publish", dial, *lab.to)
     (lab.home / "widgets/dial/notes.py").unlink()
     anna.does("repo", "token", "remove", "x", "--tokens", str(lab.tokens))
     assert "this repository needs a token" in anna.refuses("publish", dial, *lab.to)

@@ -1,1 +1,1 @@
-"""Packages: their format, their sources, their needs, and their storage."""
+"""Packages: archive format, sources, dependency resolution and storage."""

@@ -1,8 +1,9 @@
-"""The format of an archive: a ZIP file without compression, whose bytes depend only on its files.
+"""The archive format: reproducible ZIP files without compression.
 
-Entries are stored, sorted, and dated 1980. So the same files give the same bytes on every machine,
-regardless of zlib, and no entry can be larger than the archive. An archive with other bytes is
-rejected. `zipfile` parses archives, but never extracts them.
+Entries are stored without compression, sorted by path and dated 1980. The same files therefore
+produce the same bytes on every machine, regardless of zlib. No entry can be larger than its
+archive. Archives with other bytes are rejected. The module `zipfile` only parses archives, and
+never extracts them.
 """
 
 import re
@@ -58,7 +59,7 @@ _BARE: Final = frozenset(("LICENSE", "LICENCE", "NOTICE", "README", "AUTHORS"))
 
 
 def name_fault(path: str) -> str:
-    """Return the fault of a path in a package, or ""."""
+    """Return the fault of a path in a package; "" for a valid path."""
     if path.startswith(("/", "\\")) or re.match(r"[A-Za-z]:", path):
         return f"{path!r} is an absolute path"
     parts = path.split("/")
@@ -70,22 +71,22 @@ def name_fault(path: str) -> str:
         if not _PART.fullmatch(part) or part.endswith(".") or _RESERVED.fullmatch(part):
             return (
                 f"{path!r}: the name {part!r} is not allowed;"
-                " use letters, digits, '-', '_' and '.', and no name that a system reserves"
+                " use letters, digits, '-', '_' and '.', and no reserved system name"
             )
     last = parts[-1]
     if last not in _BARE and last.rpartition(".")[2].lower() not in _ENDINGS:
-        return f"{path!r}: files of this kind do not belong in a package"
+        return f"{path!r}: files of this type are not allowed in a package"
     return ""
 
 
 def names_fault(paths: Sequence[str]) -> str:
-    """Return the fault of two paths that some systems cannot distinguish, or ""."""
+    """Return the fault of two indistinguishable paths, or "". Some systems ignore case in paths."""
     seen: dict[str, str] = {}
     for path in paths:
         other = seen.setdefault(path.casefold(), path)
         if other is not path:
             same = "twice" if other == path else f"together with {other!r}: only capitals differ"
-            return f"{path!r} is there {same}"
+            return f"{path!r} is present {same}"
     return _folder_fault(seen)
 
 
@@ -95,7 +96,7 @@ def _folder_fault(seen: dict[str, str]) -> str:
         for folder in _folders(path):
             other = folders.setdefault(folder.casefold(), folder)
             if other != folder:
-                return f"{folder!r} is there together with {other!r}: only capitals differ"
+                return f"{folder!r} is present together with {other!r}: only capitals differ"
             if folder.casefold() in seen:
                 return f"{folder!r} is a file and a folder"
     return ""
@@ -115,7 +116,7 @@ class ArchiveLimits(NamedTuple):
 
     @property
     def archive_bytes(self) -> int:
-        """Limit of the archive itself, in bytes: its files and their headers."""
+        """Maximum size of the archive in bytes, including file headers."""
         return self.total_bytes + 1024 * self.entries
 
 
@@ -129,12 +130,12 @@ _TYPES: Final = {0o120000: "a link", 0o060000: "a device", 0o020000: "a device",
 
 
 def write_archive(files: Mapping[str, bytes], limits: ArchiveLimits, name: str) -> bytes:
-    """Return the archive of some files.
+    """Return the archive of the given files.
 
     Args:
-        files: path → content; paths are relative, with '/'.
+        files: file contents by path; paths are relative and use '/'.
         limits: limits of the archive.
-        name: name in messages.
+        name: archive name in error messages.
 
     Raises:
         PackageError: a path is not portable, or a limit is exceeded.
@@ -145,10 +146,10 @@ def write_archive(files: Mapping[str, bytes], limits: ArchiveLimits, name: str) 
 
 
 def read_archive(data: bytes, limits: ArchiveLimits, name: str) -> dict[str, bytes]:
-    """Return the files of an archive, path → content, in the order of their paths.
+    """Return the file contents of an archive by path, sorted by path.
 
     Raises:
-        PackageError: one line about the fault of the archive.
+        PackageError: the archive is invalid.
     """
     if len(data) > limits.archive_bytes:
         raise PackageError(f"{name}: an archive has at most {limits.archive_bytes >> 20} MiB")
@@ -157,27 +158,30 @@ def read_archive(data: bytes, limits: ArchiveLimits, name: str) -> dict[str, byt
         files = _read(data, limits, name)
     except (zipfile.BadZipFile, struct.error, EOFError, ValueError, OSError, RuntimeError,
             NotImplementedError, OverflowError) as error:  # fmt: skip
-        raise PackageError(f"{name}: the archive is damaged or cut off: {error}") from None
+        raise PackageError(f"{name}: the archive is damaged or truncated: {error}") from None
     if _written(files) != data:
         raise PackageError(
-            f"{name}: this archive contains data outside its files; make it with 'urc bundle'"
+            f"{name}: this archive contains data outside its files;"
+            " create the archive with 'urc bundle'"
         )
     return files
 
 
 def _check_end(data: bytes, limits: ArchiveLimits, name: str) -> None:
-    """Check the number of entries before the directory is parsed."""
+    """Check the end record and the number of entries before the directory is parsed."""
     if not data.startswith(b"PK"):
         raise PackageError(f"{name}: this is not a package: expected a ZIP archive")
     end = data[-_END_BYTES:]
     if len(end) < _END_BYTES or not end.startswith(_END):
-        raise PackageError(f"{name}: the archive is cut off, or something was added at its end")
+        raise PackageError(f"{name}: the archive is truncated, or has extra data at its end")
     entries, size, start = struct.unpack("<HII", end[10:20])
     if entries > limits.entries:
         raise PackageError(f"{name}: {entries} entries, at most {limits.entries} are allowed")
     # `zipfile` reads the whole directory, even if it has more entries than its end declares.
     if start + size + _END_BYTES != len(data) or size > limits.entries * 1024:
-        raise PackageError(f"{name}: the archive is damaged or cut off: its parts do not fit")
+        raise PackageError(
+            f"{name}: the archive is damaged or truncated: its sizes are inconsistent"
+        )
 
 
 def _read(data: bytes, limits: ArchiveLimits, name: str) -> dict[str, bytes]:
@@ -198,13 +202,13 @@ def _check_entry(entry: zipfile.ZipInfo, name: str) -> None:
     path = entry.orig_filename
     kind = (entry.external_attr >> 16) & 0o170000
     if kind in _TYPES:
-        raise PackageError(f"{name}: {path!r} is {_TYPES[kind]}; only ordinary files are allowed")
+        raise PackageError(f"{name}: {path!r} is {_TYPES[kind]}; only regular files are allowed")
     if fault := name_fault(path):
         raise PackageError(f"{name}: {fault}")
     if entry.flag_bits & 1:
         raise PackageError(f"{name}: {path!r} is encrypted")
     if entry.compress_type != zipfile.ZIP_STORED or entry.compress_size != entry.file_size:
-        raise PackageError(f"{name}: {path!r} is compressed; make the archive with 'urc bundle'")
+        raise PackageError(f"{name}: {path!r} is compressed; create the archive with 'urc bundle'")
 
 
 def _check_names(paths: Iterable[str], name: str, limits: ArchiveLimits) -> None:
@@ -222,11 +226,11 @@ def _check_sizes(sizes: Iterable[tuple[str, int]], limits: ArchiveLimits, name: 
         total += size
         if size > limits.entry_bytes:
             raise PackageError(
-                f"{name}: {path!r} has {size} bytes, at most {limits.entry_bytes} are allowed"
+                f"{name}: {path!r}: expected at most {limits.entry_bytes} bytes, found {size}"
             )
     if total > limits.total_bytes:
         raise PackageError(
-            f"{name}: the files have {total} bytes, at most {limits.total_bytes} are allowed"
+            f"{name}: expected at most {limits.total_bytes} bytes in all files, found {total}"
         )
 
 

@@ -1,4 +1,4 @@
-"""Atomic files: complete or absent, even after a crash of the process or the machine."""
+"""Atomic file operations: after a crash, a file is either complete or absent."""
 
 import os
 import shutil
@@ -19,15 +19,15 @@ _POLL_S: Final = 0.05
 
 
 def put_file(file: Path, data: bytes, work: Path) -> None:
-    """Write a file atomically: after a power failure, it is either old or new.
+    """Write a file atomically. After a power failure, the content is either old or new.
 
     Args:
-        file: path of the file; its folder is created.
-        data: its whole content.
-        work: a folder on the same disk, for incomplete files.
+        file: path of the file; missing folders are created.
+        data: complete content of the file.
+        work: folder on the same file system, for incomplete files.
 
     Raises:
-        OSError: the disk is full, for example; then nothing has changed.
+        OSError: the write failed, for example because the disk is full. The old content remains.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
     work.mkdir(parents=True, exist_ok=True)
@@ -49,10 +49,10 @@ def put_file(file: Path, data: bytes, work: Path) -> None:
 
 
 def put_folder(folder: Path, files: Mapping[str, bytes], work: Path) -> None:
-    """Create a folder with these files in one step, or replace an existing one.
+    """Create or replace a folder with these files in one step.
 
-    WARNING: the files are not synced to the disk, because they can be extracted again. Readers
-    must compare them with their archives.
+    WARNING: the files are not synced to the disk, because their archives remain available. Readers
+        must compare the files with their archives.
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
     work.mkdir(parents=True, exist_ok=True)
@@ -74,7 +74,7 @@ def put_folder(folder: Path, files: Mapping[str, bytes], work: Path) -> None:
 
 
 def discard(path: Path, work: Path) -> None:
-    """Delete a file or folder, if it exists; a folder disappears in one step."""
+    """Delete a file or folder if it exists. Folders are deleted in one step."""
     if not path.is_dir():
         path.unlink(missing_ok=True)
         return
@@ -88,7 +88,7 @@ def discard(path: Path, work: Path) -> None:
 
 
 def clear(work: Path) -> None:
-    """Delete the files of an interrupted change."""
+    """Delete the incomplete files of an interrupted change."""
     if work.is_dir():
         for entry in work.iterdir():
             if entry.is_dir():
@@ -99,10 +99,10 @@ def clear(work: Path) -> None:
 
 @contextmanager
 def exclusive(file: Path) -> Iterator[None]:
-    """Lock out other processes during the context; the end of this process releases the lock.
+    """Lock out other processes during the context. A crash of this process releases the lock.
 
     Raises:
-        PackageError: another process holds the lock for longer than ten seconds.
+        PackageError: another process holds the lock for more than ten seconds.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
     number = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
@@ -110,7 +110,9 @@ def exclusive(file: Path) -> Iterator[None]:
         deadline = time.monotonic() + _WAIT_S
         while not _is_locked(number):
             if time.monotonic() > deadline:
-                raise PackageError(f"{file.parent}: another urc is changing packages; try again")
+                raise PackageError(
+                    f"{file.parent}: another URC process is changing packages; try again"
+                )
             time.sleep(_POLL_S)
         yield
     finally:
@@ -142,7 +144,10 @@ def _write_all(number: int, data: bytes) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Sync a folder, so that a new name in it is permanent. Windows neither has nor needs it."""
+    """Sync a folder, so that its file names are permanent.
+
+    Windows does not support or need this step.
+    """
     if os.name == "nt":
         return
     number = os.open(folder, os.O_RDONLY)

@@ -1,4 +1,4 @@
-"""A repository over HTTP, on any web server that serves the index and the archives."""
+"""HTTP access to a repository on any web server."""
 
 import asyncio
 import ssl
@@ -17,36 +17,36 @@ __all__ = ["HttpResponse", "ask", "fetch_archive", "put", "repository_url"]
 _CONNECT_S: Final = 5.0
 _READ_S: Final = 10.0
 _TOTAL_S: Final = 120.0
-"""Limit for one file, in seconds, also for a slow transfer."""
+"""Timeout for the whole transfer of a file, in seconds."""
 _ANSWER_BYTES: Final = 65536
 _CHECKED_S: Final = 90.0
-"""Limit for the check of an upload by the repository, in seconds."""
+"""Timeout for the repository's check of an upload, in seconds."""
 
 
 class HttpResponse(NamedTuple):
-    """Response of a server."""
+    """Response of a web server."""
 
     status: int
-    """200; 304 for an unchanged file; 404 for a missing file, if that is allowed."""
+    """Status code: 200, 304 for an unchanged file, or 404 for a permitted missing file."""
     etag: str
     body: bytes
 
 
 def repository_url(text: str) -> str:
-    """Return the address of a repository in its stored form; raise `PackageError`."""
+    """Return the normalized URL of a repository; raise `PackageError`."""
     try:
         url = httpx2.URL(text)
     except httpx2.InvalidURL:
         url = httpx2.URL("")
     if url.scheme not in ("http", "https") or not url.host or url.userinfo or url.query:
         raise PackageError(
-            f"{text!r} is not an address of a repository, such as http://192.168.1.5:8090/"
+            f"{text!r} is not the URL of a repository, such as http://192.168.1.5:8090/"
         )
     return str(url.copy_with(fragment=None)).rstrip("/") + "/"
 
 
 def fetch_archive(url: str, entry: IndexEntry) -> bytes:
-    """Return an archive with the digest in the index; raise `PackageError`."""
+    """Return an archive after checking its digest; raise `PackageError`."""
     address = url + entry.file
     data = ask(address, entry.size).body
     if len(data) != entry.size or sha256(data) != entry.sha256:
@@ -60,14 +60,15 @@ def fetch_archive(url: str, entry: IndexEntry) -> bytes:
 def ask(
     url: str, most: int, etag: str = "", total_s: float = _TOTAL_S, *, may_lack: bool = False
 ) -> HttpResponse:
-    """Return the file at an address, up to `most` bytes.
+    """Return the file at a URL, up to `most` bytes.
 
     Args:
-        url: the address; redirects are not followed.
-        most: limit of the file, in bytes.
+        url: URL of the file; redirects are not followed.
+        most: maximum size of the file, in bytes.
         etag: ETag of the local copy.
-        total_s: limit of the whole transfer, in seconds.
-        may_lack: whether any other status counts as 404, because some servers have no 404.
+        total_s: timeout for the whole transfer, in seconds.
+        may_lack: whether statuses other than 200 and 304 count as 404, because some servers never
+            send 404.
 
     Raises:
         PackageError: the server is unreachable or slow, or its response is too large or invalid.
@@ -82,7 +83,7 @@ def ask(
 def put(
     url: str, body: bytes, headers: Mapping[str, str], total_s: float = _TOTAL_S
 ) -> HttpResponse:
-    """Upload a file to an address, and return the response with any status.
+    """Upload a file to a URL and return the response, regardless of its status.
 
     Raises:
         PackageError: the server is unreachable or slow.
@@ -110,7 +111,7 @@ async def _within(
 
 @cache
 def _trust() -> ssl.SSLContext:
-    """Return the trusted authorities; cached, because an index needs many requests."""
+    """Return the trusted certificate authorities. The result is cached for repeated requests."""
     return httpx2.create_ssl_context()
 
 
@@ -135,10 +136,12 @@ async def _exchange(
         if method == "GET" and status != 200:
             return HttpResponse(status if status == 304 else 404, "", b"")
         if response.headers.get("content-encoding", "identity") != "identity":
-            raise PackageError(f"{url}: the server compresses its response without being asked")
+            raise PackageError(
+                f"{url}: the server compressed its response without a request for compression"
+            )
         content = bytearray()
         async for piece in response.aiter_raw():
             content += piece
             if len(content) > most:
-                raise PackageError(f"{url}: more than the expected {most} bytes")
+                raise PackageError(f"{url}: received more than the expected {most} bytes")
         return HttpResponse(status, response.headers.get("etag", ""), bytes(content))

@@ -1,4 +1,4 @@
-"""``index.json``: the list of a repository, in a plain file that any web server can serve."""
+"""``index.json``: a repository's list of packages, in a plain file for any web server."""
 
 from collections.abc import Iterable, Sequence
 from typing import Annotated, Final
@@ -46,13 +46,13 @@ class IndexEntry(msgspec.Struct, frozen=True):
     signature: Signature | msgspec.UnsetType = msgspec.UNSET
     """Signature, if any."""
     withdrawn: _Text | msgspec.UnsetType = msgspec.UNSET
-    """Reason of a withdrawal."""
+    """Reason for the withdrawal."""
     provenance: Provenance | msgspec.UnsetType = msgspec.UNSET
     """Origin, if declared."""
 
     @property
     def why_withdrawn(self) -> str:
-        """Reason of a withdrawal, or ""."""
+        """Reason for the withdrawal; "" for an available version."""
         return self.withdrawn if isinstance(self.withdrawn, str) else ""
 
     @property
@@ -67,12 +67,12 @@ class IndexEntry(msgspec.Struct, frozen=True):
 
     @property
     def number(self) -> Version:
-        """Version of the package in comparable form."""
+        """Version of the package, for comparisons."""
         return parse_version(self.version)
 
     @property
     def file(self) -> str:
-        """Path of its archive, relative to the index."""
+        """Path of the archive, relative to the index."""
         return f"archives/{self.key}/{self.version}.zip"
 
     def __str__(self) -> str:
@@ -86,10 +86,10 @@ class Index(msgspec.Struct, frozen=True):
     name: _Text
     packages: tuple[IndexEntry, ...]
     number: Annotated[int, msgspec.Meta(ge=0, le=1 << 53)] = 0
-    """Number that grows with every change of the repository; 0 without numbers."""
+    """Number that increases with every change of the repository; 0 in unnumbered indexes."""
 
     def to_bytes(self) -> bytes:
-        """Return the file; the same packages give the same bytes."""
+        """Return the content of the file. The same packages always produce the same bytes."""
         return msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n"
 
 
@@ -118,7 +118,7 @@ def entry_of(
 def read_index(data: bytes, where: str) -> Index:
     """Return an index from an untrusted source; raise `PackageError`.
 
-    Versions and ranges are checked here, so that later code can rely on them.
+    Versions and ranges are validated, so later code need not check them.
     """
     if len(data) > INDEX_BYTES:
         raise PackageError(f"{where}: an index has at most {INDEX_BYTES >> 20} MiB")
@@ -126,7 +126,7 @@ def read_index(data: bytes, where: str) -> Index:
         index = msgspec.json.decode(data, type=Index)
         check_entries(index.packages)
     except (msgspec.DecodeError, PackageError, RecursionError, UnicodeDecodeError) as error:
-        raise PackageError(f"{where}: this is not an index of a repository: {error}") from None
+        raise PackageError(f"{where}: this is not the index of a repository: {error}") from None
     return index
 
 
@@ -150,9 +150,9 @@ def check_entries(entries: Iterable[IndexEntry]) -> None:
 
 
 def search(entries: Iterable[IndexEntry], words: Sequence[str], kind: str = "") -> list[IndexEntry]:
-    """Return the newest version of each package with all words; matches in the name come first.
+    """Return the newest version of each package that contains all words. Name matches are first.
 
-    Withdrawn versions are left out.
+    Withdrawn versions are omitted.
     """
     wanted = [word.casefold() for word in words]
     found: dict[tuple[str, str], IndexEntry] = {}

@@ -1,4 +1,4 @@
-"""The folder of a repository: source packages, and the files for any web server to serve.
+"""The folder of a repository: source packages, and files for any web server.
 
     DIR/drivers/puppet/package.yaml …     source of a package, edited by the maintainer
     DIR/archives/drivers/puppet/1.0.0.zip every version that was ever listed
@@ -8,7 +8,7 @@
     DIR/index/head.json                   its number and digest, signed by the maintainer
     DIR/drivers/puppet/urcpm.json         the same in the thesis's form
 
-Only listed files are served.
+Only files in the index are served.
 """
 
 import shutil
@@ -57,11 +57,11 @@ _SIGNED: Final = ".sig"
 
 
 class IndexListing(NamedTuple):
-    """Result of a scan of a repository's folder."""
+    """Result of scanning a repository's folder."""
 
     listed: Index
     faults: tuple[str, ...]
-    """One line for each rejected package."""
+    """One error message for each rejected package."""
 
 
 def make_index(
@@ -70,13 +70,13 @@ def make_index(
     examine: Callable[[Path], list[str]],
     index_signer: IndexSigner | None = None,
 ) -> IndexListing:
-    """Check every package in a folder, list the valid ones, and write `index.json`.
+    """Check every package in a folder, list the valid packages and write `index.json`.
 
     Args:
         folder: folder of the repository.
         name: name of the repository.
-        examine: returns the errors of a package's document, one line each.
-        index_signer: signer of the maintainer, for the index and for new source packages.
+        examine: returns the errors of a package's document, one per line.
+        index_signer: maintainer's signer for the index and for new source packages.
 
     Raises:
         PackageError: the folder is missing or not writable.
@@ -107,7 +107,7 @@ def changing(folder: Path) -> Iterator[Path]:
     """Lock a repository against other processes; yield a folder for incomplete files.
 
     Raises:
-        PackageError: another process holds the lock for longer than ten seconds.
+        PackageError: another process holds the lock for more than ten seconds.
     """
     work = folder / ".work"
     with atomic_files.exclusive(folder / ".changing"):
@@ -125,9 +125,10 @@ def keep(
     work: Path,
     notes: Notes | None = None,
 ) -> IndexEntry:
-    """Put an archive into a repository; the next index lists it.
+    """Add an archive to a repository, to be listed in the next index.
 
-    Signature and notes are written first, so an existing archive is always complete.
+    The signature and the notes are written before the archive, so an existing archive is always
+    complete.
     """
     entry = entry_of(package, signature, notes)
     archive = folder / entry.file
@@ -144,7 +145,7 @@ def keep(
 
 
 def notes_of(entry: IndexEntry) -> Notes:
-    """Return the notes about a version in an index; raise `PackageError`."""
+    """Return the notes in an index entry; raise `PackageError`."""
     provenance = entry.provenance if isinstance(entry.provenance, Provenance) else None
     try:
         return Notes(entry.why_withdrawn, provenance)
@@ -155,14 +156,14 @@ def notes_of(entry: IndexEntry) -> Notes:
 def withdraw(
     folder: Path, key: PackageId, version: str, why: str, index_signer: IndexSigner | None
 ) -> IndexEntry:
-    """Withdraw a version, or offer it again; return its entry of the index.
+    """Withdraw a version or make it available again; return the version's index entry.
 
     Args:
         folder: folder of the repository.
         key: the package.
         version: its version.
-        why: reason for users who have it installed; "" to offer it again.
-        index_signer: signer of the maintainer, for a signed index.
+        why: reason for users with the version installed; "" to make the version available again.
+        index_signer: maintainer's signer, for a signed index.
 
     Raises:
         PackageError: the version is not listed, or the repository is not writable.
@@ -195,7 +196,7 @@ def _listed(index: Index, key: PackageId, version: str) -> IndexEntry:
 
 
 def _checked(notes: Notes) -> Notes:
-    """Return notes after a check that they can be read; raise `PackageError`."""
+    """Return the notes if they can be read back; raise `PackageError`."""
     try:
         return msgspec.json.decode(msgspec.json.encode(notes), type=Notes)
     except msgspec.DecodeError as error:
@@ -203,7 +204,7 @@ def _checked(notes: Notes) -> Notes:
 
 
 def renew(folder: Path, index_signer: IndexSigner) -> None:
-    """Sign an index again if that is due; raise `PackageError`, or `OSError`."""
+    """Sign an index again if the signature is due for renewal; raise `PackageError`, `OSError`."""
     with changing(folder) as work:
         with open(folder / INDEX, "rb") as file:
             index = read_index(file.read(INDEX_BYTES + 1), INDEX)
@@ -219,18 +220,18 @@ def write_index(
 ) -> Index:
     """Write the index of a repository, then its head.
 
-    After an interruption every served file is complete, and the next call repairs the rest.
+    After an interruption, every served file is complete. The next call repairs missing files.
 
     Args:
         folder: folder of the repository, locked against other processes.
         name: name of the repository.
         entries: all versions.
         work: folder for incomplete files.
-        index_signer: signer of the maintainer, for the head.
+        index_signer: maintainer's signer, for the head.
 
     Raises:
         PackageError: the index is signed with another key; nothing has changed.
-        OSError: the disk is full, for example.
+        OSError: writing failed, for example because the disk is full.
     """
     before, number = _before(folder)
     index = Index(1, name, in_order(entries), number)
@@ -248,7 +249,7 @@ def write_index(
 
 
 def _before(folder: Path) -> tuple[Index | None, int]:
-    """Return the current index, None for a damaged one, and the last number."""
+    """Return the current index and its number; None instead of a damaged index."""
     data = _content(folder / INDEX, INDEX_BYTES + 1)
     with suppress(PackageError):
         if data is not None:
@@ -260,7 +261,7 @@ def _before(folder: Path) -> tuple[Index | None, int]:
 
 
 def head_in(folder: Path) -> IndexHead | None:
-    """Return the head in a repository's folder, or None without a valid one."""
+    """Return the head in a repository's folder; None without a valid head."""
     with suppress(PackageError):
         return read_head(_content(folder / HEAD, HEAD_BYTES) or b"", HEAD)
     return None
@@ -317,7 +318,7 @@ def _take(
 
 
 def _known(folder: Path) -> dict[str, IndexEntry]:
-    """Return the entries of the last index by file, so that known archives are not read again."""
+    """Return the entries of the last index by file, so known archives need no parsing."""
     try:
         with open(folder / INDEX, "rb") as file:
             index = read_index(file.read(INDEX_BYTES + 1), INDEX)
@@ -350,7 +351,7 @@ def _entry(folder: Path, file: Path, known: Mapping[str, IndexEntry]) -> IndexEn
 
 
 def read_signature(archive: Path) -> Signature | None:
-    """Return the signature of an archive, or None; raise `PackageError`."""
+    """Return the signature of an archive, or None if unsigned; raise `PackageError`."""
     file = archive.with_suffix(_SIGNED)
     try:
         with open(file, "rb") as opened:
@@ -362,7 +363,7 @@ def read_signature(archive: Path) -> Signature | None:
 
 
 def urcpm(said: Manifest, files: Mapping[str, bytes]) -> bytes:
-    """Return a package in the form of the thesis's figure B.2."""
+    """Return the description of a package in the format of the thesis's figure B.2."""
     needed = [key for key in map(parse_key, said.needs) if key.kind in _THESIS]
     styles = sorted(path for path in files if path.endswith(".css"))
     found: dict[str, object] = {

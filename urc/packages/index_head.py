@@ -1,7 +1,7 @@
-"""The head of an index: its number, its digest, its signature, and its expiry.
+"""The head of an index: number, digest, signature and expiry time.
 
-A maintainer with a key signs the head, and thereby the digest of the whole index. A signature is
-valid for some days, so an attacker cannot hide newer versions from a client for longer.
+A maintainer with a key signs the head, and therefore the digest of the whole index. Signatures
+expire after some days. An attacker cannot hide newer versions from clients after the expiry.
 """
 
 import time
@@ -42,22 +42,24 @@ class IndexSigner(NamedTuple):
 
 
 class IndexHead(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The head, which clients request first."""
+    """The head of an index. Clients request it before the index."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     number: Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]
     sha256: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
     """Digest of `index.json`."""
     expires: str = ""
-    """End of its validity, such as ``2026-12-05T20:00:00Z``; "" without a signature."""
+    """Expiry time, such as ``2026-12-05T20:00:00Z``; "" without a signature."""
     signature: Signature | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
-        """Reject invalid times, and a time without a signature."""
+        """Reject an invalid expiry time, and an expiry time without a signature."""
         if self.expires:
             datetime.strptime(self.expires, _TIME)  # noqa: DTZ007 (the format has a Z)
         if bool(self.expires) != isinstance(self.signature, Signature):
-            raise ValueError("a time of expiry goes with a signature")
+            raise ValueError(
+                "an expiry time requires a signature, and a signature requires an expiry time"
+            )
 
     @property
     def signed(self) -> Signature | None:
@@ -65,17 +67,17 @@ class IndexHead(msgspec.Struct, frozen=True, omit_defaults=True):
         return self.signature if isinstance(self.signature, Signature) else None
 
     def left_s(self, now_s: float) -> float:
-        """Return the rest of its validity, in seconds."""
+        """Return the remaining validity, in seconds."""
         end = datetime.strptime(self.expires, _TIME).replace(tzinfo=UTC)
         return end.timestamp() - now_s
 
     def is_sound(self) -> bool:
-        """Return whether its signature, if any, is valid."""
+        """Return whether the signature is valid; an unsigned head is valid."""
         signature = self.signed
         return signature is None or signature.verifies(_statement(self, signature.by))
 
     def to_bytes(self) -> bytes:
-        """Return the bytes of the file."""
+        """Return the content of the file."""
         return msgspec.json.encode(self) + b"\n"
 
 
@@ -84,18 +86,18 @@ def read_head(data: bytes, where: str) -> IndexHead:
     try:
         return msgspec.json.decode(data, type=IndexHead)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise PackageError(f"{where}: this is not a head of an index: {error}") from None
+        raise PackageError(f"{where}: this is not the head of an index: {error}") from None
 
 
 def check_key(old: IndexHead | None, index_signer: IndexSigner | None) -> None:
-    """Raise `PackageError` if the key of a signed head is not available.
+    """Raise `PackageError` if the key of the current signed head is not available.
 
-    Clients have pinned that key, so they would reject a head with another one.
+    Clients have pinned the key, so they would reject a head with another key.
     """
     signed = old.signed if old is not None else None
     if signed is not None and (index_signer is None or index_signer.signer.key != signed.key):
         raise PackageError(
-            f"the index is signed by {signed}: name that key with --key; if it is lost, remove"
+            f"the index is signed by {signed}: select that key with --key; if it is lost, remove"
             f" {HEAD}, and ask all users to remove the repository and to add it again"
         )
 
@@ -103,13 +105,13 @@ def check_key(old: IndexHead | None, index_signer: IndexSigner | None) -> None:
 def next_head(
     old: IndexHead | None, number: int, digest: str, index_signer: IndexSigner | None
 ) -> IndexHead:
-    """Return the head of an index, or the old one while it is still valid.
+    """Return a new head of an index, or the old head while it is still valid.
 
     Args:
-        old: the current head, if it is valid.
+        old: current head; None without a valid head.
         number: number of the index.
-        digest: digest of its bytes.
-        index_signer: signer of the maintainer; None without a signature.
+        digest: digest of the index file.
+        index_signer: maintainer's signer; None for an unsigned head.
 
     Raises:
         PackageError: the key of the signed old head is not available.

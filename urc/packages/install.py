@@ -1,4 +1,4 @@
-"""The way from a user's request to an install plan."""
+"""Install plans for packages requested by users."""
 
 from collections.abc import Callable, Iterable, Sequence
 
@@ -37,18 +37,20 @@ def plan_requirement(
     *,
     takes_withdrawn: bool = False,
 ) -> InstallPlan:
-    """Return the plan of a requirement, with all archives.
+    """Return the install plan of a requirement, with all archives.
 
     Args:
         required: the requirement.
-        sources: the sources, in the order of requests.
-        store: store whose archives are not fetched again.
-        complain: receives lines for people.
-        pinned: only these versions and bytes, even if they were withdrawn later.
+        sources: package sources, in the order of requests.
+        store: store with archives that need no download.
+        complain: receives warnings for people.
+        pinned: lock with the only accepted versions and digests, even if a version was withdrawn
+            later.
         takes_withdrawn: whether withdrawn versions are accepted.
 
     Raises:
-        PackageError: no source has it, its needs conflict, or an archive differs from the index.
+        PackageError: no source has the package, its dependencies conflict, or an archive differs
+            from the index.
     """
     everything = merged(sources, complain)
     found = everything
@@ -68,9 +70,9 @@ def plan_requirement(
 def plan_file(
     source: FileSource, others: Sequence[Source], store: Store, complain: Callable[[str], None]
 ) -> InstallPlan:
-    """Return the plan of the package in a file or folder.
+    """Return the install plan of the package in a file or folder.
 
-    Other sources are asked only for missing dependencies.
+    The other sources are used only for missing dependencies.
     """
     root = source.roots[0]
     own = merged([source], complain)
@@ -91,13 +93,13 @@ def plan_file(
 def plan_root(
     root: PackageId, wanted: str, found: Found, store: Store, pinned: Lock | None = None
 ) -> InstallPlan:
-    """Return the plan of one package, with all archives.
+    """Return the install plan of one package, with all archives.
 
     Args:
         root: the package.
-        wanted: range of its versions.
-        found: available packages, as from `merged`.
-        store: store whose archives are not fetched again.
+        wanted: range of versions of the package.
+        found: available packages, as returned by `merged`.
+        store: store with archives that need no download.
         pinned: expected result.
 
     Raises:
@@ -106,7 +108,9 @@ def plan_root(
     chosen = settle(root, wanted, found)
     lock = lock_of(root, chosen)
     if pinned is not None and lock != pinned:
-        raise PackageError(f"{root}: the lock does not match its needs; make a new lock")
+        raise PackageError(
+            f"{root}: the lock does not match the package's dependencies; create a new lock"
+        )
     check_names(chosen)
     archives: dict[str, bytes] = {}
     origins: dict[str, str] = {}
@@ -125,16 +129,16 @@ def plan_root(
 
 
 def settle(root: PackageId, wanted: str, found: Found) -> dict[PackageId, IndexEntry]:
-    """Return the chosen versions without fetching them; raise `PackageError`."""
+    """Return the resolved versions without downloading archives; raise `PackageError`."""
     return resolve(root, wanted, {key: [entry for entry, _ in some] for key, some in found.items()})
 
 
 def check_names(chosen: Iterable[PackageId]) -> None:
-    """Raise `PackageError` for a widget with the name of a built-in one."""
+    """Raise `PackageError` for a widget with the name of a built-in widget."""
     for key in chosen:
         if key.kind == "widget" and (shipped("widgets") / key.name / "widget.yaml").is_file():
             raise PackageError(
-                f"{key}: URC has a widget {key.name!r}, which no package may replace"
+                f"{key}: packages must not replace URC's built-in widget {key.name!r}"
             )
 
 
@@ -159,7 +163,7 @@ def origin_lines(plan: InstallPlan, store: Store) -> list[str]:
 
 
 def withdrawn_lines(lock: Lock, entries: Sequence[IndexEntry]) -> list[str]:
-    """Return a line for each withdrawn part of an installed package, with the reason."""
+    """Return a line with the reason for each withdrawn package in a lock."""
     return [
         phrase("{package} was withdrawn: {why}", package=entry, why=entry.why_withdrawn)
         for name, pin in lock.packages.items()
@@ -201,5 +205,5 @@ def _pinned(found: Found, lock: Lock) -> Found:
             if (entry.version, entry.sha256, entry.size) == (pin.version, pin.sha256, pin.size)
         ]
         if not kept[key]:
-            raise PackageError(f"{text} {pin.version} is not available with the bytes of the lock")
+            raise PackageError(f"{text} {pin.version} is not available with the digest in the lock")
     return kept

@@ -1,4 +1,4 @@
-"""An install plan: a lock, with new archives and their signatures."""
+"""An install plan: a lock with new archives and their signatures."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -10,18 +10,18 @@ __all__ = ["InstallPlan"]
 
 
 class InstallPlan(NamedTuple):
-    """An installation that is not executed yet."""
+    """A planned installation."""
 
     lock: Lock
     archives: Mapping[str, bytes]
-    """Digest → bytes, for archives that the store lacks."""
+    """New archives by digest, for storage."""
     origins: Mapping[str, str]
-    """``drivers/puppet`` → its source."""
+    """Source of each package, such as ``drivers/puppet``, by name."""
     signatures: Mapping[str, Signature]
-    """Digest → signature, for signed archives."""
+    """Signatures of signed archives, by digest."""
     own: frozenset[str] = frozenset()
-    """Packages from a folder that the user named. These packages are accepted without a check of
-    the pinned key.
+    """Packages from a folder that the user named. The pinned keys of these packages are not
+    checked.
     """
     remarks: Mapping[str, str] = {}
-    """Digest → remark of its repository, about a withdrawal or the origin."""
+    """Remarks of repositories about withdrawals and origins, by digest."""

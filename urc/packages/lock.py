@@ -1,4 +1,4 @@
-"""The lock: version and digest of each package that one package needs."""
+"""The lock of a package: versions and digests of the package and its dependencies."""
 
 from collections.abc import Mapping
 from typing import Annotated, Final
@@ -18,7 +18,7 @@ _PACKAGES_MOST: Final = 128
 
 
 class Pin(msgspec.Struct, frozen=True):
-    """One package of a lock."""
+    """One package in a lock."""
 
     version: Annotated[str, msgspec.Meta(max_length=64)]
     sha256: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
@@ -26,20 +26,18 @@ class Pin(msgspec.Struct, frozen=True):
 
 
 class Lock(msgspec.Struct, frozen=True):
-    """A package with all its needs, as a separate ecosystem."""
+    """A package with all its dependencies, isolated from other packages."""
 
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     root: str
     """Requested package, such as ``drivers/puppet``."""
     packages: dict[str, Pin]
-    """``drivers/puppet`` → its version; includes `root`."""
+    """Versions by package, including `root`; the keys are names such as ``drivers/puppet``."""
 
     def __post_init__(self) -> None:
         """Reject invalid names and versions."""
         if len(self.packages) > _PACKAGES_MOST or self.root not in self.packages:
-            raise ValueError(
-                f"1 to {_PACKAGES_MOST} packages are expected, and the root among them"
-            )
+            raise ValueError(f"1 to {_PACKAGES_MOST} packages, including the root")
         for key, pin in self.packages.items():
             parse_key(key)
             parse_version(pin.version)
@@ -51,21 +49,21 @@ class Lock(msgspec.Struct, frozen=True):
 
     @property
     def version(self) -> str:
-        """Version of the root."""
+        """Version of the root package."""
         return self.packages[self.root].version
 
     @property
     def number(self) -> Version:
-        """Version of the root in comparable form."""
+        """Version of the root package, for comparisons."""
         return parse_version(self.version)
 
     @property
     def digest(self) -> str:
-        """Digest that identifies this ecosystem."""
+        """Digest that identifies this combination of versions."""
         return sha256(self.to_bytes())
 
     def to_bytes(self) -> bytes:
-        """Return the file; the same choice gives the same bytes."""
+        """Return the content of the file. The same versions always produce the same bytes."""
         return msgspec.json.format(msgspec.json.encode(self, order="sorted"), indent=1) + b"\n"
 
     def __str__(self) -> str:
@@ -86,4 +84,4 @@ def read_lock(data: bytes, where: str) -> Lock:
     try:
         return msgspec.json.decode(data, type=Lock)
     except (msgspec.DecodeError, PackageError, RecursionError, UnicodeDecodeError) as error:
-        raise PackageError(f"{where}: this is not a lock: {error}") from None
+        raise PackageError(f"{where}: this is not a lock file: {error}") from None

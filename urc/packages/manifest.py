@@ -11,7 +11,7 @@ __all__ = ["LANGUAGE", "MANIFEST", "Manifest", "parse_manifest"]
 
 MANIFEST: Final = "package.yaml"
 LANGUAGE: Final = 1
-"""Version of the document language that this URC supports."""
+"""Version of the document language that this release of URC supports."""
 _NEEDS_MOST: Final = 64
 _AUTHORS_MOST: Final = 32
 _LONGEST: Final = 500
@@ -20,7 +20,7 @@ _MUST: Final = _KEYS[:6]
 
 
 class Manifest(NamedTuple):
-    """The checked content of ``package.yaml``."""
+    """The validated content of ``package.yaml``."""
 
     key: PackageId
     version: str
@@ -30,12 +30,12 @@ class Manifest(NamedTuple):
     authors: tuple[str, ...]
     summary: str
     needs: dict[str, str]
-    """``widgets/battery-svg`` → range of versions."""
+    """Version ranges of dependencies by package, such as ``widgets/battery-svg``."""
     language: int
 
     @property
     def main(self) -> str:
-        """Name of the main document, such as ``driver.yaml`` for a driver."""
+        """File name of the main document, such as ``driver.yaml`` for a driver."""
         return f"{self.key.kind}.yaml"
 
 
@@ -43,7 +43,7 @@ def parse_manifest(content: bytes, file: str) -> Manifest:
     """Return the content of a manifest.
 
     Raises:
-        PackageError: its fault, with the line.
+        PackageError: the manifest is invalid; the message contains the line.
     """
     try:
         document = parse_document(content, file, DocumentLimits(size_bytes=65536))
@@ -71,7 +71,7 @@ def parse_manifest(content: bytes, file: str) -> Manifest:
 
 
 class _Reader:
-    """A reader of the values of a manifest, with lines for faults."""
+    """A reader of manifest values; errors contain the line."""
 
     def __init__(self, document: Document) -> None:
         self._document = document

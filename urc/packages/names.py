@@ -18,7 +18,7 @@ __all__ = [
 
 KINDS: Final = ("driver", "interface", "widget", "robot")
 FOLDERS: Final = {f"{kind}s": kind for kind in KINDS}
-"""Folder → kind of the packages in it."""
+"""Kind of the packages in each folder, by folder name."""
 NAME: Final = re.compile(r"[a-z][a-z0-9-]{0,63}")
 
 
@@ -41,7 +41,7 @@ class PackageRequirement(NamedTuple):
     """A requirement from a command line."""
 
     kind: str
-    """Kind; "" for any kind with this name."""
+    """Kind of the package; "" for any kind."""
     name: str
     range: str = "*"
 
@@ -51,18 +51,18 @@ class PackageRequirement(NamedTuple):
 
 
 def parse_key(text: str) -> PackageId:
-    """Return the package with the name ``drivers/puppet``; raise `PackageError`."""
+    """Return the identity of a package such as ``drivers/puppet``; raise `PackageError`."""
     folder, slash, name = text.partition("/")
     if not slash or folder not in FOLDERS or not NAME.fullmatch(name):
         raise PackageError(
-            f"{text!r} names no package: write drivers/NAME, interfaces/NAME, widgets/NAME"
+            f"{text!r} is not a package name: write drivers/NAME, interfaces/NAME, widgets/NAME"
             " or robots/NAME, in small letters, digits and '-'"
         )
     return PackageId(FOLDERS[folder], name)
 
 
 def parse_requirement(text: str) -> PackageRequirement:
-    """Return the requirement in ``puppet``, ``drivers/puppet`` or ``puppet@^1.2``."""
+    """Parse ``puppet``, ``drivers/puppet`` or ``puppet@^1.2``; raise `PackageError`."""
     package, at, wanted = text.partition("@")
     if "/" in package:
         key = parse_key(package)
@@ -71,7 +71,8 @@ def parse_requirement(text: str) -> PackageRequirement:
         kind, name = "", package
     else:
         raise PackageError(
-            f"{text!r} names no package: write NAME or drivers/NAME, and @VERSION for a version"
+            f"{text!r} is not a package name;"
+            " expected NAME or drivers/NAME, with @VERSION for a version"
         )
     if at and not wanted:
         raise PackageError(f"{text!r}: expected a version after '@'")

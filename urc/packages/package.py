@@ -1,4 +1,4 @@
-"""A package: its manifest, its files, and its reproducible archive."""
+"""A package: its manifest, its files and its reproducible archive."""
 
 import hashlib
 import os
@@ -20,31 +20,31 @@ LEFT_OUT = ("urcpm.json",)
 
 
 class Package(NamedTuple):
-    """A complete, checked package in memory."""
+    """A complete, validated package in memory."""
 
     manifest: Manifest
     files: dict[str, bytes]
     data: bytes
-    """Bytes of the archive."""
+    """Content of the archive."""
     digest: str
-    """SHA-256 of the archive, 64 hex digits."""
+    """SHA-256 of the archive, as 64 hexadecimal digits."""
 
 
 def sha256(data: bytes) -> str:
-    """Return the digest that identifies content."""
+    """Return the SHA-256 digest as hexadecimal digits."""
     return hashlib.sha256(data).hexdigest()
 
 
 def open_package(data: bytes, name: str) -> Package:
-    """Return the package in an archive; raise `PackageError`, with `name` in the message."""
+    """Return the package in an archive; raise `PackageError` with `name` in the message."""
     return _package(read_archive(data, PACKAGE, name), data, name)
 
 
 def pack_folder(folder: Path) -> Package:
-    """Return the package in a folder, without files whose names begin with '.'.
+    """Return the package in a folder. Hidden files (names with a leading '.') are omitted.
 
     Raises:
-        PackageError: the manifest is missing, or the folder has a link or a forbidden file.
+        PackageError: the manifest is missing, or the folder contains a link or a forbidden file.
     """
     files: dict[str, bytes] = {}
     total = 0
@@ -66,7 +66,7 @@ def pack_folder(folder: Path) -> Package:
 
 
 def _files(folder: Path, below: str = "", depth: int = 0) -> Iterator[tuple[str, str]]:
-    """Yield path and file of every entry in a folder."""
+    """Yield the relative and the absolute path of every file in a folder."""
     if depth > 8:
         raise PackageError(f"{folder}: folders are nested too deep")
     with os.scandir(folder) as entries:
@@ -81,7 +81,7 @@ def _files(folder: Path, below: str = "", depth: int = 0) -> Iterator[tuple[str,
         elif stat.S_ISREG(mode):
             yield path, entry.path
         else:
-            raise PackageError(f"{entry.path}: only ordinary files are allowed in a package")
+            raise PackageError(f"{entry.path}: only regular files are allowed in a package")
 
 
 def _package(files: dict[str, bytes], data: bytes, name: str) -> Package:
@@ -95,7 +95,7 @@ def _package(files: dict[str, bytes], data: bytes, name: str) -> Package:
 
 
 def _check_document(content: bytes, manifest: Manifest, file: str) -> None:
-    """Check that the document agrees with the manifest."""
+    """Check that kind and name of the document agree with the manifest."""
     try:
         data = parse_document(content, file).data
     except ProblemsError as error:

@@ -18,13 +18,13 @@ __all__ = ["Published", "is_overheard", "publish"]
 
 
 class Published(msgspec.Struct, frozen=True):
-    """Response of a repository."""
+    """Response of a repository to an upload."""
 
     listed: str
     """Listed version, such as ``drivers/puppet 1.0.0``."""
     sha256: str
     is_new: bool = True
-    """False if exactly this version was already listed."""
+    """False if the repository already listed this version."""
 
 
 class _Fault(msgspec.Struct, frozen=True):
@@ -32,7 +32,7 @@ class _Fault(msgspec.Struct, frozen=True):
 
 
 def is_overheard(url: str) -> bool:
-    """Return whether others on the network can read a token sent to an address."""
+    """Return whether a token sent to this URL is readable on the network."""
     parts = urlsplit(url)
     if parts.scheme == "https":
         return False
@@ -49,17 +49,17 @@ def publish(
     token: str,
     provenance: Provenance | None = None,
 ) -> Published:
-    """Upload a package to a repository, which checks, tests and lists it.
+    """Upload a package to a repository. The repository checks, tests and lists the package.
 
     Args:
-        url: address of the repository. Redirects are not followed, to protect the token.
+        url: URL of the repository. Redirects are not followed, to protect the token.
         package: the package.
-        signature: its signature, if any.
+        signature: signature of the package; None for an unsigned package.
         token: upload token from the maintainer.
-        provenance: its origin, shown at installation.
+        provenance: origin of the package, shown before installation; None if unknown.
 
     Raises:
-        PackageError: the repository rejects it, or is unreachable.
+        PackageError: the repository rejects the upload or is unreachable.
     """
     address = repository_url(url) + entry_of(package).file
     headers = {
@@ -77,10 +77,12 @@ def publish(
             said = msgspec.json.decode(answer.body, type=Published)
         except (msgspec.DecodeError, UnicodeDecodeError):
             raise PackageError(
-                f"{address}: it was accepted, but the server's response is invalid"
+                f"{address}: the upload was accepted, but the server's response is invalid"
             ) from None
         if said.sha256 != package.digest:
-            raise PackageError(f"{address}: the server listed other bytes than were sent")
+            raise PackageError(
+                f"{address}: the server listed bytes that differ from the sent bytes"
+            )
         return msgspec.structs.replace(said, is_new=answer.status == 201)
     raise PackageError(f"{address}: {_reason(answer.status, answer.body)}")
 
@@ -88,7 +90,7 @@ def publish(
 def _reason(status: int, body: bytes) -> str:
     if status in (404, 405, 501):
         return (
-            f"this server accepts no packages (status {status});"
+            f"this server does not accept uploads (status {status});"
             " start one with 'urc repo serve DIR --tokens FILE'"
         )
     try:

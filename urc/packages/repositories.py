@@ -1,4 +1,4 @@
-"""The user's repositories, and the last known index of each."""
+"""The user's repositories and their last known indexes."""
 
 import hashlib
 import time
@@ -22,7 +22,7 @@ __all__ = ["Repositories", "Repository"]
 _MOST: Final = 32
 _LIST_BYTES: Final = 1 << 20
 _TRIES: Final = 2
-"""Attempts, because a repository may change between two requests."""
+"""Number of attempts. A repository may change between the requests for head and index."""
 
 
 class _Known(msgspec.Struct, frozen=True):
@@ -32,20 +32,22 @@ class _Known(msgspec.Struct, frozen=True):
 
 class _Tags(msgspec.Struct, frozen=True):
     sha256: str
-    """Digest of the index with these tags."""
+    """Digest of the index that these tags belong to."""
     index: str = ""
     """ETag of the index."""
     head: str = ""
     said: IndexHead | None = None
-    """The head after its check; None without a matching one."""
+    """The verified head; None without a head that matches the index."""
 
 
 class Repository:
-    """One repository. The last index is stored, and used while the repository is unreachable.
+    """A repository.
 
-    The number of the index only grows: an index with a lower number is rejected, and the stored one
-    is used. The first signing key is pinned; an index with another key, or without a signature, is
-    rejected.
+    The last index is stored for use while the repository is unreachable.
+
+    The index number only increases. For an index with a lower number, URC reports an error and uses
+    the stored index. The first signing key is pinned. An index with another key or without a
+    signature is rejected.
     """
 
     def __init__(
@@ -65,19 +67,19 @@ class Repository:
 
     @property
     def keeper(self) -> str:
-        """Name and fingerprint of the index's signer, or ""."""
+        """Name and fingerprint of the index's signer; "" for an unsigned index."""
         return self._trust.keeper
 
     def known(self) -> tuple[IndexEntry, ...]:
-        """Return the entries of the stored index, without a request; () if there is no index."""
+        """Return the entries of the stored index without a request; () without a stored index."""
         kept = self._kept()
         return kept[0].packages if kept is not None else ()
 
     def entries(self) -> tuple[IndexEntry, ...]:
-        """Return the current entries, or the stored ones while the repository is unreachable.
+        """Return the current entries, or the stored entries while the repository is unreachable.
 
         Raises:
-            PackageError: it was never reached, or its stored index has expired.
+            PackageError: no index is stored, or the stored index has expired.
         """
         try:
             return self.refresh().packages
@@ -90,11 +92,12 @@ class Repository:
             return kept[0].packages
 
     def refresh(self) -> Index:
-        """Request the newest index, and return it.
+        """Request the newest index and return it.
 
         Raises:
-            PackageError: the repository is unreachable, or its index is invalid, expired, older
-                than the stored one, or not signed by the pinned key.
+            PackageError: the repository is unreachable, or its index is not accepted. An accepted
+                index is valid, not expired, not older than the stored index, and signed by the
+                pinned key.
         """
         for _ in range(_TRIES):
             index = self._asked()
@@ -127,7 +130,7 @@ class Repository:
         """Request the whole index; return None if it does not match its signed head.
 
         Raises:
-            PackageError: it is older than the stored one.
+            PackageError: the index is older than the stored index.
         """
         address = self.name + INDEX
         answer = ask(address, INDEX_BYTES, kept[1].index if kept is not None else "")
@@ -165,7 +168,7 @@ class Repository:
         self._trust.forget()
 
     def _store(self, tags: _Tags, data: bytes | None = None) -> None:
-        """Store the tags, and the index unless it is unchanged."""
+        """Store the tags, and the index if `data` is given."""
         work = self._folder / "work"
         if tags.said is not None:
             self._trust.pin(tags.said, work)
@@ -174,14 +177,17 @@ class Repository:
         atomic_files.put_file(self._tags, msgspec.json.encode(tags), work)
 
     def _kept(self) -> tuple[Index, _Tags] | None:
-        """Return the stored index, with its tags if they match, or None."""
+        """Return the stored index with its tags, or None without a valid index.
+
+        Mismatched tags are empty.
+        """
         data = _content(self._index, INDEX_BYTES)
         if data is None:
             return None
         try:
             index = read_index(data, str(self._index))
         except PackageError as error:
-            self._complain(f"{error}; it is requested again")
+            self._complain(f"{error}; it will be downloaded again")
             return None
         try:
             tags = msgspec.json.decode(_content(self._tags, 4096) or b"", type=_Tags)
@@ -191,7 +197,7 @@ class Repository:
 
 
 class Repositories:
-    """The user's list of repositories, in the order of requests."""
+    """The user's repositories, in the order of requests."""
 
     def __init__(self, folder: Path, complain: Callable[[str], None]) -> None:
         self._folder = folder / "repositories"
@@ -199,23 +205,23 @@ class Repositories:
         self._complain = complain
 
     def all(self) -> list[Repository]:
-        """Return the added repositories, in their order."""
+        """Return the repositories in the order of addition."""
         return [self._repository(url) for url in self._urls()]
 
     def add(self, text: str) -> tuple[str, Index]:
-        """Add a reachable repository; return its address and its index."""
+        """Add a reachable repository; return its URL and its index."""
         url = repository_url(text)
         index = self._repository(url).refresh()
         with atomic_files.exclusive(self._folder / "changing"):
             urls = self._urls()
             if len(urls) >= _MOST:
-                raise PackageError(f"at most {_MOST} repositories can be remembered")
+                raise PackageError(f"at most {_MOST} repositories can be added")
             if url not in urls:
                 self._write((*urls, url))
         return url, index
 
     def remove(self, text: str) -> str:
-        """Remove a repository; packages from it stay installed."""
+        """Remove a repository; packages installed from it remain installed."""
         url = repository_url(text)
         with atomic_files.exclusive(self._folder / "changing"):
             urls = self._urls()
@@ -244,7 +250,7 @@ class Repositories:
 
 
 def _head(answer: HttpResponse, url: str) -> IndexHead | None:
-    """Return the head in a response, or None for a missing or damaged one."""
+    """Return the head in a response; None for a missing or damaged head."""
     with suppress(PackageError):
         return read_head(answer.body, url + HEAD)
     return None

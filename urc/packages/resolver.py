@@ -1,8 +1,8 @@
-"""The choice of versions, so that every need of every package is satisfied.
+"""Dependency resolution: the choice of a version for every required package.
 
-`resolvelib`, the resolver of pip, does the search. The resolver backtracks after a conflict, and
-reports the conflict if there is no solution. This module defines packages, needs and the best
-version, which is the newest matching one.
+The search uses `resolvelib`, the resolver of pip. The resolver backtracks after a conflict, and
+reports conflicts without a solution. This module defines packages, dependencies and the preferred
+version, which is the newest match.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -32,7 +32,7 @@ Entries = Mapping[PackageId, Sequence[IndexEntry]]
 
 
 def choose(entries: Entries, required: PackageRequirement) -> PackageId:
-    """Return the package of a requirement.
+    """Return the package for a requirement.
 
     Raises:
         PackageError: no package, or packages of several kinds, have this name.
@@ -44,7 +44,7 @@ def choose(entries: Entries, required: PackageRequirement) -> PackageId:
         return found[0]
     if found:
         names = ", ".join(map(str, sorted(found)))
-        raise PackageError(f"{required.name!r} is ambiguous; write one of {names}")
+        raise PackageError(f"{required.name!r} is ambiguous; expected one of {names}")
     from difflib import get_close_matches
 
     near = get_close_matches(required.name, [key.name for key in entries], 1)
@@ -55,15 +55,15 @@ def choose(entries: Entries, required: PackageRequirement) -> PackageId:
 
 
 def resolve(root: PackageId, wanted: str, entries: Entries) -> dict[PackageId, IndexEntry]:
-    """Return one version of `root` and of each of its needs.
+    """Return one version of `root` and of each dependency.
 
     Args:
         root: the requested package.
-        wanted: range of its versions.
-        entries: all available versions.
+        wanted: version range of the requested package.
+        entries: all available versions, by package.
 
     Raises:
-        PackageError: the conflicting needs, and the packages with these needs.
+        PackageError: the dependencies conflict; the message lists the conflicting packages.
     """
     resolver: Resolver[_Need, IndexEntry, PackageId] = Resolver(_Provider(entries), BaseReporter())
     try:
@@ -71,7 +71,9 @@ def resolve(root: PackageId, wanted: str, entries: Entries) -> dict[PackageId, I
     except ResolutionImpossible as error:
         raise PackageError(_conflict(error, entries)) from None
     except ResolutionTooDeep:
-        raise PackageError(f"{root}: its needs were not settled in {_ROUNDS} steps") from None
+        raise PackageError(
+            f"{root}: its dependencies could not be resolved in {_ROUNDS} steps"
+        ) from None
     if len(result.mapping) > _PACKAGES_MOST:
         raise PackageError(f"{root} needs more than {_PACKAGES_MOST} packages")
     return dict(sorted(result.mapping.items()))
@@ -92,7 +94,7 @@ class _Provider(AbstractProvider[_Need, IndexEntry, PackageId]):
         information: Mapping[PackageId, Iterator[Any]],
         backtrack_causes: Sequence[Any],
     ) -> tuple[bool, PackageId]:
-        """Prefer packages of an earlier conflict."""
+        """Prefer packages that caused an earlier conflict."""
         causes = {cause.requirement.key for cause in backtrack_causes}
         return identifier not in causes, identifier
 
@@ -122,12 +124,12 @@ class _Provider(AbstractProvider[_Need, IndexEntry, PackageId]):
 
 @lru_cache(maxsize=65536)
 def _allows(wanted: str, version: str) -> bool:
-    """Return whether a version is in a range; cached, because a search repeats the question."""
+    """Return whether a version is in a range. The result is cached for repeated queries."""
     return parse_range(wanted).allows(parse_version(version))
 
 
 def _conflict(error: "ResolutionImpossible[_Need, IndexEntry]", entries: Entries) -> str:
-    """Return a message with each need, its package, and the available versions."""
+    """Return a message with each conflicting requirement and the available versions."""
     causes: Iterable[Any] = error.causes
     asked: dict[PackageId, list[str]] = {}
     for cause in causes:
@@ -146,4 +148,4 @@ def _there_is(key: PackageId, entries: Entries) -> str:
     if usable:
         shown = ", ".join(usable[-8:])
         return f"there is {shown}" if len(usable) <= 8 else f"there is …, {shown}"
-    return "every version is for another URC" if known else "there is none"
+    return "every version requires another version of URC" if known else "there is none"

@@ -1,7 +1,7 @@
-"""A repository over HTTP: the files of its folder, and the lists of the thesis's figure B.3.
+"""A repository over HTTP: its listed files, and the lists of the thesis's figure B.3.
 
-Only listed files are served. The index is read again after each change, so a new package needs no
-restart.
+Only files in the index are served. The server reads the index again after each change, so new
+packages need no restart.
 """
 
 import asyncio
@@ -43,7 +43,11 @@ _HEADERS: Final = {"cache-control": "no-store", "x-content-type-options": "nosni
 
 
 class UploadService:
-    """A service for `PUT archives/drivers/puppet/1.0.0.zip`, with `authorization: Bearer TOKEN`."""
+    """The service for uploads with `PUT`.
+
+    Clients send `PUT archives/drivers/puppet/1.0.0.zip` with the header `authorization: Bearer
+    TOKEN`.
+    """
 
     def __init__(
         self,
@@ -60,7 +64,7 @@ class UploadService:
         self._waiting = 0
 
     async def answer(self, request: Request) -> Response:
-        """Answer one request: 201 if the version is new, 200 if it was listed before."""
+        """Process one upload: reply 201 for a new version, or 200 for a listed version."""
         refusal: SubmissionRefused | None = None
         key = None
         try:
@@ -71,7 +75,7 @@ class UploadService:
             # Read the body of refused requests too, or the client may miss the response.
             body = await _body(request, is_kept=refusal is None)
             if refusal is not None or key is None:
-                raise refusal or SubmissionRefused(404, "this path does not exist")
+                raise refusal or SubmissionRefused(404, "unknown path")
             taken = await self._taken(request, body)
         except SubmissionRefused as error:
             headers = {"www-authenticate": "Bearer"} if error.status == 401 else {}
@@ -81,12 +85,12 @@ class UploadService:
         except PackageError as error:
             return _told(503, {"error": str(error)})
         except OSError as error:
-            return _told(507, {"error": f"it cannot be stored: {error.strerror or error}"})
+            return _told(507, {"error": f"the package cannot be stored: {error.strerror or error}"})
         said = {"listed": str(taken.entry), "sha256": taken.entry.sha256}
         return _told(201 if taken.is_new else 200, said)
 
     async def _admitted(self, request: Request) -> PackageId:
-        """Return the package that this token may publish; raise `SubmissionRefused`."""
+        """Return the package that the token may publish; raise `SubmissionRefused`."""
         scheme, _, text = request.headers.get("authorization", "").partition(" ")
         token = None
         if scheme.lower() == "bearer":
@@ -142,7 +146,7 @@ class UploadService:
 
 
 async def _body(request: Request, *, is_kept: bool) -> bytes:
-    """Return the body, or b"" if it is not kept; raise `SubmissionRefused` if too large."""
+    """Return the body, or b"" unless `is_kept`; raise `SubmissionRefused` if it is too large."""
     size = 0
     pieces = []
     async for piece in request.stream():
@@ -156,12 +160,12 @@ async def _body(request: Request, *, is_kept: bool) -> bytes:
     wanted = request.headers.get("urc-sha256", "")
     body = b"".join(pieces)
     if is_kept and wanted and sha256(body) != wanted:
-        raise SubmissionRefused(400, "the upload was damaged on the way; try again")
+        raise SubmissionRefused(400, "the upload was damaged in transit; try again")
     return body
 
 
 def _header(request: Request, name: str, kind: type[_Told], lacks: str) -> _Told | None:
-    """Return the value of a header, JSON in base64, or None; raise `SubmissionRefused`."""
+    """Return the value of a header with JSON in base64, or None; raise `SubmissionRefused`."""
     text = request.headers.get(name, "")
     if not text:
         return None
@@ -170,7 +174,7 @@ def _header(request: Request, name: str, kind: type[_Told], lacks: str) -> _Told
             raise ValueError
         return msgspec.json.decode(base64.b64decode(text, validate=True), type=kind)
     except (ValueError, msgspec.DecodeError):
-        raise SubmissionRefused(400, f"the header {name} holds {lacks}") from None
+        raise SubmissionRefused(400, f"the header {name} contains {lacks}") from None
 
 
 def _told(status: int, said: dict[str, str], headers: dict[str, str] | None = None) -> Response:
@@ -185,7 +189,7 @@ _ANSWER_HEADERS: Final = {
 }
 _THESIS: Final = ("drivers", "widgets", "interfaces")
 _LASTING: Final = "public, max-age=31536000, immutable"
-"""For archives, whose content never changes."""
+"""Cache header for archives, which never change."""
 
 
 def repository_app(
@@ -194,13 +198,13 @@ def repository_app(
     examine: Callable[[Path], list[str]] | None = None,
     index_signer: IndexSigner | None = None,
 ) -> Starlette:
-    """Return the application that serves the repository in a folder.
+    """Return the web application that serves the repository in a folder.
 
     Args:
         folder: folder of the repository.
         tokens: upload tokens; None to refuse uploads.
-        examine: checks uploads, see `urc.packages.submission.take`.
-        index_signer: signer of the maintainer, for the index with uploads.
+        examine: checks uploads, as in `urc.packages.submission.take`.
+        index_signer: maintainer's signer, for the index after uploads.
     """
     shop = _Shop(folder)
     routes = [Route("/{path:path}", shop.answer, methods=["GET", "HEAD"])]
@@ -276,7 +280,7 @@ class _Shop:
         self._seen = seen
 
     def _head(self) -> tuple[IndexHead | None, tuple[int, ...]]:
-        """Return the stored head, and the stamp of its file."""
+        """Return the stored head and the stamp of its file."""
         try:
             with open(self._folder / HEAD, "rb") as opened:
                 stamp = _stamp(os.fstat(opened.fileno()))
@@ -289,7 +293,7 @@ class _Shop:
 
 
 def _stamp(status: os.stat_result) -> tuple[int, ...]:
-    """Return a stamp that changes with the file."""
+    """Return a stamp that changes whenever the file changes."""
     return status.st_mtime_ns, status.st_size, status.st_ino
 
 

@@ -1,8 +1,8 @@
-"""Signatures of packages: Ed25519 of `cryptography`, over a statement in plain words.
+"""Ed25519 signatures of packages, over a readable text statement.
 
-A signature says that the holder of a key declares these bytes to be that version of that package.
-The owner of a key is not verified. The key is pinned when a package is first installed, and a later
-version with another key is rejected. SSH does the same with host keys.
+A signature states that the key's holder declares these bytes to be this version of this package.
+URC does not verify the identity of the key's holder. The first installation of a package pins its
+key. Later versions with another key are rejected. SSH treats host keys in the same way.
 """
 
 import base64
@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 PUBLISHER: Final = "publisher.pem"
-"""File of the user's own key, in the data folder."""
+"""File with the user's private key, in the data folder."""
 SIGNATURE: Final = "urc-signature"
 """Header of an upload: the signature as JSON, in base64."""
 _STATEMENT: Final = "URC package signature 1\n{package}\n{version}\n{sha256}\n{by}\n"
@@ -43,7 +43,7 @@ class Signature(msgspec.Struct, frozen=True):
     """A signature in an index."""
 
     by: Annotated[str, msgspec.Meta(min_length=1, max_length=_LONGEST)]
-    """Name of the publisher, which only the key confirms."""
+    """Name of the publisher. Only the key confirms the name."""
     key: Annotated[str, msgspec.Meta(pattern=r"\A[A-Za-z0-9+/]{43}=\Z")]
     """Ed25519 public key, 32 bytes in base64."""
     value: Annotated[str, msgspec.Meta(pattern=r"\A[A-Za-z0-9+/]{86}==\Z")]
@@ -53,7 +53,7 @@ class Signature(msgspec.Struct, frozen=True):
         """Reject ambiguous base64, and names with hidden characters."""
         for text in (self.key, self.value):
             if base64.b64encode(base64.b64decode(text)).decode() != text:
-                raise ValueError("base64 with bits left over")
+                raise ValueError("expected base64 without extra bits")
         if not self.by.isprintable():
             raise ValueError("expected a name on one line")
 
@@ -100,11 +100,14 @@ class Signer:
         return fingerprint(self.key)
 
     def sign(self, package: PackageId, version: str, sha256: str) -> Signature:
-        """Return the signature, which is the same for the same package."""
+        """Return the signature of a package. The same package always has the same signature."""
         return self.signs(_statement(package, version, sha256, self.by))
 
     def signs(self, statement: bytes) -> Signature:
-        """Return the signature of a statement, which contains the signer and the subject."""
+        """Return the signature of a statement.
+
+        The statement must contain the signer and the subject.
+        """
         value = self._private.sign(statement)
         return Signature(self.by, self.key, base64.b64encode(value).decode())
 
@@ -113,7 +116,7 @@ class Signer:
 
 
 def fingerprint(key: str) -> str:
-    """Return the fingerprint of a public key, in the form of SSH."""
+    """Return the fingerprint of a public key, in the format of SSH."""
     digest = hashlib.sha256(base64.b64decode(key)).digest()
     return "SHA256:" + base64.b64encode(digest).decode().rstrip("=")
 
@@ -129,7 +132,7 @@ def new_signer(by: str, file: Path) -> Signer:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
     if not by.strip() or len(by) > _LONGEST or not by.isprintable():
-        raise PackageError(f"the name of a publisher is one line of 1 to {_LONGEST} characters")
+        raise PackageError(f"expected a publisher's name of 1 to {_LONGEST} characters on one line")
     private = Ed25519PrivateKey.generate()
     text = private.private_bytes(
         serialization.Encoding.PEM,
@@ -141,7 +144,7 @@ def new_signer(by: str, file: Path) -> Signer:
         number = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     except FileExistsError:
         raise PackageError(
-            f"{file}: a key exists already; users recognise your packages by it"
+            f"{file}: this key already exists; users recognise your packages by this key"
         ) from None
     with os.fdopen(number, "wb") as opened:
         opened.write(f"{_NAMED}{by}\n".encode() + text)
@@ -149,7 +152,7 @@ def new_signer(by: str, file: Path) -> Signer:
 
 
 def read_signer(file: Path) -> Signer | None:
-    """Return the key in a file, or None without a file; raise `PackageError`."""
+    """Return the key in a file, or None if the file is missing; raise `PackageError`."""
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
@@ -177,5 +180,8 @@ def _no_key(file: Path) -> str:
 
 
 def _statement(package: PackageId, version: str, sha256: str, by: str) -> bytes:
-    """Return the statement to sign. No part contains a line end, so no two look alike."""
+    """Return the statement to sign.
+
+    Its parts contain no line ends, so different statements have different bytes.
+    """
     return _STATEMENT.format(package=package, version=version, sha256=sha256, by=by).encode()

@@ -1,4 +1,4 @@
-"""Sources of packages: repositories, bundles, archives and folders, with one interface."""
+"""Package sources with one interface: repositories, bundles, archives and folders."""
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -27,11 +27,11 @@ class Source(Protocol):
         """Return every version of every package; raise `PackageError`."""
 
     def fetch(self, entry: IndexEntry) -> bytes:
-        """Return an archive with exactly the digest of the entry; raise `PackageError`."""
+        """Return the archive with the digest of the entry; raise `PackageError`."""
 
 
 class FileSource:
-    """A bundle, a package's archive, or a package's folder."""
+    """A bundle, an archive or a folder as a source of packages."""
 
     def __init__(
         self,
@@ -46,13 +46,13 @@ class FileSource:
         self.is_folder = is_folder
         """Whether the source is a folder of packages in development."""
         self.signatures = dict(signatures or {})
-        """Digest → signature, for signed archives."""
+        """Signatures of signed archives, by digest."""
         self.roots = tuple(roots)
-        """Packages to install for a request of the whole source."""
+        """Packages to install if the user requests the whole source."""
         self._packages = {package.digest: package for package in packages}
 
     def entries(self) -> tuple[IndexEntry, ...]:
-        """Return the entries of its packages."""
+        """Return the index entries of all packages."""
         return tuple(
             entry_of(package, self.signatures.get(digest))
             for digest, package in self._packages.items()
@@ -60,7 +60,7 @@ class FileSource:
 
     @property
     def packages(self) -> tuple[Package, ...]:
-        """The packages, with those to install first."""
+        """All packages of the source. For a folder, the requested package is first."""
         return tuple(self._packages.values())
 
     def fetch(self, entry: IndexEntry) -> bytes:
@@ -69,7 +69,7 @@ class FileSource:
 
 
 def open_source(path: Path) -> FileSource:
-    """Return the source at a path: a folder, an archive, or a bundle; raise `PackageError`."""
+    """Return the source at a path: a folder, an archive or a bundle; raise `PackageError`."""
     if path.is_dir():
         packages = _pack_with_needs(path)
         return FileSource(str(path), packages, [packages[0].manifest.key], is_folder=True)
@@ -89,7 +89,7 @@ def open_source(path: Path) -> FileSource:
 
 
 def _pack_with_needs(folder: Path) -> list[Package]:
-    """Return the package in a folder, and its needs from the same repository."""
+    """Return the package in a folder and its dependencies in the same repository."""
     packages = [pack_folder(folder)]
     top = folder.resolve().parent.parent
     known = {packages[0].manifest.key}
@@ -109,9 +109,9 @@ def make_bundle(
 
     Args:
         root: package to install.
-        archives: digest → bytes, of `root` and all its needs.
-        signatures: digest → signature, for signed archives.
-        name: name in messages.
+        archives: archives of `root` and all its dependencies, by digest.
+        signatures: signatures of signed archives, by digest.
+        name: bundle name in error messages.
     """
     entries = in_order(
         entry_of(open_package(data, digest), signatures.get(digest))
@@ -133,7 +133,9 @@ def _open_bundle(data: bytes, name: str) -> FileSource:
     for entry in index.packages:
         found = files.pop(entry.file, b"")
         if sha256(found) != entry.sha256:
-            raise PackageError(f"{name}: {entry}: the archive is missing, or has other bytes")
+            raise PackageError(
+                f"{name}: {entry}: the archive is missing, or does not match its digest"
+            )
         package = open_package(found, f"{name}/{entry.file}")
         if entry.signed is not None:
             signatures[package.digest] = entry.signed
@@ -155,7 +157,7 @@ def _open_bundle(data: bytes, name: str) -> FileSource:
 def offered(
     found: Mapping[PackageId, list[tuple[IndexEntry, Source]]],
 ) -> dict[PackageId, list[tuple[IndexEntry, Source]]]:
-    """Return the versions that are not withdrawn."""
+    """Return all versions except withdrawn versions."""
     kept = {key: [one for one in some if not one[0].why_withdrawn] for key, some in found.items()}
     return {key: some for key, some in kept.items() if some}
 
@@ -163,14 +165,14 @@ def offered(
 def merged(
     sources: Iterable[Source], complain: Callable[[str], None]
 ) -> dict[PackageId, list[tuple[IndexEntry, Source]]]:
-    """Return every version of every package, also withdrawn ones, with its source.
+    """Return every version of every package with its source, including withdrawn versions.
 
-    All versions of a package come from the first source that has it. So a source that is added
-    later cannot offer a newer version under a known name.
+    All versions of a package are from the first source that contains the package. Therefore a
+    source that is added later cannot offer a newer version of a known package.
 
     Args:
-        sources: the sources, in the order of requests.
-        complain: receives a line for each unreachable source.
+        sources: package sources, in the order of requests.
+        complain: receives an error message for each unreachable source.
     """
     found: dict[PackageId, list[tuple[IndexEntry, Source]]] = {}
     for source in sources:

@@ -1,4 +1,4 @@
-"""The installed packages, as stored in ``state.json``: pure functions from state to state."""
+"""The state of installed packages in ``state.json``, with pure functions from state to state."""
 
 from collections.abc import Iterable, Mapping
 from typing import Annotated
@@ -19,38 +19,41 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
     format: Annotated[int, msgspec.Meta(ge=1, le=1)]
     installed: tuple[Lock, ...]
     keys: dict[str, str] = {}
-    """``drivers/puppet`` → public key of its first installation. The key stays after a removal,
-    which would otherwise bypass the check of keys.
+    """Public key of the first installation, by package, such as ``drivers/puppet``. Removing a
+    package does not delete its key. Otherwise, a reinstallation would bypass the key check.
     """
     before: dict[str, Lock] = {}
-    """Digest of an installed lock → the lock that an update replaced, for one step back."""
+    """Lock before the last update, for one undo step, by digest of the installed lock."""
 
     def with_installed(self, plan: InstallPlan) -> "StoreState":
-        """Return the state with a plan installed. Other versions of the package stay."""
+        """Return the state after installing a plan.
+
+        Other versions of the package remain installed.
+        """
         lock = plan.lock
         others = [one for one in self.installed if not _same(one, lock)]
         return self._next((*others, lock), self.before, plan)
 
     def with_update(self, old: Lock, plan: InstallPlan) -> "StoreState":
-        """Return the state with `old` replaced; it stays available for one step back."""
+        """Return the state after replacing `old`. One undo step can restore `old`."""
         gone = (old, plan.lock)
         others = [one for one in self.installed if not any(_same(one, lock) for lock in gone)]
         return self._next((*others, plan.lock), {**self.before, plan.lock.digest: old}, plan)
 
     def with_back(self, lock: Lock) -> "StoreState":
-        """Return the state before the update to `lock`; a second call undoes the first.
+        """Return the state before the update to `lock`. A second call undoes the first call.
 
         Raises:
             PackageError: no update to `lock` is known.
         """
         old = self.before.get(lock.digest)
         if old is None:
-            raise PackageError(f"{lock} was not updated here; there is nothing to go back to")
+            raise PackageError(f"{lock} has no update to undo")
         others = [one for one in self.installed if not (_same(one, old) or _same(one, lock))]
         return self._next((*others, old), {**self.before, old.digest: lock}, None)
 
     def without(self, gone: Iterable[Lock]) -> "StoreState":
-        """Return the state without the locks of these packages."""
+        """Return the state without these locks."""
         digests = {lock.digest for lock in gone}
         kept = tuple(lock for lock in self.installed if lock.digest not in digests)
         return self._next(kept, self.before, None)
@@ -65,14 +68,14 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
 
     @property
     def kept(self) -> tuple[Lock, ...]:
-        """All locks whose archives are still needed."""
+        """All locks with archives that are still needed."""
         return (*self.installed, *self.before.values())
 
     def check(self, plan: InstallPlan) -> None:
         """Raise `PackageError` for a plan that contradicts the state.
 
-        Contradictions are other bytes of a known version, an invalid signature, another key than
-        the pinned one, and a missing signature in spite of a pinned key.
+        Rejected are different bytes of a known version, invalid signatures, and keys that differ
+        from the pinned key. A missing signature is rejected if a key is pinned.
         """
         for name, pin in plan.lock.packages.items():
             self._check_known(name, pin)
@@ -91,7 +94,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
             )
 
     def _check_known(self, name: str, pin: Pin) -> None:
-        """Reject other bytes under a known version, which would be a silent change."""
+        """Reject different bytes of a known version, because the change would be silent."""
         for lock in self.kept:
             known = lock.packages.get(name)
             if known and known.version == pin.version and known.sha256 != pin.sha256:
@@ -103,7 +106,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
     def _next(
         self, installed: tuple[Lock, ...], before: Mapping[str, Lock], plan: InstallPlan | None
     ) -> "StoreState":
-        """Return the next state: sorted, with new keys, without steps back to removed locks."""
+        """Return the next state: sorted, with new keys, and without undo steps of removed locks."""
         digests = {lock.digest for lock in installed}
         keys = dict(self.keys)
         if plan is not None:

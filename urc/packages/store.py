@@ -1,4 +1,4 @@
-"""The installed packages of this user on this machine, usable without any network.
+"""The user's installed packages on this machine, usable without a network.
 
     packages/
       state.json              installed packages, one lock each, and pinned keys
@@ -7,8 +7,9 @@
       ecosystems/<sha256>/    the files of one lock, extracted from its blobs
       work/                   incomplete files, and files to delete
 
-Only `state.json` defines the installed packages, and it changes atomically. The next change
-deletes all files that it does not name. So the store is consistent at every moment.
+Only `state.json` defines the installed packages, and it changes atomically. Each change also
+deletes all files that `state.json` does not refer to. Therefore the store is consistent at all
+times.
 """
 
 import os
@@ -36,7 +37,7 @@ _STATE_BYTES: Final = 16 << 20
 
 
 class Store:
-    """The store in one folder, which is created with the first installation."""
+    """The store in one folder. The first installation creates the folder."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -44,7 +45,7 @@ class Store:
         self._state = folder / "state.json"
 
     def installed(self) -> tuple[Lock, ...]:
-        """Return the requested and installed packages, by name and version.
+        """Return the locks of all requested packages, sorted by name and version.
 
         Raises:
             PackageError: the state cannot be read.
@@ -64,11 +65,11 @@ class Store:
             raise PackageError(f"{self._state}: this file is damaged: {error}") from None
 
     def previous(self, lock: Lock) -> Lock | None:
-        """Return the lock that an update replaced by `lock`, or None."""
+        """Return the lock before the update to `lock`, or None without an update."""
         return self.state().before.get(lock.digest)
 
     def find(self, required: PackageRequirement) -> Lock | None:
-        """Return the newest installed version of a requirement, or None.
+        """Return the newest installed version for a requirement, or None.
 
         Raises:
             PackageError: packages of several kinds have this name.
@@ -77,10 +78,10 @@ class Store:
         return max(found, key=lambda lock: lock.number, default=None)
 
     def document(self, lock: Lock) -> Path:
-        """Return the document of an installed package, after a comparison with its blobs.
+        """Return the document of an installed package. Its files are compared with their archives.
 
         Raises:
-            PackageError: both its files and its blobs were changed.
+            PackageError: both the files and the archives are damaged.
         """
         folder = self.place(lock)
         if not _holds(folder, self._files(lock)):
@@ -93,7 +94,7 @@ class Store:
         return self.folder / "ecosystems" / lock.digest
 
     def blob(self, digest: str) -> bytes:
-        """Return an archive of the store; raise `PackageError` for a missing or damaged one."""
+        """Return an archive in the store; raise `PackageError` for a missing or damaged archive."""
         try:
             with open(self.blob_file(digest), "rb") as file:
                 data = file.read(PACKAGE.archive_bytes + 1)
@@ -110,11 +111,11 @@ class Store:
         return self.blob_file(digest).is_file()
 
     def blob_file(self, digest: str) -> Path:
-        """Return the path of an archive, which may not exist."""
+        """Return the path of an archive. The archive may be missing."""
         return self.folder / "blobs" / f"{digest}.zip"
 
     def signature(self, digest: str) -> Signature | None:
-        """Return the unchecked signature of an archive, or None."""
+        """Return the unverified signature of an archive, or None."""
         try:
             with open(self._signature_file(digest), "rb") as file:
                 return msgspec.json.decode(file.read(4096), type=Signature)
@@ -122,18 +123,18 @@ class Store:
             return None
 
     def keep_signature(self, digest: str, signature: Signature) -> None:
-        """Store the signature of an archive; only for `StoreTransaction`."""
+        """Store the signature of an archive. Only `StoreTransaction` may call this method."""
         if self.signature(digest) != signature:
             data = msgspec.json.encode(signature) + b"\n"
             atomic_files.put_file(self._signature_file(digest), data, self.work)
 
     def make(self, lock: Lock) -> Path:
-        """Return the folder of a lock's files; extract them again if they are incomplete.
+        """Return the folder of a lock's files; extract incomplete files again.
 
         The caller must hold the lock of `changing`.
 
         Raises:
-            PackageError: one of its archives is missing or damaged.
+            PackageError: an archive is missing or damaged.
         """
         files = self._files(lock)
         if not _holds(self.place(lock), files):
@@ -157,7 +158,7 @@ class Store:
                     self._collect()
 
     def write_state(self, state: StoreState) -> None:
-        """Write the state; only for `StoreTransaction`."""
+        """Write the state. Only `StoreTransaction` may call this method."""
         data = msgspec.json.format(msgspec.json.encode(state, order="sorted"), indent=1)
         atomic_files.put_file(self._state, data + b"\n", self.work)
 
@@ -170,7 +171,7 @@ class Store:
         return files
 
     def _collect(self) -> None:
-        """Delete files without a lock; files in use are deleted at the next change."""
+        """Delete files without a lock. Files in use are deleted by a later change."""
         locks = self.state().kept
         digests = {pin.sha256 for lock in locks for pin in lock.packages.values()}
         for folder, wanted in (
@@ -187,7 +188,7 @@ class Store:
 
 
 class StoreTransaction:
-    """A change of the store, under its lock."""
+    """A change of the store while the store is locked."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -196,11 +197,11 @@ class StoreTransaction:
         """Extract the files of a plan for a preview, without installing them.
 
         Returns:
-            The folder, with a folder for each kind: ``drivers/puppet/driver.yaml``.
+            The folder of the files, with a subfolder for each kind: ``drivers/puppet/driver.yaml``.
 
         Raises:
-            PackageError: an archive differs from the lock, other bytes of a version are already
-                installed, or a signature is not the expected one.
+            PackageError: an archive differs from the lock or from an installed version, or a
+                signature is not accepted.
         """
         store = self._store
         store.state().check(plan)
@@ -210,7 +211,9 @@ class StoreTransaction:
             if data is None:
                 data = store.blob(pin.sha256)
             elif sha256(data) != pin.sha256:
-                raise PackageError(f"{key} {pin.version}: the bytes differ from those in the lock")
+                raise PackageError(
+                    f"{key} {pin.version}: the archive does not match the digest in the lock"
+                )
             said = open_package(data, f"{key} {pin.version}").manifest
             if (str(said.key), said.version) != (key, pin.version):
                 raise PackageError(f"{key} {pin.version}: this is {said.key} {said.version}")
@@ -224,15 +227,15 @@ class StoreTransaction:
         return store.make(plan.lock)
 
     def commit(self, plan: InstallPlan) -> None:
-        """Install a staged plan. Other versions of the package stay installed."""
+        """Install a staged plan. Other versions of the package remain installed."""
         self._store.write_state(self._store.state().with_installed(plan))
 
     def replace(self, old: Lock, plan: InstallPlan) -> None:
-        """Install a staged plan in place of `old`, which stays available for `back`."""
+        """Replace `old` by a staged plan. `back` can restore `old`."""
         self._store.write_state(self._store.state().with_update(old, plan))
 
     def back(self, lock: Lock) -> Lock:
-        """Restore the lock that an update replaced by `lock`; raise `PackageError`."""
+        """Restore the lock before the update to `lock`; raise `PackageError`."""
         state = self._store.state().with_back(lock)
         old = self._store.state().before[lock.digest]
         self._store.make(old)
@@ -240,13 +243,14 @@ class StoreTransaction:
         return old
 
     def remove(self, required: PackageRequirement) -> tuple[list[Lock], list[str]]:
-        """Remove an installed package, and the packages that only it needed.
+        """Remove an installed package and its unused dependencies.
 
         Returns:
-            The removed requests, and all removed packages, as ``drivers/puppet 1.0.0``.
+            The removed locks, and the names of all removed packages, such as ``drivers/puppet
+            1.0.0``.
 
         Raises:
-            PackageError: it is not installed, or another package needs it.
+            PackageError: the package is not installed, or another package depends on it.
         """
         state = self._store.state()
         gone = _meant(required, state.installed)
@@ -257,16 +261,19 @@ class StoreTransaction:
         return gone, sorted(_all(state.installed) - _all(after.installed))
 
     def forget_key(self, key: PackageId) -> None:
-        """Accept any signature of a package from now on; raise `PackageError`."""
+        """Delete the pinned key of a package; raise `PackageError`.
+
+        Any signature is then accepted.
+        """
         self._store.write_state(self._store.state().without_key(key))
 
 
 def _check_needs(said: Manifest, lock: Lock) -> None:
-    """Check that the index and the package declare the same needs."""
+    """Check that the index and the package declare the same dependencies."""
     for need, wanted in said.needs.items():
         pin = lock.packages.get(need)
         if pin is None or not parse_range(wanted).allows(parse_version(pin.version)):
-            found = f"comes with {pin.version}" if pin else "does not come with it"
+            found = f"is in the lock as {pin.version}" if pin else "is not in the lock"
             raise PackageError(
                 f"{said.key} {said.version} needs {need} {wanted}, which {found}:"
                 " the index and the package disagree"
@@ -274,7 +281,7 @@ def _check_needs(said: Manifest, lock: Lock) -> None:
 
 
 def ecosystem_of(document: Path) -> Path | None:
-    """Return the folder of an installed document's files, or None."""
+    """Return the folder with the files of an installed document, or None."""
     for folder in document.resolve().parents:
         if (folder / LOCK).is_file():
             return folder
@@ -282,7 +289,7 @@ def ecosystem_of(document: Path) -> Path | None:
 
 
 def _meant(required: PackageRequirement, locks: tuple[Lock, ...]) -> list[Lock]:
-    """Return the locks of a requirement; without a range, any installed version counts."""
+    """Return the locks that match a requirement. Without a range, all installed versions match."""
     wanted = parse_range(required.range)
     found = [
         lock
@@ -293,7 +300,7 @@ def _meant(required: PackageRequirement, locks: tuple[Lock, ...]) -> list[Lock]:
     ]
     if len({lock.key for lock in found}) > 1:
         names = ", ".join(sorted({lock.root for lock in found}))
-        raise PackageError(f"{required.name!r} is ambiguous; write one of {names}")
+        raise PackageError(f"{required.name!r} is ambiguous; expected one of {names}")
     return found
 
 
@@ -311,7 +318,7 @@ def _not_installed(required: PackageRequirement, locks: tuple[Lock, ...]) -> str
         and required.kind in ("", parse_key(key).kind)
     ]
     if needed:
-        return f"{required} was not installed by itself: {'; '.join(needed)}"
+        return f"{required} was installed only as a dependency: {'; '.join(needed)}"
     names = ", ".join(map(str, locks))
     return f"{required} is not installed" + (f"; there is {names}" if names else "; nothing is")
 

@@ -1,4 +1,4 @@
-"""Uploads to a repository: the check of a package, and its listing."""
+"""Uploads to a repository: package checks and listing."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -35,7 +35,7 @@ class SubmissionResult(NamedTuple):
 
     entry: IndexEntry
     is_new: bool
-    """False if exactly this version was already listed."""
+    """False if the repository already listed this version."""
 
 
 def take(
@@ -51,16 +51,16 @@ def take(
 
     Args:
         folder: folder of the repository.
-        entry_file: path of the upload, ``archives/drivers/puppet/1.0.0.zip``.
+        entry_file: path of the upload, such as ``archives/drivers/puppet/1.0.0.zip``.
         data: the archive.
-        signature: its signature, if any.
+        signature: signature of the package; None for an unsigned package.
         examine: returns the errors of a document in a folder of packages.
-        provenance: its origin, if declared.
-        index_signer: signer of the maintainer, for the index.
+        provenance: declared origin of the package, if any.
+        index_signer: maintainer's signer, for the index.
 
     Raises:
-        Refused: the upload is rejected.
-        OSError: the disk is full, for example; the index is unchanged.
+        SubmissionRefused: the upload is rejected.
+        OSError: writing failed, for example because the disk is full. The index is unchanged.
     """
     package, entry = _opened(entry_file, data, signature)
     with changing(folder) as work:
@@ -91,14 +91,14 @@ def take(
 
 
 def _noted(notes: Notes, provenance: Provenance | None, entry: IndexEntry) -> Notes:
-    """Return the notes about a version, with its origin; the first declared origin counts."""
+    """Return the notes about a version with its origin. The first declared origin remains valid."""
     if None not in (notes.provenance, provenance) and notes.provenance != provenance:
         raise SubmissionRefused(409, f"{entry} is already listed, {notes.provenance}")
     return msgspec.structs.replace(notes, provenance=notes.provenance or provenance)
 
 
 def _opened(file: str, data: bytes, signature: Signature | None) -> tuple[Package, IndexEntry]:
-    """Return the package in an uploaded archive, and its entry of the index."""
+    """Return the package in an uploaded archive, and its index entry."""
     try:
         package = open_package(data, file)
         entry = entry_of(package, signature)
@@ -120,7 +120,7 @@ def _look(
     work: Path,
     examine: Callable[[Path], list[str]],
 ) -> None:
-    """Extract a package and its needs into a separate folder, and check it there."""
+    """Extract a package and its dependencies into a separate folder, and check the package."""
     known: dict[PackageId, list[IndexEntry]] = {}
     for one in (*others, entry):
         if not one.why_withdrawn:

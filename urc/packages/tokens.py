@@ -1,4 +1,4 @@
-"""Upload tokens of a repository, of which only the digests are stored."""
+"""Upload tokens of a repository. Only digests of the tokens are stored."""
 
 import re
 import secrets
@@ -27,9 +27,10 @@ class UploadToken(msgspec.Struct, frozen=True):
 
     name: str
     sha256: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
-    """Digest of the token. A slow hash is not needed, because 256 random bits resist guessing."""
+    """Digest of the token. A slow hash is not needed, because a token has 256 random bits."""
     may: tuple[str, ...]
-    """Allowed packages: ``drivers/puppet``, ``drivers/puppet*``, ``widgets/*`` or ``*``."""
+    """Packages that the token may publish: ``drivers/puppet``, ``drivers/puppet*``, ``widgets/*``
+    or ``*``."""
 
     def allows(self, key: PackageId) -> bool:
         """Return whether the token allows uploads of a package."""
@@ -45,7 +46,7 @@ class _File(msgspec.Struct, frozen=True):
 
 
 class UploadTokens:
-    """A file of tokens; each call reads it, so that a removal takes effect at once."""
+    """A file of tokens. Each call reads the file, so a removal takes effect immediately."""
 
     def __init__(self, file: Path) -> None:
         self.file = file
@@ -58,12 +59,12 @@ class UploadTokens:
         except FileNotFoundError:
             return ()
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
-            raise PackageError(f"{self.file}: this is not a file of tokens: {error}") from None
+            raise PackageError(f"{self.file}: this is not a token file: {error}") from None
         except OSError as error:
             raise PackageError(f"{self.file}: {error.strerror or error}") from None
 
     def find(self, text: str) -> UploadToken | None:
-        """Return the token with this text, or None, in constant time."""
+        """Return the stored token with this text, or None. The comparison takes constant time."""
         digest = sha256(text.encode())
         found = None
         for token in self.all():
@@ -72,25 +73,25 @@ class UploadTokens:
         return found
 
     def add(self, name: str, may: tuple[str, ...]) -> str:
-        """Generate a token and return its text, which is not stored.
+        """Generate a token and return its text. The text itself is not stored.
 
         Raises:
-            PackageError: the name is in use or invalid, or `may` names no packages.
+            PackageError: the name is in use or invalid, or `may` contains an invalid package.
         """
         if not _NAME.fullmatch(name):
             raise PackageError(f"{name!r}: expected a name of letters, digits, '-', '_' and '.'")
         for one in may:
             if not _MAY.fullmatch(one):
                 raise PackageError(
-                    f"{one!r} names no packages; drivers/puppet, drivers/puppet*, widgets/* or *"
-                    " is expected"
+                    f"{one!r} is not a package pattern;"
+                    " expected drivers/puppet, drivers/puppet*, widgets/* or *"
                 )
         text = new_token()
         with self._changing() as known:
             if any(token.name == name for token in known):
-                raise PackageError(f"{self.file}: a token {name!r} exists already")
+                raise PackageError(f"{self.file}: a token {name!r} already exists")
             if len(known) >= _MOST:
-                raise PackageError(f"{self.file}: at most {_MOST} tokens can be kept")
+                raise PackageError(f"{self.file}: at most {_MOST} tokens can be stored")
             self._write((*known, UploadToken(name, sha256(text.encode()), may)))
         return text
 
@@ -113,12 +114,12 @@ class UploadTokens:
 
 
 def new_token() -> str:
-    """Return a new token: 256 random bits."""
+    """Return the text of a new token with 256 random bits."""
     return f"urc_{secrets.token_urlsafe(32)}"
 
 
 def read_token(file: Path) -> str:
-    """Return the token in a file; raise `PackageError`."""
+    """Return the token text in a file; raise `PackageError`."""
     try:
         with open(file, "rb") as opened:
             text = opened.read(1024).decode("utf-8", "replace").strip()

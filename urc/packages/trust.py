@@ -1,4 +1,4 @@
-"""The pinned key of each repository: the first key that signs its index, as for packages."""
+"""The pinned key of a repository: the first key that signed its index."""
 
 import time
 from collections.abc import Callable
@@ -26,12 +26,12 @@ class PinnedKey:
     """The pinned key of one repository."""
 
     def __init__(self, url: str, file: Path, now: Callable[[], float] = time.time) -> None:
-        """Store the arguments, without reading the file.
+        """Initialize without reading the file.
 
         Args:
-            url: address of the repository, for messages.
-            file: file of the key.
-            now: source of time, in seconds since 1970.
+            url: URL of the repository, for messages.
+            file: file that stores the pinned key.
+            now: returns the current time in seconds since the epoch.
         """
         self._url = url
         self._file = file
@@ -39,21 +39,21 @@ class PinnedKey:
 
     @property
     def keeper(self) -> str:
-        """Name and fingerprint of the index's signer, or ""."""
+        """Name and fingerprint of the index's signer; "" without a pinned key."""
         pin = self._pin()
         return f"{pin.by} ({fingerprint(pin.key)})" if pin is not None else ""
 
     @property
     def number(self) -> int:
-        """Highest signed number; a valid index never has a lower one."""
+        """Highest signed number. Valid indexes have at least this number."""
         pin = self._pin()
         return pin.number if pin is not None else 0
 
     def check(self, head: IndexHead | None) -> None:
-        """Raise `PackageError` unless a head has the pinned key, is valid now, and is not older.
+        """Raise `PackageError` unless a head has the pinned key, is valid now and is not outdated.
 
         Args:
-            head: head of the repository; None for a missing or damaged one.
+            head: head of the repository; None for a missing or damaged head.
         """
         signature = head.signed if head is not None else None
         if head is not None and not head.is_sound():
@@ -75,13 +75,13 @@ class PinnedKey:
             )
         if head.left_s(self._now()) <= 0:
             raise PackageError(
-                f"{self._url}: the index expired at {head.expires}: nothing is"
+                f"{self._url}: the index expired at {head.expires}; nothing is"
                 " installed from it until its maintainer renews it; check this machine's clock too;"
                 " installed packages stay"
             )
 
     def pin(self, head: IndexHead, work: Path) -> None:
-        """Pin the key of a checked head."""
+        """Pin the key of a verified head."""
         signature = head.signed
         if signature is None:
             return
@@ -90,7 +90,7 @@ class PinnedKey:
             atomic_files.put_file(self._file, msgspec.json.encode(new) + b"\n", work)
 
     def forget(self) -> None:
-        """Accept any key the next time."""
+        """Delete the pinned key, so that the next key is accepted."""
         self._file.unlink(missing_ok=True)
 
     def _pin(self) -> _Pin | None:

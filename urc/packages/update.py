@@ -1,8 +1,8 @@
-"""Updates of installed packages: the list, the changes, and the way back.
+"""Updates of installed packages: list, preview, install and undo.
 
 The command line and the pages use the same functions. `newer` lists updates, and `plan_update`
-fetches one. After `Change.stage`, `staged_difference` shows the changes. `Change.replace` installs
-the update, and `Change.back` undoes it.
+downloads one update. After `StoreTransaction.stage`, `staged_difference` returns the changes.
+`StoreTransaction.replace` installs the update, and `StoreTransaction.back` undoes it.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -44,23 +44,24 @@ class AvailableUpdate(NamedTuple):
 
 
 class PackageSummary(Protocol):
-    """The preview of a package's documents; `urc.runtime.package_preview` implements it."""
+    """The preview of a package's documents, implemented by `urc.runtime.package_preview`."""
 
     @property
     def permissions(self) -> Sequence[str]:
-        """Permissions, one line each."""
+        """Permissions of the package, one line each."""
 
     @property
     def risks(self) -> Sequence[str]:
-        """Local resources without a setting, one line each."""
+        """Uses of local resources without a setting, one line each."""
 
     @property
     def wire(self) -> Mapping[str, str]:
-        """Path in the document → its value, for all keys that decide the sent bytes."""
+        """Values of all keys that affect the sent bytes, by path in the document."""
 
 
 Look = Callable[[Path, Path, Sequence[str]], PackageSummary]
-"""Arguments: document, folder with all its files, names of included widgets."""
+"""Returns a preview for a document, the folder with all its files, and the names of included
+widgets."""
 
 
 class UpdateDiff(NamedTuple):
@@ -74,20 +75,21 @@ class UpdateDiff(NamedTuple):
     risks: list[str]
     """New uses of local resources without a setting."""
     wire: list[str]
-    """Changed keys, as ``- commands.beep.send: "beep"`` and ``+ commands.beep.send: "BEEP"``."""
+    """Changed keys, such as ``- commands.beep.send: "beep"`` and ``+ commands.beep.send:
+    "BEEP"``."""
 
 
 def newer(
     store: Store, sources: Sequence[Source], complain: Callable[[str], None]
 ) -> list[AvailableUpdate]:
-    """Return the available updates; only indexes are fetched.
+    """Return the available updates. Only indexes are downloaded.
 
-    Of several installed versions of a package, the newest counts.
+    If several versions of a package are installed, only the newest is compared.
 
     Args:
         store: store with the installed packages.
-        sources: the repositories, in the order of requests.
-        complain: receives a line for each unreachable repository, or one with conflicting packages.
+        sources: repositories, in the order of requests.
+        complain: receives a message for each unreachable repository and each dependency conflict.
 
     Raises:
         PackageError: the store cannot be read.
@@ -114,17 +116,18 @@ def plan_update(
     complain: Callable[[str], None],
     wanted: str = "*",
 ) -> InstallPlan | None:
-    """Return the plan of the newest version, with its archives, or None without an update.
+    """Return the install plan of the newest version with its archives; None without an update.
 
     Args:
-        old: the installed package.
-        sources: as for `newer`.
+        old: lock of the installed package.
+        sources: package sources, as for `newer`.
         store: its store.
-        complain: receives lines for people.
-        wanted: range of versions, whose newest is chosen.
+        complain: receives warnings for people.
+        wanted: version range; the newest version in this range is installed.
 
     Raises:
-        PackageError: no source has it, its needs conflict, or an archive differs from the index.
+        PackageError: no source has the package, its dependencies conflict, or an archive differs
+            from the index.
     """
     found = offered(merged(sources, complain))
     if old.key not in found:
@@ -139,10 +142,10 @@ def staged_difference(
     """Return the changes of a staged update.
 
     Args:
-        old: the installed package.
-        plan: plan of the update.
-        store: store of both.
-        staged: result of `Change.stage` for the plan.
+        old: lock of the installed package.
+        plan: install plan of the update.
+        store: store with both versions.
+        staged: result of `StoreTransaction.stage` for the plan.
         look: returns the preview of documents.
 
     Raises:
@@ -157,13 +160,13 @@ def staged_difference(
 
 
 def differences(before: Iterable[str], after: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Return the items only in the second, and the items only in the first, in their order."""
+    """Return the items only in `after`, and the items only in `before`, in their original order."""
     old, new = list(before), list(after)
     return [one for one in new if one not in old], [one for one in old if one not in new]
 
 
 def headline(old: Lock, new: Lock) -> str:
-    """Return the change of a package, as text: ``drivers/puppet 1.0.0 → 1.1.0``."""
+    """Return the version change of a package as text, such as ``drivers/puppet 1.0.0 → 1.1.0``."""
     return str(old) if old.version == new.version else f"{old} → {new.version}"
 
 
@@ -209,7 +212,7 @@ def _newest(locks: Iterable[Lock]) -> list[Lock]:
 
 
 def _lock(old: Lock, wanted: str, found: Found) -> Lock | None:
-    """Return the lock of the newest version, or None if it is not an update of `old`."""
+    """Return the lock of the newest version; None if it does not update `old`."""
     new = lock_of(old.key, settle(old.key, wanted, found))
     if new == old or new.number < old.number:
         return None
@@ -219,7 +222,7 @@ def _lock(old: Lock, wanted: str, found: Found) -> Lock | None:
 
 
 def _is_step_up(old: Lock, new: Lock) -> bool:
-    """Return whether a need of the same version got newer, and none got older."""
+    """Return whether at least one dependency is newer, and no dependency is older."""
     pairs = [
         (parse_version(pin.version), parse_version(new.packages[name].version))
         for name, pin in old.packages.items()

@@ -1,6 +1,6 @@
-"""Notes of a repository about a version: its origin, and its withdrawal.
+"""Notes of a repository about a version: origin and withdrawal.
 
-The notes are stored in a small file next to the archive, and in the index.
+Notes are stored in the index and in a small file next to the archive.
 """
 
 import re
@@ -23,21 +23,21 @@ _COMMIT: Final = re.compile("[0-9a-f]{7,64}", re.ASCII)
 class Provenance(msgspec.Struct, frozen=True, omit_defaults=True):
     """The origin of a package, as declared by its publisher.
 
-    In an index of another repository, it may break the rules of `check`.
+    An origin from another repository's index may violate the rules of `check`.
     """
 
     source: Annotated[str, msgspec.Meta(max_length=_LONGEST)] = ""
-    """Address of the source."""
+    """URL of the source code."""
     commit: Annotated[str, msgspec.Meta(max_length=100)] = ""
     tool: Annotated[str, msgspec.Meta(max_length=100)] = ""
-    """Packaging program, with its version."""
+    """Name and version of the packaging program."""
 
     def check(self) -> None:
-        """Raise `PackageError` for an origin that is not accepted from a publisher."""
+        """Raise `PackageError` for an invalid declared origin."""
         if not self.source.startswith(("https://", "http://", "ssh://")):
-            raise PackageError("a source begins with https://, http:// or ssh://")
+            raise PackageError("expected a source that starts with https://, http:// or ssh://")
         if self.commit and not _COMMIT.fullmatch(self.commit):
-            raise PackageError("a commit is 7 to 64 hex digits, in lower case")
+            raise PackageError("expected a commit of 7 to 64 lower-case hex digits")
         if not (self.source + self.tool).isprintable():
             raise PackageError("expected text on one line")
 
@@ -51,7 +51,7 @@ class Notes(msgspec.Struct, frozen=True, omit_defaults=True):
     """All notes about one version."""
 
     withdrawn: Annotated[str, msgspec.Meta(max_length=_LONGEST)] = ""
-    """Reason of a withdrawal, or ""."""
+    """Reason for the withdrawal; "" for an available version."""
     provenance: Provenance | None = None
 
     def __post_init__(self) -> None:
@@ -61,7 +61,7 @@ class Notes(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def notes_beside(archive: Path) -> Path:
-    """Return the path of the notes about an archive."""
+    """Return the path of the notes file next to an archive."""
     return archive.with_suffix(".json")
 
 
@@ -74,11 +74,11 @@ def read_notes(archive: Path) -> Notes:
     except FileNotFoundError:
         return Notes()
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise PackageError(f"{file}: these are not notes about a package: {error}") from None
+        raise PackageError(f"{file}: this is not a file of package notes: {error}") from None
 
 
 def write_notes(archive: Path, notes: Notes, work: Path) -> None:
-    """Write the notes about an archive."""
+    """Write the notes about an archive, or delete the file if the notes are empty."""
     if notes == Notes():
         notes_beside(archive).unlink(missing_ok=True)
     else:

@@ -1,6 +1,6 @@
-"""Versions by Semantic Versioning 2.0, and the ranges of a package's needs.
+"""Versions according to Semantic Versioning 2.0, and version ranges of dependencies.
 
-`semver` parses and compares versions. The library has no ranges, so URC parses them here:
+`semver` parses and compares versions. The library does not support ranges, so URC parses them:
 ``^1.2``, ``~1.2.3``, ``>=1.2, <2``, ``1.2.3`` and ``*``.
 """
 
@@ -25,9 +25,9 @@ _PART = re.compile(
 
 @lru_cache(maxsize=65536)
 def parse_version(text: str) -> Version:
-    """Return a version; raise `PackageError` for an invalid one, or for build metadata.
+    """Return a parsed version; raise `PackageError` if it is invalid or contains build metadata.
 
-    Two builds of one version would be the same version with different bytes.
+    With build metadata, two equal versions could have different bytes.
     """
     try:
         if len(text) > _LONGEST or not text.isascii() or not text.isprintable():
@@ -38,13 +38,13 @@ def parse_version(text: str) -> Version:
             f"{text[:_LONGEST]!r} is not a version; expected MAJOR.MINOR.PATCH, such as 1.2.0"
         ) from None
     if version.build:
-        raise PackageError(f"{text!r}: a package's version has no build metadata ('+…')")
+        raise PackageError(f"{text!r}: the version of a package cannot have build metadata ('+…')")
     return version
 
 
 class _Bound(NamedTuple):
     sign: str
-    """Comparison: ``>=``, ``>``, ``<`` or ``<=``."""
+    """Comparison operator: ``>=``, ``>``, ``<`` or ``<=``."""
     version: Version
 
     def allows(self, version: Version) -> bool:
@@ -72,8 +72,8 @@ class Range:
     def allows(self, version: Version) -> bool:
         """Return whether a version is in the range.
 
-        A pre-release matches only if the range names a pre-release of the same x.y.z. So no user
-        gets an unfinished version without asking for it.
+        A pre-release matches only if the range names a pre-release of the same x.y.z. Therefore
+        users receive pre-releases only on request.
         """
         if version.prerelease and _core(version) not in self._unfinished:
             return False
@@ -94,7 +94,10 @@ def _core(version: Version) -> tuple[int, int, int]:
 
 @lru_cache(maxsize=4096)
 def parse_range(text: str) -> Range:
-    """Return a range: comma-separated parts that must all match; raise `PackageError`."""
+    """Parse a range of comma-separated parts; raise `PackageError`.
+
+    A version must match all parts.
+    """
     if text.strip() == "*":
         return Range("*", ())
     bounds: list[_Bound] = []
@@ -110,7 +113,7 @@ def parse_range(text: str) -> Range:
 
 
 def _bounds(found: re.Match[str]) -> list[_Bound]:
-    """Return the bounds of one part. A missing number matches any number."""
+    """Return the bounds of one part. An omitted number matches any number."""
     sign = found["sign"] or "="
     major, minor, patch = (
         None if found[name] is None else int(found[name]) for name in ("major", "minor", "patch")
@@ -133,14 +136,14 @@ def _bounds(found: re.Match[str]) -> list[_Bound]:
 
 
 def _after(low: Version, minor: int | None) -> Version:
-    """Return the first version after all that `1` or `1.2` matches."""
+    """Return the first version above all versions that match `1` or `1.2`."""
     if minor is None:
         return Version(low.major + 1, 0, 0, "0")
     return Version(low.major, low.minor + 1, 0, "0")
 
 
 def _caret(major: int, minor: int | None, patch: int | None) -> Version:
-    """Return the first incompatible version: the left-most number that is not 0 changes."""
+    """Return the first incompatible version: the left-most nonzero number changes."""
     if major or minor is None:
         return Version(major + 1, 0, 0, "0")
     if minor or patch is None:

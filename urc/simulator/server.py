@@ -53,7 +53,8 @@ async def serve(
         is_anywhere: whether to listen on free ports instead of the profile's ports and paths.
         emulated_robot: emulated robot to serve; None: create one from the profile.
 
-    Returns: Endpoint of each transport, by name.
+    Returns:
+        Endpoint of each transport, by name.
 
     Raises:
         UrcError: a transport cannot be emulated, or an address is not available.

@@ -19,10 +19,13 @@ TO = ("--to", "http://127.0.0.1:1/", "--token-file")
         (("repo", "withdraw", "lab", "drivers/x", "1.0.0"), "'urc repo withdraw' needs --why"),
         (("repo", "restore", "lab"), "'urc repo restore' takes DIR PACKAGE VERSION"),
         (("publish", "x", *TO, "{token}", "--commit", "0123abc"), "--commit needs --source"),
-        (("publish", "x", *TO, "{token}", "--source", "x"), "--source and --commit: a source"),
+        (
+            ("publish", "x", *TO, "{token}", "--source", "x"),
+            "--source and --commit: expected a source",
+        ),
         (
             ("publish", "x", *TO, "{token}", "--source", "https://x.example/", "--commit", "no"),
-            "--source and --commit: a commit is 7 to 64 hex digits",
+            "--source and --commit: expected a commit of 7 to 64",
         ),
     ],
 )

@@ -74,11 +74,11 @@ HOSTILE: dict[str, tuple[Callable[[], bytes], str]] = {
     "pipe": (lambda: zipped((special("a.txt", 0o010666), b"")), "'a.txt' is a pipe; only"),
     "case": (
         lambda: zipped(("a.txt", b""), ("A.txt", b"")),
-        "'A.txt' is there together with 'a.txt'",
+        "'A.txt' is present together with 'a.txt'",
     ),
     "case of folder": (
         lambda: zipped(("a/x.txt", b""), ("A/y.txt", b"")),
-        "'A' is there together with 'a': only capitals differ",
+        "'A' is present together with 'a': only capitals differ",
     ),
     "file and folder": (
         lambda: zipped(("a.txt/b.txt", b""), ("a.txt", b"")),
@@ -91,15 +91,18 @@ HOSTILE: dict[str, tuple[Callable[[], bytes], str]] = {
     "control": (lambda: zipped(("a\n.txt", b"")), "is not allowed"),
     "letters": (lambda: zipped(("ä.txt", b"")), "is not allowed"),
     "deep": (lambda: zipped(("a/" * 9 + "b.txt", b"")), "too long or too deep"),
-    "program": (lambda: zipped(("a.py", b"")), "files of this kind do not belong in a package"),
-    "library": (lambda: zipped(("a.so", b"")), "files of this kind do not belong in a package"),
-    "path file": (lambda: zipped(("a.pth", b"")), "files of this kind do not belong"),
+    "program": (lambda: zipped(("a.py", b"")), "files of this type are not allowed in a package"),
+    "library": (lambda: zipped(("a.so", b"")), "files of this type are not allowed in a package"),
+    "path file": (lambda: zipped(("a.pth", b"")), "files of this type are not allowed"),
     "bomb": (
         lambda: zipped(("a.txt", bytes(50 << 20)), compression=zipfile.ZIP_DEFLATED),
         "'a.txt' is compressed",
     ),
     "10 GB of zeros": (bomb, "'a.txt' is compressed"),
-    "large entry": (lambda: zipped(("a.txt", bytes((5 << 20) + 1))), "at most 5242880 are"),
+    "large entry": (
+        lambda: zipped(("a.txt", bytes((5 << 20) + 1))),
+        "expected at most 5242880 bytes",
+    ),
     "large all": (
         lambda: zipped(*((f"{one}.txt", bytes(5 << 20)) for one in range(5))),
         "an archive has at most 20 MiB",
@@ -109,12 +112,12 @@ HOSTILE: dict[str, tuple[Callable[[], bytes], str]] = {
     "a crowd": (lambda: crowded(60_000), "60000 entries, at most 200 are allowed"),
     "told few": (
         lambda: crowded(5000)[:-14] + struct.pack("<2H2LH", 1, 1, 47 * 5000, 4, 0),
-        "its parts do not fit",
+        "its sizes are inconsistent",
     ),
     "no archive": (lambda: b"#!/bin/sh\n", "this is not a package: expected a ZIP archive"),
     "empty": (lambda: b"", "this is not a package: expected a ZIP archive"),
-    "end added": (lambda: GOOD + b"more", "cut off, or something was added at its end"),
-    "twice": (lambda: _twice(), "is there twice"),
+    "end added": (lambda: GOOD + b"more", "truncated, or has extra data at its end"),
+    "twice": (lambda: _twice(), "is present twice"),
     "dated": (lambda: zipped(("a.txt", b"x")), "this archive contains data outside its files"),
 }
 
@@ -193,7 +196,7 @@ def test_a_folder_with_a_link_is_not_packed(tmp_path: Path) -> None:
     """It could bring any file of the author's machine along."""
     home = write_package(tmp_path, "widget", "dial")
     (home / "notes.txt").symlink_to("/etc/hostname")
-    with pytest.raises(PackageError, match="only ordinary files are allowed in a package"):
+    with pytest.raises(PackageError, match="only regular files are allowed in a package"):
         pack_folder(home)
 
 

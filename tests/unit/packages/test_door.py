@@ -190,7 +190,7 @@ def test_what_was_changed_on_the_way_is_told(lab: Lab) -> None:
         "archives/widgets/dial/1.0.0.zip", content=DIAL.data[:-1], headers=headers
     )
     assert (answer.status_code, answer.json()["error"]) == (
-        400, "the upload was damaged on the way; try again",
+        400, "the upload was damaged in transit; try again",
     )  # fmt: skip
 
 
@@ -228,7 +228,7 @@ def test_what_a_package_needs_must_be_there(lab: Lab) -> None:
 def test_a_widget_of_urcs_own_name_is_refused(lab: Lab) -> None:
     """Nobody could install it."""
     status, told = lab.puts(package("widget", "stop"))
-    assert (status, "URC has a widget 'stop'" in told) == (422, True)
+    assert (status, "URC's built-in widget 'stop'" in told) == (422, True)
 
 
 def test_a_signature_is_checked_and_listed(lab: Lab, anna: Signer) -> None:
@@ -256,7 +256,7 @@ def test_a_header_that_is_no_signature_is_told(lab: Lab, text: str) -> None:
     headers = {"authorization": f"Bearer {lab.token}", SIGNATURE: text}
     answer = lab.client.put("archives/widgets/dial/1.0.0.zip", content=DIAL.data, headers=headers)
     assert (answer.status_code, answer.json()) == (
-        400, {"error": "the header urc-signature holds no signature"},
+        400, {"error": "the header urc-signature contains no signature"},
     )  # fmt: skip
 
 
@@ -308,7 +308,7 @@ def test_a_server_that_ends_at_any_moment_leaves_the_repository_whole(
         if status == 201:
             break
         deaths += 1
-        assert (status, told) == (507, "it cannot be stored: No space left on device")
+        assert (status, told) == (507, "the package cannot be stored: No space left on device")
         assert lab.lists() in (before, [*before, f"widgets/dial 1.{minor}.0"])
         assert lab.puts(made, signature)[0] in (200, 201)
         assert f"widgets/dial 1.{minor}.0" in lab.lists()
@@ -343,7 +343,7 @@ def test_tokens_are_shown_once_and_kept_as_digests(tmp_path: Path) -> None:
         "drivers/puppet", "drivers/puppet-2", "widgets/dial",
     ]  # fmt: skip
     assert tokens.find(text[:-1]) is None
-    with pytest.raises(PackageError, match="a token 'ci' exists already"):
+    with pytest.raises(PackageError, match="a token 'ci' already exists"):
         tokens.add("ci", ("*",))
     with pytest.raises(PackageError, match="unknown token 'x'; expected one of: ci"):
         tokens.remove("x")
@@ -352,7 +352,7 @@ def test_tokens_are_shown_once_and_kept_as_digests(tmp_path: Path) -> None:
 @pytest.mark.parametrize("may", ["", "drivers", "../x", "drivers/*x", "Drivers/*", "scripts/*"])
 def test_what_a_token_may_is_checked(tmp_path: Path, may: str) -> None:
     """A pattern that means nothing would be a surprise later."""
-    with pytest.raises(PackageError, match="names no packages; drivers/puppet"):
+    with pytest.raises(PackageError, match="is not a package pattern; expected drivers/puppet"):
         UploadTokens(tmp_path / "tokens.json").add("ci", (may,))
 
 
@@ -361,7 +361,7 @@ def test_a_damaged_file_of_tokens_lets_nobody_in(lab: Lab, text: str) -> None:
     """The keeper is told by name of the file."""
     lab.tokens.file.write_text(text, encoding="latin-1")
     assert lab.puts(DIAL)[0] == 503
-    with pytest.raises(PackageError, match=r"tokens\.json: this is not a file of tokens: "):
+    with pytest.raises(PackageError, match=r"tokens\.json: this is not a token file: "):
         lab.tokens.all()
 
 

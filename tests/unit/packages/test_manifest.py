@@ -45,7 +45,7 @@ def test_a_manifest_is_read() -> None:
         ),
         ("[A. Author]", "[]", "p.yaml:6:10: authors: expected a list of 1 to 32 names"),
         ("[A. Author]", '["a\\nb"]', "p.yaml:6:11: authors.0: expected a text on one line"),
-        ("widgets/dial", "dial", "p.yaml:9:9: needs.dial: 'dial' names no package"),
+        ("widgets/dial", "dial", "p.yaml:9:9: needs.dial: 'dial' is not a package name"),
         ("^1.0", "soon", "p.yaml:9:17: needs.widgets/dial: 'soon' is not a range of versions"),
         ("licence:", "license:", "unknown key 'license'; expected one of: urc, package, name"),
         ("urc: 1", "urc: [", "p.yaml:"),

@@ -97,7 +97,7 @@ def test_a_package_for_another_language_version_is_passed_over() -> None:
     later = IndexEntry("widget", "dial", "2.0.0", "0" * 64, 1, language=2)
     found = resolve(key, "*", {key: [later, entry("widgets/dial", "1.0.0")]})
     assert found[key].version == "1.0.0"
-    with pytest.raises(PackageError, match="every version is for another URC"):
+    with pytest.raises(PackageError, match="every version requires another version of URC"):
         resolve(key, "*", {key: [later]})
 
 
@@ -106,7 +106,7 @@ def test_a_name_means_the_one_package_that_has_it() -> None:
     known = entries({"drivers/bot": {"1.0.0": {}}, "robots/bot": {"1.0.0": {}}})
     assert choose(known, PackageRequirement("robot", "bot")) == PackageId("robot", "bot")
     with pytest.raises(
-        PackageError, match="'bot' is ambiguous; write one of drivers/bot, robots/bot"
+        PackageError, match="'bot' is ambiguous; expected one of drivers/bot, robots/bot"
     ):
         choose(known, PackageRequirement("", "bot"))
     with pytest.raises(PackageError, match="no repository has bod; did you mean 'bot'"):

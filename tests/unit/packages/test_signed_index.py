@@ -134,7 +134,7 @@ def test_who_has_not_the_key_changes_no_signed_index(lab: Signed, signs: bool) -
     lab.write(1)
     before = {file: file.read_bytes() for file in lab.folder.rglob("*.json")}
     index_signer = IndexSigner(lab.other, VALID_S, lambda: lab.now) if signs else None
-    with pytest.raises(PackageError, match=r"the index is signed by Keeper .*: name that key"):
+    with pytest.raises(PackageError, match=r"the index is signed by Keeper .*: select that key"):
         write_index(lab.folder, "Lab", entries(2), lab.folder / ".work", index_signer)
     assert {file: file.read_bytes() for file in lab.folder.rglob("*.json")} == before
     write_index(lab.folder, "Lab", entries(1), lab.folder / ".work")  # the same: nothing to sign
@@ -151,7 +151,7 @@ def test_who_has_not_the_key_changes_no_signed_index(lab: Signed, signs: bool) -
 )
 def test_a_head_that_says_nonsense_is_none(head: bytes) -> None:
     """A time that nobody answers for, or that is none."""
-    with pytest.raises(PackageError, match="this is not a head of an index"):
+    with pytest.raises(PackageError, match="this is not the head of an index"):
         read_head(head.replace(b"HASH", b"0" * 64), HEAD)
 
 

@@ -97,7 +97,7 @@ def test_removal_never_touches_what_another_needs(store: Store) -> None:
     with pytest.raises(PackageError) as told:
         remove(store, "dial")
     assert str(told.value) == (
-        "dial was not installed by itself: drivers/car 1.0.0 needs widgets/dial 1.0.0"
+        "dial was installed only as a dependency: drivers/car 1.0.0 needs widgets/dial 1.0.0"
     )
 
 
@@ -133,7 +133,7 @@ def test_bytes_that_are_not_those_of_the_lock_are_refused(store: Store) -> None:
     """Whoever handed them over."""
     lock = install(Store(store.folder.parent / "other"), BOT, DIAL)
     with (
-        pytest.raises(PackageError, match="the bytes differ from those in the lock"),
+        pytest.raises(PackageError, match="the archive does not match the digest in the lock"),
         store.changing() as change,
     ):
         change.stage(InstallPlan(lock, {BOT.digest: BOT.data, DIAL.digest: DIAL_2.data}, {}, {}))
@@ -281,7 +281,7 @@ def test_a_second_process_is_kept_out(store: Store, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(atomic_files, "_WAIT_S", 0.0)
     with (
         store.changing(),
-        pytest.raises(PackageError, match="another urc is changing packages; try again"),
+        pytest.raises(PackageError, match="another URC process is changing packages; try again"),
         store.changing(),
     ):
         pass

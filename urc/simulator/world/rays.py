@@ -39,8 +39,9 @@ def cast(faces: EdgeArrays, x: float, y: float, angles: Numbers) -> tuple[Number
         y: y coordinate of the rays' origin, in metres.
         angles: directions of the rays in radians, counter-clockwise from the x axis.
 
-    Returns: Two arrays of shape (rays, edges): distances in metres (``inf`` without intersection),
-        and positions from 0 to 1.
+    Returns:
+        Two arrays of shape (rays, edges): distances in metres (``inf`` without intersection), and
+        positions from 0 to 1.
     """
     cosine, sine = np.cos(angles)[:, None], np.sin(angles)[:, None]
     ax, ay = faces.start[:, 0] - x, faces.start[:, 1] - y
