@@ -209,5 +209,5 @@ def test_explain_prints_a_page_and_a_list(capsys: pytest.CaptureFixture[str]) ->
 def test_explain_suggests_the_code_that_was_meant(capsys: pytest.CaptureFixture[str]) -> None:
     """Wrong use, told in one line."""
     assert main(["explain", "unknown-kye"]) == 2
-    told = "urc explain: there is no code 'unknown-kye'; did you mean 'unknown-key'?\n"
+    told = "urc explain: unknown code 'unknown-kye'; did you mean 'unknown-key'?\n"
     assert capsys.readouterr().err == told

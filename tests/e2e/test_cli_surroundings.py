@@ -63,8 +63,8 @@ def test_dashboard_that_others_reach_says_so(urc_process: Start) -> None:
     dashboard.wait_for("^dashboard ")
     assert dashboard.end(signal.SIGTERM) == 0
     assert dashboard.errors == [
-        "urc serve: 0.0.0.0 is reachable from other machines, and there is no sign-in:"
-        " anyone on that network can drive these robots"
+        "urc serve: 0.0.0.0 is reachable from other machines without a sign-in:"
+        " anyone on the network can drive these robots"
     ]
 
 
@@ -119,7 +119,9 @@ def test_doctor_finds_this_machine_fit() -> None:
     done = run("doctor", "--port", "0")
     assert (done.returncode, done.stderr) == (0, "")
     assert {line[:7].strip() for line in done.stdout.splitlines()} <= {"ok", "note"}
-    assert re.search(r"^ok +robots +\d+ of \d+ load$", done.stdout, re.MULTILINE)
+    assert re.search(
+        r"^ok +robots +\d+ of \d+ shipped robots are valid$", done.stdout, re.MULTILINE
+    )
 
 
 @pytest.mark.parametrize(

@@ -274,7 +274,8 @@ def test_dev_is_for_this_machine_alone(urc_process: Start, tmp_path: Path) -> No
     process = urc_process("serve", str(file), "--dev", "--host", "0.0.0.0", "--port", "0")
     assert process.wait() == 2
     assert process.errors == [
-        "urc serve: --dev shows all traffic and is for this machine only, not 0.0.0.0"
+        "urc serve: --dev shows all traffic, so it is allowed only on this machine;"
+        " found --host 0.0.0.0"
     ]
 
 

@@ -175,7 +175,7 @@ async def test_the_key_stands_nowhere_but_in_its_file(
         (
             ("--manage", "--host", "0.0.0.0"),
             "--manage lets others at 0.0.0.0 install packages and change settings: add --token"
-            " FILE to require the token in that file",
+            " FILE to require a token",
         ),
         (("--token", "x"), "--token is for management from other machines: add --manage"),
     ],

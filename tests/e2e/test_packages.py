@@ -96,7 +96,7 @@ def test_a_robot_is_got_once_and_driven_for_ever_without_a_network(
         assert f"added {url}: Lab, 4 versions of packages" in person.does("repo", "add", url)
         assert person.does("repo", "list") == f"{url}\n"
         assert person.does("repo", "search", "DIAL") == "widgets/dial 1.0.0  The widget dial.\n"
-        assert "--yes agrees in advance" in person.does("install", "my-puppet", code=2)
+        assert "use --yes to confirm in advance" in person.does("install", "my-puppet", code=2)
         assert person.does("list") == ""
         told = person.does("install", "my-puppet", "--yes")
     assert "robots/my-puppet 1.0.0 has these permissions:" in told

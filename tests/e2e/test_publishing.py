@@ -121,7 +121,7 @@ def test_what_one_publishes_another_installs_updates_and_undoes(
     assert ben.does("list", "--updates") == (
         "drivers/puppet 1.0.0 → 1.1.0  with widgets/dial 1.0.0 → 1.1.0\n"
     )
-    assert "there is no terminal to ask" in ben.does("update", code=2)
+    assert "no terminal is available" in ben.does("update", code=2)
     assert "it gains permissions" in ben.does("update", "--yes", code=1)
     assert ben.does("list") == "drivers/puppet 1.0.0  with widgets/dial 1.0.0\n"
     told = ben.does("update", "puppet", "--yes", "--allow-more")
@@ -130,13 +130,13 @@ def test_what_one_publishes_another_installs_updates_and_undoes(
         "  new permission: connects by tcp (wire)",
         "  lost permission: connects by tcp (wire)",
         '    - commands.beep.send: "beep"\n    + commands.beep.send: "BEEP"',
-        "updated drivers/puppet to 1.1.0; 'urc update --back drivers/puppet' reverts it",
+        "updated drivers/puppet to 1.1.0; undo with 'urc update --back drivers/puppet'",
     ):
         assert line in told
     _is_withdrawn(lab, anna, ben, people("dora"))
     lab.end()  # the way back needs nobody
     told = ben.does("update", "--back", "puppet")
-    assert told == "drivers/puppet is reverted to 1.0.0, the version before 1.1.0\n"
+    assert told == "drivers/puppet is restored to 1.0.0, the version before 1.1.0\n"
     assert ben.does("list") == "drivers/puppet 1.0.0  with widgets/dial 1.0.0\n"
     bundle = str(lab.token.parent / "puppet.urcof")
     ben.does("bundle", "puppet", "--to", bundle)
@@ -214,10 +214,10 @@ def test_what_is_wrong_is_refused_in_one_line(
     assert "this repository needs a token" in anna.refuses("publish", dial, *lab.to)
     for url in ("http://robots.example/", "http://192.168.1.5:8090/"):
         told = anna.does("publish", dial, "--to", url, "--token-file", str(lab.token), code=2)
-        assert f"{url} is not encrypted: an attacker on the way can read the token" in told
+        assert f"{url} is not encrypted: an attacker on the network can read the token" in told
     inside = str(lab.folder / "tokens.json")
     told = anna.does("repo", "serve", str(lab.folder), "--tokens", inside, code=2)
-    assert "it is inside the repository, which web servers publish" in told
+    assert "this file is inside the published repository" in told
     assert lab.holds() == before
 
     _is_cut_off(lab, package("widget", "dial", "3.0.0").data)

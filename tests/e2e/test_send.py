@@ -204,12 +204,12 @@ async def test_a_latched_stop_holds_what_is_sent(profile: str, cart: Cart, data:
     done = await send(profile, "go", *place)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == (
-        "urc send: go failed (not-allowed): STOP is latched, pressed by screen 1, before a restart:"
+        "urc send: go failed (not-allowed): STOP was latched by screen 1, before a restart:"
         " reset it first; --despite-stop overrides this\n"
     )
     done = await send(profile, "drive", "speed=1", "--hold", "200ms", *place)
     assert (done.returncode, done.stdout) == (1, "")
-    assert "drive failed (refused): STOP is latched" in done.stderr
+    assert "drive failed (refused): STOP was latched" in done.stderr
     for command in ("beep", "halt"):
         assert (await send(profile, command, *place)).returncode == 0
     assert cart.heard == ["beep", "halt"]
@@ -291,7 +291,7 @@ async def test_a_stop_of_a_running_server_is_told_with_its_address(
     await asyncio.to_thread(lambda: urlopen(stop, timeout=30).close())  # noqa: S310
     done = await send(profile, "go", *place)
     assert (done.returncode, done.stdout) == (1, "")
-    assert "STOP is latched, pressed by " in done.stderr
+    assert "STOP was latched by " in done.stderr
     assert f"reset it first on {url}" in done.stderr
     assert "go" not in cart.heard
 
@@ -332,7 +332,7 @@ async def test_a_stop_that_is_pressed_meanwhile_ends_what_is_held(
     latch(data, "screen 7")
     assert await held.wait_async() == 1
     assert held.errors[-1].startswith(
-        "urc send: drive failed (stopped): STOP is latched, pressed by screen 7"
+        "urc send: drive failed (stopped): STOP was latched by screen 7"
     )
     assert cart.heard[-1] == "drive 0"
 
@@ -342,7 +342,7 @@ async def test_how_long_it_is_held_must_be_said(profile: str) -> None:
     done = await send(profile, "drive", "speed=1")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
-        "urc send: drive moves the robot while it is held: give a time, such as --hold 1s\n"
+        "urc send: drive moves the robot while held: add a duration, such as --hold 1s\n"
     )
     done = await send(profile, "beep", "--hold", "1s")
     assert (done.returncode, done.stderr) == (
@@ -352,7 +352,7 @@ async def test_how_long_it_is_held_must_be_said(profile: str) -> None:
     done = await send(profile, "drive", "speed=1", "--hold", "2m")
     assert (done.returncode, done.stderr) == (
         2,
-        "urc send: --hold is 60s at most; drive longer on a dashboard\n",
+        "urc send: --hold is limited to 60s; use a dashboard to drive longer\n",
     )
     done = await send(profile, "drive", "speed=7", "--hold", "1s")
     assert (done.returncode, done.stderr) == (

@@ -89,7 +89,7 @@ async def test_a_dashboard_has_faults_from_the_start_and_by_typed_lines(tmp_path
         typed.write(b"faults\nfault tello:silent\nmend puppet\n")
         assert await said.readline() == b"faults: delay=400ms\n"
         error = await complaints.readline()
-        assert error.startswith(b"no robot 'tello' is emulated here")
+        assert error.startswith(b"no emulated robot has the name 'tello'")
         assert await said.readline() == b"faults: none\n"
 
 

@@ -1,1 +1,1 @@
-"""The verbs of the `urc` command."""
+"""The subcommands of the `urc` program, one module each."""

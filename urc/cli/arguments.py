@@ -1,6 +1,7 @@
-"""Command-line words → values, for all verbs alike.
+"""Command-line parsing, shared by all subcommands.
 
-Layer 6. A verb is a module with `EXAMPLE`, `add_arguments(parser)` and `run(arguments) -> int`.
+Layer 6. Each module of a subcommand has `EXAMPLE`, `add_arguments(parser)` and `run(arguments) ->
+int`.
 """
 
 import argparse
@@ -38,11 +39,11 @@ _SECONDS = {"ms": 0.001, "s": 1.0, "m": 60.0, "h": 3600.0, None: 1.0}
 
 
 class _Exit(Exception):
-    """Raised after help or an error was printed."""
+    """Raised after help text or an error message was printed."""
 
 
 class _Parser(argparse.ArgumentParser):
-    """argparse with errors in one line."""
+    """An argument parser with one-line error messages."""
 
     def error(self, message: str) -> NoReturn:
         complain(f"{self.prog}: {message}; try '{self.prog} --help'")
@@ -56,7 +57,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parse(verb: str, summary: str, module: Any, words: list[str]) -> argparse.Namespace | int:
-    """Return the arguments of a verb, or the exit code when help or an error was printed."""
+    """Return the parsed arguments, or the exit code after help text or an error message."""
     parser = _Parser(
         prog=f"urc {verb}",
         description=summary[0].upper() + summary[1:] + ".",
@@ -74,7 +75,7 @@ def parse(verb: str, summary: str, module: Any, words: list[str]) -> argparse.Na
 
 def add_profile(parser: argparse.ArgumentParser) -> None:
     """Add PROFILE and the options for its settings."""
-    parser.add_argument("profile", metavar="PROFILE", help="a robot file, or the name of a robot")
+    parser.add_argument("profile", metavar="PROFILE", help="robot file or robot name")
     add_settings(parser)
 
 
@@ -87,10 +88,13 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         type=_assignment,
-        help="a setting of the profile; also as URC_SET_NAME in the environment",
+        help="value of a setting; alternatively set URC_SET_NAME in the environment",
     )
     parser.add_argument(
-        "--settings", dest="settings_file", metavar="FILE", help="a YAML file of name: value"
+        "--settings",
+        dest="settings_file",
+        metavar="FILE",
+        help="YAML file with lines of the form NAME: VALUE",
     )
 
 
@@ -110,12 +114,12 @@ def add_dev(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dev",
         action="store_true",
-        help="a developer page for each robot: traffic, parser, reload on every save",
+        help="add a developer page for each robot: traffic, parser, and reload on every save",
     )
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether `host` is reachable from this machine only."""
+    """Return whether `host` is reachable only from this machine."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -125,7 +129,10 @@ def is_loopback(host: str) -> bool:
 def add_port(parser: argparse.ArgumentParser) -> None:
     """Add `--port`, the port of the dashboard."""
     parser.add_argument(
-        "--port", type=port, default=8080, help="port; 0 takes a free one (default: 8080)"
+        "--port",
+        type=port,
+        default=8080,
+        help="port of the dashboard; 0 selects a free port (default: 8080)",
     )
 
 
@@ -137,9 +144,10 @@ def load(word: str) -> "Profile":
 
 
 def profile_path(word: str) -> str:
-    """Return the file for a word: a path, a shipped robot, or an installed robot.
+    """Return the file of a robot, given a path, a shipped robot or an installed robot.
 
-    A file takes precedence over a shipped robot, and a shipped robot over an installed package.
+    An existing path has priority over shipped robots, and shipped robots have priority over
+    installed packages.
     """
     path = Path(word)
     if path.suffix in (".yaml", ".yml") or os.path.isfile(word):
@@ -157,13 +165,13 @@ def profile_path(word: str) -> str:
         return word  # a folder fails when it is read
     for suffix in (".yaml", ".yml"):
         if os.path.isfile(word + suffix):
-            raise UrcError(f"there is no file {word!r}; did you mean {word + suffix!r}?")
+            raise UrcError(f"file {word!r} does not exist; did you mean {word + suffix!r}?")
     known = ", ".join(sorted(file.stem for file in shipped("robots").glob("*.yaml")))
-    raise UrcError(f"there is no file and no robot {word!r}; known robots: {known}")
+    raise UrcError(f"no file or robot has the name {word!r}; known robots: {known}")
 
 
 def what_it_has(word: str, known: Iterable[str]) -> str:
-    """Return the hint for a word that a profile does not know."""
+    """Return a suggestion for a name that is unknown in a profile."""
     from difflib import get_close_matches
 
     names = list(known)
@@ -172,7 +180,10 @@ def what_it_has(word: str, known: Iterable[str]) -> str:
 
 
 def duration(text: str) -> float:
-    """Return seconds, more than 0; `text` is a number with ms, s, m or h, or plain seconds."""
+    """Return a duration in seconds, above 0.
+
+    `text` is a number of seconds, or a number with ms, s, m or h.
+    """
     found = _DURATION.fullmatch(text)
     seconds = float(found[1]) * _SECONDS[found[2]] if found else 0.0
     if not seconds:

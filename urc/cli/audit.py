@@ -1,4 +1,4 @@
-"""`urc audit`: the audit log of motions as JSON lines."""
+"""`urc audit`: print the audit log of motion as JSON lines."""
 
 import argparse
 from pathlib import Path
@@ -15,26 +15,35 @@ MOST = 1_000_000
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the number of entries, the robot, and the data folder."""
     parser.add_argument(
-        "--last", type=_count, default=USUAL, metavar="N", help="newest entries (default: 200)"
+        "--last",
+        type=_count,
+        default=USUAL,
+        metavar="N",
+        help="number of newest entries to print (default: 200)",
     )
-    parser.add_argument("--robot", default="", metavar="NAME", help="entries of this robot only")
+    parser.add_argument(
+        "--robot", default="", metavar="NAME", help="print only entries of this robot"
+    )
     parser.add_argument(
         "--data-dir",
         dest="data",
         metavar="FOLDER",
         type=Path,
-        help="data folder of 'urc serve' (default: this user's own)",
+        help="data folder of 'urc serve' (default: data folder of this user)",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the entries, oldest first; return 1 when the file was tampered with."""
+    """Print the entries, oldest first; return 1 if the log was tampered with."""
     from urc._folders import data_folder
     from urc.runtime.audit import check, read
 
     file = (arguments.data or data_folder()) / "audit.sqlite"
     if not file.is_file():
-        raise UrcError(f"there is no {file}: 'urc serve' creates it, --data-dir names its folder")
+        raise UrcError(
+            f"{file} does not exist; start 'urc serve' to create the file,"
+            " or select its folder with --data-dir"
+        )
     for entry in read(file, robot=arguments.robot, last=arguments.last):
         print(json_text(entry._asdict()))
     broken = check(file)

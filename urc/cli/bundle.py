@@ -1,4 +1,4 @@
-"""`urc bundle`: a package with its dependencies in one file, for machines without a network."""
+"""`urc bundle`: pack a package with its dependencies into one file, for offline machines."""
 
 import argparse
 from pathlib import Path
@@ -13,25 +13,25 @@ EXAMPLE = "urc bundle drivers/puppet --to puppet.urcof"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the content, the signer and the file."""
+    """Add the package, the signing key and the output file."""
     parser.add_argument(
         "package",
         metavar="PACKAGE",
-        help="an installed package, a name as for 'install', or a folder",
+        help="installed package, package name as in 'install', or folder",
     )
     parser.add_argument(
-        "--to", metavar="FILE", type=Path, help="file to write (default: NAME-VERSION.urcof)"
+        "--to", metavar="FILE", type=Path, help="output file (default: NAME-VERSION.urcof)"
     )
     parser.add_argument(
         "--key",
         metavar="FILE",
         type=Path,
-        help="key to sign packages from a folder (default: your own, if any)",
+        help="signing key for packages from a folder (default: your own key, if you have one)",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the bundle; the same packages give the same bytes."""
+    """Write the bundle. The same packages always produce the same bytes."""
     from urc.cli.error_report import Misuse
     from urc.cli.packages import open_store
     from urc.packages.atomic_files import put_file
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     lock = plan.lock
     file: Path = arguments.to or Path(f"{lock.key.name}-{lock.version}.urcof")
     if file.suffix != ".urcof":
-        raise Misuse(f"{file}: the name of a bundle must end with .urcof")
+        raise Misuse(f"{file}: the file name of a bundle must end with .urcof")
     archives = {
         pin.sha256: plan.archives.get(pin.sha256) or store.blob(pin.sha256)
         for pin in lock.packages.values()
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _planned(word: str, store: "Store") -> "InstallPlan":
-    """Return the packages; installed versions come first, because they are tested."""
+    """Return the packages. Installed versions have priority, because they are tested."""
     from urc.cli.packages import is_path, planned
     from urc.packages.install_plan import InstallPlan
     from urc.packages.names import parse_requirement
@@ -70,7 +70,7 @@ def _planned(word: str, store: "Store") -> "InstallPlan":
 
 
 def _signatures(plan: "InstallPlan", arguments: argparse.Namespace) -> "dict[str, Signature]":
-    """Return the signatures; packages from a folder get the user's own signature."""
+    """Return the signatures. Packages from a folder are signed with the user's key."""
     from urc.cli.packages import signer
     from urc.packages.names import parse_key
 

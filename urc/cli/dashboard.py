@@ -1,4 +1,4 @@
-"""The common part of `urc serve` and `urc demo`: from profiles to a running server."""
+"""Code shared by `urc serve` and `urc demo`: start a dashboard for profiles."""
 
 import asyncio
 import gc
@@ -31,7 +31,7 @@ from urc.web.fleet.robots import Glimpse
 __all__ = ["DashboardAddress", "SettingsOf", "run_dashboard", "workshop_of"]
 
 SettingsOf = Callable[[Profile], Mapping[str, Value]]
-"""Return the settings of a profile from the command line; raise `UrcError` for invalid ones."""
+"""Return the command-line settings of a profile; raise `UrcError` for invalid settings."""
 _LOOK = (320, 240)
 """Columns and rows of the preview on a card."""
 
@@ -43,25 +43,25 @@ def _nothing(_: Profile) -> Mapping[str, Value]:
 
 @dataclass(frozen=True, slots=True)
 class DashboardAddress:
-    """Address and folders of the dashboard."""
+    """Address, folders and options of the dashboard."""
 
     host: str
     port: int
     allowed_hosts: Sequence[str] = ()
     data: Path | None = None
-    """Folder of URC's own data; None means the folder of this user."""
+    """Data folder of URC; None means the default data folder of this user."""
     has_guard: bool = True
-    """Whether a guard process stops motion when this process cannot."""
+    """Whether to start a guard process, which stops motion if this process fails."""
     tiles: Path | None = None
-    """Folder of map tiles; None means maps with a grid only."""
+    """Folder of map tiles; None means maps without background tiles."""
     token: str = ""
-    """Token for management from other machines; "" allows none."""
+    """Token for package and settings management from other machines; "" forbids it."""
     shows_installed: bool = False
-    """Whether installed robots and drivers are on the menu."""
+    """Whether the menu lists installed robots and drivers."""
     trusted: Sequence[str] = ()
-    """Third-party widgets that share the page without a sandbox."""
+    """Third-party widgets that run in the page without a sandbox."""
     recordings: Path | None = None
-    """Folder for a recording of each session; None records no session."""
+    """Folder for recordings of all sessions; None disables recording."""
 
 
 def run_dashboard(
@@ -74,24 +74,25 @@ def run_dashboard(
     is_dev: bool = False,
     faults: Sequence[str] = (),
 ) -> int:
-    """Serve the dashboard until a signal ends it; return 0 then.
+    """Serve the dashboard until a signal arrives, then return 0.
 
     Args:
-        profiles: the robots at the start.
-        place: address, port, host names, and folders.
-        is_simulated: each robot is emulated, over a real socket, instead of the real one.
-        on_ready: called once with the entrance.
-        given: the settings of a profile from the command line.
-        is_dev: whether there are developer pages, and saved documents are read again.
-        faults: of emulated robots, as ``loss=5%`` or ``tello:loss=5%``.
+        profiles: initial robots.
+        place: address, folders and options of the dashboard.
+        is_simulated: whether emulated robots replace the real robots.
+        on_ready: called once with the start addresses.
+        given: returns the command-line settings of a profile.
+        is_dev: whether to serve developer pages and reload changed documents.
+        faults: faults of emulated robots, such as ``loss=5%`` or ``tello:loss=5%``.
 
     Raises:
-        UrcError: a port that is not available, two robots of one name, an impossible fault.
+        UrcError: the port is not available, two robots have the same name, or a fault is
+            impossible.
     """
     names = [profile.name for profile in profiles]
     for name in names:
         if names.count(name) > 1:
-            raise Misuse(f"two robots are named {name!r}; a name must be unique")
+            raise Misuse(f"two robots have the name {name!r}; each name must be unique")
     faulty = FaultInjector() if is_simulated else None
     work = _serve(profiles, place, faulty, on_ready, given, is_dev, faults)
     return run_loop(work, code_when_ended=0, is_fast=True)
@@ -151,7 +152,7 @@ async def _serve(
 
 @asynccontextmanager
 async def _listening(faulty: FaultInjector) -> AsyncIterator[None]:
-    """Execute typed fault commands during the context."""
+    """Read and execute fault commands from standard input during the context."""
     task = asyncio.create_task(faulty.listen())
     try:
         yield
@@ -163,7 +164,7 @@ async def _listening(faulty: FaultInjector) -> AsyncIterator[None]:
 def workshop_of(
     place: DashboardAddress, given: SettingsOf = _nothing, faulty: FaultInjector | None = None
 ) -> RobotOptions:
-    """Return the robot factory of a dashboard; with `faulty`, its robots are emulated."""
+    """Return the robot factory of a dashboard. With `faulty`, all robots are emulated."""
     return RobotOptions(
         own_folder(place.data),
         make=partial(_robot, place, faulty),
@@ -178,7 +179,7 @@ def _motion(place: DashboardAddress) -> Motion:
 
 
 def _first(factory: RobotFactory, profile: Profile) -> Robot:
-    """Return a robot that exists from the start, with its stored settings if they are valid."""
+    """Return an initial robot with its stored settings, if they are valid."""
     try:
         return factory.robot(profile.name, profile)
     except UrcError as error:
@@ -192,14 +193,14 @@ def _robot(
     profile: Profile,
     values: Mapping[str, Value],
 ) -> Robot:
-    """Return a robot whose session opens with its first page."""
+    """Return a robot with a session that opens together with its first page."""
     settings = values if faulty is None else _complete(profile, values)
     opened = partial(_session, _motion(place), place.recordings, faulty, profile, settings)
     return Robot(profile, settings, opened, is_emulated=faulty is not None)
 
 
 def _seen(emulated_robot: EmulatedRobot) -> Glimpse:
-    """Return the preview of an emulated robot: its camera, a view from above, or readings."""
+    """Return the preview of an emulated robot: camera image, top view or readings."""
     now_s = time.time()
     return (
         emulated_robot.camera(now_s)
@@ -216,7 +217,7 @@ async def _session(
     profile: Profile,
     values: Mapping[str, Value],
 ) -> AsyncIterator[Session]:
-    """Open a session with a robot, or with its emulation, which ends with the session."""
+    """Open a session with a robot or its emulation until the context ends."""
     transports = built_in_catalog().transports
     async with AsyncExitStack() as stack:
         settings = values
@@ -234,7 +235,7 @@ async def _session(
 
 @asynccontextmanager
 async def _kept(session: Session, folder: Path) -> AsyncIterator[None]:
-    """Record a session; report a failed recording, and continue without it."""
+    """Record a session. Report a failed recording and continue without it."""
     from urc.runtime.recording.recorder import recorded  # most record nothing
 
     profile = session.profile
@@ -250,5 +251,5 @@ async def _kept(session: Session, folder: Path) -> AsyncIterator[None]:
 
 
 def _complete(profile: Profile, values: Mapping[str, Value]) -> dict[str, Value]:
-    """Return settings with samples for values that only a real robot needs."""
+    """Return the settings, with sample values for missing settings of a real robot."""
     return sample_settings(profile.settings) | dict(values)

@@ -1,4 +1,4 @@
-"""The folder of URC's own data, private to this user."""
+"""URC's data folder, private to the current user."""
 
 import os
 from contextlib import suppress
@@ -13,14 +13,14 @@ _OWN = 0o700
 
 
 def own_folder(named: Path | None = None) -> Path:
-    """Return the folder of URC's own data; create it if it is missing.
+    """Return URC's data folder; create it if necessary.
 
-    The default folder becomes private, even if an older version left it open. A chosen folder that
-    exists may serve other users, and stays as it is. If the folder cannot be created, the first
-    write to it fails with a message.
+    The default folder becomes private, even if an older version created it with other permissions.
+    The permissions of an existing custom folder remain unchanged, because the folder may be shared.
+    If the folder cannot be created, the first write reports the error.
 
     Args:
-        named: from `--data-dir`; None means ``URC_DATA_DIR`` or the default folder.
+        named: value of `--data-dir`; None means ``URC_DATA_DIR`` or the default folder.
     """
     folder = named or data_folder()
     with suppress(OSError):

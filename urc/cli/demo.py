@@ -1,4 +1,4 @@
-"""`urc demo`: the gallery's robots, each emulated over real sockets, in the browser."""
+"""`urc demo`: emulate the gallery's robots over real sockets, and open the browser."""
 
 import argparse
 import os
@@ -27,7 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(port=None)
     add_dev(parser)
     add_faults(parser, has_names=True)
-    parser.add_argument("--no-browser", action="store_true", help="print the address only")
+    parser.add_argument(
+        "--no-browser", action="store_true", help="print the address without opening a browser"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -37,12 +39,15 @@ def run(arguments: argparse.Namespace) -> int:
     from urc.runtime.registries import built_in_catalog
 
     if arguments.dev and not is_loopback(arguments.host):
-        raise Misuse(f"--dev shows all traffic and is for this machine only, not {arguments.host}")
+        raise Misuse(
+            "--dev shows all traffic, so it is allowed only on this machine;"
+            f" found --host {arguments.host}"
+        )
     catalog = built_in_catalog()
     files = sorted(shipped("robots").glob("*.yaml"))
     profiles = [load_profile(file, catalog) for file in files]
     if not profiles:
-        raise UrcError(f"there are no robots in {shipped('robots')}")
+        raise UrcError(f"{shipped('robots')} contains no robots")
 
     def announce(ready_dashboard: ReadyDashboard) -> None:
         first, *others = ready_dashboard.lines()
@@ -63,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _port(arguments: argparse.Namespace) -> int:
-    """Return the given port, else the usual port, else any free port."""
+    """Return the given port, or the default port if it is free, or any free port."""
     if arguments.port is not None:
         return int(arguments.port)
     family = socket.AF_INET6 if ":" in arguments.host else socket.AF_INET
@@ -75,13 +80,13 @@ def _port(arguments: argparse.Namespace) -> int:
 
 
 def has_screen(platform: str, environment: Mapping[str, str]) -> bool:
-    """Return whether a window can open; else a text browser would take over the terminal."""
+    """Return whether a graphical browser can open. A text browser would block the terminal."""
     if platform in ("win32", "darwin"):
         return True
     return any(environment.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
 
 
 def _open_browser(url: str) -> None:
-    """Open the page in a thread, because some browsers return only when they are closed."""
+    """Open the page in a thread, because some browsers block until their window is closed."""
     with suppress(webbrowser.Error, OSError):
         webbrowser.open(url)

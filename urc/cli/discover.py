@@ -1,4 +1,4 @@
-"""`urc discover`: robots that announce themselves, serial ports, and the topics of a rosbridge."""
+"""`urc discover`: find announced robots, serial ports and topics of a rosbridge."""
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,23 +21,23 @@ Row = Mapping[str, object]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the profile, the duration, and the format of the output."""
+    """Add the profile, the duration, and the output format."""
     parser.add_argument(
         "profile",
         metavar="PROFILE",
         nargs="?",
-        help="a robot file, or the name of a robot: search only its transports and services",
+        help="robot file or robot name: search only for its transports and services",
     )
     add_settings(parser)
     parser.add_argument(
         "--for", dest="seconds", type=duration, default=DEFAULT_S, metavar="TIME",
-        help="time to listen for announcements (default: 3s)",
+        help="duration of listening for announcements (default: 3s)",
     )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="one JSON line for each result")
+    parser.add_argument("--json", action="store_true", help="print one JSON line per result")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Search; return 1 without a result."""
+    """Search for robots and print the results; return 1 without a result."""
     from urc.cli.event_loop import run_loop
     from urc.cli.settings import complete_settings, settings_given
 
@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _known_robots() -> list["Profile"]:
-    """Return the robots that ship with URC, without those that fail to load."""
+    """Return the shipped robots without invalid profiles."""
     from urc.shipped import shipped
 
     found = []
@@ -59,7 +59,7 @@ def _known_robots() -> list["Profile"]:
         try:
             found.append(load(str(path)))
         except UrcError as problem:
-            complain(f"urc discover: {path.name} is left out: {str(problem).splitlines()[0]}")
+            complain(f"urc discover: {path.name} is omitted: {str(problem).splitlines()[0]}")
     return found
 
 
@@ -133,9 +133,11 @@ async def _mdns(profiles: Sequence["Profile"], seconds: float) -> list[Row]:
 async def _nearby(
     profiles: Sequence["Profile"], settings: Sequence[Mapping[str, "Value"]], typed: set[str]
 ) -> tuple[list[Row], str]:
-    """Return the open ports of shipped robots, at their defaults on this machine or at given hosts.
+    """Return the open ports of shipped robots on this machine, or at the given hosts.
 
-    An answering rosbridge also reports its topics.
+    Settings have their defaults.
+
+    For each rosbridge that replies, the result includes its topics.
     """
     from urc.transports.discover_local import listening
 
@@ -165,7 +167,7 @@ async def _nearby(
 def _places(
     profile: "Profile", settings: Mapping[str, "Value"]
 ) -> Iterator[tuple[str, tuple[str, int]]]:
-    """Yield type, host and port of the transports of a robot with complete settings."""
+    """Yield type, host and port of each transport with complete settings."""
     from urc.runtime.settings import options_of
     from urc.transports.ros.rosbridge import DEFAULT_PORT
 

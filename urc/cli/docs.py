@@ -1,4 +1,4 @@
-"""`urc docs`: the manual page of a profile, as Markdown."""
+"""`urc docs`: print the manual page of a profile as Markdown."""
 
 import argparse
 
@@ -10,9 +10,7 @@ EXAMPLE = "urc docs puppet > puppet.md"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the profile."""
-    parser.add_argument(
-        "profile", metavar="PROFILE", help="a robot or driver file, or the name of a robot"
-    )
+    parser.add_argument("profile", metavar="PROFILE", help="robot file, driver file or robot name")
 
 
 def run(arguments: argparse.Namespace) -> int:

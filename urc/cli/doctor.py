@@ -1,4 +1,4 @@
-"""`urc doctor`: checks the features of this machine."""
+"""`urc doctor`: check the features of this machine."""
 
 import argparse
 import platform
@@ -19,21 +19,21 @@ REQUIRED = {
     "PyYAML": "reads documents",
     "jsonschema": "explains their problems",
     "Jinja2": "templates and pages",
-    "jmespath": "selects values in JSON",
+    "jmespath": "queries for values in JSON",
     "starlette": "the dashboard's pages",
     "uvicorn": "the dashboard's server",
-    "websockets": "the dashboard's live values",
+    "websockets": "live values on the dashboard",
     "msgspec": "the dashboard's messages",
     "asyncssh": "robots behind SSH",
     "roslibpy": "robots behind rosbridge",
 }
 OPTIONAL = {
     "paho-mqtt": "robots behind an MQTT broker (pip install 'urc[mqtt]')",
-    "cbor2": "images from rosbridge in CBOR (pip install 'urc[cbor]')",
-    "zeroconf": "robots that announce themselves, for 'urc discover' (pip install 'urc[mdns]')",
+    "cbor2": "CBOR images from rosbridge (pip install 'urc[cbor]')",
+    "zeroconf": "discovery of announced robots by 'urc discover' (pip install 'urc[mdns]')",
     "mcap": "recordings of sessions (pip install 'urc[record]')",
-    "google-re2": "patterns that are not provably fast; without it they are refused",
-    "uvloop": "a faster event loop; without it, held commands have a little more delay",
+    "google-re2": "patterns without provably linear run time, which URC refuses otherwise",
+    "uvloop": "a faster event loop; without this package, held commands have slightly more delay",
 }
 FOLDERS: tuple[Literal["schemas", "robots", "widgets", "templates"], ...] = (
     "schemas",
@@ -41,7 +41,7 @@ FOLDERS: tuple[Literal["schemas", "robots", "widgets", "templates"], ...] = (
     "widgets",
     "templates",
 )
-_VENDOR_REMEDY = "install the wheel, or run ./dev once; without them there are no plots"
+_VENDOR_REMEDY = "install the wheel, or run ./dev once; plots are not available without these files"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print a line per check; return 1 when a requirement is missing."""
+    """Print one line per check; return 1 if a requirement is missing."""
     problems = list(_problems(arguments.port))
     width = max(len(finding.name) for finding in problems)
     for finding in problems:
@@ -119,7 +119,7 @@ def _load_robots() -> str:
     files = sorted(shipped("robots").glob("*.yaml"))
     for file in files:
         load_profile(file, built_in_catalog())
-    return f"{len(files)} of {len(files)} load"
+    return f"{len(files)} of {len(files)} shipped robots are valid"
 
 
 def _try_port(port: int) -> str:

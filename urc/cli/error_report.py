@@ -1,4 +1,4 @@
-"""Error messages of the verbs: one line for each problem, never a traceback."""
+"""Error messages of all subcommands: one line for each problem, without a traceback."""
 
 from urc.cli.output import complain
 from urc.problems import ProblemsError, UrcError, to_text
@@ -7,11 +7,11 @@ __all__ = ["Misuse", "explain"]
 
 
 class Misuse(UrcError):
-    """Wrong use of the command line: exit code 2."""
+    """Invalid use of the command line, with exit code 2."""
 
 
 def explain(error: Exception, program: str) -> int:
-    """Print a failure of `program`, such as ``urc watch``; return the exit code."""
+    """Print the error message of a program such as ``urc watch``; return the exit code."""
     match error:
         case ProblemsError():
             for problem in error.problems:
@@ -32,9 +32,9 @@ def explain(error: Exception, program: str) -> int:
 
 
 def _mistake(bug: Exception) -> str:
-    """Return one line about a mistake of URC, for its developers."""
+    """Return one line for developers about a bug in URC."""
     from traceback import extract_tb  # slow to load, and only now needed
 
     frames = extract_tb(bug.__traceback__)
     place = f" at {frames[-1].filename}:{frames[-1].lineno}" if frames else ""
-    return f"this is a mistake in URC, please report it: {type(bug).__name__}{place}: {bug}"
+    return f"this is a bug in URC, please report it: {type(bug).__name__}{place}: {bug}"

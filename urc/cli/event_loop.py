@@ -1,4 +1,4 @@
-"""An event loop for a verb: signals end it, and a slow reader does not block it."""
+"""The event loop of a subcommand, with signal handling and non-blocking output."""
 
 import asyncio
 import logging
@@ -21,12 +21,14 @@ def run_loop(
 ) -> int:
     """Run `work` until it returns, or until SIGINT or SIGTERM cancels it; return the exit code.
 
-    A second signal ends the process at once.
+    A second signal terminates the process immediately.
 
     Args:
         work: returns an exit code; its cleanup after cancellation must take bounded time.
-        code_when_ended: exit code for a signal; 128 + its number by default, as in a shell.
-        is_fast: use the fastest installed loop, which takes a moment to load.
+        code_when_ended: exit code after a signal; the default is 128 plus the signal number, as in
+            a shell.
+        is_fast: whether to use the fastest installed event loop. Loading it delays the start
+            slightly.
     """
     handler = logging.StreamHandler()
     handler.setFormatter(_OneLine())
@@ -58,7 +60,7 @@ async def _until_signal(work: Coroutine[Any, Any, int], code_when_ended: int | N
 
 
 class _OneLine(logging.Formatter):
-    """Log lines for people, with the name of an exception and without its traceback."""
+    """Log lines for people, with exception names but without tracebacks."""
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line."""
@@ -75,10 +77,10 @@ class _Job(NamedTuple):
 
 
 class LineWriter:
-    """A writer for the standard streams that a slow reader cannot block.
+    """A writer for standard streams that a slow reader cannot block.
 
-    A daemon thread writes straight to the descriptor. At its exit, Python waits for other threads,
-    and for the buffer of a `print` that may never end.
+    A daemon thread writes directly to the file descriptor. Other threads and buffered `print`
+    output could block Python's exit indefinitely.
     """
 
     def __init__(self) -> None:
@@ -86,10 +88,10 @@ class LineWriter:
         threading.Thread(target=self._work, name="writer", daemon=True).start()
 
     async def write(self, stream: TextIO, text: str) -> None:
-        """Return when all of `text` is written.
+        """Write all of `text`, and return afterwards.
 
         Raises:
-            OSError: it cannot be written; `BrokenPipeError` when the reader is gone.
+            OSError: writing failed; `BrokenPipeError` if the reader has closed the stream.
         """
         loop = asyncio.get_running_loop()
         data = text.encode(stream.encoding, "backslashreplace")

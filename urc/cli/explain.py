@@ -1,4 +1,4 @@
-"""`urc explain`: the page of a problem's code."""
+"""`urc explain`: print the help page of a problem code."""
 
 import argparse
 from difflib import get_close_matches
@@ -16,12 +16,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "code",
         metavar="CODE",
         nargs="?",
-        help="code printed by 'urc validate'; default: list all codes",
+        help="code printed by 'urc validate' (default: list all codes)",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the page of a code, or a line for each code."""
+    """Print the help page of a code, or one line for each code."""
     every = pages()
     if arguments.code is None:
         width = max(map(len, every))
@@ -33,8 +33,8 @@ def run(arguments: argparse.Namespace) -> int:
     if page is None:
         close = get_close_matches(arguments.code, every, n=1)
         hint = f"did you mean '{close[0]}'?" if close else "'urc explain' lists all codes"
-        raise Misuse(f"there is no code {arguments.code!r}; {hint}")
+        raise Misuse(f"unknown code {arguments.code!r}; {hint}")
     if new is not None:
-        print(f"{arguments.code} is called {new} now.\n")
+        print(f"The new name of {arguments.code} is {new}.\n")
     print(page)
     return 0

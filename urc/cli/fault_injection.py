@@ -1,4 +1,4 @@
-"""Fault injection for emulated robots: at the start, and by typed lines."""
+"""Fault injection for emulated robots, by command-line options and typed commands."""
 
 import argparse
 import sys
@@ -24,18 +24,18 @@ __all__ = ["FaultInjector", "add_faults"]
 
 
 _LONGEST: Final = 4096
-"""Maximum bytes of a line; longer lines are dropped."""
+"""Maximum length of a line, in bytes; longer lines are dropped."""
 _MOST_WAITING: Final = 64
-"""Maximum unread lines; beyond this number the newest are dropped."""
+"""Maximum number of unread lines; further lines are dropped."""
 
 
 async def typed_lines(stream: TextIO | None) -> AsyncIterator[str]:
-    """Yield the lines of a stream until it ends; none if it cannot be read.
+    """Yield the lines of a stream until it ends. An unreadable stream yields no lines.
 
-    A process in the background of a terminal reads nothing: the terminal would stop the process.
+    A background process must not read from its terminal, or the terminal would suspend the process.
 
     Args:
-        stream: a pipe or terminal, or None.
+        stream: a pipe or a terminal, or None.
     """
     try:
         handle = -1 if stream is None else stream.fileno()
@@ -79,7 +79,10 @@ async def typed_lines(stream: TextIO | None) -> AsyncIterator[str]:
 
 
 def _is_ours(handle: int) -> bool:
-    """Return whether reading is allowed: a terminal belongs to its foreground process."""
+    """Return whether the process may read the stream.
+
+    Only foreground processes may read a terminal.
+    """
     try:
         return not os.isatty(handle) or os.tcgetpgrp(handle) == os.getpgrp()
     except (AttributeError, OSError):
@@ -87,8 +90,12 @@ def _is_ours(handle: int) -> bool:
 
 
 def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
-    """Add the option for faults from the start; `has_names` if there may be several robots."""
-    which = " with emulated robots: FAULT with all, ROBOT:FAULT with one," if has_names else ","
+    """Add the option for initial faults; `has_names` permits the form ROBOT:FAULT."""
+    which = (
+        " fault of emulated robots: FAULT affects all robots, ROBOT:FAULT a single robot;"
+        if has_names
+        else ","
+    )
     name = "tello:" if has_names else ""
     parser.add_argument(
         "--fault",
@@ -105,23 +112,24 @@ def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
 class FaultInjector:
     """The emulated robots of one process, and their injected faults.
 
-    A robot keeps its faults when it is emulated again, for example after a change of its settings.
+    A robot's faults persist when its emulation restarts, for example after a change of its
+    settings.
     """
 
     def __init__(self, now: Callable[[], float] = time.time) -> None:
-        """Start without a robot.
+        """Start without robots.
 
         Args:
-            now: seconds since the epoch.
+            now: returns the current time in seconds since the epoch.
         """
         self._now = now
         self._emulated_robots: dict[str, list[EmulatedRobot]] = {}
         self._wrong: dict[str, dict[str, str]] = {}
-        """Robot → its faults as written, for its next emulation."""
+        """Faults of each robot for its next emulation, by robot name."""
 
     @contextmanager
     def watch(self, name: str, emulated_robot: "EmulatedRobot") -> Iterator[None]:
-        """Inject the faults of a robot during the context."""
+        """Inject the stored faults of a robot during the context."""
         emulated_robots = self._emulated_robots.setdefault(name, [])
         for text in self._wrong.get(name, {}).values():
             with suppress(UrcError):  # another version may lack that signal
@@ -133,7 +141,7 @@ class FaultInjector:
             emulated_robots.remove(emulated_robot)
 
     def begin(self, texts: Sequence[str]) -> None:
-        """Inject the faults of the command line; raise `Misuse` for an impossible fault."""
+        """Inject the command-line faults; raise `Misuse` for an impossible fault."""
         for text in texts:
             try:
                 self.inject(text)
@@ -141,12 +149,12 @@ class FaultInjector:
                 raise Misuse(f"--fault: {error}") from None
 
     def inject(self, text: str) -> None:
-        """Inject a fault: ``loss=5%``, or ``tello:loss=5%``.
+        """Inject a fault such as ``loss=5%`` or ``tello:loss=5%``.
 
-        Without a name, it applies to every robot that can have it.
+        Without a robot name, the fault applies to every robot that supports it.
 
         Raises:
-            UrcError: an unknown robot or fault, or a fault that no robot here can have; one line.
+            UrcError: the robot or the fault is unknown, or no robot supports the fault.
         """
         from urc.simulator.faults import parse_fault
 
@@ -166,10 +174,10 @@ class FaultInjector:
             raise refusals[0]
 
     def mend(self, robot: str = "") -> None:
-        """Remove all faults, of one robot or of all robots.
+        """Remove all faults of one robot or of all robots.
 
         Raises:
-            UrcError: an unknown robot; one line.
+            UrcError: the robot is unknown.
         """
         for name in self._named(robot) if robot else [*self._emulated_robots]:
             self._wrong.pop(name, None)
@@ -180,10 +188,10 @@ class FaultInjector:
         if robot in self._emulated_robots:
             return [robot]
         hint = did_you_mean(robot, self._emulated_robots, "robots")
-        raise UrcError(f"no robot {robot!r} is emulated here" + (f"; {hint}" if hint else ""))
+        raise UrcError(f"no emulated robot has the name {robot!r}" + (f"; {hint}" if hint else ""))
 
     def __str__(self) -> str:
-        """Return the injected faults, for people."""
+        """Return the injected faults as text."""
         found = []
         for name, emulated_robots in self._emulated_robots.items():
             faults = ", ".join(
@@ -194,7 +202,7 @@ class FaultInjector:
         return f"faults: {'; '.join(found) or 'none'}"
 
     def obey(self, line: str) -> None:
-        """Execute a typed line, and print the injected faults."""
+        """Execute a typed command and print the injected faults."""
         verb, _, rest = line.strip().partition(" ")
         try:
             if verb == "fault" and rest:
@@ -203,7 +211,7 @@ class FaultInjector:
                 self.mend(rest.strip())
             elif line.strip() not in ("", "faults"):
                 raise UrcError(
-                    f"{line.strip()[:60]!r} is not a command; write fault …, mend or faults"
+                    f"unknown command {line.strip()[:60]!r}; expected fault …, mend or faults"
                 )
         except UrcError as error:
             complain(str(error))
@@ -212,6 +220,6 @@ class FaultInjector:
             print(self, flush=True)
 
     async def listen(self) -> None:
-        """Execute all lines of standard input, until it ends."""
+        """Execute the commands from standard input until it ends."""
         async for line in typed_lines(sys.stdin):
             self.obey(line)

@@ -1,4 +1,4 @@
-"""`urc install`: a package with its dependencies, from a repository, a bundle or a folder."""
+"""`urc install`: install a package and its dependencies from a repository, a bundle or a folder."""
 
 import argparse
 from pathlib import Path
@@ -20,23 +20,23 @@ EXAMPLE = "urc install drivers/puppet@^1.0"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the package and the options of consent."""
+    """Add the package and the confirmation options."""
     parser.add_argument(
         "package",
         metavar="PACKAGE",
-        help="NAME or drivers/NAME, optionally with @VERSION; or a bundle, archive or folder",
+        help="NAME or drivers/NAME, optionally with @VERSION; or a bundle, an archive or a folder",
     )
     parser.add_argument("--yes", action="store_true", help="install without asking")
     parser.add_argument(
         "--allow-more",
         action="store_true",
-        help="with --yes: also accept another version with more permissions",
+        help="with --yes: also accept new permissions compared with another installed version",
     )
     add_risks(parser)
     parser.add_argument(
         "--signed-by",
         metavar="SHA256:…",
-        help="refuse the package unless the key with this fingerprint signed it",
+        help="accept the package only with a signature by the key with this fingerprint",
     )
     parser.add_argument(
         "--withdrawn",
@@ -47,12 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--lock",
         metavar="FILE",
         type=Path,
-        help="install exactly the versions of this lock file; write it if it is missing",
+        help="install exactly the versions in this lock file; create the file if it is missing",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Show the permissions, ask, install."""
+    """Show the permissions, ask for confirmation, and install the package."""
     from urc.cli.packages import is_agreed_to, is_path, keep_in_use, open_store, planned, used_lock
     from urc.packages.atomic_files import put_file
     from urc.packages.install import origin_lines
@@ -61,7 +61,9 @@ def run(arguments: argparse.Namespace) -> int:
     lock_file: Path | None = arguments.lock
     pinned = _pinned(lock_file)
     if pinned is not None and is_path(arguments.package):
-        raise Misuse("a lock file selects versions of repositories; give the name of a package")
+        raise Misuse(
+            "a lock file selects versions from repositories, so a package name is required"
+        )
     plan = planned(arguments.package, pinned, takes_withdrawn=arguments.withdrawn)
     store = open_store()
     with store.changing() as change:
@@ -84,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
         put_file(lock_file, plan.lock.to_bytes(), lock_file.resolve().parent)
     print(f"installed {plan.lock}")
     if used is not None and (used.key, used.version) != (plan.lock.key, plan.lock.version):
-        print(f"{used} stays in use; the settings of the robot select the version")
+        print(f"{used} remains in use; the settings of the robot select the version")
     return 0
 
 
@@ -115,7 +117,7 @@ def _compare(
     look: "PreviewWorker",
     risks: list[str],
 ) -> "UpdateDiff | None":
-    """Print and return the changes in another version; None without a version to compare."""
+    """Print and return the changes from the installed version; None for a new installation."""
     from urc.packages.update import UpdateDiff, staged_difference
     from urc.problems import UrcError, printable
 
@@ -125,10 +127,10 @@ def _compare(
         found = staged_difference(used, plan, store, folder, look)
     except UrcError as error:
         line = str(error).strip().partition("\n")[0]
-        complain(f"urc install: the changes are unknown: {used} cannot be read: {line}")
+        complain(f"urc install: cannot show the changes, because {used} cannot be read: {line}")
         # Unknown changes count as new permissions.
         return UpdateDiff([], ["all permissions above"], [], risks, [])
-    print(f"{used} is in use; this changes:")
+    print(f"{used} is in use. The installation makes these changes:")
     for line in difference_lines(found):
         print(printable(line))
     return found
@@ -137,7 +139,7 @@ def _compare(
 def _show(
     plan: "InstallPlan", folder: Path, origins: list[str], look: "PreviewWorker"
 ) -> list[str]:
-    """Print the permissions of a package; return the resources of this machine that it names."""
+    """Print the permissions of a package; return the local resources named by the package."""
     from urc.packages.store import kinds_in
     from urc.problems import printable
 

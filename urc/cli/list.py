@@ -1,4 +1,4 @@
-"""`urc list`: the installed packages and their newer versions."""
+"""`urc list`: list installed packages and available updates."""
 
 import argparse
 
@@ -6,9 +6,11 @@ EXAMPLE = "urc list --json"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the selection and the format."""
-    parser.add_argument("--updates", action="store_true", help="only packages with a newer version")
-    parser.add_argument("--json", action="store_true", help="one JSON line for each package")
+    """Add the selection and the output format."""
+    parser.add_argument(
+        "--updates", action="store_true", help="list only packages with a newer version"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON line per package")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -37,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _updates(*, is_json: bool) -> int:
-    """Print the updates; return 0 also without any."""
+    """Print the available updates; return 0 even without updates."""
     from urc.cli.output import complain, json_text
     from urc.cli.packages import known_repositories, open_store
     from urc.packages.update import headline, newer

@@ -1,7 +1,7 @@
-"""The `urc` command: finds the verb, imports it alone, and turns every failure into one line.
+"""The `urc` program: imports only the requested subcommand and reports every failure in one line.
 
-Layer 6. Nothing heavy may be imported here, not even `typing`: `urc --version` and each verb pay
-only for what they use.
+Layer 6. Fast start: this module must not import large modules, not even `typing`. `urc --version`
+loads no subcommand, and each subcommand loads only its own imports.
 """
 
 import os
@@ -11,40 +11,43 @@ from collections.abc import Sequence
 __all__ = ["VERBS", "main"]
 
 VERBS: dict[str, str] = {
-    "demo": "serve all shipped robots, emulated, and open the browser",
+    "demo": "emulate all shipped robots and open the dashboard in a browser",
     "serve": "serve the dashboard for real robots",
     "validate": "check documents and run their tests",
-    "explain": "explain the code of a problem, with a correction",
-    "resolve": "print a profile as one document, with the place of every key",
-    "migrate": "rename old keys and values in documents; every other byte stays",
-    "docs": "write the manual page of a profile, as Markdown",
+    "explain": "explain a problem code and its correction",
+    "resolve": "print a profile as one document, with the origin of every key",
+    "migrate": "replace old names of keys and values in documents",
+    "docs": "print the manual page of a profile as Markdown",
     "simulate": "emulate the robot of a profile on its real ports",
     "watch": "print a robot's signals as JSON lines",
-    "send": "run one command and print its reply",
-    "record": "record a session to a file; Ctrl-C stops",
+    "send": "run one command of a robot and print the reply",
+    "record": "record a session to a file, until Ctrl-C",
     "replay": "replay a recording in the dashboard",
     "new": "create the files of a new widget",
-    "repo": "manage repositories of packages, their tokens and keys",
-    "install": "install a package and its dependencies, after showing its permissions",
-    "update": "update installed packages, after showing the changes; or revert",
+    "repo": "manage package repositories, upload tokens and keys",
+    "install": "install a package and its dependencies, after showing the permissions",
+    "update": "update installed packages after showing the changes, or undo an update",
     "search": "search the repositories for packages",
     "list": "list the installed packages",
     "remove": "remove an installed package and its unused dependencies",
     "bundle": "pack a package and its dependencies into one file",
     "publish": "publish a package to a repository",
-    "trust": "show the host key of an SSH server, and store it on consent",
-    "audit": "print the audit log of motions as JSON lines",
-    "discover": "find robots on the network, serial ports, and ROS topics",
+    "trust": "show the host key of an SSH server, and store it after confirmation",
+    "audit": "print the audit log of motion as JSON lines",
+    "discover": "find robots on the network, serial ports and ROS topics",
     "schema": "print the JSON Schema of a kind of document",
     "doctor": "check the features of this machine",
 }
 
 _INTERRUPTED = 130
-"""The exit code of a shell after SIGINT: 128 + 2."""
+"""Exit code of a shell after SIGINT: 128 + 2."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command line; return its exit code: 0 success, 1 problems or failure, 2 wrong use."""
+    """Run one command line; return its exit code.
+
+    Exit codes are 0 for success, 1 for problems or failure, and 2 for invalid use.
+    """
     _mend_streams()
     words = list(sys.argv[1:] if argv is None else argv)
     try:
@@ -96,13 +99,13 @@ def _usage() -> str:
     lines = [f"  {name:<{width}}  {text}" for name, text in VERBS.items()]
     return "\n".join(
         (
-            "usage: urc VERB …",
+            "usage: urc SUBCOMMAND …",
             "",
             "Describe a robot in one YAML file, and drive it from any browser.",
             "",
             *lines,
             "",
-            "'urc VERB --help' explains a verb. 'urc --version' prints the version.",
+            "'urc SUBCOMMAND --help' explains a subcommand. 'urc --version' prints the version.",
         )
     )
 
@@ -113,16 +116,16 @@ def _unknown(verb: str) -> int:
     from urc.cli.output import complain
 
     close = get_close_matches(verb, VERBS, n=1)
-    hint = f"did you mean '{close[0]}'?" if close else "'urc --help' lists all verbs"
-    complain(f"urc: there is no verb {verb!r}; {hint}")
+    hint = f"did you mean '{close[0]}'?" if close else "'urc --help' lists all subcommands"
+    complain(f"urc: unknown subcommand {verb!r}; {hint}")
     return 2
 
 
 def _mend_streams() -> None:
-    """Open missing standard streams, and let all of them take any text.
+    """Open missing standard streams, and let all streams accept any text.
 
-    WARNING: missing streams come first. Else the next file or socket would get the number of a
-    standard stream, and printed text would go to a robot.
+    WARNING: missing streams must be opened first. Otherwise the next file or socket would receive
+        the number of a standard stream, and printed text could reach a robot.
     """
     for number in range(3):
         try:
@@ -138,7 +141,7 @@ def _mend_streams() -> None:
 
 
 def _flush(code: int) -> int:
-    """Flush the output, so that its failure is reported like any other."""
+    """Flush the output, so that write errors are reported like other errors."""
     try:
         sys.stdout.flush()
     except BrokenPipeError:
@@ -153,7 +156,10 @@ def _flush(code: int) -> int:
 
 
 def _discard_output() -> None:
-    """Discard pending output: Python would try to write it, and complain, at its exit."""
+    """Discard pending output.
+
+    Otherwise, Python would retry the failed write and print an error at exit.
+    """
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

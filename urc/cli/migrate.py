@@ -1,4 +1,4 @@
-"""`urc migrate`: replaces old keys and values of documents with their present names."""
+"""`urc migrate`: replace old names of keys and values in documents."""
 
 import argparse
 import os
@@ -11,19 +11,22 @@ EXAMPLE = "urc migrate robot.yaml drivers/arm.yaml"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the documents and the check."""
+    """Add the documents and the check option."""
     parser.add_argument(
-        "files", metavar="FILE", nargs="+", help="documents of any kind; changed in place"
+        "files",
+        metavar="FILE",
+        nargs="+",
+        help="documents of any kind; the files are changed in place",
     )
     parser.add_argument(
         "--check",
         action="store_true",
-        help="change no file; exit code 1 when a document has an old name",
+        help="do not change files; exit with code 1 if a document contains an old name",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Rename in each file; return 1 when a file fails, or when a check finds an old name."""
+    """Migrate each file; return 1 after a failure, or if `--check` finds an old name."""
     code = 0
     for file in dict.fromkeys(arguments.files):
         try:
@@ -41,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _migrate(file: str, *, is_check: bool) -> bool:
-    """Rename in one file, or only check it; return whether it has an old name."""
+    """Migrate one file, or only check it; return whether it contains an old name."""
     from urc.config.migrate import migrate
 
     migrated = migrate(file)
@@ -57,9 +60,9 @@ def _migrate(file: str, *, is_check: bool) -> bool:
 
 
 def _write(file: str, content: bytes) -> None:
-    """Replace the content of a file atomically: a failure leaves the old content.
+    """Replace the content of a file atomically. After a failure, the old content remains.
 
-    A symbolic link and the permissions stay.
+    Symbolic links and file permissions are preserved.
     """
     real = os.path.realpath(file)
     number, new = tempfile.mkstemp(dir=os.path.dirname(real), suffix=".new")

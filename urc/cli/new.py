@@ -1,4 +1,4 @@
-"""`urc new`: the files of a new widget, complete and valid, as a starting point."""
+"""`urc new`: create the files of a new, valid widget as a starting point."""
 
 import argparse
 import os
@@ -17,27 +17,32 @@ _TYPES = Path(__file__).resolve().parents[1] / "web" / "static" / "core/types.js
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the kind and the name."""
-    parser.add_argument("kind", metavar="KIND", choices=("widget",), help="kind to create: widget")
-    parser.add_argument("name", metavar="NAME", help="name: lower-case letters, digits and '-'")
+    parser.add_argument(
+        "kind", metavar="KIND", choices=("widget",), help="kind of package to create: widget"
+    )
+    parser.add_argument(
+        "name", metavar="NAME", help="name of the widget: lower-case letters, digits and '-'"
+    )
     parser.add_argument(
         "--into",
         metavar="DIR",
         type=Path,
-        help="folder for the new folder (default: 'widgets' here, next to the robots that use it)",
+        help="parent folder of the new folder"
+        " (default: 'widgets' in the current folder, next to the robots with the widget)",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Create the folder; never change an existing one."""
+    """Create the folder; never change an existing folder."""
     from urc.problems import UrcError
 
     name: str = arguments.name
     if not _NAME.fullmatch(name):
         raise UrcError(
-            f"a widget cannot have the name {name!r}: use lower-case letters, digits and '-'"
+            f"{name!r} is not a valid widget name: use lower-case letters, digits and '-'"
         )
     if (shipped("widgets") / name).is_dir():
-        raise UrcError(f"a widget with the name {name!r} ships with URC, and takes precedence")
+        raise UrcError(f"a widget with the name {name!r} ships with URC and takes precedence")
     home: Path = arguments.into or Path("widgets")
     folder = home / name
     try:
@@ -63,7 +68,10 @@ def _filled(text: str, name: str, folder: Path) -> str:
 
 
 def _path_to(target: Path, folder: Path) -> str:
-    """Return the path of a URC file from a folder: relative within one checkout, else absolute."""
+    """Return the path from a folder to a URC file.
+
+    The path is relative within one checkout, and otherwise absolute.
+    """
     home = shipped("schemas").parent.resolve()
     if folder.resolve().is_relative_to(home):
         return Path(os.path.relpath(target.resolve(), folder.resolve())).as_posix()

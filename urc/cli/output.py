@@ -1,4 +1,4 @@
-"""Output: lines for people on standard error, JSON for any reader."""
+"""Output of subcommands: messages on standard error, and JSON."""
 
 import os
 import sys
@@ -10,7 +10,7 @@ __all__ = ["complain", "json_text"]
 
 
 def complain(line: str) -> None:
-    """Print one line for people; ignore a closed standard error."""
+    """Print one message line to standard error; ignore a closed stream."""
     try:
         print(printable(line), file=sys.stderr, flush=True)
     except OSError:
@@ -27,11 +27,11 @@ def json_text(value: Mapping[str, object], indent: int | None = None) -> str:
 
 
 def _plain(value: object) -> object:
-    """Return a reading without a JSON type as one: bytes become base64."""
+    """Return a JSON-compatible form of a reading; bytes become base64 text."""
     if isinstance(value, bytes):
         from base64 import b64encode
 
         return b64encode(value).decode("ascii")
     if isinstance(value, Mapping):
         return dict(value)
-    raise TypeError(f"{type(value).__name__} has no JSON form")
+    raise TypeError(f"{type(value).__name__} has no JSON representation")

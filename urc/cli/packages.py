@@ -1,4 +1,4 @@
-"""The common part of the package verbs: store, repositories, confirmation, installed names."""
+"""Code shared by the package subcommands: store, repositories, confirmation and installed names."""
 
 import argparse
 import os
@@ -47,28 +47,28 @@ def open_store() -> "Store":
 
 
 def repositories() -> "Repositories":
-    """Return the repositories that this user added."""
+    """Return the repositories that this user has added."""
     from urc.packages.repositories import Repositories
 
     return Repositories(own_folder() / "packages", complain)
 
 
 def known_repositories() -> "list[Repository]":
-    """Return the repositories that this user added.
+    """Return the repositories that this user has added.
 
     Raises:
-        Misuse: no repository is added.
+        Misuse: the user has not added a repository.
     """
     known = repositories().all()
     if not known:
-        raise Misuse("no repository is known; 'urc repo add URL' adds one")
+        raise Misuse("no repository is configured; add one with 'urc repo add URL'")
     return known
 
 
 def installed_document(word: str) -> Path | None:
     """Return the document of an installed robot or driver by name, or None.
 
-    Without a version, it is the version in use; see `urc.runtime.settings_store.in_use`.
+    Without a version, the version in use is returned; see `urc.runtime.settings_store.in_use`.
     """
     if not (data_folder() / "packages" / "state.json").is_file():
         return None
@@ -91,7 +91,7 @@ def installed_document(word: str) -> Path | None:
 
 
 def is_path(word: str) -> bool:
-    """Return whether a word means a file or folder, not the name of a package."""
+    """Return whether a word is the path of a file or folder instead of a package name."""
     path = Path(word)
     is_told = path.suffix in (".urcof", ".zip") or word.startswith((".", "/", "~"))
     return is_told or (path / "package.yaml").is_file()
@@ -100,7 +100,7 @@ def is_path(word: str) -> bool:
 def planned(
     word: str, pinned: "Lock | None" = None, *, takes_withdrawn: bool = False
 ) -> "InstallPlan":
-    """Return the install plan of a package's name, file or folder, with all archives fetched."""
+    """Return the install plan of a package name, file or folder, with all archives downloaded."""
     from urc.packages.install import plan_file, plan_requirement
     from urc.packages.names import parse_requirement
     from urc.packages.sources import open_source
@@ -110,14 +110,14 @@ def planned(
         source = open_source(Path(word).expanduser())
         return plan_file(source, known, store, complain)
     if not known:
-        raise Misuse("no repository is known; 'urc repo add URL' adds one")
+        raise Misuse("no repository is configured; add one with 'urc repo add URL'")
     return plan_requirement(
         parse_requirement(word), known, store, complain, pinned, takes_withdrawn=takes_withdrawn
     )
 
 
 def known_entries() -> "list[IndexEntry]":
-    """Return the stored indexes of the repositories, without a request."""
+    """Return the stored indexes of the repositories, without network requests."""
     from urc.packages.names import PackageError
 
     try:
@@ -131,19 +131,19 @@ RISKS_FLAG: Final = "--let-it-use-my-keys-files-and-fixed-hosts"
 
 
 def add_risks(parser: argparse.ArgumentParser) -> None:
-    """Add the flag for packages that name files, keys, programs or hosts themselves."""
+    """Add the option that accepts packages with predefined files, keys, programs or hosts."""
     parser.add_argument(
         RISKS_FLAG,
         dest="takes_risks",
         action="store_true",
-        help="also accept keys, files, programs or hosts that the package itself names",
+        help="also accept keys, files, programs or hosts that the package itself specifies",
     )
 
 
 def is_agreed(question: str) -> bool:
-    """Ask the user; raise `Misuse` without a terminal."""
+    """Ask the user a yes-or-no question; raise `Misuse` without a terminal."""
     if not sys.stdin.isatty():
-        raise Misuse("there is no terminal to ask; --yes agrees in advance")
+        raise Misuse("no terminal is available for the question; use --yes to confirm in advance")
     try:
         return input(f"{question} Type yes: ").strip().lower() == "yes"
     except EOFError:
@@ -156,17 +156,17 @@ def is_agreed_to(
     arguments: argparse.Namespace,
     question: str,
 ) -> bool:
-    """Ask the user, or take `--yes`, which is not enough for new permissions.
+    """Ask the user, or use `--yes`. New permissions require an additional option.
 
     Args:
-        difference: to the installed version; None if none is installed.
-        risks: resources of this machine that the package itself names.
-        arguments: with ``yes``, ``allow_more`` and ``takes_risks``.
-        question: such as ``Update it?``.
+        difference: changes from the installed version; None without an installed version.
+        risks: local resources that the package itself specifies.
+        arguments: parsed arguments with ``yes``, ``allow_more`` and ``takes_risks``.
+        question: question to the user, such as ``Update it?``.
     """
     gains = difference is not None and bool(difference.gained)
     if risks:
-        _warn("WARNING: the package itself names these resources of your machine:")
+        _warn("WARNING: the package itself specifies these resources of your machine:")
         for line in risks:
             _warn(f"  {line}")
     if arguments.yes:
@@ -182,16 +182,19 @@ def _is_yes_enough(gains: bool, has_risks: bool, arguments: argparse.Namespace) 
         *([RISKS_FLAG] if has_risks and not arguments.takes_risks else []),
     ]
     if lacks:
-        what = "it gains permissions" if gains else "it names resources of this machine"
+        what = "it gains permissions" if gains else "it specifies resources of this machine"
         complain(
-            f"urc: {what}, and --yes alone does not accept that;"
+            f"urc: {what}, and --yes does not accept this;"
             f" add {' '.join(lacks)}, or remove --yes to be asked"
         )
     return not lacks
 
 
 def used_lock(store: "Store", key: "PackageId") -> "Lock | None":
-    """Return the version of a package in use; a robot or driver in use may have another key."""
+    """Return the version of a package in use.
+
+    For a robot or driver, the version in use may have another key.
+    """
     from urc.runtime.settings_store import DRIVEN, in_use
 
     installed = store.installed()
@@ -202,7 +205,7 @@ def used_lock(store: "Store", key: "PackageId") -> "Lock | None":
 
 
 def keep_in_use(lock: "Lock") -> None:
-    """Pin a version for dashboards, independent of other installed versions."""
+    """Select the version for dashboards, independently of other installed versions."""
     from urc.runtime.settings_store import DRIVEN, pin
 
     if lock.key.kind in DRIVEN:
@@ -219,7 +222,7 @@ def _warn(line: str) -> None:
 
 
 def signer(file: Path | None = None) -> "Signer | None":
-    """Return the key in the given file, or this user's own key if any.
+    """Return the key in the given file, or this user's own key; None without a key.
 
     Raises:
         Misuse: the given file does not exist.
@@ -228,7 +231,7 @@ def signer(file: Path | None = None) -> "Signer | None":
 
     found = read_signer(file or data_folder() / PUBLISHER)
     if found is None and file is not None:
-        raise Misuse(f"{file}: this file does not exist; 'urc repo key new NAME' creates a key")
+        raise Misuse(f"{file}: this file does not exist; create a key with 'urc repo key new NAME'")
     return found
 
 

@@ -1,4 +1,4 @@
-"""`urc publish`: uploads a package to a repository that accepts packages."""
+"""`urc publish`: upload packages to a repository."""
 
 import argparse
 from pathlib import Path
@@ -28,23 +28,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         type=Path,
         required=True,
-        help="the token from the maintainer of the repository",
+        help="file with the upload token from the maintainer of the repository",
     )
     parser.add_argument(
-        "--key", metavar="FILE", type=Path, help="key of the publisher (default: your own, if any)"
+        "--key",
+        metavar="FILE",
+        type=Path,
+        help="key of the publisher (default: your own key, if you have one)",
     )
     parser.add_argument(
-        "--source", metavar="URL", default="", help="URL of the source, shown at installation"
+        "--source",
+        metavar="URL",
+        default="",
+        help="URL of the source code, shown before installation",
     )
     parser.add_argument("--commit", metavar="HEX", default="", help="commit of --source")
     parser.add_argument(
         "--allow-warnings", action="store_true", help="publish despite warnings of 'urc validate'"
     )
-    parser.add_argument("--insecure", action="store_true", help="send the token without encryption")
+    parser.add_argument(
+        "--insecure", action="store_true", help="permit sending the token without encryption"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Upload each package; stop at the first refusal, with its reason."""
+    """Upload each package; stop at the first rejected package."""
     from urc.cli.error_report import Misuse
     from urc.cli.packages import signer
     from urc.packages.http_repository import repository_url
@@ -55,8 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
     url = repository_url(arguments.to)
     if is_overheard(url) and not arguments.insecure:
         raise Misuse(
-            f"{url} is not encrypted: an attacker on the way can read the token; use https,"
-            " or --insecure in a network that you trust"
+            f"{url} is not encrypted: an attacker on the network can read the token; use https,"
+            " or add --insecure in a trusted network"
         )
     token, made = read_token(arguments.token_file), _provenance(arguments)
     key = signer(arguments.key)
@@ -75,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _provenance(arguments: argparse.Namespace) -> "Provenance | None":
-    """Return the source of the packages, if given."""
+    """Return the origin of the packages, if given."""
     import msgspec
 
     from urc import __version__
@@ -97,10 +105,10 @@ def _provenance(arguments: argparse.Namespace) -> "Provenance | None":
 
 
 def _look(source: "FileSource", document: Path, arguments: argparse.Namespace) -> None:
-    """Refuse a package folder with problems; the repository checks packed archives.
+    """Reject a package folder with problems. The repository checks packed archives.
 
     Raises:
-        PackageError: the errors, and the warnings unless they are allowed.
+        PackageError: the document has errors, or warnings that are not permitted.
     """
     from urc.packages.names import PackageError
     from urc.problems import has_errors
@@ -121,7 +129,7 @@ def _look(source: "FileSource", document: Path, arguments: argparse.Namespace) -
 
 
 def _of_files(manifest: Path) -> "list[Problem]":
-    """Return the problems of the files next to a widget's manifest."""
+    """Return the problems in the files of a widget."""
     from urc.config.load import WidgetFolder, check
     from urc.runtime.registries import built_in_catalog
     from urc.shipped import shipped

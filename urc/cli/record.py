@@ -1,4 +1,4 @@
-"""`urc record`: connects, and records the session in a file for `urc replay`."""
+"""`urc record`: connect to a robot and record the session to a file for `urc replay`."""
 
 import argparse
 import asyncio
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--output",
         metavar="FILE",
         type=Path,
-        help="file to write (default: ROBOT-TIME.mcap here)",
+        help="output file (default: ROBOT-TIME.mcap in the current folder)",
     )
     parser.add_argument(
         "--for", dest="seconds", type=duration, metavar="TIME", help="stop after 500ms, 5s, 2m …"
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Record until the time is over or a signal arrives; return 1 when nothing was received."""
+    """Record for the duration or until a signal arrives; return 1 if nothing was received."""
     from urc.cli.event_loop import run_loop
     from urc.cli.settings import complete_settings
 
@@ -69,7 +69,7 @@ async def _record(
 
 
 async def _until_over(recorder: "Recorder", seconds: float | None) -> None:
-    """Return when the time is over, when recording failed, or at Ctrl-C."""
+    """Return when the duration has elapsed or recording has failed, or at Ctrl-C."""
     try:
         async with asyncio.timeout(seconds):
             while not recorder.fault:  # noqa: ASYNC110 - a thread sets it

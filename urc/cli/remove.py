@@ -1,4 +1,4 @@
-"""`urc remove`: removes an installed package, and dependencies that nothing else needs."""
+"""`urc remove`: remove an installed package and its unused dependencies."""
 
 import argparse
 
@@ -13,12 +13,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--keep-settings",
         action="store_true",
-        help="keep the settings of its robot, including secrets",
+        help="keep the settings of the removed robot, including secrets",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Remove it; keep what another package needs."""
+    """Remove the package; keep the dependencies of other packages."""
     from urc._folders import data_folder
     from urc.cli.packages import open_store
     from urc.packages.names import parse_requirement
@@ -30,7 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
     for line in gone:
         print(f"removed {line}")
     if not gone:
-        print("removed; another package needs it, so its files stay")
+        print("removed; another package needs it, so its files remain")
     for name in names_kept(folder, removed, store.installed()):
         file = SettingsStore(folder, name)
         if arguments.keep_settings:

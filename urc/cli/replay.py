@@ -1,4 +1,4 @@
-"""`urc replay`: the dashboard on a recording, with its values as if they were live."""
+"""`urc replay`: show a recording in the dashboard like live values."""
 
 import argparse
 from pathlib import Path
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--profile",
         metavar="PROFILE",
-        help="robot file to show it with, for a changed interface or third-party widgets"
+        help="robot file for the display, for a changed interface or third-party widgets"
         " (default: the profile in the recording)",
     )
     parser.add_argument(
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="TIME",
         help="start at 90s, 2m …",
     )
-    parser.add_argument("--loop", action="store_true", help="restart at the end")
+    parser.add_argument("--loop", action="store_true", help="restart playback at the end")
     add_host(parser)
     add_port(parser)
 
@@ -58,10 +58,10 @@ def run(arguments: argparse.Namespace) -> int:
     recording = open_recording(arguments.recording, has_profile=bool(arguments.profile))
     start_s, length_s = arguments.start_s, recording.length_s
     if start_s > length_s:
-        raise Misuse(f"--from {start_s:g}s is past the end: the recording lasts {length_s:.1f} s")
+        raise Misuse(f"--from {start_s:g}s is after the end of the recording, at {length_s:.1f} s")
     if recording.unread_bytes > 0:
-        lost = f"its last {recording.unread_bytes} bytes cannot be read"
-        complain(f"urc replay: {recording.file} is damaged, or was cut off: {lost}")
+        lost = f"the last {recording.unread_bytes} bytes cannot be read"
+        complain(f"urc replay: {recording.file} is damaged or truncated: {lost}")
     elif recording.unread_bytes:
         complain(f"urc replay: {recording.file} is incomplete; the last second may be missing")
     profile = load(arguments.profile) if arguments.profile else _profile_in(recording)
@@ -98,7 +98,7 @@ def _profile_in(recording: "Recording") -> "Profile":
             return load(str(file))
         except ProblemsError as error:
             line = str(error).partition("\n")[0].replace(str(file), recording.file.name)
-            raise UrcError(f"{line}; --profile names another profile for it") from None
+            raise UrcError(f"{line}; select another profile with --profile") from None
 
 
 def _speed(text: str) -> float:

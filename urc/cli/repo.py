@@ -1,4 +1,4 @@
-"""`urc repo`: repositories of packages, known ones and one's own."""
+"""`urc repo`: use and maintain package repositories."""
 
 import argparse
 import asyncio
@@ -16,17 +16,19 @@ if TYPE_CHECKING:
 
 
 def token(arguments: argparse.Namespace) -> int:
-    """Add, list or remove tokens of a repository."""
+    """Add, list or remove upload tokens of a repository."""
     from urc.packages.tokens import UploadTokens
     from urc.problems import printable
 
     if arguments.tokens is None:
-        raise Misuse("'urc repo token' needs --tokens FILE, the same file as for 'urc repo serve'")
+        raise Misuse(
+            "'urc repo token' requires --tokens FILE, the same file as for 'urc repo serve'"
+        )
     tokens = UploadTokens(arguments.tokens)
     match arguments.words:
         case ["add", name]:
             if not arguments.may:
-                raise Misuse("'urc repo token add' needs --may: the packages that it may publish")
+                raise Misuse("'urc repo token add' requires --may with the packages for the token")
             print(tokens.add(name, tuple(arguments.may)))
         case ["remove", name]:
             tokens.remove(name)
@@ -35,12 +37,12 @@ def token(arguments: argparse.Namespace) -> int:
             for one in tokens.all():
                 print(printable(f"{one.name}  {', '.join(one.may)}"))
         case _:
-            raise Misuse("'urc repo token' takes add NAME, remove NAME or list")
+            raise Misuse("expected 'urc repo token' with add NAME, remove NAME or list")
     return 0
 
 
 def key(arguments: argparse.Namespace) -> int:
-    """Create or show one's own key, list the pinned keys, or forget one."""
+    """Create or show the user's key, list the pinned keys, or delete a pinned key."""
     from urc._folders import data_folder
     from urc.cli.packages import open_store
     from urc.packages.names import parse_key
@@ -50,11 +52,11 @@ def key(arguments: argparse.Namespace) -> int:
     match arguments.words:
         case ["new", name]:
             made = new_signer(name, file)
-            print(f"{made}, in {file}: keep a copy in a private place")
+            print(f"{made}, in {file}: keep a private backup of this file")
         case ["show"]:
             own = read_signer(file)
             if own is None:
-                raise Misuse(f"{file}: there is no key; 'urc repo key new NAME' creates one")
+                raise Misuse(f"{file}: there is no key; create one with 'urc repo key new NAME'")
             print(own)
         case ["list"]:
             for name, kept in sorted(open_store().state().keys.items()):
@@ -62,9 +64,9 @@ def key(arguments: argparse.Namespace) -> int:
         case ["forget", name]:
             with open_store().changing() as change:
                 change.forget_key(parse_key(name))
-            print(f"forgot the key of {name}; the next key that signs it is pinned")
+            print(f"deleted the pinned key of {name}; the next installation pins a new key")
         case _:
-            raise Misuse("'urc repo key' takes new NAME, show, list or forget PACKAGE")
+            raise Misuse("expected 'urc repo key' with new NAME, show, list or forget PACKAGE")
     return 0
 
 
@@ -72,9 +74,9 @@ EXAMPLE = "urc repo add http://192.168.1.5:8090/"
 
 _PORT = 8090
 _ARCHIVE_S = 60.0
-"""Time limit for the upload of an archive, in seconds."""
+"""Timeout for the upload of an archive, in seconds."""
 _RENEW_S = 3600.0
-"""Period between two checks of the expiry of a served index, in seconds."""
+"""Interval between checks for the expiry of a served index, in seconds."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -91,14 +93,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "words", metavar="URL|WORD|DIR|NAME", nargs="*", help="arguments of the action"
     )
     parser.add_argument(
-        "--json", action="store_true", help="search: one JSON line for each package"
+        "--json", action="store_true", help="search: print one JSON line per package"
     )
     parser.add_argument("--name", metavar="TEXT", help="index, serve: title of the repository")
     parser.add_argument(
         "--tokens",
         metavar="FILE",
         type=Path,
-        help="serve: tokens that may publish; token: the file to change",
+        help="serve: file of the upload tokens; token: file to change",
     )
     parser.add_argument(
         "--may",
@@ -110,29 +112,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--key",
         metavar="FILE",
         type=Path,
-        help="index, serve, withdraw, restore, key: a publisher's key (default: your own, if any)",
+        help="index, serve, withdraw, restore, key: file of the publisher's key"
+        " (default: your own key, if you have one)",
     )
     parser.add_argument(
         "--valid",
         metavar="DAYS",
         type=_days,
         default=14,
-        help="index, serve, withdraw, restore: validity of a signed index, 1 to 365 (default: 14)",
+        help="index, serve, withdraw, restore: validity of a signed index in days, 1 to 365"
+        " (default: 14)",
     )
     parser.add_argument(
-        "--why", metavar="TEXT", help="withdraw: reason, shown to users who have it installed"
+        "--why", metavar="TEXT", help="withdraw: reason, shown to users with the version installed"
     )
     add_host(parser)
     parser.add_argument(
         "--port",
         type=port,
         default=_PORT,
-        help=f"serve: port; 0 takes a free one (default: {_PORT})",
+        help=f"serve: port; 0 selects a free port (default: {_PORT})",
     )
 
 
 def _days(text: str) -> int:
-    """Return a number of days; raise an error in one line for argparse."""
+    """Return a number of days; raise an argparse error with a one-line message."""
     if text.isdecimal() and len(text) < 4 and 1 <= int(text) <= 365:
         return int(text)
     raise argparse.ArgumentTypeError(f"expected 1 to 365 days, found {text[:20]!r}")
@@ -145,7 +149,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _one(arguments: argparse.Namespace, what: str) -> str:
     if len(arguments.words) != 1:
-        raise Misuse(f"'urc repo {arguments.action}' takes one {what}")
+        raise Misuse(f"'urc repo {arguments.action}' requires exactly one {what}")
     return str(arguments.words[0])
 
 
@@ -159,14 +163,19 @@ def _add(arguments: argparse.Namespace) -> int:
     keeper = next((one.keeper for one in known.all() if one.name == url), "")
     print(printable(f"its index is signed by {keeper}" if keeper else "its index is not signed"))
     if url.startswith("http:"):
-        complain(f"urc repo: {url} is not encrypted: an attacker on the way can change the index")
+        complain(
+            f"urc repo: {url} is not encrypted: an attacker on the network can change the index"
+        )
     return 0
 
 
 def _remove(arguments: argparse.Namespace) -> int:
     from urc.cli.packages import repositories
 
-    print(f"removed {repositories().remove(_one(arguments, 'URL'))}; installed packages stay")
+    print(
+        f"removed {repositories().remove(_one(arguments, 'URL'))};"
+        " its installed packages remain installed"
+    )
     return 0
 
 
@@ -189,7 +198,7 @@ def _search(arguments: argparse.Namespace) -> int:
 
 
 def _index(arguments: argparse.Namespace) -> int:
-    """Write the index of a folder, for any static web server; return 1 for a skipped package."""
+    """Write the index of a folder for a static web server; return 1 after a rejected package."""
     from urc.packages.index_builder import make_index
     from urc.runtime.package_check import examine
 
@@ -199,13 +208,13 @@ def _index(arguments: argparse.Namespace) -> int:
         complain(f"not listed: {fault}")
     print(f"{folder / 'index.json'}  {len(listing.listed.packages)} versions of packages")
     if codec is not None:
-        print(f"signed by {codec.signer}; sign it again ('urc repo index', or a running"
-              f" 'urc repo serve') within {arguments.valid / 2:g} days")  # fmt: skip
+        print(f"signed by {codec.signer}; renew the signature within {arguments.valid / 2:g} days"
+              " with 'urc repo index' or a running 'urc repo serve'")  # fmt: skip
     return 1 if listing.faults else 0
 
 
 def _codec(arguments: argparse.Namespace) -> "IndexSigner | None":
-    """Return the signature settings of the index; None without a key."""
+    """Return the signer of the index; None without a key."""
     from urc.cli.packages import signer
     from urc.packages.index_head import IndexSigner
 
@@ -216,12 +225,12 @@ def _codec(arguments: argparse.Namespace) -> "IndexSigner | None":
 def _withdraw(arguments: argparse.Namespace) -> int:
     """Withdraw a version, with a reason."""
     if not (arguments.why or "").strip():
-        raise Misuse("'urc repo withdraw' needs --why: the reason for its users")
+        raise Misuse("'urc repo withdraw' requires --why with a reason for users of the version")
     return _note(arguments, arguments.why.strip())
 
 
 def _restore(arguments: argparse.Namespace) -> int:
-    """Offer a withdrawn version again."""
+    """Make a withdrawn version available again."""
     return _note(arguments, "")
 
 
@@ -230,15 +239,15 @@ def _note(arguments: argparse.Namespace, why: str) -> int:
     from urc.packages.names import parse_key
 
     if len(arguments.words) != 3:
-        raise Misuse(f"'urc repo {arguments.action}' takes DIR PACKAGE VERSION")
+        raise Misuse(f"'urc repo {arguments.action}' requires DIR PACKAGE VERSION")
     folder, package, version = arguments.words
     entry = withdraw(Path(folder), parse_key(package), version, why, _codec(arguments))
-    print(f"{entry} is withdrawn: {why}" if why else f"{entry} is offered again")
+    print(f"{entry} is withdrawn: {why}" if why else f"{entry} is available again")
     return 0
 
 
 def _serve(arguments: argparse.Namespace) -> int:
-    """Write the index of a folder, and serve it until Ctrl-C or SIGTERM."""
+    """Write the index of a folder and serve it until Ctrl-C or SIGTERM."""
     from urc.cli.event_loop import run_loop
     from urc.packages.server import repository_app
     from urc.runtime.package_check import examine_apart
@@ -269,7 +278,7 @@ def _serve(arguments: argparse.Namespace) -> int:
 
 
 async def _renewing(folder: Path, codec: "IndexSigner | None") -> None:
-    """Sign the index again before it expires, as long as it is served."""
+    """Renew the signature of the index before it expires, while the repository is served."""
     from urc.packages.index_builder import renew
     from urc.packages.names import PackageError
 
@@ -278,18 +287,20 @@ async def _renewing(folder: Path, codec: "IndexSigner | None") -> None:
         try:
             await asyncio.to_thread(renew, folder, codec)
         except (PackageError, OSError) as error:
-            complain(f"urc repo: the signature of the index is not renewed: {error}")
+            complain(f"urc repo: the signature of the index cannot be renewed: {error}")
 
 
 def _tokens(arguments: argparse.Namespace, folder: Path) -> "UploadTokens | None":
-    """Return the tokens that may publish, or None."""
+    """Return the upload tokens; None without a token file."""
     from urc.packages.tokens import UploadTokens
 
     file: Path | None = arguments.tokens
     if file is None:
         return None
     if file.resolve().is_relative_to(folder.resolve()):
-        raise Misuse(f"{file}: it is inside the repository, which web servers publish; move it")
+        raise Misuse(
+            f"{file}: this file is inside the published repository; move it to another folder"
+        )
     UploadTokens(file).all()  # report mistakes now, not at the first upload
     return UploadTokens(file)
 

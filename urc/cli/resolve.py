@@ -1,4 +1,4 @@
-"""`urc resolve`: a profile as one document, with the origin of each key."""
+"""`urc resolve`: print a profile as one document, with the origin of each key."""
 
 import argparse
 
@@ -10,9 +10,7 @@ EXAMPLE = "urc resolve puppet"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the profile."""
-    parser.add_argument(
-        "profile", metavar="PROFILE", help="a robot or driver file, or the name of a robot"
-    )
+    parser.add_argument("profile", metavar="PROFILE", help="robot file, driver file or robot name")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""`urc schema`: the grammar of a kind of document, for editors and other programs."""
+"""`urc schema`: print the JSON Schema of a kind of document, for editors and other programs."""
 
 import argparse
 import json
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--path",
         action="store_true",
-        help="print the path of the file; without KIND, of all schemas",
+        help="print the path of the schema file; without KIND, the paths of all schemas",
     )
 
 
@@ -38,12 +38,12 @@ def run(arguments: argparse.Namespace) -> int:
         sys.stdout.write(json.dumps(_bundled(folder, file.name), indent=2, ensure_ascii=False))
         sys.stdout.write("\n")
     else:
-        raise Misuse(f"KIND is missing: one of {', '.join(KINDS)}")
+        raise Misuse(f"KIND is missing: expected one of {', '.join(KINDS)}")
     return 0
 
 
 def _bundled(folder: Path, name: str) -> Any:
-    """Return the schema `name` with all schemas that it refers to under its ``$defs``."""
+    """Return the schema `name` with all referenced schemas under its ``$defs``."""
     pending, texts = [name], {name: (folder / name).read_text("utf-8")}
     while pending:
         for other in _OTHER.findall(texts[pending.pop()]):
@@ -57,7 +57,7 @@ def _bundled(folder: Path, name: str) -> Any:
 
 
 def _relinked(node: Any, here: str, root: str) -> Any:
-    """Return a schema with references to the parts in the bundle of `root`."""
+    """Return a schema with references to the definitions in the bundle of `root`."""
     if isinstance(node, list):
         return [_relinked(item, here, root) for item in node]
     if not isinstance(node, dict):

@@ -1,4 +1,4 @@
-"""`urc search`: packages in the known repositories."""
+"""`urc search`: search the configured repositories for packages."""
 
 import argparse
 
@@ -6,7 +6,7 @@ EXAMPLE = "urc search battery --kind widget"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the words and the format of the output."""
+    """Add the words and the output format."""
     parser.add_argument(
         "words", metavar="WORD", nargs="*", help="words that a package must contain"
     )
@@ -14,9 +14,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--kind",
         choices=("driver", "interface", "widget", "robot"),
         default="",
-        help="only packages of this kind",
+        help="search only for packages of this kind",
     )
-    parser.add_argument("--json", action="store_true", help="one JSON line for each package")
+    parser.add_argument("--json", action="store_true", help="print one JSON line per package")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -1,7 +1,7 @@
-"""`urc send`: one command, its reply as JSON.
+"""`urc send`: run one command of a robot and print the reply as JSON.
 
-Motion does not start while STOP is latched or an operator drives, and ends when either happens. The
-engine is informed of a STOP that another process latched.
+Motion is refused or stopped while STOP is latched or an operator has the controls. If another
+process latches STOP, the engine is informed.
 """
 
 import argparse
@@ -34,20 +34,21 @@ from urc.runtime.latch import LatchStore
 from urc.runtime.running_servers import RunningServer, headers, servers
 
 _ANSWER_S = 2.0
-"""Timeout of a server's reply in seconds; after it, the state of the server is unknown."""
+"""Timeout for the reply of a server, in seconds. After the timeout, the server's state is
+unknown."""
 _LOOK_S = 0.1
 _ASK_S = 0.5
 _MOST_BYTES = 4096
 
 
 class MotionInterlock:
-    """Interlocks of a robot: the stored latch, and the servers on the same data folder."""
+    """Interlocks of a robot: the stored latch, and the servers with the same data folder."""
 
     def __init__(self, data: Path, robot: str, clock: Callable[[], float]) -> None:
-        """Prepare for one robot, without reading anything.
+        """Prepare the interlocks of one robot without reading files.
 
         Args:
-            data: folder of URC's own data.
+            data: data folder of URC.
             robot: name of the profile.
             clock: monotonic seconds.
         """
@@ -61,14 +62,14 @@ class MotionInterlock:
         self._ask_s = float("-inf")
         self._driven = ""
         self.why = ""
-        """Reason why motion is refused, as of the last `look`; "" if it is allowed."""
+        """Reason for refusing motion at the last call of `look`; "" if motion is allowed."""
 
     async def check(self) -> str:
-        """Read the state now; return `why`."""
+        """Read the interlocks and return `why`."""
         return await asyncio.to_thread(self._check)
 
     async def follow(self, on_change: Callable[[str], None]) -> None:
-        """Read the state repeatedly until cancelled; report every change of `why`."""
+        """Read the interlocks repeatedly until cancelled; report every change of `why`."""
         while True:
             before = self.why
             if await self.check() != before:
@@ -93,10 +94,10 @@ class MotionInterlock:
         if seen != self._seen:
             self._seen = seen
             by = self._latch.load().state.latched_by
-            self._latched = f"STOP is latched, pressed by {by}: reset it first" if by else ""
+            self._latched = f"STOP was latched by {by}: reset it first" if by else ""
 
     def _asked(self) -> str:
-        """Return the first objection of a server, or ""."""
+        """Return the first reason of a server for refusing motion, or ""."""
         for file, server in servers(self._data).items():
             why = self._answer(file, server)
             if why:
@@ -127,7 +128,7 @@ class MotionInterlock:
         finally:
             line.close()
         if by:
-            return printable(f"STOP is latched, pressed by {by}: reset it first on {url}")
+            return printable(f"STOP was latched by {by}: reset it first on {url}")
         return printable(f"{holder} drives the robot on {url}") if holder else ""
 
 
@@ -135,9 +136,9 @@ EXAMPLE = "urc send my-robot.yaml set_speed speed=3 --set host=192.168.1.20"
 
 _WHOLE = re.compile(r"[+-]?[0-9]{1,300}")
 KNOWN_S = 3.0
-"""Time limit in seconds for reading the signals that a command requires."""
+"""Timeout for reading the signals that a command requires, in seconds."""
 _WRONG_USE = ("bad-argument", "unknown-command")
-"""Codes of failures that wrong arguments cause."""
+"""Codes of failures due to wrong arguments."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -150,24 +151,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="hold_s",
         metavar="TIME",
         type=duration,
-        help="hold a held command for this time (500ms, 2s), then release it",
+        help="duration of a held command, such as 500ms or 2s; the command is then released",
     )
     parser.add_argument(
         "--despite-stop",
         action="store_true",
-        help="move the robot even while STOP is latched or an operator drives it",
+        help="move the robot even while STOP is latched or an operator has the controls",
     )
     parser.add_argument(
         "--data-dir",
         dest="data",
         metavar="FOLDER",
         type=Path,
-        help="data folder of 'urc serve' (default: this user's own)",
+        help="data folder of 'urc serve' (default: data folder of this user)",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the command and print its reply; return 1 when it failed."""
+    """Run the command and print its reply; return 1 after a failure."""
     from urc.cli.event_loop import run_loop
     from urc.cli.settings import complete_settings
 
@@ -187,13 +188,15 @@ def _check_hold(command: "Command", hold_s: float | None) -> None:
         raise Misuse(f"{command.name} is not a held command: remove --hold")
     if command.hold is not None and hold_s is None:
         raise Misuse(
-            f"{command.name} moves the robot while it is held: give a time, such as --hold 1s"
+            f"{command.name} moves the robot while held: add a duration, such as --hold 1s"
         )
     if hold_s is not None:
         from urc.runtime.scripted_hold import LONGEST_HOLD_S
 
         if hold_s > LONGEST_HOLD_S:
-            raise Misuse(f"--hold is {LONGEST_HOLD_S:g}s at most; drive longer on a dashboard")
+            raise Misuse(
+                f"--hold is limited to {LONGEST_HOLD_S:g}s; use a dashboard to drive longer"
+            )
 
 
 def _arguments(command: "Command", words: list[str]) -> dict[str, "Reading"]:
@@ -217,20 +220,20 @@ def _arguments(command: "Command", words: list[str]) -> dict[str, "Reading"]:
 
 
 def _elements(argument: "Argument", text: str) -> tuple["Value", ...]:
-    """Return the elements of an array: ``1,2,3``, or ``["a, b", "c"]`` in JSON."""
+    """Return the elements of an array in the form ``1,2,3`` or JSON, such as ``["a, b", "c"]``."""
     if text.startswith("["):
         import json
 
         try:
             return tuple(json.loads(text))
         except (ValueError, RecursionError):
-            raise Misuse(f"{argument.name}: {text!r} is not a JSON list") from None
+            raise Misuse(f"{argument.name}: {text!r} is not a JSON array") from None
     single = argument._replace(type=argument.items)
     return tuple(_value(single, word.strip()) for word in text.split(",")) if text else ()
 
 
 def _value(argument: "Argument", text: str) -> "Value":
-    """Return the typed value; the engine checks range and choices."""
+    """Return the typed value. The engine checks ranges and choices."""
     try:
         if argument.type == "integer":
             return int(text, 0)
@@ -280,7 +283,7 @@ async def _given(
     hold_s: float | None,
     interlock: "MotionInterlock | None",
 ) -> dict[str, "Reading"]:
-    """Give the command, or hold it; return the values of its reply."""
+    """Send the command or hold it; return the values of its reply."""
     if hold_s is None:
         return dict((await session.command(command.name, values)).values)
     from urc.protocol.requests.encode import BadArgument, check_arguments
@@ -300,7 +303,7 @@ async def _given(
 async def _heeding(
     session: "Session", command: "Command", arguments: argparse.Namespace
 ) -> AsyncIterator["MotionInterlock | None"]:
-    """Obey STOP and operators during the context, unless the arguments say otherwise."""
+    """Apply the interlocks during the context, unless the arguments override them."""
     may_move = command.moves or command.hold is not None
     if arguments.despite_stop or not may_move:
         yield None
@@ -324,7 +327,7 @@ async def _heeding(
 
 
 async def _known(session: "Session", command: "Command") -> None:
-    """Wait for the first reading of the signals that the command requires, up to the time limit."""
+    """Wait for the first readings of all signals that the command requires, with a timeout."""
     wanted = {name for one in command.requires for name in one.condition.names}
     wanted &= session.profile.driver.signals.keys()
 
@@ -344,7 +347,10 @@ async def _known(session: "Session", command: "Command") -> None:
 
 
 def _why(session: "Session", command: "Command", failed: "CommandFailed") -> str:
-    """Return the reason, with the state of the links when the robot is not connected."""
+    """Return the reason for a failure.
+
+    If the robot is not connected, the reason includes the state of its links.
+    """
     from urc.protocol.requests.bounds import lines_of
 
     if failed.code != "disconnected":

@@ -1,4 +1,4 @@
-"""`urc serve`: the dashboard on real robots."""
+"""`urc serve`: serve the dashboard for real robots."""
 
 import argparse
 import os
@@ -24,14 +24,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "profiles",
         metavar="PROFILE",
         nargs="*",
-        help="robot files or names (default: all installed robots)",
+        help="robot files or robot names (default: all installed robots)",
     )
     add_settings(parser)
     add_host(parser)
     add_port(parser)
-    _add_names(parser, "--allow-host", "host name of this machine, in addition to its addresses")
+    _add_names(parser, "--allow-host", "additional host name of this machine")
     parser.add_argument(
-        "--simulate", action="store_true", help="emulate the robots instead of connecting"
+        "--simulate", action="store_true", help="emulate the robots instead of connecting to them"
     )
     add_faults(parser, has_names=True)
     add_dev(parser)
@@ -43,32 +43,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--manage",
         action="store_true",
-        help="allow other machines to install packages and change settings; needs --token",
+        help="let other machines install packages and change settings; requires --token",
     )
     parser.add_argument(
         "--token",
         dest="token_file",
         metavar="FILE",
         type=Path,
-        help="file with the token for --manage; created if it is missing",
+        help="file with the token for --manage; created if missing",
     )
     parser.add_argument(
         "--no-guard",
         dest="has_guard",
         action="store_false",
-        help="for debugging: send motion from this process; if it hangs, nothing stops a robot",
+        help="for debugging: send motion commands without a guard process;"
+        " if this process hangs, robots are not stopped",
     )
     for flag, text in (
-        ("--data-dir", "data folder: latched stops, audit log, settings"),
-        ("--tiles", "map tiles as FOLDER/z/x/y.png, for the option tiles of the widget map"),
+        ("--data-dir", "data folder for latched stops, audit log and settings"),
+        (
+            "--tiles",
+            "folder of map tiles in the form FOLDER/z/x/y.png, for the map widget's option tiles",
+        ),
         ("--record", "record each session to a file in this folder, for 'urc replay'"),
     ):
         parser.add_argument(flag, metavar="FOLDER", type=Path, help=text)
     _add_names(
         parser,
         "--trust-widget",
-        "run a third-party widget in the page instead of a sandboxed frame: it gets all rights of"
-        " the page",
+        "run a third-party widget in the page with all rights of the page, instead of in a"
+        " sandboxed frame",
     )
 
 
@@ -87,10 +91,10 @@ def run(arguments: argparse.Namespace) -> int:
     _check(arguments)
     profiles = [load(word) for word in arguments.profiles]
     if not profiles and (arguments.settings or arguments.settings_file):
-        raise Misuse("--set and --settings need a profile on the command line")
+        raise Misuse("--set and --settings require a profile on the command line")
     settings_given(profiles, arguments)  # report invalid settings before the server starts
     for folder in dict.fromkeys(each for one in profiles for each in hidden_beside(one.file)):
-        complain(f"urc serve: {folder} is not used: a widget of this name ships with URC")
+        complain(f"urc serve: {folder} is ignored: a widget with this name ships with URC")
     if not is_loopback(arguments.host):
         _warn(arguments)
 
@@ -108,7 +112,9 @@ def run(arguments: argparse.Namespace) -> int:
         return settings_given([bare, *others], arguments)[0][0]
 
     if not arguments.has_guard:
-        complain("urc serve: no guard: a moving robot is not stopped when this process hangs")
+        complain(
+            "urc serve: no guard process: if this process hangs, moving robots are not stopped"
+        )
     return run_dashboard(
         profiles,
         DashboardAddress(
@@ -132,24 +138,27 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    """Refuse arguments that exclude each other.
+    """Reject contradictory arguments.
 
     Raises:
-        Misuse: for such arguments, or a folder that does not exist.
+        Misuse: the arguments contradict each other, or a folder does not exist.
     """
     if arguments.dev and not is_loopback(arguments.host):
-        raise Misuse(f"--dev shows all traffic and is for this machine only, not {arguments.host}")
+        raise Misuse(
+            "--dev shows all traffic, so it is allowed only on this machine;"
+            f" found --host {arguments.host}"
+        )
     if arguments.manage and not arguments.token_file and not is_loopback(arguments.host):
         raise Misuse(
             f"--manage lets others at {arguments.host} install packages and change settings:"
-            " add --token FILE to require the token in that file"
+            " add --token FILE to require a token"
         )
     if arguments.token_file and not arguments.manage:
         raise Misuse("--token is for management from other machines: add --manage")
     if arguments.faults and not arguments.simulate:
         raise Misuse("--fault is for emulated robots: add --simulate")
     if arguments.tiles and not arguments.tiles.is_dir():
-        raise Misuse(f"--tiles needs a folder of map tiles; {arguments.tiles} is not a folder")
+        raise Misuse(f"--tiles requires a folder of map tiles; {arguments.tiles} is not a folder")
     if arguments.record:
         from urc.runtime.recording.recorder import check_installed
 
@@ -158,6 +167,6 @@ def _check(arguments: argparse.Namespace) -> None:
 
 def _warn(arguments: argparse.Namespace) -> None:
     complain(
-        f"urc serve: {arguments.host} is reachable from other machines, and there is no sign-in:"
-        " anyone on that network can drive these robots"
+        f"urc serve: {arguments.host} is reachable from other machines without a sign-in:"
+        " anyone on the network can drive these robots"
     )

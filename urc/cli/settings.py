@@ -1,4 +1,4 @@
-"""The settings of the robots on a command line: `--set`, the environment, a file, defaults."""
+"""Settings of robots from `--set`, the environment, a file and defaults."""
 
 import argparse
 import os
@@ -18,20 +18,19 @@ __all__ = ["complete_settings", "settings_given"]
 def settings_given(
     profiles: Sequence[Profile], arguments: argparse.Namespace, *, allows_any_port: bool = False
 ) -> list[tuple[dict[str, Value], tuple[str, ...]]]:
-    """Return, for each profile, the values of its settings and the names of those without a value.
+    """Return the settings of each profile, and the names of its settings without a value.
 
-    `--set` takes precedence over the environment, the environment over the settings file, and the
-    file over the profile's default. With several profiles, a setting goes to each profile that has
-    it.
+    The order of precedence is `--set`, the environment, the settings file, and the profile's
+    defaults. With several profiles, a setting applies to each profile that declares it.
 
     Args:
-        profiles: at least one.
-        arguments: with the options of `add_settings`.
-        allows_any_port: whether port 0 lets the system choose.
+        profiles: one or more profiles.
+        arguments: parsed arguments with the options of `add_settings`.
+        allows_any_port: whether a port may be 0, for any free port.
 
     Raises:
-        Misuse: a name that no profile has, or a text that is not a value of its type.
-        ProblemsError: the same, in the settings file.
+        Misuse: no profile declares the name, or the text is not a value of the setting's type.
+        ProblemsError: the settings file contains such a name or value.
     """
     given: dict[str, str] = dict(arguments.settings)
     _warn_of_secrets(profiles, arguments)
@@ -39,7 +38,7 @@ def settings_given(
     if len(profiles) > 1:
         for name in given:
             if not any(name in profile.settings for profile in profiles):
-                raise Misuse(f"none of these robots has a setting {name!r}")
+                raise Misuse(f"no robot has a setting {name!r}")
     filed = _settings_in(arguments.settings_file, profiles, allows_any_port=allows_any_port)
     resolved = []
     for profile in profiles:
@@ -60,21 +59,21 @@ def settings_given(
 
 
 def _warn_of_secrets(profiles: Sequence[Profile], arguments: argparse.Namespace) -> None:
-    """Warn once of each secret on the command line, and name the alternatives."""
+    """Warn once about each secret on the command line, and suggest alternatives."""
     told: set[str] = arguments.__dict__.setdefault("told_secrets", set())
     for name, _ in arguments.settings:
         settings = [one.settings[name] for one in profiles if name in one.settings]
         if name not in told and any(one.is_secret for one in settings):
             told.add(name)
             complain(
-                f"warning: --set {name}=… is visible to every user of this machine, in the list of"
-                f" processes: use {environment_name(name)} in the environment, or a file with"
+                f"warning: --set {name}=… is visible to every user of this machine in the process"
+                f" list: use {environment_name(name)} in the environment, or a file with"
                 " --settings"
             )
 
 
 def complete_settings(profile: Profile, arguments: argparse.Namespace) -> dict[str, Value]:
-    """Return the value of every setting; raise `Misuse` with the names of settings without one."""
+    """Return the values of all settings; raise `Misuse` with the names of missing settings."""
     ((values, missing),) = settings_given([profile], arguments)
     if missing:
         words = " ".join(f"--set {name}=…" for name in missing)
@@ -85,13 +84,17 @@ def complete_settings(profile: Profile, arguments: argparse.Namespace) -> dict[s
 def _settings_in(
     file: str | None, profiles: Sequence[Profile], *, allows_any_port: bool
 ) -> dict[str, str]:
-    """Return the texts of a settings file, each checked against the profiles that have it."""
+    """Return the texts in a settings file, checked against all profiles with the setting."""
     if file is None:
         return {}
     document = read_document(file)
     if not isinstance(document.data, dict):
         raise ProblemsError(
-            [document.problem((), "wrong-type", "a settings file must be a mapping of name: value")]
+            [
+                document.problem(
+                    (), "wrong-type", "expected a settings file with lines of the form NAME: VALUE"
+                )
+            ]
         )
     problems: list[Problem] = []
     texts: dict[str, str] = {}
@@ -114,7 +117,7 @@ def _faults_of(
     settings = [one.settings[name] for one in profiles if name in one.settings]
     if not settings:
         known = ", ".join(dict.fromkeys(key for one in profiles for key in one.settings)) or "none"
-        text = f"there is no setting {name!r}; there are: {known}"
+        text = f"unknown setting {name!r}; expected one of: {known}"
         yield document.problem((name,), "unknown-setting", text, key=True)
     elif isinstance(value, (dict, list)):
         yield document.problem((name,), "wrong-type", "expected text, a number, true or false")

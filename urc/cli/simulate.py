@@ -1,4 +1,4 @@
-"""`urc simulate`: the emulated robot of a profile, on its real ports."""
+"""`urc simulate`: emulate the robot of a profile on its real ports."""
 
 import argparse
 import asyncio
@@ -19,14 +19,15 @@ if TYPE_CHECKING:
 EXAMPLE = "urc simulate puppet --set port=6789"
 
 _SOURCE: Final = "urc.simulator.emulated_robot"
-"""Name of the logger for frames that an emulated robot cannot answer."""
+"""Name of the logger for frames without a reply."""
 _AGAIN_S: Final = 10.0
-"""Time in seconds after which the same warning appears again, with a count."""
+"""Minimum interval between repetitions of a warning, in seconds. A repetition contains a count."""
 _LINES_A_SECOND: Final = 5
 _LAST_LINES: Final = 10
-"""Maximum different warnings in the final summary."""
+"""Maximum number of different warnings in the final summary."""
 _KINDS_MOST: Final = 200
-"""Maximum different warnings with a count of their own; beyond it the oldest goes."""
+"""Maximum number of warnings with a separate count; above the limit, the oldest count is
+dropped."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,11 +84,11 @@ async def _simulate(
 
 
 class UnansweredLog(logging.Handler):
-    """A reporter of frames that an emulated robot could not answer: one line each, with a count.
+    """A reporter of frames without a reply. Each frame has one line with a count.
 
     Args:
         tell: prints one line.
-        clock: seconds; only differences count.
+        clock: returns a monotonic time in seconds.
     """
 
     def __init__(
@@ -97,16 +98,16 @@ class UnansweredLog(logging.Handler):
         self._tell = tell
         self._clock = clock
         self._counts: dict[str, int] = {}
-        """Warning → its count since its last line."""
+        """Counts since the last output, by warning."""
         self._told_at: dict[str, float] = {}
         self._forgotten = 0
-        """Count of warnings without a line and without a count of their own."""
+        """Number of unprinted warnings without a separate count."""
         self._second = float("-inf")
         self._lines = 0
         """Number of lines in the second that began at `_second`."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Count a warning, and print it unless it was printed a moment ago."""
+        """Count a warning, and print it unless it was printed recently."""
         text = record.getMessage()
         if text not in self._counts and len(self._counts) >= _KINDS_MOST:
             oldest = next(iter(self._counts))
@@ -121,7 +122,7 @@ class UnansweredLog(logging.Handler):
             self._told_at[text] = now
 
     def finish(self) -> None:
-        """Report the counted warnings, the most frequent ones first."""
+        """Print the counted warnings, the most frequent warnings first."""
         left = sorted(self._counts.items(), key=lambda item: -item[1])
         for text, count in left[:_LAST_LINES]:
             if count:
@@ -129,7 +130,7 @@ class UnansweredLog(logging.Handler):
                 self._tell(f"{text} ({count} {again}time{'s' if count > 1 else ''})")
         others = self._forgotten + sum(count for _, count in left[_LAST_LINES:])
         if others:
-            self._tell(f"{others} other frames were not answered")
+            self._tell(f"{others} other frames had no reply")
         self._counts.clear()
         self._forgotten = 0
 

@@ -1,4 +1,4 @@
-"""The entrance of a dashboard: the printed addresses, and the keys in them."""
+"""The start addresses of a dashboard, with the keys in them."""
 
 import os
 import secrets
@@ -24,7 +24,7 @@ _LONGEST = 200
 
 
 class ReadyDashboard(NamedTuple):
-    """The addresses of a dashboard that is ready."""
+    """The addresses of a running dashboard."""
 
     url: str
     """Without a key."""
@@ -32,19 +32,19 @@ class ReadyDashboard(NamedTuple):
 
     @property
     def address(self) -> str:
-        """The address with all rights, for the user who started the dashboard."""
+        """Address with all rights, for the user who started the dashboard."""
         return self.access.address(self.url)
 
     @property
     def address_once(self) -> str:
-        """The address for the browser that URC starts: it works once."""
+        """One-time address for the browser that URC opens."""
         return self.access.address_once(self.url)
 
     def lines(self) -> Iterator[str]:
-        """Yield the lines to print: first the address with all rights."""
+        """Yield the lines to print. The first line is the address with all rights."""
         yield f"dashboard {self.address}"
         if self.access.is_open:
-            yield f"for others {self.url}   (without a key: watch and drive)"
+            yield f"for others {self.url} (without a key: watch and drive)"
         if managers := self.access.address_of_managers(self.url):
             yield f"for managers {managers}"
 
@@ -62,10 +62,10 @@ def access_for(host: str, token: str = "") -> "Access":
 
 
 def token_in(file: Path) -> str:
-    """Return the token in a file; create the file if it is missing.
+    """Return the token in a file; create a missing file.
 
     Raises:
-        UrcError: the file cannot be read or written, or has no token.
+        UrcError: the file cannot be read or written, or contains no valid token.
     """
     from urc.private_files import put_private
 
@@ -74,12 +74,12 @@ def token_in(file: Path) -> str:
             put_private(file, secrets.token_urlsafe(24).encode() + b"\n")
         token = file.read_text("ascii").strip()
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "it is not plain text"
+        reason = getattr(error, "strerror", None) or "the file is not plain text"
         raise UrcError(f"--token: cannot use {file}: {reason}") from error
     if not _SHORTEST <= len(token) <= _LONGEST or not token.isprintable() or " " in token:
         raise Misuse(
-            f"--token: {file} must have {_SHORTEST} to {_LONGEST} characters without spaces;"
-            " remove the file, and URC creates one"
+            f"--token: {file} must contain {_SHORTEST} to {_LONGEST} characters without spaces;"
+            " remove the file to create a new token"
         )
     return token
 
@@ -87,7 +87,7 @@ def token_in(file: Path) -> str:
 def announce(
     stack: ExitStack | AsyncExitStack, data: Path, host: str, ready_dashboard: ReadyDashboard
 ) -> None:
-    """Let other programs of this user find a dashboard until `stack` ends."""
+    """Register the dashboard for other programs of this user until `stack` closes."""
     from urc.runtime.running_servers import RunningServer, announced
 
     server = RunningServer(
@@ -101,7 +101,7 @@ def announce(
 
 
 def _near(url: str, host: str) -> str:
-    """Return the address for programs of this machine."""
+    """Return the address for programs on this machine."""
     port = urlsplit(url).port
     try:
         address = ip_address(host)

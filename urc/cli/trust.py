@@ -1,4 +1,4 @@
-"""`urc trust`: shows the host key of an SSH server to the user, and stores it on consent."""
+"""`urc trust`: show the host key of an SSH server, and store it after confirmation."""
 
 import argparse
 import sys
@@ -17,20 +17,25 @@ if TYPE_CHECKING:
 EXAMPLE = "urc trust my-robot.yaml --set host=192.168.1.20"
 
 _NOT_ASKED_FOR = "-"
-"""Placeholder for a password: reading a host key needs no login."""
+"""Placeholder for a password. Reading a host key requires no login."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the profile, the transport, and the answer."""
+    """Add the profile, the transport, and the fingerprint."""
     add_profile(parser)
     parser.add_argument(
-        "transport", metavar="TRANSPORT", nargs="?", help="an ssh transport, if there are several"
+        "transport",
+        metavar="TRANSPORT",
+        nargs="?",
+        help="ssh transport, required if the profile has several",
     )
-    parser.add_argument("--yes", metavar="SHA256:…", help="trust this fingerprint without asking")
+    parser.add_argument(
+        "--yes", metavar="SHA256:…", help="trust this fingerprint without a question"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Show the key and store it on consent; return 1 when it is not stored."""
+    """Show the host key and store it after confirmation; return 1 if it is not stored."""
     from urc.cli.event_loop import run_loop
 
     profile = load(arguments.profile)
@@ -49,21 +54,25 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _transport(profile: "Profile", named: str | None) -> str:
-    """Return the ssh transport with this name, or the only one."""
+    """Return the ssh transport with this name, or the only ssh transport."""
     choices = [name for name, spec in profile.driver.transports.items() if spec.type == "ssh"]
     if not choices:
         raise Misuse(f"{profile.name} has no ssh transport: nothing to trust")
     if named is None and len(choices) == 1:
         return choices[0]
     if named is None:
-        raise Misuse(f"{profile.name} has several ssh transports; name one: {', '.join(choices)}")
+        raise Misuse(
+            f"{profile.name} has several ssh transports; specify one of: {', '.join(choices)}"
+        )
     if named not in choices:
-        raise Misuse(f"there is no ssh transport {named!r}; {what_it_has(named, choices)}")
+        raise Misuse(
+            f"{profile.name} has no ssh transport {named!r}; {what_it_has(named, choices)}"
+        )
     return named
 
 
 def _settings(profile: "Profile", name: str, arguments: argparse.Namespace) -> dict[str, "Value"]:
-    """Return the settings; secrets are optional if no tunnel needs a login."""
+    """Return the settings. Secrets are optional unless a tunnel needs a login."""
     from urc.cli.settings import settings_given
 
     ((values, missing),) = settings_given([profile], arguments)
@@ -83,7 +92,7 @@ def _line(profile: "Profile", name: str, settings: dict[str, "Value"]) -> "SshTr
 
     line = make_transports(profile.driver, settings, built_in_catalog().transports)[name]
     if not isinstance(line, SshTransport):
-        raise UrcError(f"transports.{name}: this ssh transport has no keys that URC can store")
+        raise UrcError(f"transports.{name}: URC cannot store keys for this ssh transport")
     return line
 
 
@@ -96,16 +105,17 @@ def _decide(line: "SshTransport", offer: "OfferedHostKey", yes: str | None) -> i
         print("this key is already trusted")
         return 0
     if offer.expected == "revoked":
-        raise UrcError("this key is revoked in the known-hosts file, and cannot be trusted")
+        raise UrcError("this key is revoked in the known-hosts file and cannot be trusted")
     if offer.expected != "unknown":
         print(
-            f"the key was {offer.expected} before: a reinstalled robot, or an attacker in between"
+            f"the key has changed from {offer.expected}:"
+            " either the robot was reinstalled, or an attacker intercepts the connection"
         )
     if yes is None and not _is_confirmed():
         print("nothing is stored")
         return 1
     if yes is not None and yes.rstrip("=") != offer.fingerprint:
-        raise UrcError(f"this is not the key to trust ({yes}); nothing is stored")
+        raise UrcError(f"the key does not match {yes}; nothing is stored")
     file = remember(address.host, address.port, offer.key)
     print(f"trusted from now on, in {file}")
     return 0
@@ -113,8 +123,8 @@ def _decide(line: "SshTransport", offer: "OfferedHostKey", yes: str | None) -> i
 
 def _is_confirmed() -> bool:
     if not sys.stdin.isatty():
-        raise Misuse("there is no terminal to ask; --yes SHA256:… trusts that fingerprint")
+        raise Misuse("no terminal is available for the question; use --yes SHA256:… to trust a key")
     try:
-        return input("Is this the robot's own key? Type yes: ").strip().lower() == "yes"
+        return input("Is this the key of the robot? Type yes: ").strip().lower() == "yes"
     except EOFError:
         return False

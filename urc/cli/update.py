@@ -1,4 +1,4 @@
-"""`urc update`: updates installed packages after showing the changes, and reverts."""
+"""`urc update`: update installed packages after showing the changes, or undo an update."""
 
 import argparse
 from typing import TYPE_CHECKING
@@ -17,25 +17,27 @@ EXAMPLE = "urc update drivers/puppet"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the packages and the options of consent."""
+    """Add the packages and the confirmation options."""
     parser.add_argument(
         "packages",
         metavar="NAME",
         nargs="*",
-        help="packages, optionally with @RANGE (default: all)",
+        help="packages, optionally with @RANGE (default: all installed packages)",
     )
     parser.add_argument(
-        "--yes", action="store_true", help="do not ask, unless an update wants new permissions"
+        "--yes",
+        action="store_true",
+        help="do not ask for confirmation, unless an update needs new permissions",
     )
     parser.add_argument(
         "--allow-more", action="store_true", help="with --yes: also accept new permissions"
     )
     add_risks(parser)
-    parser.add_argument("--back", action="store_true", help="revert the last update of NAME")
+    parser.add_argument("--back", action="store_true", help="undo the last update of NAME")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Update, or revert; return 1 after a failure."""
+    """Update packages, or undo an update; return 1 after a failure."""
     if arguments.back:
         return _back(arguments)
     from urc.cli.packages import known_repositories, open_store
@@ -60,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _installed(store: "Store", word: str) -> "tuple[Lock, str]":
-    """Return the installed package of a name, and its wanted range."""
+    """Return the installed package of a name, and the requested range."""
     from urc.packages.names import PackageError, parse_requirement
 
     required = parse_requirement(word)
@@ -71,7 +73,7 @@ def _installed(store: "Store", word: str) -> "tuple[Lock, str]":
 
 
 def _all(store: "Store") -> "list[tuple[Lock, str]]":
-    """Return the newest version of every installed package."""
+    """Return the newest installed version of every package."""
     newest = {lock.root: lock for lock in store.installed()}  # in the order of versions
     if not newest:
         print("nothing is installed")
@@ -81,7 +83,7 @@ def _all(store: "Store") -> "list[tuple[Lock, str]]":
 def _update(
     old: "Lock", plan: "InstallPlan", store: "Store", arguments: argparse.Namespace
 ) -> bool:
-    """Show the changes, ask, and update; return whether it was done."""
+    """Show the changes, ask for confirmation, and update; return whether it was installed."""
     from urc.cli.packages import is_agreed_to
     from urc.packages.install import origin_lines
     from urc.packages.update import staged_difference
@@ -97,14 +99,14 @@ def _update(
             print(f"{old} stays")
             return False
         change.replace(old, plan)
-    print(f"updated {old.root} to {plan.lock.version}; 'urc update --back {old.root}' reverts it")
+    print(f"updated {old.root} to {plan.lock.version}; undo with 'urc update --back {old.root}'")
     return True
 
 
 def _told(
     old: "Lock", plan: "InstallPlan", difference: "UpdateDiff", origins: list[str]
 ) -> list[str]:
-    """Return the changes, for people."""
+    """Return the changes as text."""
     from urc.packages.update import headline
 
     lines = [headline(old, plan.lock)]
@@ -114,7 +116,7 @@ def _told(
 
 
 def difference_lines(difference: "UpdateDiff") -> list[str]:
-    """Return the differences in permissions and sent bytes between two versions, for people."""
+    """Return the differences in permissions and sent bytes between two versions, as text."""
     lines = [f"  new permission: {line}" for line in difference.gained]
     lines += [f"  lost permission: {line}" for line in difference.lost]
     if not difference.gained:
@@ -126,12 +128,12 @@ def difference_lines(difference: "UpdateDiff") -> list[str]:
 
 def _back(arguments: argparse.Namespace) -> int:
     if len(arguments.packages) != 1:
-        raise Misuse("--back takes the name of one package")
+        raise Misuse("--back requires exactly one package name")
     from urc.cli.packages import open_store
 
     store = open_store()
     lock, _ = _installed(store, arguments.packages[0])
     with store.changing() as change:
         old = change.back(lock)
-    print(f"{lock.root} is reverted to {old.version}, the version before {lock.version}")
+    print(f"{lock.root} is restored to {old.version}, the version before {lock.version}")
     return 0

@@ -1,7 +1,7 @@
-"""`urc validate`: the problems of documents, and their own tests.
+"""`urc validate`: check documents and run their tests.
 
-The command needs no robot and no network. This module imports little, because people run it on
-every save.
+The command needs no robot and no network. This module imports little, because editors run the
+command on every save.
 """
 
 import argparse
@@ -35,11 +35,11 @@ class _Report:
         self.is_cut_short = False
         """Whether errors prevented later checks."""
         self.problems: list[Problem] = []
-        """Problems in the order of the command line, without duplicates from shared documents."""
+        """Problems in command-line order, without duplicates from shared documents."""
         self.coverage: list[Coverage] = []
-        """Test coverage of each profile whose tests were run."""
+        """Test coverage of each tested profile."""
         self.looked_at: dict[str, None] = {}
-        """Every file that affects the result, existing or not."""
+        """Paths of all files that affect the result, including missing files."""
 
     def add(self, problems: list[Problem]) -> None:
         self.problems = list(dict.fromkeys([*self.problems, *problems]))
@@ -51,23 +51,25 @@ class _Report:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the documents, the format and the checks."""
     parser.add_argument(
-        "paths", metavar="PATH", nargs="+", help="documents of any kind, or names of robots"
+        "paths", metavar="PATH", nargs="+", help="documents of any kind, or robot names"
     )
     parser.add_argument(
         "--format", choices=FORMATS, default="text", help="format of the report (default: text)"
     )
-    parser.add_argument("--strict", action="store_true", help="fail on warnings, too")
-    parser.add_argument("--no-tests", action="store_true", help="do not run the documents' tests")
+    parser.add_argument("--strict", action="store_true", help="exit with an error on warnings, too")
+    parser.add_argument("--no-tests", action="store_true", help="skip the tests of the documents")
     parser.add_argument(
         "--coverage", action="store_true", help="list commands, polls and messages without a test"
     )
     parser.add_argument(
-        "--watch", action="store_true", help="check again whenever a document changes, until Ctrl-C"
+        "--watch",
+        action="store_true",
+        help="repeat the check after every change of a document, until Ctrl-C",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Check all documents, print the report; return 1 after an error."""
+    """Check all documents and print the report; return 1 after an error."""
     paths = list(dict.fromkeys(map(_document_in, arguments.paths)))
     if arguments.watch:
         return _watch(paths, arguments)
@@ -82,7 +84,7 @@ def _exit_code(report: _Report, arguments: argparse.Namespace) -> int:
 
 
 def _watch(paths: list[str], arguments: argparse.Namespace) -> int:
-    """Check now and after every change; Ctrl-C ends it with the code of the last check."""
+    """Check now and after every change. Ctrl-C exits with the code of the last check."""
     from urc.runtime.file_watch import FileWatcher, wait_for_change
 
     code = 0
@@ -132,7 +134,7 @@ def _examine(paths: list[str], *, with_tests: bool) -> _Report:
 def _examine_folder(
     path: str, widget: "Widget | None", report: _Report, *, with_demo: bool = True
 ) -> None:
-    """Add the problems of the files next to a widget's manifest, if the manifest is valid."""
+    """Add the problems in the files of a widget, if its manifest is valid."""
     from urc.web.show.widget_check import FILES, check_widget
 
     home = os.path.dirname(path)
@@ -142,7 +144,7 @@ def _examine_folder(
 
 
 def _examine_own_widgets(profile: "Profile", report: _Report) -> None:
-    """Add the problems of the files of a document's widgets, except shipped ones."""
+    """Add the problems in the widgets of a document, except shipped widgets."""
     from urc.shipped import shipped
 
     home = shipped("widgets").resolve()
@@ -152,9 +154,9 @@ def _examine_own_widgets(profile: "Profile", report: _Report) -> None:
 
 
 def _document_in(path: str) -> str:
-    """Return the document for a path, or for the name of a robot.
+    """Return the document for a path or a robot name.
 
-    A widget's folder means its manifest. A missing file is reported like other problems.
+    The folder of a widget stands for its manifest. A missing file is reported like other problems.
     """
     manifest = os.path.join(path, "widget.yaml")
     if os.path.isfile(manifest):
@@ -176,7 +178,7 @@ def _widgets_of_package(path: str) -> "WidgetFolder | None":
 
 
 def _print(report: _Report, arguments: argparse.Namespace, indent: int | None = None) -> None:
-    """Print a report; without `indent`, a report for programs is one line."""
+    """Print a report. Without `indent`, a machine-readable report is a single line."""
     if arguments.format == "json":
         print(json_text(_as_json(report), indent), flush=True)
     elif arguments.format == "sarif":
@@ -214,7 +216,7 @@ def _summary(report: _Report) -> str:
         passed = report.tests - report.failed
         words.append(f"{passed} of {_count(report.tests, 'test')} passed")
     words += filter(None, [summary(report.coverage)])
-    more = "; later checks wait for the correction of errors" if report.is_cut_short else ""
+    more = "; later checks run after the errors are corrected" if report.is_cut_short else ""
     return f"{_count(report.files, 'document')}: {', '.join(words)}{more}"
 
 

@@ -1,4 +1,4 @@
-"""`urc watch`: connects and prints a JSON line per update, for people, pipes and logs."""
+"""`urc watch`: print a JSON line per update, for people, pipes and logs."""
 
 import argparse
 import asyncio
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 EXAMPLE = "urc watch puppet battery --for 5s"
 
 _LAST_WORDS_S = 5.0
-"""Time limit in seconds for the last lines, after the time is over."""
+"""Timeout for writing the last lines, in seconds."""
 
 _LOSSES_S = 5.0
-"""Minimum interval between two lines about losses, in seconds."""
+"""Minimum interval between two messages about lost updates, in seconds."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,12 +39,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--for", dest="seconds", type=duration, metavar="TIME", help="stop after 500ms, 5s, 2m …"
     )
     parser.add_argument(
-        "--wire", action="store_true", help="also print the raw traffic, in hex and text"
+        "--wire",
+        action="store_true",
+        help="also print the raw traffic, as hexadecimal digits and text",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Watch until the time is over or a signal arrives; return 1 when nothing was received."""
+    """Watch for the duration or until a signal arrives; return 1 if nothing was received."""
     from urc.cli.event_loop import run_loop
     from urc.cli.settings import complete_settings
 
@@ -78,7 +80,7 @@ async def _watch(
 
 
 async def _follow(tap: "EventTap", printer: "_Printer", seconds: float | None) -> None:
-    """Print the events of the tap until the time is over."""
+    """Print the events of the tap until the duration has elapsed."""
     now = asyncio.get_running_loop().time
     ends = math.inf if seconds is None else now() + seconds
     is_over = False
@@ -103,11 +105,11 @@ def _reasons(hub: "Hub") -> str:
 
 
 class _Printer:
-    """A printer of events as lines: JSON on standard output, log entries on standard error."""
+    """A printer of events: JSON lines on standard output, and log lines on standard error."""
 
     def __init__(self, writer: "LineWriter", signals: Iterable[str]) -> None:
         self.received = 0
-        """Lines with data of the robot."""
+        """Number of printed lines with data of the robot."""
         self._writer = writer
         self._signals = frozenset(signals)
         self._dropped = 0
@@ -137,7 +139,7 @@ class _Printer:
                 await self._writer.write(stream, "".join(f"{line}\n" for line in lines))
 
     async def tell_losses(self, dropped: int, *, is_last: bool) -> None:
-        """Print the number of lost updates, from time to time and at the end."""
+        """Print the number of lost updates, at intervals and at the end."""
         now_s = time.monotonic()
         if dropped == self._dropped or not (is_last or now_s >= self._losses_told_s + _LOSSES_S):
             return

@@ -105,11 +105,11 @@ async def test_script_must_name_the_fingerprint(controller: Desk, tmp_path: Path
     """Whatever the server shows is not good enough."""
     code, said = await controller.trusts()
     assert code == 2
-    assert "there is no terminal to ask; --yes SHA256:… trusts that fingerprint" in said
+    assert "no terminal is available for the question; use --yes SHA256:… to trust a key" in said
     other = fingerprint_of(new_key(tmp_path / "other"))
     code, said = await controller.trusts("--yes", other)
     assert code == 1
-    assert f"this is not the key to trust ({other}); nothing is stored" in said
+    assert f"the key does not match {other}; nothing is stored" in said
     assert controller.kept == ""
     code, said = await controller.trusts("--yes", controller.sshd.fingerprint)
     assert code == 0, said
@@ -128,7 +128,7 @@ async def test_changed_key_is_shown_with_the_old_one_and_takes_its_place(control
     await controller.sshd.start()
     code, said = await controller.trusts(answer="no")
     assert code == 1
-    assert f"the key was {before} before" in said
+    assert f"the key has changed from {before}:" in said
     assert f"has the host key {controller.sshd.fingerprint}" in said
     assert (await controller.trusts(answer="yes"))[0] == 0
     assert elsewhere in controller.kept
@@ -139,7 +139,7 @@ async def test_wrong_use_is_told(controller: Desk) -> None:
     """Names that are no ssh transport, and servers that are not there."""
     code, said = await controller.trusts("console")
     assert code == 2
-    assert "there is no ssh transport 'console'" in said
+    assert "has no ssh transport 'console'" in said
     controller.sshd.kill()
     code, said = await controller.trusts()
     assert code == 1

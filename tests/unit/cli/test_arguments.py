@@ -115,5 +115,5 @@ def test_profile_is_a_path_or_the_name_of_a_robot(
     for word in ("nobody", "x" * 5000):
         with pytest.raises(UrcError) as told:
             path(word)
-        expected = f"there is no file and no robot {word!r}; known robots: puppet"
+        expected = f"no file or robot has the name {word!r}; known robots: puppet"
         assert str(told.value) == expected

@@ -75,6 +75,6 @@ def test_folder_without_an_audit_is_told(
     output, errors = capsys.readouterr()
     assert output == ""
     assert errors == (
-        f"urc audit: there is no {tmp_path / 'audit.sqlite'}:"
-        " 'urc serve' creates it, --data-dir names its folder\n"
+        f"urc audit: {tmp_path / 'audit.sqlite'} does not exist;"
+        " start 'urc serve' to create the file, or select its folder with --data-dir\n"
     )

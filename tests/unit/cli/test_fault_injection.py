@@ -52,7 +52,7 @@ def test_a_robot_that_is_emulated_anew_keeps_its_faults() -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("pupet:silent", "no robot 'pupet' is emulated here; did you mean 'puppet'?"),
+        ("pupet:silent", "no emulated robot has the name 'pupet'; did you mean 'puppet'?"),
         ("puppet:nosie=2x", "unknown fault 'nosie'; known faults: delay=200ms, loss=5%"),
         ("noise=2x", "fault noise: this robot has no world"),
         ("puppet:stuck=batery", "fault stuck: there is no signal 'batery'; did you mean"),
@@ -79,6 +79,6 @@ def test_typed_lines_are_obeyed_and_answered(capsys: pytest.CaptureFixture[str])
     said = capsys.readouterr()
     assert said.out == "faults: tello: loss=20%\nfaults: tello: loss=20%\nfaults: none\n"
     assert said.err.splitlines() == [
-        "no robot 'pupet' is emulated here; did you mean 'puppet'?",
-        "'break it' is not a command; write fault …, mend or faults",
+        "no emulated robot has the name 'pupet'; did you mean 'puppet'?",
+        "unknown command 'break it'; expected fault …, mend or faults",
     ]

@@ -50,12 +50,12 @@ def test_help_of_a_verb_can_be_asked_for_in_two_ways(verb: str, capsys: Output) 
 
 @pytest.mark.parametrize(
     ("word", "hint"),
-    [("wach", "did you mean 'watch'?"), ("x", "'urc --help' lists all verbs")],
+    [("wach", "did you mean 'watch'?"), ("x", "'urc --help' lists all subcommands")],
 )
 def test_unknown_verb_is_told_with_a_suggestion(word: str, hint: str, capsys: Output) -> None:
     """Exit code 2: wrong use."""
     assert main([word]) == 2
-    assert capsys.readouterr() == ("", f"urc: there is no verb '{word}'; {hint}\n")
+    assert capsys.readouterr() == ("", f"urc: unknown subcommand '{word}'; {hint}\n")
 
 
 CASES: list[tuple[BaseException, int, str]] = [
@@ -76,7 +76,7 @@ CASES: list[tuple[BaseException, int, str]] = [
     (
         ValueError("two\nlines"),
         1,
-        "urc watch: this is a mistake in URC, please report it: ValueError at FILE: two\\x0alines",
+        "urc watch: this is a bug in URC, please report it: ValueError at FILE: two\\x0alines",
     ),
     (BrokenPipeError(), 0, ""),
     (KeyboardInterrupt(), 130, ""),
@@ -105,7 +105,7 @@ def test_failure_of_a_verb_is_told_without_a_traceback(
 def test_mistake_without_a_place_is_told_too(capsys: Output) -> None:
     """An exception that was never raised has no traceback."""
     assert explain(KeyError("x"), "urc") == 1
-    expected = "urc: this is a mistake in URC, please report it: KeyError: 'x'\n"
+    expected = "urc: this is a bug in URC, please report it: KeyError: 'x'\n"
     assert capsys.readouterr().err == expected
 
 
@@ -134,7 +134,7 @@ def test_schema_says_where_its_file_is(capsys: Output) -> None:
 def test_schema_of_nothing_is_wrong_use(capsys: Output) -> None:
     """The line says what there is."""
     assert main(["schema"]) == 2
-    expected = "urc schema: KIND is missing: one of robot, driver, interface, widget\n"
+    expected = "urc schema: KIND is missing: expected one of robot, driver, interface, widget\n"
     assert capsys.readouterr() == ("", expected)
 
 
@@ -144,7 +144,7 @@ def test_schema_of_nothing_is_wrong_use(capsys: Output) -> None:
         (
             ("watch", "nobody"),
             1,
-            "urc watch: there is no file and no robot 'nobody'; known robots: ",
+            "urc watch: no file or robot has the name 'nobody'; known robots: ",
         ),
         (("watch", "gone.yaml"), 1, "gone.yaml:1:1: error no-such-file: there is no such file"),
         (
@@ -161,7 +161,7 @@ def test_schema_of_nothing_is_wrong_use(capsys: Output) -> None:
         (
             ("serve", "puppet", "puppet"),
             2,
-            "urc serve: two robots are named 'puppet'; a name must be unique",
+            "urc serve: two robots have the name 'puppet'; each name must be unique",
         ),
         (
             ("simulate", "puppet", "--set", "port=x"),

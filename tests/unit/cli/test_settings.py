@@ -74,7 +74,7 @@ def test_each_robot_takes_the_settings_that_it_has(filed: Filed) -> None:
     ("names", "pair", "message"),
     [
         (("bot",), ("prot", "1"), "bot has no setting 'prot'; did you mean 'port'?"),
-        (("bot", "b"), ("prot", "1"), "none of these robots has a setting 'prot'"),
+        (("bot", "b"), ("prot", "1"), "no robot has a setting 'prot'"),
         (("bot",), ("port", "0"), "--set port: '0' is not a port from 1 to 65535"),
         (("bot",), ("key", "abc"), "--set key: that is not a whole number"),
     ],
@@ -118,7 +118,7 @@ def test_any_port_is_for_those_who_listen(filed: Filed) -> None:
         (
             "prot: 1\nport: [1]\nhost: a b\nkey: hunter2\n",
             """\
-mine.yaml:1:1: error unknown-setting prot: there is no setting 'prot'; there are: host, port, key
+mine.yaml:1:1: error unknown-setting prot: unknown setting 'prot'; expected one of: host, port, key
     1 | prot: 1
       | ^^^^
 mine.yaml:2:1: error wrong-type port: expected text, a number, true or false
@@ -132,7 +132,7 @@ mine.yaml:4:6: error wrong-value key: that is not a whole number""",
         (
             "- a\n",
             """\
-mine.yaml:1:1: error wrong-type: a settings file must be a mapping of name: value
+mine.yaml:1:1: error wrong-type: expected a settings file with lines of the form NAME: VALUE
     1 | - a
       | ^""",
         ),
@@ -162,7 +162,7 @@ def test_a_secret_that_is_typed_is_warned_of_once(capsys: pytest.CaptureFixture[
         settings_given([robot()], typed)
     said = capsys.readouterr().err
     assert said == (
-        "warning: --set key=… is visible to every user of this machine, in the list of processes:"
+        "warning: --set key=… is visible to every user of this machine in the process list:"
         " use URC_SET_KEY in the environment, or a file with --settings\n"
     )
 

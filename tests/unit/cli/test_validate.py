@@ -86,7 +86,7 @@ def _documents(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
                 "folder:1:1: error is-directory: ",
                 "broken.yaml:15:14: error wrong-type polls.0.every: ",
             ],
-            "3 documents: 3 errors, 0 warnings; later checks wait for the correction of errors",
+            "3 documents: 3 errors, 0 warnings; later checks run after the errors are corrected",
         ),
     ],
 )

@@ -134,7 +134,7 @@ def test_a_widget_that_is_never_used_is_told(
     monkeypatch.setattr(dashboard, "run_dashboard", lambda *_, **__: 0)
     assert main(["serve", "bot.yaml"]) == 0
     assert capsys.readouterr().err == (
-        f"urc serve: {own} is not used: a widget of this name ships with URC\n"
+        f"urc serve: {own} is ignored: a widget with this name ships with URC\n"
     )
 
 

@@ -16,8 +16,8 @@ TO = ("--to", "http://127.0.0.1:1/", "--token-file")
         (("serve", PUPPET, "--fault", "silent"), "--fault is for emulated robots: add --simulate"),
         (("repo", "index", "lab", "--valid", "0"), "expected 1 to 365 days, found '0'"),
         (("repo", "index", "lab", "--valid", "1e3"), "expected 1 to 365 days, found '1e3'"),
-        (("repo", "withdraw", "lab", "drivers/x", "1.0.0"), "'urc repo withdraw' needs --why"),
-        (("repo", "restore", "lab"), "'urc repo restore' takes DIR PACKAGE VERSION"),
+        (("repo", "withdraw", "lab", "drivers/x", "1.0.0"), "'urc repo withdraw' requires --why"),
+        (("repo", "restore", "lab"), "'urc repo restore' requires DIR PACKAGE VERSION"),
         (("publish", "x", *TO, "{token}", "--commit", "0123abc"), "--commit needs --source"),
         (
             ("publish", "x", *TO, "{token}", "--source", "x"),

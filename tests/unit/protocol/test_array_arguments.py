@@ -81,7 +81,7 @@ def test_the_emulated_robot_reads_arrays_back() -> None:
     [
         ("text", "joints=1,2.5,-3", {"joints": (1, 2.5, -3)}),
         ("json", "joints=", {"joints": ()}),
-        ("json", "joints=[1, 0x]", "is not a JSON list"),
+        ("json", "joints=[1, 0x]", "is not a JSON array"),
         ("json", "joints=[1, 2]", {"joints": (1, 2)}),
         ("json", "joints=1,a", "expected integer, found 'a'"),
     ],

@@ -176,7 +176,7 @@ def test_urc_install_of_what_cannot_be_compared_is_not_agreed_to_beforehand(
     store.blob_file(old.packages["drivers/rover"].sha256).write_bytes(b"rubbish")
     assert main(["install", str(ATTACK), "--yes"]) == 1
     said = capsys.readouterr().err
-    assert "the changes are unknown: drivers/rover 1.0.0 cannot be read" in said
+    assert "cannot show the changes, because drivers/rover 1.0.0 cannot be read" in said
     assert "--allow-more" in said
     assert main(["install", str(ATTACK), "--yes", "--allow-more"]) == 0
 
@@ -190,7 +190,7 @@ def test_urc_install_shows_and_asks_the_same(
     assert main(["install", str(ATTACK), "--yes"]) == 0
     said = capsys.readouterr().out
     assert '+ commands.drive.send: "drive {{ -speed }}"' in said
-    assert "1.0.0 stays in use" in said
+    assert "1.0.0 remains in use" in said
     with served(tmp_path) as client:
         client.get("/")
         assert speed_of(client) == "drive 1"
