@@ -117,7 +117,7 @@ class AccessMiddleware:
         session = self._access.admit(word)
         if session is None and scope["state"]["visitor"].standing == "stranger":
             return self._page(scope, url=url if self._access.is_open else "", is_old=True)
-        # A page, not a redirect: after one from another site the browser sends no strict cookie.
+        # A page, not a redirect: browsers send no strict cookie after a redirect from another site.
         page = self._page(scope, url=url)
         if session is not None:
             is_secure = scope["scheme"] == "https"

@@ -146,7 +146,7 @@ class BrowserClient:
         self._live = live
         while True:
             async with asyncio.timeout(STALL_S):
-                # Values taken before the socket is free would be old when they leave.
+                # Values taken before the socket is free would be outdated when they are sent.
                 await self._flow.drained()
                 self._news.clear()
                 self._send_shared(live)

@@ -283,7 +283,7 @@ def _answered(asked: wire.ParseRequest | wire.PreviewRequest, known: _Known) -> 
         return (
             _tried(asked, known) if isinstance(asked, wire.ParseRequest) else _shown(asked, known)
         )
-    except Exception as bug:  # a supervisor: a bug costs the answer
+    except Exception as bug:  # a supervisor: a bug must not end the page's connection
         log.exception("a request of a developer page failed")
         return _refused(asked, f"internal error in URC ({type(bug).__name__}: {bug})")
 

@@ -170,7 +170,7 @@ def _cut(
 
 def _envelope(spec: TransportSpec, data: bytes, topic: str) -> Envelope:
     body: object = data
-    if spec.type == "ros":  # its messages are structured data; others bring bytes
+    if spec.type == "ros":  # its messages are structured data; all others are bytes
         try:
             body = json.loads(data)
         except (ValueError, RecursionError) as error:

@@ -94,7 +94,7 @@ class ProfileWatch:
             try:
                 found = await asyncio.to_thread(examine, self.file)
                 self._judge(found)
-            except Exception as bug:  # a supervisor: the old version goes on
+            except Exception as bug:  # a supervisor: the old version keeps running
                 log.exception("%s could not be checked", self.file)
                 self._report("broken", f"the check failed ({type(bug).__name__}: {bug})")
 

@@ -315,7 +315,7 @@ class ControlService:
     def _tick(self, operator: OperatorSession, tick: wire.Tick, now: float) -> None:
         given = tuple.__new__(
             ControlInput, (tick.epoch, tick.number, tick.echo)
-        )  # fast: many a second
+        )  # fast: called many times per second
         command = tick.command
         reason = self.controller.tick(operator.client.id, command, tick.arguments, given, now)
         if not reason:

@@ -137,7 +137,7 @@ def widget_assets(widgets: Iterable[Widget]) -> Assets:
                 f"two robots use different widgets named {widget.name!r}: "
                 f"{folder} and {widget.folder}"
             )
-        # Also missing ones: an author may write the widget while the page is open.
+        # List missing files too: an author may write the widget while the page is open.
         for name in WIDGET_FILES:
             found.files[f"{widget.name}/{name}"] = _File(widget.folder / name)
         for name, file in _more_files(widget):

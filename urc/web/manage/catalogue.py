@@ -101,7 +101,7 @@ class PackageCatalog:
             *(in_daemon(lambda one=one: self._answer(one), f"ask {one.name}") for one in known)  # type: ignore[misc]
         )
         found: dict[PackageId, list[tuple[IndexEntry, str]]] = {}
-        for place, entries in reversed(answers):  # the first one wins
+        for place, entries in reversed(answers):  # the first repository takes precedence
             fresh: dict[PackageId, list[tuple[IndexEntry, str]]] = {}
             for entry in entries:
                 fresh.setdefault(entry.key, []).append((entry, place.url))

@@ -89,7 +89,7 @@ class Manager:
             del self._parked[name]
         for name, locks in parked.items():
             if name in self.fleet.robots and name not in self._parked:
-                continue  # a robot of that name was there from the start
+                continue  # a robot with this name was given at the start
             await self._park(name, locks)
 
     async def _park(self, name: str, locks: list[Lock]) -> None:
@@ -97,7 +97,7 @@ class Manager:
             kept = await asyncio.to_thread(self.factory.kept(name).load)
             lock, served = self.factory.chosen(locks, kept.version), self._parked.get(name)
             if served in locks and not kept.version:
-                lock = served  # another program installed a newer one; the user chooses
+                lock = served  # another program installed a newer version; the user chooses
             if name in self.fleet.robots and (served == lock or self._waits(name)):
                 return
             profile = await asyncio.to_thread(self.factory.profile, lock)
