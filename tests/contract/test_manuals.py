@@ -81,13 +81,13 @@ Three times.
 
 - name: `blink`
 - sends `` B\\|3 \\x09`\\x0d\\x0a ``, in hex `42 7c 33 20 09 60 0d 0a`
-- done when it is sent
+- done when the frame is sent
 
 ### Set
 
 - name: `set`
 - sends `SET {{ level }} {{ side }}`
-- done when it is sent
+- done when the frame is sent
 
 | argument |  | type | allowed | default |
 |---|---|---|---|---|
@@ -144,7 +144,7 @@ def test_page_says_what_happens_when_control_is_lost(tmp_path: Path) -> None:
     )
     file.write_text(held, "utf-8")
     page = manual(load_profile(file, built_in_catalog()))
-    assert "- held: sent every 100ms while it is held\n" in page
+    assert "- held: sent every 100ms while the control is held\n" in page
     assert "## When control is lost\n\n" in page
     assert "- `set`: `level 0, side a`\n" in page
     assert "  - The document does not say whether the robot stops by itself.\n" in page

@@ -15,12 +15,12 @@ __all__ = ["Channel", "ChannelListener", "GuardedLineSpec"]
 
 
 class GuardedLineSpec(NamedTuple):
-    """One transport of a robot, described for the guard."""
+    """The description of one guarded transport of a robot."""
 
     make: messages.MakeTransport
     transport: Transport
-    """The transport object in this process that corresponds to `make`. Only a guard in the same
-    process opens this transport object."""
+    """Transport object in this process, equivalent to `make`. Only a guard in this process opens
+    the transport object."""
 
 
 class ChannelListener(Protocol):
@@ -33,7 +33,7 @@ class ChannelListener(Protocol):
     def briefing(self) -> Iterable[messages.ToGuard]:
         """Return the messages that initialise a new guard, in sending order.
 
-        Called once for each new guard; the call marks pending stops as sent.
+        The channel calls this method once per new guard; the call marks pending stops as sent.
         """
 
     def handle(self, message: messages.FromGuard, size: int) -> None:
@@ -60,8 +60,8 @@ class Channel(Protocol):
 
         Args:
             message: the message.
-            slot: key of a replaceable message: a newer message replaces an unsent one with the same
-                key; "" for none.
+            slot: replacement key: a newer message replaces an unsent message with the same key; ""
+                for none.
             is_urgent: whether to send the message before all unsent messages.
 
         Raises:

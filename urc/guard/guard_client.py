@@ -3,12 +3,13 @@
 Theory of operation. The guard's state is lost when the guard process dies. The client therefore
 keeps a table of all held commands that were armed or stopped. Each entry stores the terms of the
 command, and whether the command may be moving. A new guard is initialised from this table. The new
-guard receives the connections, a pending stop for each possibly moving command, and the terms of
-the other armed commands. For each pending stop, the guard opens the connection and writes the stop
-first. Motion never resumes automatically.
+guard receives the list of transports, a pending stop for each possibly moving command, and the
+terms of the other armed commands. For each pending stop, the guard opens the connection and writes
+the stop first. Motion never resumes automatically.
 
-A control *may be moving* from its first tick or stop request until the guard reports that the stop
-after the newest tick was written. A pending stop thus survives the death of the guard process.
+A control *may be moving* from its first tick or stop request. This state lasts until the guard
+reports that the stop after the newest tick was written. A pending stop therefore survives the death
+of the guard process.
 """
 
 import asyncio
@@ -37,7 +38,7 @@ class HeldSpec(NamedTuple):
 
     line: str
     terms: HoldTerms
-    """Default terms without a stop frame, for a stop before the first arming."""
+    """Initial terms, without a stop frame, for a stop before the control is first armed."""
 
 
 @dataclass(slots=True)
@@ -50,7 +51,7 @@ class _Control:
     number: int = 0
     """Number of the newest tick, counted since the present guard started."""
     at_s: float = 0.0
-    """Time of the newest tick."""
+    """Time of the newest tick, in seconds of the guard's clock."""
     counted: CountedFrame | None = None
     """Frame of the newest tick of a held control, if the frame carries counters; otherwise None."""
     may_move: bool = False
@@ -143,7 +144,7 @@ class GuardClient:
         self.channel.post(tick, slot=command)
 
     def renew(self, command: str, stop: Payload | FrameVariants) -> None:
-        """Replace the stop frame of `command`, without arming it."""
+        """Replace the stop frame of `command` without arming the command."""
         control = self._controls.get(command)
         if control is not None:
             control.terms = terms = control.terms.stopped_by(stop)

@@ -1,4 +1,4 @@
-"""A connection to the robot inside the guard.
+"""The guard's side of a connection to a robot.
 
 Theory of operation. One task at a time opens the transport, reads until the connection ends, and
 closes the transport. The engine requests opening and closing, and receives data within its
@@ -192,7 +192,7 @@ class GuardedConnection:
             self._counted = said.number
 
     def _refuse(self, number: int) -> None:
-        """Discard the rest of this round, because other frames have used its counter values."""
+        """Discard the other frames of this round, because their counter values are already used."""
         self._round += 1
         self._emit(messages.SendStale(self.name, self._turn, number, self._sent_counters.stand))
 
@@ -243,7 +243,7 @@ class GuardedConnection:
     # -- one connection
 
     def _switch(self, work: Coroutine[Any, Any, None]) -> None:
-        """Replace the running task by `work`."""
+        """Replace the running task with `work`."""
         self._task = asyncio.get_running_loop().create_task(self._after(self._task, work))
 
     async def _after(self, old: asyncio.Task[None] | None, work: Coroutine[Any, Any, None]) -> None:

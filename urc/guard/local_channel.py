@@ -53,7 +53,7 @@ class LocalChannel:
         """Return at once."""
 
     def now(self) -> float:
-        """Return the time of the clock."""
+        """Return the current time of the clock, in seconds."""
         return self._clock.now()
 
     def _emit(self, message: messages.FromGuard) -> int:

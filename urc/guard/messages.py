@@ -49,8 +49,7 @@ class MakeTransport(msgspec.Struct, array_like=True, frozen=True, tag=1):
 
     line: str
     factory: str
-    """Factory of the transport as ``module:attribute``, the same text as in the table of
-    transports."""
+    """Factory of the transport as ``module:attribute``, as listed in the table of transports."""
     options: dict[str, Any]
     subscriptions: list[tuple[str, dict[str, Any]]]
     tunnel: str
@@ -87,8 +86,8 @@ class SendBytes(msgspec.Struct, array_like=True, frozen=True, tag=3):
     """Counter values of the frame, or None; the frame is sent only while these values are the next
     ones."""
     round: int = 0
-    """Expected number of `SendStale` messages on this connection; with any other number, the frame
-    is dropped."""
+    """Expected number of `SendStale` messages on this connection; the frame is dropped if the
+    numbers differ."""
 
 
 class CloseLine(msgspec.Struct, array_like=True, frozen=True, tag=4):
@@ -115,7 +114,7 @@ class ArmControl(msgspec.Struct, array_like=True, frozen=True, tag=6):
 
 
 class RenewLease(msgspec.Struct, array_like=True, frozen=True, tag=7):
-    """A tick of sampled input, which renews the lease of a control."""
+    """A tick of sampled input that renews the lease of a control."""
 
     control: str
     number: int
@@ -241,10 +240,10 @@ class CountersAdvanced(msgspec.Struct, array_like=True, frozen=True, tag=30):
     sent: int
     """Number of the newest counted `SendBytes` that was sent."""
     stand: dict[str, int]
-    """Counter name → last value sent."""
+    """Counter name → last sent value."""
     stale: list[tuple[str, int]]
-    """Control and number of each tick that cannot be sent, because other frames used its counter
-    values."""
+    """Control and number of each tick that cannot be sent, because its counter values were used by
+    other frames."""
 
 
 class SendStale(msgspec.Struct, array_like=True, frozen=True, tag=31):

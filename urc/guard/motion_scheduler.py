@@ -228,7 +228,7 @@ class MotionScheduler:
         self.tell_counted()
 
     def tell_counted(self) -> None:
-        """Report changed counters, and obsolete ticks."""
+        """Report changed counters and obsolete ticks."""
         if self._sent_counters.is_changed:
             for control, hold_to_run in self._holds.items():
                 if hold_to_run.is_waiting and not self._sent_counters.fits(

@@ -85,8 +85,7 @@ class Pipe:
 
         Args:
             message: a message for the encoder.
-            slot: key of a replaceable message: a newer message replaces an unsent one with the same
-                key.
+            slot: replacement key: a newer message replaces an unsent message with the same key.
             is_urgent: whether to send the message before all unsent messages.
 
         Raises:

@@ -80,7 +80,7 @@ class GuardAcceptor:
 def launch(
     *, is_inherited: bool = CAN_INHERIT
 ) -> tuple["subprocess.Popen[bytes]", socket.socket | GuardAcceptor]:
-    """Start the guard process; return the process, and our end of the pipe or the acceptor."""
+    """Start the guard process; return the process, and our pipe end or the `GuardAcceptor`."""
     return _heir() if is_inherited else _visitor()
 
 

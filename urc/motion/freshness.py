@@ -75,9 +75,8 @@ class DuplicateElimination:
     """A filter for messages that a page sends twice, over two independent lossy connections.
 
     The first copy counts. A page's numbers only grow, and each connection keeps their order. A
-    number that is not above the newest one is a copy, or a newer message overtook the message on
-    the other connection. A delayed tick must not move a control that was released over the other
-    connection.
+    message with a lower or equal number is a copy, or a newer message has overtaken it. A delayed
+    tick must not move a control that was released over the other connection.
     """
 
     def __init__(self) -> None:

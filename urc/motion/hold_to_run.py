@@ -1,4 +1,4 @@
-"""One hold-to-run control: its frames while it is held, and its stop.
+"""One hold-to-run control: its frames during motion, and its stop.
 
 Theory of operation. A `HoldToRun` is idle, moving or stopping. The control moves the robot only
 while *ticks of sampled input* arrive. Each tick renews a short lease and replaces the unwritten

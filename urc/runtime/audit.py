@@ -62,9 +62,9 @@ class AuditEntry(NamedTuple):
     """Name of the person or page that caused the event."""
     role: str = ""
     client: str = ""
-    """Id of the connection."""
+    """Identifier of the page's connection."""
     epoch: int = 0
-    """Epoch of the lease."""
+    """Epoch of the lease at the time of the event."""
     command: str = ""
     arguments: str = ""
     """Arguments as JSON."""
@@ -107,7 +107,7 @@ class AuditLog:
 
         Args:
             file: path of the file.
-            most_bytes: approximate limit of the file, in bytes.
+            most_bytes: approximate maximum size of the file, in bytes.
             most_waiting: maximum number of queued entries.
             now: source of UTC time, in seconds.
         """
@@ -280,7 +280,7 @@ class AuditLog:
 
 
 def shown(data: bytes, most: int = 64) -> str:
-    """Return bytes as hex, or as a hash if there are more than `most`."""
+    """Return `data` in hex; return size and hash if `data` has more than `most` bytes."""
     if len(data) <= most:
         return data.hex()
     return f"{len(data)} bytes, sha256 {hashlib.sha256(data).hexdigest()}"

@@ -1,6 +1,6 @@
 """The destination of a robot's transports as a short digest, to which secrets are bound.
 
-A secret is sent to the host that the transports' options name. Each secret is therefore stored with
+Secrets are sent to the hosts named in the transport options. Each secret is therefore stored with
 the destination for which it was entered, and is never used for a different destination.
 """
 

@@ -40,7 +40,7 @@ class RosTopic(NamedTuple):
 
 
 async def ros_topics(transport: Transport, timeout_s: float) -> list[RosTopic]:
-    """Ask rosapi for all topics, on a rosbridge transport that this function opens and closes.
+    """Query all topics from rosapi; the function opens and closes the rosbridge transport.
 
     Raises:
         TransportError: the bridge or rosapi does not respond.

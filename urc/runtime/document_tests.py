@@ -278,8 +278,8 @@ def _isolated(driver: Driver, *, keeps_conditions: bool) -> Driver:
 
     Args:
         driver: the loaded driver.
-        keeps_conditions: whether to keep the `requires` and `verify` conditions of commands.
-            Without a robot, a test of bytes has no signals for these conditions.
+        keeps_conditions: whether to keep the `requires` and `verify` conditions of commands. Byte
+            tests omit these conditions, because no robot reports the required signals.
     """
     transports = {
         name: spec._replace(on_connect=(), on_close=(), keepalive=None, stale_after_s=None)

@@ -25,7 +25,7 @@ __all__ = [
 
 
 class MotionFrames(Protocol):
-    """The engine as the controller uses it: `urc.protocol.motion_encoder.MotionEncoder`."""
+    """The controller's interface to the engine: `urc.protocol.motion_encoder.MotionEncoder`."""
 
     def is_lasting(self, command: str) -> bool:
         """Return whether the stop frame of a held command never changes."""
@@ -72,7 +72,7 @@ class MotionBackend(Protocol):
     async def stops(self) -> Sequence[tuple[str, Reason]]:
         """Wait for written stop frames; return the command and the reason of each.
 
-        The list is in order and is never empty. Cancelling the wait loses no stop. A control
+        The returned list is in order and never empty. Cancelling the wait loses no stop. A control
         stopped by `stop` is reported as ``stopped`` even without motion, after the transport has
         accepted the stop.
         """

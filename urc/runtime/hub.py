@@ -82,7 +82,7 @@ class SampleHistory:
         return found
 
     def firsts(self, names: Sequence[str]) -> dict[str, int]:
-        """Return the number of each signal's first reading; `names` ends with the newest ones."""
+        """Return the sequence number of each signal's first reading in `names`, oldest first."""
         counts = self._counts
         return {name: counts[name] - names.count(name) + 1 for name in counts if name in names}
 
@@ -189,8 +189,7 @@ class AuditRecord:
     """An audit log entry, as passed to taps."""
 
     time_s: float
-    """Monotonic time of the entry, in seconds; the time of day inside the entry may be adjusted by
-    the system."""
+    """Monotonic time of the entry, in seconds, unaffected by adjustments of the time of day."""
     entry: "AuditEntry"
 
 

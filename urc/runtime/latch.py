@@ -56,10 +56,9 @@ class LatchStore:
     def load(self) -> Latch:
         """Return the stored state.
 
-        An unreadable or invalid file counts as latched, because the true state is unknown. In this
-        case the robot receives the stop again, unless the file confirms an earlier delivery. Page
-        numbers restart at one in each run, so the name of the page that stopped the robot is marked
-        as from before the restart.
+        An unreadable or invalid file counts as latched, because the true state is unknown. After an
+        unreadable file, the stop is sent again, unless the file confirms an earlier delivery. Page
+        numbers restart at one in each run, so page names from an earlier run are marked.
         """
         try:
             with self._file.open("rb") as file:

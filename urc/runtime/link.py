@@ -3,8 +3,8 @@
 Theory of operation. `run` is a loop with three waits. First, the loop waits for a reason to
 connect: always present on a persistent link, otherwise an `Open` event or a request. Then the loop
 waits for the backoff delay, and finally for the end of the connection. A reader and a writer run
-while the connection is open. Every connection end, by the robot, the engine or a rule of the link,
-goes through `_end`; one place stops both tasks.
+while the connection is open. The robot, the engine or a rule of the link can end a connection.
+Every end goes through `_end`, and one place stops both tasks.
 
 A connection counts as good after its first valid frame; only a good connection resets the backoff.
 URC therefore does not flood a robot that accepts connections and closes them again. With
@@ -77,8 +77,8 @@ class Link:
             hub: destination of states, log entries and traffic.
             clock: source of time.
             random: returns a number in [0, 1) for the jitter of the backoff.
-            expects_frames: whether the robot sends frames without a request. If so, the link
-                becomes live with the first frame; otherwise, when the connection opens.
+            expects_frames: whether the robot sends frames without a request. A link that expects
+                frames becomes live with the first frame; other links, when the connection opens.
         """
         self._spec = spec
         self._name = spec.name
@@ -103,7 +103,8 @@ class Link:
         self._is_overdue = False
         """Whether the robot has been silent since the last request."""
         self.tried = asyncio.Event()
-        """Set after the first attempt, or immediately if the engine decides when to connect."""
+        """Event that is set after the first attempt, or immediately if the engine decides when to
+        connect."""
         if not self._is_persistent:
             self.tried.set()
         self._report = LinkReport(spec.name, transport.address, hub, clock)
@@ -228,7 +229,7 @@ class Link:
             await self._close()
 
     async def _connection(self) -> None:
-        """Make one attempt and, if it succeeds, serve the connection until its end."""
+        """Make one connection attempt; on success, serve the connection until its end."""
         if self._report.state == "idle":
             self._report.show("connecting")
             self.publish()

@@ -146,13 +146,14 @@ def _commands(driver: Driver) -> Iterator[str]:
             within = shown_duration(command.verify.within_s)
             yield f"- done when {_code(command.verify.condition.source)}, within {within}"
         if command.hold is not None:
-            yield f"- held: sent every {shown_duration(command.hold.repeat_s)} while it is held"
+            every = shown_duration(command.hold.repeat_s)
+            yield f"- held: sent every {every} while the control is held"
         if command.moves:
             where = f" where {_code(command.moves_if.source)}" if command.moves_if else ""
             until = "refused while STOP is latched or another operator drives"
             yield f"- moves the robot by itself{where}: {until}"
         if command.stops:
-            yield "- given once when STOP is pressed"
+            yield "- sent once when STOP is pressed"
         yield ""
         yield from _arguments(command)
 
@@ -170,7 +171,7 @@ def _what_goes_out(command: Command, spec: TransportSpec | None) -> Iterator[str
             if isinstance(template, Template):
                 yield f"- sends {_code(template.source)}"
     if command.reply is None:
-        yield "- done when it is sent"
+        yield "- done when the frame is sent"
 
 
 def _constant_bytes(command: Command, spec: TransportSpec | None) -> bytes | None:
@@ -231,7 +232,7 @@ def _releases(driver: Driver) -> Iterator[str]:
         if command.hold is not None and command.hold.step_s is not None:
             lasts = shown_duration(command.hold.step_s)
             yield f"- {_code(command.name)}: nothing is sent"
-            yield f"  - The robot moves in steps and stops by itself after each: {lasts} at most."
+            yield f"  - The robot moves in steps of at most {lasts}, and stops after each step."
         elif command.hold is not None:
             values = {
                 name: command.hold.release.get(name, argument.default)

@@ -3,8 +3,8 @@
 Theory of operation. Pages send ticks of sampled input, and release messages. For each tick, the
 controller checks the lease of the page and the age of the tick; the engine checks the arguments.
 The controller then passes the frame to the motion backend, which owns the connection and enforces
-the time limits. The first tick of a gesture arms the control. The stop frame is rendered at the
-same time, so that a stop needs neither the engine nor the document.
+the time limits. The first tick of a gesture arms the control. The first tick also renders the stop
+frame, so that a stop needs neither the engine nor the document.
 
 After a stop without a release, the control stays disarmed until its page sends a release. A stick
 that is still held after a reconnection therefore moves nothing.
@@ -133,7 +133,10 @@ class MotionController:
     # -- the robot
 
     def attach(self, session: MotionSession) -> None:
-        """Attach a session: its engine, backend and events. An outstanding stop is sent."""
+        """Attach a session: its engine, backend and events.
+
+        Attaching a session sends an outstanding stop.
+        """
         self._frames, self._backend = session.frames, session.backend
         session.on_motion = self.handle
         backend = self._backend
@@ -157,7 +160,7 @@ class MotionController:
         self._screens[client.id] = _Screen(client)
 
     def part(self, client: str) -> None:
-        """Remove a page and stop the commands that it held."""
+        """Remove a page and stop the commands that the page held."""
         self._screens.pop(client, None)
         self._settle(self.lease.leave(client))
 

@@ -31,8 +31,7 @@ def examine(document: Path) -> list[str]:
     """Return the errors of a package's document, one line per error.
 
     Args:
-        document: path such as ``TOP/drivers/puppet/driver.yaml``, next to the packages that it
-            needs.
+        document: path such as ``TOP/drivers/puppet/driver.yaml``, next to the required packages.
     """
     top = document.parent.parent.parent
     checked = check(

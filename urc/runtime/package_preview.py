@@ -1,8 +1,8 @@
 """A preview of a package's permissions and risks, before its installation or update.
 
-Files, keys, agents, remote programs and hosts normally come from settings. A package may specify
-them as constants, but the person who installs the package must know. The preview therefore lists
-constants separately from the permissions.
+Files, keys, agents, remote programs and hosts normally come from settings. Constants are permitted
+instead, but the person who installs the package must know about the constants. The preview
+therefore lists constants separately from the permissions.
 """
 
 import re

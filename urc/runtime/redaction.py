@@ -22,8 +22,8 @@ REDACTED = "‹secret›".encode()
 """Replacement for secret bytes in displayed data."""
 
 _SHORTEST = 3
-"""Minimum length of a secret to replace inside a frame; for shorter secrets, which occur too often,
-the whole frame is hidden."""
+"""Minimum length of a secret to replace inside a frame. Shorter secrets occur too often, so the
+whole frame is hidden."""
 _SHORTEST_CODED = 6
 _SHORTEST_PART = 4
 """Minimum length of a truncated secret to redact; shorter parts occur in many words."""

@@ -53,7 +53,7 @@ async def connect(
 
     Raises:
         UrcError: the profile has errors, or a setting is wrong or missing. An unreachable robot
-            raises no error in `connect`; `command` reports the failure, and `state` shows it.
+            raises no error in `connect`; `command` and `state` report the failure.
     """
     opened = profile if isinstance(profile, Profile) else load(profile)
     given = {_setting_name(opened, name): _as_text(value) for name, value in settings.items()}

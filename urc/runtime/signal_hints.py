@@ -88,7 +88,7 @@ class SignalHints:
         return f"{text} waits {what}{passes}"
 
     def _answered_by(self, transport: str, fed: bytes, signal: str) -> str:
-        """Return an unsent request whose reply the frame may be, or None."""
+        """Return a hint about an unsent request that the frame may answer, or ""."""
         spec = self._driver.transports[transport]
         for asked in self._could_ask():
             reads = [asked.reply.read, *(stage.read for stage in asked.reply.stages)]
@@ -103,7 +103,7 @@ class SignalHints:
         return ""
 
     def _asked_in_vain(self, transport: str, fed: bytes, signal: str) -> str:
-        """Return the sent request whose reply format matches none of the received frames, or ""."""
+        """Return a hint if the reply format of a sent request matches no received frame, or ""."""
         spec = self._driver.transports[transport]
         for label, reply in self._were_asked(transport):
             reads = [reply.read, *(stage.read for stage in reply.stages)]

@@ -1,6 +1,6 @@
 """Comparison of expected and actual results in a document's tests.
 
-Layer 4, pure. Each mismatch is described in part of a line, with both values.
+Layer 4, pure. Each mismatch message is part of a line and contains both values.
 """
 
 import math
@@ -26,7 +26,7 @@ _SHOWN: Final = 3
 """Maximum number of reported failures per test."""
 _SHOWN_BYTES: Final = 48
 _BEFORE_BYTES: Final = 16
-"""Number of shown bytes of a long frame, and the number of them before the first difference."""
+"""Number of shown bytes of a long frame, in total and before the first difference."""
 
 
 def first(failures: list[str]) -> list[str]:

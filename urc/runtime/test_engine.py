@@ -39,7 +39,7 @@ Kind = Literal["command", "poll", "message"]
 Exercised = tuple[Kind, str]
 """Kind and name of a part of a driver that a test can use."""
 _TWO_PEOPLE: Final = ("author of the test", "operator")
-"""Confirmations for every command, because tests check the bytes on the wire."""
+"""Confirmations of two people, so that tests can run every command."""
 _BRINGS_OBJECTS: Final = frozenset(("ros",))
 """Transport types with objects as messages; all other types carry bytes."""
 _MOST_TICKS: Final = 20_000

@@ -209,7 +209,7 @@ class TcpStream(asyncio.BufferedProtocol):
 
 
 class StreamTransport:
-    """The methods of a transport that only require an open stream."""
+    """The transport methods that need only an open stream."""
 
     def __init__(self) -> None:
         self._stream: ByteStream | None = None

@@ -42,7 +42,7 @@ class Tls:
     def __init__(
         self, context: ssl.SSLContext, server_name: str = "", *, is_server: bool = False
     ) -> None:
-        """Store the settings; certificates must match `server_name`, or for "" the host."""
+        """Store the settings; certificates must match `server_name`, or the host if it is empty."""
         self._context = context
         self._server_name = server_name
         self._is_server = is_server
@@ -54,7 +54,8 @@ class Tls:
         Args:
             kind: type of the transport, for error messages.
             option: ``true``, ``false``, None, or a mapping with ``ca``, ``cert``, ``key``,
-                ``server_name`` and ``verify``. The first three are file names or PEM texts.
+                ``server_name`` and ``verify``. ``ca``, ``cert`` and ``key`` are file names or PEM
+                texts.
             is_server: whether the robot connects to URC, so that URC presents its certificate.
 
         Raises:
@@ -223,7 +224,7 @@ def _load_own(
 
 
 def _no_password() -> str:
-    raise ValueError("the key has a password; use a key without one")
+    raise ValueError("the key is protected by a password; use an unprotected key")
 
 
 def _pem(given: str) -> str:

@@ -40,8 +40,9 @@ __all__ = [
 
 
 NOTICE: Final = "notice"
-"""Verb of messages that a transport itself creates. The body is a one-line text about an error that
-the robot does not report. Notices go to the robot's log and do not prove that the robot is alive.
+"""Verb of messages that a transport itself creates. The body of a notice is a one-line text about
+an error that the robot does not report. Notices go to the robot's log and do not prove that the
+robot is alive.
 """
 
 
@@ -54,11 +55,11 @@ class TransportError(UrcError):
 
 
 class ConnectFailed(TransportError):
-    """An error because the connection could not be opened."""
+    """A failed attempt to open a connection."""
 
 
 class PeerClosed(TransportError):
-    """An error because the peer closed the connection, or the connection broke."""
+    """The end of a connection: closed by the peer, or broken."""
 
 
 class Transport(Protocol):

@@ -13,7 +13,7 @@ __all__ = ["body_of", "complaint", "fault_of", "read_body"]
 
 _COMPLAINT_BYTES: Final = 65536
 _FORMATS: Final = {"gzip": 31, "x-gzip": 31, "deflate": 47}
-"""Content-Encoding → window bits for zlib, for gzip or for automatic detection."""
+"""Content-Encoding → zlib window bits, for gzip or for automatic detection."""
 
 
 async def read_body(response: httpx2.Response, max_bytes: int) -> bytes:

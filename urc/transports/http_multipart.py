@@ -2,10 +2,10 @@
 
 The parser is pure: bytes in, parts out.
 
-Many cameras violate the multipart format (RFC 2046, section 5.1). The parser accepts quoted and
-plain boundaries, and boundaries whose header includes the two dashes of the body. Parts without
+Many cameras violate the multipart format (RFC 2046, section 5.1). The parser accepts quoted
+boundaries, plain boundaries, and headers that include the body's two dashes. Parts without
 Content-Length and lines that end in LF alone are also accepted. Every part and header has a maximum
-size; a larger one makes the stream invalid.
+size; larger parts or headers make the stream invalid.
 """
 
 import re

@@ -1,6 +1,6 @@
 """The factory of the MQTT transport, for robots behind an MQTT broker.
 
-This module imports no MQTT library, so that it can report a missing library.
+This module does not import the MQTT library, so a missing library can be reported.
 """
 
 from importlib.util import find_spec

@@ -5,8 +5,8 @@ Each `open` connects a socket and passes it to a new paho client, which is dropp
 connection. No message of an earlier connection can therefore be sent late. A reused paho client
 would keep unacknowledged messages and send them again. The transport starts no thread.
 
-Every MQTT session is clean. The broker publishes the last will after every end of the connection,
-even if URC closes it; an extra stop is harmless.
+Every MQTT session starts clean. The broker publishes the last will after every end of the
+connection, even if URC closes the connection. An extra stop is harmless.
 """
 
 import asyncio
@@ -96,7 +96,7 @@ class MqttTransport:
         if not isinstance(data, Envelope):
             raise TransportError("mqtt carries messages, not bytes; use publish")
         if data.verb != "publish":
-            raise TransportError(f"mqtt cannot {data.verb}; it can publish")
+            raise TransportError(f"mqtt cannot {data.verb}; supported: publish")
         await self._session.publish(data)
 
     async def close(self) -> None:
@@ -311,7 +311,7 @@ class _Session:
         if flags.is_disconnect_packet_from_server:
             self._lose(f"{HUNG_UP} ({_low(code)})")
         elif code == "Keep alive timeout":
-            self._lose(f"the broker has not answered for {2 * KEEPALIVE_S} s")
+            self._lose(f"the broker has not replied for {2 * KEEPALIVE_S} s")
         else:
             self._lose(HUNG_UP)
 

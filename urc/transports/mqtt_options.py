@@ -95,7 +95,7 @@ def body_bytes(body: object) -> bytes:
     try:
         return _encode(body)
     except (TypeError, ValueError, OverflowError) as problem:
-        raise TransportError(f"this cannot be sent as JSON ({problem})") from problem
+        raise TransportError(f"the value cannot be sent as JSON ({problem})") from problem
 
 
 def _will(given: object) -> WillMessage | None:

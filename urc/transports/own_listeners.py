@@ -1,4 +1,4 @@
-"""The listening addresses of URC's own dashboard, which no transport may connect to.
+"""The listening addresses of URC's own dashboard, which are forbidden for transports.
 
 A document that connects to the dashboard would have the rights of a local program. The address of
 each new connection is checked, so host names, redirects and address notations make no difference.
@@ -16,7 +16,7 @@ __all__ = ["OWN_DOORS", "OwnAddressError", "OwnListeners"]
 
 
 class OwnAddressError(OSError):
-    """An error because a connection leads to URC's own dashboard."""
+    """An attempted connection to URC's own dashboard."""
 
     def __init__(self) -> None:
         super().__init__(None, "this address is the dashboard itself; it cannot be a robot")
@@ -51,13 +51,13 @@ class OwnListeners:
             self._doors.append((_address(address), int(port)))
 
     def check(self, line: socket.socket) -> None:
-        """Raise `OwnAddressError` if a connected socket leads to an own listener."""
+        """Raise `OwnAddressError` if a connected socket leads to URC's own dashboard."""
         peer = line.getpeername()
         if line.family in (socket.AF_INET, socket.AF_INET6):
             self.check_place(_address(peer[0]), peer[1])
 
     def check_place(self, address: Address, port: int, *, is_near: bool = True) -> None:
-        """Raise `OwnAddressError` if a connection to that address would reach an own listener.
+        """Raise `OwnAddressError` if a connection to that address would reach URC's own dashboard.
 
         Args:
             address: target address.

@@ -85,7 +85,7 @@ class SshConnection:
         """Return the target address for `host`; raise `OwnAddressError` for URC's own dashboard.
 
         An SSH server on this machine could reach the dashboard. For an SSH server on this machine,
-        a host name is looked up once in this method, so that the server cannot resolve it
+        a host name is looked up once in this method, so the server cannot resolve the name
         differently.
         """
         is_near = self._is_on_this_machine()

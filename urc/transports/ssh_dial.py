@@ -101,7 +101,9 @@ async def look_at_key(
         if client.offer is None:
             raise
     if client.offer is None:
-        raise ConnectFailed(f"{target.address.text} shows a certificate, which needs no trust")
+        raise ConnectFailed(
+            f"{target.address.text} presents a certificate, which needs no confirmation"
+        )
     return client.offer
 
 
@@ -173,7 +175,7 @@ def _explain(target: SshTarget, client: _Client, fault: Exception) -> str:
             hint = "" if login.legacy else "; 'legacy: true' permits old algorithms"
             return f"{place} offers no algorithm that URC accepts{hint} ({_first(fault.reason)})"
         case asyncssh.ConnectionLost():
-            return f"{place} closed the connection before the login was done"
+            return f"{place} closed the connection before the login was complete"
         case asyncssh.ProtocolError() | asyncssh.ProtocolNotSupported():
             return f"{place} does not speak SSH as expected ({_first(fault.reason).lower()})"
         case asyncssh.DisconnectError():

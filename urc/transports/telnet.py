@@ -56,7 +56,7 @@ class TelnetTransport(StreamTransport):
     def __init__(
         self, host: str, port: int, wishes: TelnetOptions, tunnel: Tunnel | None = None
     ) -> None:
-        """Store the address, the options, and the tunnel of the connection or None."""
+        """Store the address, the options, and the optional tunnel."""
         super().__init__()
         self._address = Address(host, port)
         self._wishes = wishes

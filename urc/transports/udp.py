@@ -33,8 +33,8 @@ _AT_ONCE = 64
 """Maximum number of datagrams read in one turn of the event loop."""
 _LONGEST = 65_536
 _RECVERR = {socket.AF_INET: (socket.IPPROTO_IP, 11), socket.AF_INET6: (socket.IPPROTO_IPV6, 25)}
-"""Linux socket option IP_RECVERR, which Python does not define. This option also reports refusals
-on unconnected sockets."""
+"""Linux socket option IP_RECVERR, which Python does not define. IP_RECVERR also reports refusals on
+unconnected sockets."""
 _LOST_HERE = (errno.ENOBUFS, errno.EAGAIN, errno.ENOMEM)
 """Errors that mean the local loss of a datagram, which UDP permits."""
 _NO_WAY = (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENETDOWN, errno.EADDRNOTAVAIL)
@@ -97,8 +97,8 @@ class UdpTransport:
     async def open(self, timeout_s: float) -> None:
         """Bind the local port, and return immediately if the address of the robot is known.
 
-        Otherwise, wait for the first datagram; raise `ConnectFailed` without one within `timeout_s`
-        seconds.
+        If the robot's address is unknown, wait for the first datagram; raise `ConnectFailed` after
+        `timeout_s` seconds.
         """
         await self.close()
         try:

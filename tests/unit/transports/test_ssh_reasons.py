@@ -109,4 +109,4 @@ async def test_good_bye_behind_an_offer_is_not_lost() -> None:
 async def test_server_that_says_nothing_more_has_closed_the_line() -> None:
     """Then there is no other reason."""
     said = await refusal(Curt(VERSION))
-    assert said == "10.0.0.7:22 closed the connection before the login was done"
+    assert said == "10.0.0.7:22 closed the connection before the login was complete"

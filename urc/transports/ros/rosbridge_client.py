@@ -1,7 +1,7 @@
 """The roslibpy protocol of a rosbridge connection, without roslibpy's network connection.
 
 roslibpy implements the rosbridge operations, their ids, and pending requests. The network
-connections of roslibpy are not used. Reasons: roslibpy's connections replay old messages after a
+connections of roslibpy are not used. These connections would replay old messages after a
 reconnection, fail on binary frames, and never probe the other side. The measurements are in
 docs/decisions. In this module, roslibpy's protocol writes into a list, and the transport sends the
 list over URC's socket. The transport passes received data to the protocol. Each object serves only
@@ -109,7 +109,9 @@ class RosClient:
             "cancel": self._cancel,
         }.get(envelope.verb)
         if work is None:
-            raise TransportError(f"rosbridge cannot {envelope.verb}; it can publish, call and goal")
+            raise TransportError(
+                f"rosbridge cannot {envelope.verb}; supported: publish, call, goal"
+            )
         try:
             work(envelope.attributes, envelope.body)
         except BadOperation as problem:
@@ -181,7 +183,7 @@ class RosClient:
         """Process one operation from the bridge.
 
         Raises:
-            BadFrame: the operation is invalid.
+            BadOperation: the operation is invalid.
         """
         self._size_bytes = size_bytes
         self._protocol.arrived(operation)

@@ -52,12 +52,12 @@ def encode_operation(operation: Mapping[str, object]) -> bytes:
     """Encode an operation as JSON; bytes become base64, and not-a-number becomes null.
 
     Raises:
-        BadFrame: a value cannot be written as JSON.
+        BadOperation: a value cannot be written as JSON.
     """
     try:
         return _encode_json(operation)
     except (TypeError, ValueError, OverflowError) as problem:
-        raise BadOperation(f"this cannot be sent as JSON ({problem})") from problem
+        raise BadOperation(f"the value cannot be sent as JSON ({problem})") from problem
 
 
 class OperationReader:
@@ -73,7 +73,7 @@ class OperationReader:
         """Return the operation of a frame, or None for an incomplete operation.
 
         Raises:
-            BadFrame: the frame is invalid.
+            BadOperation: the frame is invalid.
         """
         if frame[:1] >= _CBOR_MAP:
             return _operation(_read_cbor(frame))
