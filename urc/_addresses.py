@@ -1,8 +1,8 @@
 """Addresses of this machine's network interfaces, determined without sending a packet.
 
-Name servers and the host name are unreliable: many machines resolve themselves only as 127.0.1.1.
-Linux, macOS and the BSDs have getifaddrs in the C library. On other systems, the routing table
-determines the source address of an outgoing packet.
+Name servers and the host name are unreliable: on many machines, the host name resolves only to
+127.0.1.1. Linux, macOS and the BSDs have getifaddrs in the C library. On other systems, the routing
+table determines the source address of an outgoing packet.
 """
 
 import ctypes
@@ -46,14 +46,14 @@ def local_addresses() -> tuple[Address, ...]:
 def is_of_this_machine(address: Address) -> bool:
     """Return whether `address` belongs to an interface of this machine.
 
-    Addresses of a router or container host that forwards packets do not count.
+    The address of a router or container host that forwards packets to this machine does not count.
     """
     plain = unmapped(address)
     return plain.is_loopback or plain.is_unspecified or plain in _all()
 
 
 def unmapped(address: Address) -> Address:
-    """Return `address` without its scope, and an IPv4-mapped IPv6 address as IPv4."""
+    """Return `address` without a scope; convert an IPv4-mapped IPv6 address to IPv4."""
     if address.version == 4:
         return address
     return address.ipv4_mapped or ipaddress.IPv6Address(int(address))

@@ -1,7 +1,7 @@
 """Checksum algorithms: parameters, and functions that compute checksums of bytes.
 
-The libraries `anycrc` and, for two CRCs, `zlib` and `binascii` compute CRCs. Each sum or fold is
-one call of a C function.
+CRCs are computed by `anycrc`, except for two CRCs in `zlib` and `binascii`. Each sum or fold is one
+call of a C function.
 """
 
 import binascii
@@ -51,9 +51,9 @@ class FoldSpec(NamedTuple):
     mask: int | None = None
     """Mask that selects the bits of the result; None: all bits."""
     added: int = 0
-    """Number to add to the result, after the mask."""
+    """Number to add to the result after masking."""
     ored: int = 0
-    """Mask of bits to set in the result, in the last step."""
+    """Mask of the bits to set in the result as the last step."""
     is_odd_xored: bool = False
     """Whether an odd last byte is combined by XOR; only for 16-bit numbers."""
 
@@ -78,7 +78,7 @@ PLAIN_CHECKSUMS: Final = {
 
 
 def algorithm_of(name: str) -> CrcSpec | FoldSpec | str | None:
-    """Return the algorithm with this name; None for an unknown name."""
+    """Return the checksum algorithm with this name; None for an unknown name."""
     if name in PLAIN_CHECKSUMS:
         return name
     if name in FOLDED:
@@ -121,7 +121,7 @@ def build_algorithm(spec: CrcSpec | FoldSpec | str, *, is_big: bool = True) -> C
     """Return a function that computes the checksum of bytes.
 
     Args:
-        spec: parameters or name of the algorithm.
+        spec: parameters or name of the checksum algorithm.
         is_big: whether numbers are big-endian; used only by folds of numbers wider than one byte.
     """
     if isinstance(spec, str):

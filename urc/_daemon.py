@@ -1,4 +1,4 @@
-"""Blocking work in a daemon thread, without delaying the event loop or the exit of the process.
+"""Execution of blocking work in a daemon thread, without delaying the event loop or process exit.
 
 A closing event loop waits for the threads of `asyncio.to_thread`. A repository that does not answer
 for two minutes must not delay Ctrl-C by two minutes.
@@ -18,7 +18,7 @@ _T = TypeVar("_T")
 def in_daemon(work: Callable[[], _T], name: str) -> "asyncio.Future[_T]":
     """Start `work` in a new thread; return a future for the result or exception.
 
-    Cancelling the future does not stop the thread; its result is then discarded.
+    Cancelling the future does not stop the thread, but discards the result of the thread.
     """
     loop = asyncio.get_running_loop()
     future: asyncio.Future[_T] = loop.create_future()

@@ -60,7 +60,7 @@ def too_large(most: int) -> str:
 
 
 def refused(file: str, code: str, message: str, hint: str = "") -> ProblemsError:
-    """Return the error for a file that is rejected as a whole."""
+    """Return an error that rejects a whole file."""
     return ProblemsError([Problem(code, message, file, hint=hint)])
 
 
@@ -73,7 +73,7 @@ def _documents_in(folder: str) -> str:
 
 
 def similar_file(path: str) -> str:
-    """Return a similar file name in the folder of `path`; "" for none."""
+    """Return a similar file name in the folder of `path`; "" if no name is similar."""
     from difflib import get_close_matches
 
     folder, name = os.path.split(path)

@@ -1,8 +1,8 @@
 """Text forms of values in templates, joined lists, paths, topics and messages.
 
 Private to expressions. Equal numbers have the same text, whether received as 20 or 20.0. The text
-has the minimum number of digits that identify the number. Exponents are avoided, because few robots
-can read exponents.
+has the minimum number of digits that identify the number. Numbers have no exponents, because few
+robots can parse exponents.
 """
 
 import json
@@ -13,7 +13,7 @@ from urc.problems import printable
 __all__ = ["quoted", "spelt"]
 
 _ENDS = {"\n": "\\n", "\r": "\\r", "\t": "\\t"}
-"""Short escapes of control characters."""
+"""Escape sequences of control characters with a short escape."""
 
 
 def spelt(value: object) -> str:
@@ -34,7 +34,7 @@ def spelt(value: object) -> str:
 def quoted(value: object, most: int = 40) -> str:
     """Return the text of a value for messages to people: quoted text, or bytes as hex digits.
 
-    Terminal control characters are escaped exactly once.
+    Control characters are escaped exactly once, to protect terminals.
 
     Args:
         value: any value from a robot, a page or a document.

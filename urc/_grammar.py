@@ -1,7 +1,7 @@
 """Translation of expressions into Python source, for the supported subset of Jinja.
 
 Private to `urc.expressions`. Grammar and precedence are those of Jinja ("Expressions" in its
-template designer documentation). A custom parser reports the column of every error, and saves the
+template designer documentation). A custom parser can report the column of every error, and avoids
 40 ms for importing a template engine. `tests/unit/test_expressions.py` compares this parser with
 Jinja.
 
@@ -42,9 +42,9 @@ _TESTS = (
 )  # fmt: skip
 _PATTERNS = ("match", "search")
 COUNTERS: Final = "seq()"
-"""Root name for counters in a namespace; the name is invalid in documents."""
+"""Root name for the counters in a namespace; documents cannot use this name."""
 NONCE: Final = "nonce()"
-"""Root name for the nonce in a namespace; the name is invalid in documents."""
+"""Root name for the nonce in a namespace; documents cannot use this name."""
 _MOST_NONCE: Final = 64
 _NONCE_ALONE = re.compile(r"\(\d+\)")
 _COUNTER = re.compile(r"[a-z][a-z0-9_]{0,63}")
@@ -64,7 +64,7 @@ def translate(
         text: an expression without braces.
         resolve: function that returns the Python source for reading a root name.
         names: set that receives the root names in the expression.
-        settings: set that receives every NAME of ``settings.NAME``.
+        settings: set that receives the names of settings, from ``settings.NAME``.
         allows_bytes: whether the expression's value may be bytes.
 
     Raises:
@@ -128,7 +128,7 @@ class _Parser:
         return token
 
     def _accept(self, text: str) -> bool:
-        """Skip the token `text` if next, unless the token is a string literal."""
+        """Skip the next token if equal to `text`, unless the token is a string literal."""
         if self._next.text == text and self._next.kind in ("operator", "name"):
             self._place += 1
             return True
@@ -228,7 +228,7 @@ class _Parser:
             elif self._accept("["):
                 value = self._subscript(value, is_settings)
             elif self._next.text == "(" and self._next.kind == "operator":
-                text = "calls are not part of the language, only filters, seq() and nonce()"
+                text = "function calls are not supported, except filters, seq() and nonce()"
                 raise ExpressionSyntaxError(text, self._next.offset)
             else:
                 return value
@@ -293,7 +293,7 @@ class _Parser:
         self._place += 1
         if name.kind != "string" or not _COUNTER.fullmatch(string_of(name)):
             raise ExpressionSyntaxError(
-                "'seq' takes a name in quotes first, such as 'id'", name.offset
+                "the first argument of 'seq' must be a name in quotes, such as 'id'", name.offset
             )
         if self._accept(","):
             low = self._whole()
@@ -353,7 +353,9 @@ class _Parser:
         self._expect("(")
         token = self._advance()
         if token.kind != "string":
-            raise ExpressionSyntaxError(f"{test.text!r} takes a pattern in quotes", token.offset)
+            raise ExpressionSyntaxError(
+                f"the argument of {test.text!r} must be a pattern in quotes", token.offset
+            )
         source = token.text[1:-1]  # unchanged: a backslash belongs to the pattern
         self._expect(")")
         try:

@@ -1,7 +1,7 @@
 """Reserved HTTP headers, which identify the sender or delimit the request.
 
 With these headers, a document could impersonate a page of the dashboard, a page of another program,
-or a proxy. Browsers forbid scripts to set these headers for the same reason.
+or a proxy. For the same reason, browsers do not let scripts set these headers.
 """
 
 from typing import Final

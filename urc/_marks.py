@@ -9,7 +9,7 @@ __all__ = ["Mark", "Span", "UnfilledText"]
 
 
 class Span(NamedTuple):
-    """A range of text. Lines and columns are 1-based; the end is exclusive."""
+    """A range of text, with 1-based lines and columns and an exclusive end."""
 
     line: int
     column: int

@@ -47,7 +47,7 @@ def order_of(number: Number) -> str:
 
 
 def plain_reader(number: Number) -> Callable[[bytes, int], Any]:
-    """Return a function that reads the raw number at an offset of complete data."""
+    """Return a function that reads a raw number from bytes at an offset."""
     code = format_of(number)
     if code:
         unpack = struct.Struct(order_of(number) + code).unpack_from
@@ -71,7 +71,7 @@ def plain_writer(number: Number) -> Callable[[Any], bytes]:
 def reader_of(
     number: Number, fault: type[Exception]
 ) -> Callable[[bytes, int, int], tuple[Any, int]]:
-    """Return a function that reads a raw number within bounds, and returns the number and its end.
+    """Return a function that reads a number from data between two offsets.
 
     The function raises `fault` for an invalid number.
     """

@@ -27,7 +27,7 @@ class Number(NamedTuple):
     """Whether the 16-bit words are in reverse order; `endian` is the byte order within each word.
     """
     is_by_seven: bool = False
-    """Whether each byte contains a zero bit and seven bits of the number."""
+    """Whether each byte contains only seven bits of the number, after a zero bit."""
 
     @property
     def size(self) -> int:

@@ -1,9 +1,9 @@
 r"""Regular expressions of documents, with matching in linear time.
 
-Private to `urc.patterns` and `urc.filters.lists`. The dialect is RE2, without look-around and
-back-references. ``$`` matches only the end, and ``\d`` only ASCII digits. Patterns that
-`_is_linear` proves linear run on `re`, which is ten times faster for short lines. Other patterns
-run on RE2, or are refused if RE2 is not installed.
+Private to `urc.patterns` and `urc.filters.lists`. The dialect of all patterns is RE2, without
+look-around and back-references. In this dialect, ``$`` matches only the end of the text, and ``\d``
+only ASCII digits. Patterns that `_is_linear` proves linear run on `re`, which is ten times faster
+for short lines. Other patterns run on RE2, or are refused if RE2 is not installed.
 
 Theory of operation: backtracking exceeds linear time only if two parts of a pattern can divide the
 same characters in many ways. A proven pattern must therefore have a start anchor, and alternatives
@@ -44,8 +44,8 @@ The pattern ``\\$[^\\r\\n]{1,80}\\r\\n`` for an NMEA 0183 sentence has size 802.
 within the limit takes about half a second for a frame of 64 KiB.
 """
 _RE2_BYTES: Final = 4 << 20
-"""Memory limit of RE2 for one pattern. With 1 MiB, RE2 falls back to a hundred times slower
-algorithm for repeats of optional parts."""
+"""Memory limit of RE2 for one pattern. With only 1 MiB, RE2 is a hundred times slower for repeats
+of optional parts."""
 _BEYOND_ASCII: Final = 6
 """Number of RE2 instructions for all non-ASCII characters, which RE2 matches byte by byte."""
 
@@ -117,7 +117,7 @@ class Pattern:
         return self._search if self.is_proven else None
 
     def search(self, text: str) -> Mapping[str, str | None] | None:
-        """Return the named groups of the first match in `text`, or None."""
+        """Return the named groups of the first match in `text`; None without a match."""
         found: _Match | None = self._search(text)
         return None if found is None else found.groupdict()
 
@@ -174,13 +174,13 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
 def example(pattern: Pattern, groups: Mapping[str, str], variant: int = 0) -> str:
     """Return a short text that matches `pattern`, with `groups` as named groups.
 
-    The text may still not match `pattern`; the caller must check.
+    The caller must check that the result really matches `pattern`.
 
     Args:
         pattern: pattern to match.
         groups: texts of the named groups, by name.
-        variant: number of the variant. Variant 0 omits optional parts without given groups, and
-            contains the first alternatives and the first printable characters. Other variants
+        variant: number of the text variant. Variant 0 omits optional parts without given groups,
+            and contains the first alternatives and the first printable characters. Other variants
             contain other alternatives, characters and repeats.
     """
     tree = _parser.parse(pattern.source, re.ASCII)
@@ -293,12 +293,12 @@ def _check_dialect(tree: Any, text: str) -> None:
     for operation, argument in tree:
         if operation in _REFUSED:
             raise PatternError(
-                f"{_REFUSED[operation]} are not part of the language: {text!r}{_INSTEAD[operation]}"
+                f"{_REFUSED[operation]} are not supported: {text!r}{_INSTEAD[operation]}"
             )
         if operation in (_constants.MAX_REPEAT, _constants.MIN_REPEAT):
             low, high, _ = argument
             if max(low, 0 if high is _constants.MAXREPEAT else high) > MAX_REPEAT:
-                raise PatternError(f"a repeat goes up to {MAX_REPEAT}: {text!r}")
+                raise PatternError(f"a repeat count is at most {MAX_REPEAT}: {text!r}")
         for part in _parts(operation, argument):
             _check_dialect(part, text)
 
@@ -358,7 +358,7 @@ def _re2_search(text: str) -> Any:
     except re2.error as error:
         reason = error.args[0] if error.args else "unknown"
         words = reason.decode("utf-8", "replace") if isinstance(reason, bytes) else str(reason)
-        raise PatternError(f"not a pattern of this language (RE2): {words}") from None
+        raise PatternError(f"not an RE2 pattern: {words}") from None
 
 
 class _NotProven(Exception):

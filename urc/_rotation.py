@@ -1,7 +1,7 @@
 """Conversion of a quaternion to roll, pitch and yaw, in radians.
 
 Private to `urc.filters.table`. A quaternion is [x, y, z, w] or {x, y, z, w}, of any norm except
-zero. The angles are rotations about x, then y, then z, in the axes of REP-103. Without an
+zero. Roll, pitch and yaw are rotations about x, then y, then z, in the axes of REP-103. Without an
 orientation, all angles are not-a-number ("not available"), which arithmetic preserves.
 """
 

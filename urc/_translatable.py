@@ -1,6 +1,6 @@
 """Translatable texts for people.
 
-A phrase keeps its English text and its values for a later translation; see `urc.web.words`.
+A phrase stores the English text and the values, for later translation by `urc.web.words`.
 `scripts.translations` finds the texts as arguments of `phrase`.
 """
 
@@ -15,7 +15,7 @@ class Phrase(str):
     __slots__ = ("between", "names", "pieces", "text")
 
     text: str
-    """Text with ``{name}`` for each of `names`."""
+    """English text with a placeholder ``{name}`` for each of `names`."""
     names: Mapping[str, str]
     pieces: tuple[str, ...]
     """Parts of a joined phrase; a joined phrase has no `text`."""
@@ -23,7 +23,7 @@ class Phrase(str):
 
 
 def phrase(text: str, /, **names: object) -> Phrase:
-    """Return a phrase with these values, which may be phrases."""
+    """Return a phrase; the values of placeholders may also be phrases."""
     said = {name: one if isinstance(one, str) else str(one) for name, one in names.items()}
     made = Phrase(text.format_map(said))
     made.text, made.names, made.pieces, made.between = text, said, (), ""

@@ -1,7 +1,7 @@
 """Translation of YAML parser errors into messages and hints for people.
 
-Private to `urc.source`. The module supports both parsers of PyYAML (C and pure Python). Their
-messages differ, so most decisions depend on the text at the error.
+Private to `urc.source`. The module supports both parsers of PyYAML (C and pure Python). The
+messages of the two parsers differ, so most decisions depend on the text at the error.
 """
 
 import re
@@ -90,7 +90,7 @@ def _directive(at: _Clue) -> SyntaxFault | None:
         first,
         0,
         "unquoted",
-        "a line that starts with '%' is a directive of YAML",
+        "a line that starts with '%' is a YAML directive",
         "quote the value if it is text; documents of URC need no directives",
     )
 
@@ -227,7 +227,7 @@ def _block(at: _Clue) -> SyntaxFault | None:
             *place,
             "indentation",
             "the indentation of this line does not match its block",
-            "indent it like the other lines of its block; quote values with special characters",
+            "indent the line like the rest of its block; quote values with special characters",
         )
     if "<document start>" in said:
         return SyntaxFault(
@@ -263,7 +263,7 @@ def _second_colon(at: _Clue) -> SyntaxFault:
         at.line,
         len(at.text) - len(at.text.lstrip()),
         "indentation",
-        "this line is indented more than the one above, which has a value already",
+        "this line is indented more than the line above, which already has a value",
         "give both lines the same indentation",
     )
 

@@ -1,7 +1,7 @@
 """Conversion of YAML events into plain data and a parallel tree of marks.
 
 Private to `urc.source`. The reader processes the events of the YAML parser directly, without the
-library's composer. Nesting and aliases are therefore limited *while* reading: a document with
+library's composer. Nesting and aliases are therefore limited *during* reading, so a document with
 exponentially many aliases is rejected early. Every key and value has a position, and scalars follow
 the core schema of YAML 1.2.
 """
@@ -21,8 +21,8 @@ __all__ = ["DocumentLimits", "StoppedError", "TreeReader"]
 _TAGS: Final = "tag:yaml.org,2002:"
 _PATH_SHOWN: Final = 12
 _PROBLEMS_MOST: Final = 100
-"""Maximum number of problems in one text. The limit is needed because each problem copies its line,
-which may be long."""
+"""Maximum number of problems in one text. Each problem copies its source line, which may be
+long."""
 _CUT_COMMENT = re.compile(r" #[^\s#!]")
 
 
@@ -59,7 +59,7 @@ class TreeReader:
         self._nodes = 0
         self._path: list[str] = []
         self._anchors: dict[str, _Built | None] = {}
-        """Anchored nodes by anchor name; None while the node is being read."""
+        """Anchored nodes by anchor name; None for a node that is still incomplete."""
 
     def read(self) -> tuple[object, Mark] | None:
         """Return the data and marks of the document; None for a text without a document.

@@ -1,10 +1,10 @@
 """Templates and expressions in documents: a subset of Jinja, compiled to Python functions.
 
 `urc._grammar` defines the supported subset. Expressions are a sandbox: no attributes of Python
-objects, no loops, and no operator that expands a short text. The only calls are the filters of
-`urc.filters.table`. Literal text is preserved exactly, whereas Jinja converts CR to LF and drops a
-final newline. URC raises errors that Jinja hides (``'abc' | int`` is 0), because a wrong reading
-must not become zero.
+objects, no loops, and no operator that expands a short text. Filters of `urc.filters.table` are the
+only functions. Literal text is preserved exactly, whereas Jinja converts CR to LF and drops a final
+newline. URC raises errors that Jinja hides (``'abc' | int`` is 0), because a wrong reading must not
+become zero.
 
 The result of a template with only one ``{{ expression }}`` keeps the type of the expression.
 """
@@ -70,13 +70,13 @@ class ExpressionError(UrcError):
 
 
 class Template:
-    """A compiled template. Equal if the source is equal; safe to share."""
+    """A compiled template. Immutable templates with equal source are equal."""
 
     __slots__ = ("_function", "is_constant", "names", "python", "settings", "source")
 
     def __init__(self, source: str, python: str, names: frozenset[str], settings: frozenset[str]):
         self.source = source
-        """Source as in the document."""
+        """Source of the template, as in the document."""
         self.python = python
         """Source of the Python expression, over a mapping `ns`."""
         self.names = names
@@ -258,7 +258,7 @@ def defaulted_names(template: Template) -> frozenset[str]:
 
 
 def _gather(node: ast.AST, needed: set[str], spare: set[str], *, has_default: bool) -> None:
-    """Add the root names under `node` to `needed` or `spare` (with a default)."""
+    """Add the root names under `node` to `needed`, or to `spare` for names with a default."""
     if isinstance(node, ast.Subscript) and ast.unparse(node.value) == "ns":
         (spare if has_default else needed).add(str(ast.literal_eval(node.slice)))
         return
@@ -271,7 +271,7 @@ def _gather(node: ast.AST, needed: set[str], spare: set[str], *, has_default: bo
 def digested_settings(template: Template) -> frozenset[str]:
     """Return the settings that appear only in tests, and in hashes with a nonce or time.
 
-    A hash with a nonce or time does not reveal the setting, and is useless for a replay.
+    A hash with a nonce or time does not reveal a setting, and cannot be replayed.
     """
     if not template.settings:
         return frozenset()

@@ -1,7 +1,7 @@
 """Media type and size of an image, from its first bytes and without decoding.
 
-A small file may need gigabytes in a browser, so the size in pixels matters, not the file size.
-Sources: PNG (ISO/IEC 15948, 11.2.2), JPEG (ITU-T T.81, B.2.2), GIF89a (section 18), WebP (RFC
+A small image file may need gigabytes in a browser, so the size in pixels matters, not the file
+size. Sources: PNG (ISO/IEC 15948, 11.2.2), JPEG (ITU-T T.81, B.2.2), GIF89a (section 18), WebP (RFC
 9649), BMP (BITMAPINFOHEADER).
 """
 
@@ -21,7 +21,7 @@ _SIGNS: Final = (
     (b"BM", "image/bmp"),
 )
 _SIZE_MARKERS: Final = frozenset((*range(0xC0, 0xD0),)) - {0xC4, 0xC8, 0xCC}
-"""JPEG markers that start a frame (SOF), without the three markers for tables and an extension."""
+"""JPEG start-of-frame markers (SOF), without the three markers for tables and an extension."""
 _ALONE: Final = frozenset((0x01, *range(0xD0, 0xD9)))
 """JPEG markers without a length field."""
 
@@ -41,7 +41,8 @@ def media_type(data: bytes) -> str:
 def picture_size(data: bytes) -> tuple[int, int] | None:
     """Return the width and height of an image in pixels; None if the first bytes lack the size.
 
-    AVIF is not supported: its size is in nested boxes, and browsers limit AVIF themselves.
+    The result for AVIF is always None: the size is in nested boxes, and browsers limit the size
+    themselves.
     """
     read = _READERS.get(media_type(data))
     try:

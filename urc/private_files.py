@@ -36,8 +36,8 @@ def put_private(file: Path, data: bytes) -> None:
         data: complete content.
 
     Raises:
-        OSError: the file cannot be written, for example on a full disk. The old content then
-            remains, unless only the folder's sync failed.
+        OSError: the file cannot be written, for example on a full disk. After an error, the file
+            has the old content, unless only the folder's sync failed.
     """
     make_private(file.parent)
     # `mkstemp` makes files that only their owner can read.
@@ -56,7 +56,7 @@ def put_private(file: Path, data: bytes) -> None:
 
 
 def _keep_name(folder: Path) -> None:
-    """Sync the folder to disk, if the system supports syncing folders."""
+    """Sync a folder to disk, if supported by the operating system."""
     if hasattr(os, "O_DIRECTORY"):
         number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:

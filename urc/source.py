@@ -334,8 +334,8 @@ def _inside_lines(
 ) -> Span | None:
     """Return the position of a character in a multi-line scalar.
 
-    The function searches the source lines one after another in the value. The search supports block
-    scalars, plain text, and quoted text without escapes.
+    The function searches for each source line in the value. Block scalars, plain text, and quoted
+    text without escapes are supported.
     """
     position = 0
     last = min(span.end_line, len(lines))

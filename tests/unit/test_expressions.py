@@ -175,7 +175,7 @@ def test_a_template_of_one_expression_keeps_its_type(source: str, expected: obje
         ("a {{ b c }}", 7, "'c' is not expected here"),
         ("{{ x | nope }}", 7, "no filter 'nope'"),
         ("{{ x | hex(1, 2) }}", 7, "takes 0 to 1 arguments"),
-        ("{{ x() }}", 4, "calls are not part of the language"),
+        ("{{ x() }}", 4, "function calls are not supported"),
         ("{{ word[0:1:2] }}", 11, "a start and an end, but no step"),
         ("{{ x : 1 }}", 5, "':' is not expected here"),
         ("{{ word is match(x) }}", 17, "a pattern in quotes"),

@@ -1,8 +1,8 @@
 """Axis conventions, and the conversion of values between them.
 
 Arithmetic only. Body axes are FLU (x forward, y left, z up; REP-103) and FRD (x forward, y right, z
-down). World axes are ENU (east, north, up) and NED (north, east, down). A bearing is the angle from
-north, clockwise.
+down). World axes are ENU (east, north, up) and NED (north, east, down). A bearing is a clockwise
+angle from north.
 """
 
 import math
@@ -45,8 +45,8 @@ def turn_quaternion(
 ) -> tuple[float, float, float, float]:
     """Convert an orientation [x, y, z, w] from the axes `here` to the axes `there`.
 
-    Between body axes, the result is the same rotation in the new axes. Between ENU and NED, the
-    body axes change too: an FLU body in ENU becomes an FRD body in NED, as in autopilots.
+    Between FLU and FRD, the result is the same rotation in the new axes. Between ENU and NED, the
+    body axes also change: an FLU body in ENU becomes an FRD body in NED, as in autopilots.
     """
     x, y, z, w = quaternion
     if here == there:
@@ -64,7 +64,7 @@ def turn_angle(
     """Convert a heading, or an angle or rate about one body axis, to the axes `there`.
 
     Args:
-        angle: angle, rate or heading, in `unit`.
+        angle: angle, angular rate or heading to convert, in `unit`.
         here: current axes; ENU, NED or bearing for a heading.
         there: target axes.
         about: rotation axis for body axes: ``x`` (roll), ``y`` (pitch) or ``z`` (yaw).

@@ -1,8 +1,8 @@
 """Items of a binary frame, in frame order, for reading and writing.
 
 The loader creates the items from ``struct:`` and resolves every named type. The readers and writers
-of `urc.protocol` compile the items. All share two rules of this module: the names of nested fields,
-and the sizes that earlier items determine.
+of `urc.protocol` compile the items. The loader, the readers and the writers share this module's
+rules for names of nested fields and for sizes from earlier items.
 """
 
 from collections.abc import Iterator, Mapping
@@ -46,7 +46,7 @@ class Extent(NamedTuple):
     number: int = 0
     """Size or length, for ``fixed``."""
     prefix: Number | None = None
-    """Length field in front of the data, for ``prefix``."""
+    """Length field before the data, for ``prefix``."""
     expression: Template | None = None
     """Formula over earlier items, for ``expression``."""
 
@@ -70,12 +70,13 @@ class Item(NamedTuple):
     condition: Template | None = None
     """Condition under which the item is present; None: always present."""
     const: int | float | bool | bytes | None = None
-    """Required raw value; a frame with a different value does not match. None: any value."""
+    """Required raw value; a frame with a different value does not match. With None, any value
+    matches."""
     scale: float = 1
     offset: float = 0
-    """value = raw · scale + offset"""
+    """Offset of the value: value = raw · scale + offset."""
     enum: tuple[tuple[int, str], ...] = ()
-    """Pairs of a raw number and its word. A number without a word stays a number."""
+    """Pairs of a raw number and the corresponding word; a number without a word stays a number."""
     valid: tuple[float, float] | None = None
     """Valid range of the scaled value; a value outside the range is a violation."""
     value: Template | None = None
@@ -210,7 +211,7 @@ def _least(item: Item) -> int:
 def derived_sizes(items: tuple[Item, ...]) -> Mapping[str, Template]:
     """Return the formulas for sizes and counts, by the name of the item that contains the number.
 
-    When sending, URC computes these items from the data.
+    URC computes the values of these items from the data to send.
     """
     given = {
         one.id

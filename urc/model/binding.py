@@ -13,9 +13,9 @@ __all__ = ["targets"]
 def targets(command: Command, port: WidgetPort, given: OutputBinding) -> dict[str, str]:
     """Return the output arguments by the names of the command arguments that receive them.
 
-    The binding decides. Without a binding, a value goes to the argument of the same name. A single
-    value of an output that is not a hold-to-run control goes to the only free argument, even
-    under a different name.
+    The binding decides. Without a binding, a value goes to the argument of the same name. If a
+    command has one free argument, a single value goes to this argument even under a different name.
+    Hold-to-run controls are an exception.
     """
     open_ones = [name for name in command.arguments if name not in given.fixed]
     if not port.is_held and not given.names and len(port.arguments) == 1 and len(open_ones) == 1:

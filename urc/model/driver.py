@@ -51,8 +51,8 @@ class Timeouts(NamedTuple):
     idle_s: float | None = None
     """Idle time before the connection is closed, in seconds; None: never."""
     on_connect_s: float | None = None
-    """Timeout for all steps of ``on_connect`` together, in seconds; None: only each step's own
-    timeout."""
+    """Timeout for all steps of ``on_connect`` together, in seconds; None: only the timeouts of the
+    steps apply."""
 
 
 class Backoff(NamedTuple):
@@ -65,13 +65,13 @@ class Backoff(NamedTuple):
 
 
 class TransportSpec(NamedTuple):
-    """A transport of a driver. `type` is a row of the transports table."""
+    """A transport of a driver; `type` is a row of the transports table."""
 
     name: str
     type: str
     options: Mapping[str, object] = NOTHING
-    """Options of the transport, such as ``host`` and ``port``. Values are plain values, templates
-    over settings, or lists and mappings of both."""
+    """Options of the transport, such as ``host`` and ``port``. The values of options are plain
+    values, templates over settings, or lists and mappings of both."""
     connection: Literal["persistent", "per_request"] = "persistent"
     framing: FramingSpec = FramingSpec()
     encoding: str = "utf-8"
@@ -91,8 +91,8 @@ class TransportSpec(NamedTuple):
     tunnel: str = ""
     """Name of the transport that tunnels this connection; "": no tunnel."""
     is_half_duplex: bool = False
-    """Whether the connection is half-duplex. Until the robot has replied, only a stop may be
-    sent."""
+    """Whether the connection is half-duplex. In half duplex, only a stop may be sent before the
+    reply to the previous request."""
     never_replies: bool = False
     """Whether the robot never sends on this connection, so silence does not indicate a loss."""
     errors: tuple[Pattern, ...] = ()
@@ -110,7 +110,7 @@ class Reply(NamedTuple):
     """Reply timeout, in seconds; None: ``timeouts.reply`` of the transport."""
     match: Template | None = None
     """Correlation condition over the fields, the arguments of the command, and the counters in the
-    request (``seq.NAME``). None: replies arrive in the order of the requests."""
+    request (``seq.NAME``). Without a correlation, replies arrive in the order of the requests."""
     stages: tuple[Stage, ...] = ()
     """Further replies that complete the request."""
     faults: tuple[ErrorReply, ...] = ()
@@ -192,20 +192,20 @@ class Command(NamedTuple):
     description: str = ""
     priority: Priority = "normal"
     is_latest_only: bool = False
-    """Whether a newer call replaces a queued one."""
+    """Whether a newer call replaces a queued call of the same command."""
     rate_per_s: float | None = None
     """Average rate limit in calls per second, with bursts of two calls; None: unlimited."""
     is_idempotent: bool = False
     """Whether repeated execution has the same effect as a single execution."""
     retries: int = 0
     """Maximum number of retries after a timeout of an idempotent command, or at the robot's
-    request. 0 means `RESENDS` if the robot may request retransmissions."""
+    request. The value 0 means `RESENDS` if the robot may request retransmissions."""
     retry: Retry = Retry()
     """Delays before the retries."""
     hold: Hold | None = None
     moves: bool = False
-    """Whether the command starts autonomous motion. Also true for a sequence that runs a held
-    command or a command with autonomous motion."""
+    """Whether the command starts autonomous motion. A sequence with a held command, or with a
+    command that starts autonomous motion, also counts."""
     moves_if: Template | None = None
     """Condition over the arguments for autonomous motion; None: every call moves if `moves` is
     true."""
@@ -215,8 +215,8 @@ class Command(NamedTuple):
     requires: tuple[Requirement, ...] = ()
     verify: Verify | None = None
     steps: tuple[Step, ...] = ()
-    """Steps of a sequence. With steps, `send` is empty, and `transport` is the first transport of
-    the sequence."""
+    """Steps of a sequence; () for a plain command. For a sequence, `send` is empty, and `transport`
+    is the first transport of the steps."""
 
     def moves_with(self, arguments: Mapping[str, object]) -> bool:
         """Return whether these arguments start motion; True when `moves_if` cannot be evaluated."""
@@ -241,7 +241,7 @@ class Poll(NamedTuple):
     phase_s: float = 0.0
     """Delay between connecting and the first request, in seconds."""
     run: str = ""
-    """Command that supplies `send` and `reply`; "": the poll declares both."""
+    """Command that supplies the poll's `send` and `reply`; "": the poll declares both."""
     arguments: Mapping[str, Reading] = NOTHING
     """Arguments of the command in `run`, including defaults."""
     when: Template | None = None
@@ -251,7 +251,7 @@ class Poll(NamedTuple):
 
 
 class Message(NamedTuple):
-    """An unsolicited frame: its pattern, and the signals that it updates."""
+    """A declared unsolicited frame, with the signals to update."""
 
     name: str
     transport: str
@@ -274,7 +274,7 @@ class Driver(NamedTuple):
     def learnt(self, transport: str) -> frozenset[str]:
         """Return the names of the fields that a login reads, such as ``_nonce``.
 
-        The fields are available while the connection is open.
+        Fields from the login are available while the connection is open.
         """
         names: set[str] = set()
         for step in all_steps(self.transports[transport].on_connect):

@@ -56,8 +56,8 @@ class Keepalive(NamedTuple):
     """Command to run; "" when `send` declares the frame."""
     send: WriteSpec | None = None
     watchdog_s: float | None = None
-    """Watchdog timeout of the robot according to its manufacturer, in seconds. After this time
-    without a frame, the robot closes the connection or stops."""
+    """Watchdog timeout of the robot, in seconds, according to its manufacturer. After a watchdog
+    timeout, the robot closes the connection or stops."""
     after: tuple[str, ...] = ()
     """Commands that reset the watchdog of the robot; (): every frame resets the watchdog."""
 
@@ -93,11 +93,11 @@ class Stage(NamedTuple):
 
 
 MOST_STOPS: Final = 11
-"""Maximum number of transmissions of a stop, which is repeated on a lossy transport."""
+"""Maximum number of transmissions of a stop on a lossy transport."""
 
 
 class Hold(NamedTuple):
-    """A command that moves the robot only while its control is held."""
+    """A command that moves the robot only while the operator holds the control."""
 
     repeat_s: float
     """Period of the setpoints, in seconds."""
@@ -107,14 +107,15 @@ class Hold(NamedTuple):
     """Duration of the motion lease without a renewal by the operator, 0.1 to 1.0 s."""
     watchdog_s: float | None = None
     """Watchdog timeout of the robot, in seconds: motion continues for this time after the last
-    setpoint. ``inf``: no watchdog; None: unknown. Only the loader's rules use the value."""
+    setpoint. The value ``inf`` means that the robot has no watchdog, and None that the watchdog is
+    unknown. Only rules of the loader use the watchdog timeout."""
     slew: Mapping[str, float] = NOTHING
     """Maximum increase per second away from the stop value, by argument."""
     on_stall: Literal["abort", "wait"] | None = None
     """Reaction to a stalled connection during motion; None: the default of the transport."""
     step_s: float | None = None
     """Maximum duration of a motion step that the robot ends itself, in seconds; no stop is sent.
-    None: the robot moves until a stop arrives."""
+    Without a duration, the robot moves until a stop arrives."""
 
 
 class Confirm(NamedTuple):

@@ -94,7 +94,7 @@ class TrailerSpec(NamedTuple):
     mark: bytes = b""
     """Separator between the text and the checksum."""
     is_padded: bool = True
-    """Whether the digits have leading zeros."""
+    """Whether the digits of the checksum have leading zeros."""
     is_optional: bool = False
     """Whether a text without separator and checksum is also valid."""
     each: bytes = b""
@@ -104,7 +104,7 @@ class TrailerSpec(NamedTuple):
 
 
 class LengthSpec(NamedTuple):
-    """A length field. The size of the frame is field × `unit` + `adjust` bytes."""
+    """A length field: the size of the frame is field × `unit` + `adjust` bytes."""
 
     offset: int
     size: int
@@ -123,8 +123,8 @@ class LengthSpec(NamedTuple):
     """Offset of the flag byte that marks a valid length field; -1: the length field is always
     valid."""
     flag_mask: int = 0
-    """Mask of the flag byte. If any masked bit is set, the length field is valid; otherwise the
-    frame has `adjust` bytes."""
+    """Mask of the flag byte. If any masked bit of the flag byte is set, the length field is valid;
+    otherwise the frame has `adjust` bytes."""
 
     @property
     def is_loose(self) -> bool:
@@ -136,17 +136,18 @@ class EscapeSpec(NamedTuple):
     """Byte stuffing: escape sequences for bytes with a special meaning in the framing."""
 
     byte: int = 0
-    """Escape byte in front of a stuffed byte."""
+    """Escape byte before a stuffed byte."""
     table: Mapping[Any, int] = NOTHING
     """Replacements that follow the escape byte, by stuffed byte."""
     xor: int | None = None
     """XOR mask for decoding any stuffed byte, because a robot may stuff bytes outside `table`.
-    None: only the pairs of `table` are valid."""
+    Without a mask, only bytes of `table` may be stuffed."""
     after: bytes = b""
     """Sequence after which `insert` is stuffed; `byte` and `table` are then unused."""
     insert: int = 0
     is_of_payload: bool = False
-    """Whether length and checksum cover the stuffed bytes instead of the original bytes."""
+    """Whether length field and checksum refer to the stuffed bytes instead of the original
+    bytes."""
 
 
 class FrameLayout(NamedTuple):

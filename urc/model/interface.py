@@ -18,9 +18,9 @@ class OutputBinding(NamedTuple):
     """The mapping of a widget output's values to command arguments."""
 
     names: Mapping[str, str] = NOTHING
-    """Output arguments with different names, by command argument."""
+    """Arguments of the output, by command argument; only for pairs with different names."""
     fixed: Mapping[str, Value] = NOTHING
-    """Constant values, by command argument."""
+    """Constant values for command arguments, by argument."""
 
 
 class WidgetUse(NamedTuple):
@@ -41,13 +41,13 @@ class WidgetUse(NamedTuple):
     lists: Mapping[str, tuple[str, ...]] = NOTHING
     """Lists of driver signals, by multiple input of the widget."""
     files: Mapping[str, str] = NOTHING
-    """File paths, by the file name in an option."""
+    """Paths of the files that options refer to, by the file name in the option."""
     pages: Mapping[str, tuple[str, ...]] = NOTHING
     """Validated URLs of third-party pages, by option."""
 
 
 class Slot(NamedTuple):
-    """A rectangle of a layout. Rows and columns are 0-based; spans are at least 1."""
+    """A rectangle of a layout, with 0-based row and column and spans of at least 1."""
 
     name: str
     row: int

@@ -41,8 +41,9 @@ class Envelope(NamedTuple):
     """Operation of the envelope. The driver sends ``publish``, ``call``, ``goal``, ``cancel`` and
     ``request``. The transport delivers ``message``, ``response``, ``feedback`` and ``notice``."""
     attributes: Mapping[str, object] = NOTHING
-    """Address and options: topic, type, method, path, headers, quality of service … A request and
-    its response have the same ``id``. A response has ``ok``, and on failure a ``reason``."""
+    """Address and options: topic, type, method, path, headers, quality of service and so on. A
+    request and its response have the same ``id``. A response has ``ok``, and a failure also has a
+    ``reason``."""
     body: object = None
     """Content of the envelope: JSON-like data, or bytes."""
 
@@ -64,7 +65,7 @@ class Count(NamedTuple):
 
 
 class Numbered(NamedTuple):
-    """A frame with counters; the frame is valid only while its numbers are next."""
+    """A frame with counters, valid only while its numbers are the next numbers."""
 
     data: Payload
     takes: Count
@@ -81,11 +82,11 @@ class CountedFrame(NamedTuple):
 
     numbered: Numbered
     again: Callable[[], Numbered | None]
-    """Function that renders the frame with the next numbers; None: the frame is impossible."""
+    """Function that renders the frame with the next numbers, or returns None on failure."""
 
 
 class FramingSpec(NamedTuple):
-    """Rules for cutting a byte stream into frames. `type` is a row of the framings table."""
+    """Rules for cutting a byte stream into frames; `type` is a row of the framings table."""
 
     type: str = "delimiter"
     options: Mapping[str, object] = NOTHING
@@ -148,11 +149,11 @@ class ReadSpec(NamedTuple):
     sets: Mapping[str, Template] = NOTHING
     """Expressions over the converted fields, by signal."""
     when: Template | None = None
-    """Condition over the converted fields; if false, the frame does not match. None: always
-    true."""
+    """Condition over the converted fields; if false, the frame does not match. Without a condition,
+    every frame with these fields matches."""
     lines: int | Pattern | None = None
-    """Number of frames in the reply, or a pattern for the last frame. The frames are joined by
-    LF."""
+    """Number of frames in the reply, or a pattern for the last frame. The reader receives the
+    frames of a reply joined by LF."""
     topic: Template | None = None
     """Template over settings for the source topic, on transports for messages; None: any topic."""
     collects: Mapping[str, Collect] = NOTHING
@@ -160,7 +161,7 @@ class ReadSpec(NamedTuple):
     head: Mapping[str, str] = NOTHING
     """Lower-case names of HTTP response headers, or ``status``, by field."""
     listen: Mapping[str, Value] = NOTHING
-    """Subscription options of `topic`: type, throttle in seconds, quality of service …"""
+    """Subscription options of `topic`, such as type, throttle in seconds and quality of service."""
 
 
 class WriteSpec(NamedTuple):

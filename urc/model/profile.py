@@ -103,12 +103,12 @@ class DialogueStep(NamedTuple):
     leaves: bool = False
     """Whether the operator disconnects: all connections close in an orderly way."""
     sent: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
-    """All output since the previous check, by transport; (): no output."""
+    """Expected output since the previous check, by transport; (): no output."""
     expect: Mapping[str, Expected] = NOTHING
     reply: Mapping[str, Value | tuple[Value, ...]] | None = None
-    """Expected reply values of the first completed, unchecked command."""
+    """Expected reply values of the first completed command that no step has checked."""
     of: str = ""
-    """Command for `reply` or `fails`; "": any command."""
+    """Name of the command that `reply` or `fails` refers to; "": any command."""
     fails: str = ""
     """Expected failure message."""
     closed: str = ""
@@ -116,7 +116,7 @@ class DialogueStep(NamedTuple):
 
 
 class DocumentTest(NamedTuple):
-    """A test in a document."""
+    """A declared test of a document."""
 
     name: str
     line: int
@@ -151,7 +151,7 @@ class DocumentTest(NamedTuple):
 
 
 class Reaction(NamedTuple):
-    """One reaction of the emulated robot. Its actions run in the order of the attributes."""
+    """One reaction of the emulated robot; the actions run in the order of the attributes."""
 
     after_s: float = 0.0
     """Time since the previous reaction, in seconds."""
@@ -166,7 +166,7 @@ class Reaction(NamedTuple):
     framing: FramingSpec | None = None
     """Framing of `send`; None: the framing of the request's reply, or of the connection."""
     closes: bool = False
-    """Whether the robot closes the connection."""
+    """Whether the robot closes the connection in this reaction."""
 
 
 class SimulatorRule(NamedTuple):

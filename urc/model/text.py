@@ -1,4 +1,4 @@
-"""Parsed options of the text forms, from `urc.config` to `urc.protocol`."""
+"""Parsed options of the text forms, written by `urc.config` and read by `urc.protocol`."""
 
 from typing import Literal, NamedTuple
 

@@ -17,7 +17,7 @@ class Scale(NamedTuple):
     offset: float = 0.0
 
     def __call__(self, value: float) -> float:
-        """Convert the value to the target unit."""
+        """Return `value` in the target unit."""
         return value * self.factor + self.offset
 
 
@@ -131,7 +131,7 @@ def conversion(have: str, want: str) -> Scale | None:
 def are_apart(one: str, other: str) -> bool:
     """Return whether a number certainly has different meanings in the two units.
 
-    A missing unit can be any unit.
+    If a unit is missing, the result is False.
     """
     scale = conversion(one, other)
     return bool(one and other) and (scale is None or scale != (1.0, 0.0))

@@ -2,8 +2,8 @@
 
 All values in `urc.model` are named tuples. Named tuples are as immutable and typed as frozen
 dataclasses. Compared with a dataclass, defining a named tuple takes a tenth of the time, and
-constructing one takes a third. Definitions matter at every start of the command line, and
-constructions at every sample.
+constructing a named tuple takes a third. The definition time matters at every start of the command
+line, and the construction time at every sample.
 """
 
 from collections.abc import Mapping
@@ -58,19 +58,19 @@ class AlarmLimits(NamedTuple):
 
 
 class Conversion(NamedTuple):
-    """The conversion from a raw field to a value. The attributes apply in the order below."""
+    """The conversion from a raw field to a value, with its steps in the order of the attributes."""
 
     base: int = 0
     """Base of whole numbers in text, 2 to 36; 0: text is not converted."""
     not_available: tuple[Value, ...] = ()
     """Raw values that mean "not available"."""
     polynomial: tuple[float, ...] = ()
-    """Polynomial coefficients c0, c1, c2 …: value = c0 + c1·raw + c2·raw² …; (): no polynomial."""
+    """Coefficients c0, c1, c2 … of the polynomial c0 + c1·raw + c2·raw² …; (): no polynomial."""
     points: tuple[tuple[float, float], ...] = ()
     """Interpolation table of (raw, value) pairs with increasing raw values, linear between points
     and clamped outside the table."""
     states: tuple[tuple[str, str], ...] = ()
-    """Pairs of a raw text and its word."""
+    """Pairs of a raw text and the corresponding word."""
 
 
 PLAIN = Conversion()
@@ -110,11 +110,11 @@ class Signal(NamedTuple):
     """Dead band in `unit`: smaller changes are not reported. An array is reported when any element
     changes by the dead band or more."""
     debounce_s: float = 0.0
-    """Debounce time in seconds: a new value is reported only if it lasts this long."""
+    """Debounce time in seconds: a new value is reported only after this time."""
 
 
 class Sample(NamedTuple):
-    """One reading: the value, the arrival time of its first byte, and the alarm."""
+    """One reading of a signal: value, arrival time of the first byte, and alarm."""
 
     signal: str
     value: Reading

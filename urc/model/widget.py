@@ -20,14 +20,14 @@ class WidgetPort(NamedTuple):
     quantity: str = ""
     """For an input: required quantity, in any unit and without conversion; "": any quantity."""
     unit_of: str = ""
-    """Input or output of the same widget with the same unit; "": none."""
+    """Name of another input or output that must have the same unit; "": no such port."""
     is_required: bool = True
     description: str = ""
     is_held: bool = False
-    """For an output: whether it is a hold-to-run control. A hold-to-run output takes only motion
-    commands."""
+    """For an output: whether the output is a hold-to-run control. A hold-to-run output takes only
+    motion commands."""
     arguments: tuple[str, ...] = ()
-    """For an output: names of its values; hold-to-run values range from -1 to 1."""
+    """For an output: names of the values; hold-to-run values range from -1 to 1."""
     items: tuple[str, ...] = ()
     """For an array input: accepted element types; (): any type."""
     size: int | None = None
@@ -52,7 +52,7 @@ class Widget(NamedTuple):
     options: Mapping[str, object] = NOTHING
     """JSON Schema ``properties`` of the widget's options."""
     at_least_one_of: tuple[str, ...] = ()
-    """Inputs, outputs and options; at least one is required. (): no requirement."""
+    """Inputs, outputs and options, at least one of them required; (): no requirement."""
     required_together: tuple[tuple[str, ...], ...] = ()
     """Groups of inputs or outputs; a group works only when all its members are bound."""
     min_cells: tuple[int, int] = (1, 1)
@@ -62,5 +62,5 @@ class Widget(NamedTuple):
     released."""
     summary: str = ""
     licence: str = ""
-    """SPDX licence identifier from the manifest."""
+    """SPDX licence identifier of the widget, from the manifest."""
     author: str = ""

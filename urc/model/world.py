@@ -53,7 +53,7 @@ BODY_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "climb": ("quadrotor",),
     "hover": ("quadrotor",),
 }
-"""Body types with each key, by key; a missing key applies to all body types."""
+"""Body types that support a key, by key; a missing key applies to all body types."""
 
 
 def _words(text: str) -> frozenset[str]:
@@ -78,8 +78,7 @@ READINGS: Final[Mapping[str, frozenset[str]]] = {
         " cliff_front_right drop"
     ),
 }
-"""Names of sensor values under ``world.NAME``, with the parts of a group under
-``world.NAME.PART``."""
+"""Names of sensor values for ``world.NAME``, and of their parts for ``world.NAME.PART``."""
 
 
 class Wall(NamedTuple):
@@ -167,7 +166,7 @@ class LaserSpec(NamedTuple):
     last: float = pi
     """End of the field of view, one step after the last ray; the rays are evenly spaced."""
     max: float = 8.0
-    """Maximum range."""
+    """Maximum range of the laser scanner."""
     noise: float = 0.01
     """Standard deviation of the range noise."""
 
@@ -202,7 +201,7 @@ class BatterySpec(NamedTuple):
     idle: float = 0.3
     """Current at standstill, in A."""
     drive: float = 2.0
-    """Additional current at full effort, in A."""
+    """Additional current at full drive, in A."""
 
 
 class Failsafe(NamedTuple):
@@ -212,7 +211,7 @@ class Failsafe(NamedTuple):
     without: tuple[str, ...]
     """Commands that reset the fail-safe timer."""
     sets: Mapping[str, Template | Reading] = NOTHING
-    """New values by state variable; if empty, the body stops."""
+    """New values of state variables, by variable; if empty, the body stops."""
 
 
 class WorldSpec(NamedTuple):

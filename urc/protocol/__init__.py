@@ -1,1 +1,1 @@
-"""Protocol engine: decoding and encoding of bytes, without I/O or a clock."""
+"""The protocol engine: decoding and encoding of bytes, without I/O or a clock."""

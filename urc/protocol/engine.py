@@ -1,8 +1,8 @@
 """The engine: the synchronous state machine of one driver.
 
-Pure: no I/O, no clock, no callbacks, no tasks. The owner of a transport reports events with their
-time, and executes the returned events. Live robots, document tests, playback and the simulator
-share this engine.
+The engine is pure: no I/O, no clock, no callbacks, no tasks. The owner of a transport reports
+events with their time, and executes the returned events. Live robots, document tests, playback and
+the simulator share this engine.
 
     events = engine.start("wire", now)            # the transport is connected
     events = engine.receive("wire", data, now)    # bytes were received
@@ -80,11 +80,11 @@ _PLAIN = frozenset(
 class Engine:
     """The protocol state machine of one driver.
 
-    Methods return lists of events, and are not re-entrant.
+    All methods of the engine return lists of events, and are not re-entrant.
 
     Args:
         driver: a loaded driver, with compiled patterns and templates.
-        settings: values of all settings of the profile, by name.
+        settings: values of all settings in the profile, by name.
         fresh: sources of time and randomness for sent frames; fixed sources for tests.
         is_compiled: whether to generate a function for each message and command. Generated
             functions save time in live sessions, but not in short document tests.
@@ -196,7 +196,7 @@ class Engine:
         return self._settle(events, now)
 
     def receive(self, transport: str, data: Payload, now: float) -> list[Event]:
-        """Process bytes or an envelope received on `transport`."""
+        """Process received bytes, or a received envelope, of `transport`."""
         return self._settle(self.lines[transport].receive(data, now), now)
 
     def command(self, request: Request, now: float) -> list[Event]:

@@ -33,7 +33,7 @@ class Request(NamedTuple):
     confirmed_by: tuple[str, ...] = ()
     """Names of the people who have confirmed the command, including the requester."""
     on_sent: Callable[[Payload], None] | None = None
-    """Callback for each sent payload, except for secrets and sequences."""
+    """Callback for each sent payload, except for secret payloads and payloads of sequences."""
 
 
 class Open(NamedTuple):
@@ -50,7 +50,8 @@ class Send(NamedTuple):
     is_secret: bool = False
     """Whether `data` contains a secret, and must not be shown or logged."""
     counted: CountedFrame | None = None
-    """The frame with its counter numbers, for a connection shared with the guard."""
+    """The frame with its counter numbers, for a connection that the guard also uses; otherwise
+    None."""
 
 
 class Close(NamedTuple):
@@ -108,7 +109,8 @@ class Violation(NamedTuple):
 class NumbersUsed(NamedTuple):
     """The counters of this connection advanced, so rendered stop frames may have outdated numbers.
 
-    The event occurs only on connections with counters shared with motion (`MotionEncoder.share`).
+    `NumbersUsed` occurs only on connections that share counters with motion
+    (`MotionEncoder.share`).
     """
 
     transport: str

@@ -32,11 +32,11 @@ Check = Callable[[Mapping[str, object]], dict[str, Reading]]
 
 
 class MotionUnavailable(UrcError):
-    """Motion is not possible now; the message is the reason."""
+    """Motion is currently not possible; the message is the reason."""
 
 
 class _Way:
-    """The encoder of one held command, looked up once because setpoints are frequent."""
+    """The prepared encoder of one held command, because setpoints are frequent."""
 
     __slots__ = ("ask", "check", "command", "is_guarded", "line")
 
@@ -119,8 +119,8 @@ class MotionEncoder:
     def has_stops(self, command: str) -> bool:
         """Return whether the rendered stops of `command` are still valid.
 
-        Stops are valid while at least half of the spare numbers are left. Stops that depend on
-        other values are never valid.
+        Stops are valid while at least half of the spare numbers are left. Rendered stops that
+        depend on other values are never still valid.
         """
         made, line = self._made.get(command), self._found(command).transport
         if made is None or not self._asks[command].is_local or line not in self._lengths:
@@ -136,8 +136,8 @@ class MotionEncoder:
         """Return the stop of `command`: bytes including framing, an envelope, or frame variants.
 
         Rendering a stop needs no connection. A stop with a counter is a series with one frame for
-        each possible next number. The series is long enough for all stops of the connection. The
-        stop is empty for a robot that ends each motion step itself.
+        each possible next number. A series of stops has enough frames for all stops of the
+        connection. The stop is empty for a robot that ends each motion step itself.
 
         Raises:
             BadArgument: the command is not held, or the stop cannot be written.
@@ -164,10 +164,10 @@ class MotionEncoder:
         now: float,
         confirmed_by: tuple[str, ...] = (),
     ) -> Payload | CountedFrame:
-        """Return the frame of `command` with these arguments, for sending now.
+        """Return the frame of `command` with `arguments`, ready for sending.
 
-        In half duplex, the frame is empty while a reply is pending; the next setpoint follows
-        later.
+        In half duplex, the frame is empty while a reply is pending, and only the next setpoint is
+        sent.
 
         On a shared connection, the counter numbers are only proposed; `set_counters` confirms the
         numbers after the transmission.

@@ -22,7 +22,7 @@ from urc.protocol.sequences.sequence_runner import Sink
 __all__ = ["KeepaliveState", "PollState", "PollSchedule"]
 
 Run = Callable[[str, Mapping[str, object], Sink, float], list[LineEvent]]
-"""Function that runs a command; the parameters are name, arguments, sink and time."""
+"""Function that runs a command, with the parameters name, arguments, sink and time."""
 
 
 class PollState:
@@ -103,9 +103,9 @@ class KeepaliveState:
 
         Args:
             keepalive: the declaration.
-            line: the connection to keep open.
+            line: conversation on the connection to keep open.
             ask: request of the keepalive; None for a keepalive that runs a command.
-            known: state with the names for the templates.
+            known: state of the robot, for the keepalive's templates.
         """
         self._keepalive = keepalive
         self._line = line
@@ -123,7 +123,7 @@ class KeepaliveState:
         return max(self._line.last_sent, self._spoke_at) + self._keepalive.every_s
 
     def forget(self) -> None:
-        """Reset for a new connection."""
+        """Reset the keepalive for a new connection."""
         self._is_asked = False
 
     def speak(self, run: Callable[[str], list[LineEvent]], now: float) -> list[LineEvent]:
@@ -141,7 +141,7 @@ class KeepaliveState:
         return self.done(outcome, now)
 
     def done(self, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Record the end of the command, which reports failures itself."""
+        """Record the end of the keepalive's command, which reports failures itself."""
         self._is_asked = False
         return []
 
@@ -209,7 +209,7 @@ class PollSchedule:
                     poll.stop()
 
     def stop(self) -> None:
-        """Poll no more."""
+        """Stop all polls."""
         for poll in self._polls:
             poll.stop()
 

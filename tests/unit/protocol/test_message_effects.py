@@ -178,4 +178,4 @@ def test_an_answer_that_cannot_be_written_is_a_fault_and_its_message_is_not(tmp_
     )
     events = made.receive("wire", b"V2.5\n", 1.0)
     assert (values(events, "volts"), sent(events)) == ([2.5], [])
-    assert faults(events) == ["the answer cannot be sent: '_token' has no value here"]
+    assert faults(events) == ["the acknowledgement cannot be sent: '_token' has no value here"]

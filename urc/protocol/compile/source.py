@@ -22,7 +22,7 @@ def function_of(
 
     Args:
         name: name of the function, a Python identifier.
-        arguments: parameter list of the function, as in ``def``.
+        arguments: parameter list of the function, in Python syntax.
         lines: lines of the function body, indented by at least four spaces.
         scope: global variables of the function, by name.
     """

@@ -29,7 +29,7 @@ class SourceBuilder:
         return name
 
     def add(self, line: str, depth: int = 1) -> None:
-        """Add a line, indented `depth` times."""
+        """Add a source line with `depth` levels of indentation."""
         self.lines.append("    " * depth + line)
 
     def compile(self, name: str, argument: str) -> Callable[[Any], Any]:

@@ -1,7 +1,7 @@
 """The form of envelopes: publish, call, goal and request.
 
-Pure. An envelope has an address (attributes) and a body. Another form writes the body. JSON bodies
-stay data, because each transport for messages has its own encoding.
+Pure. An envelope has an address (attributes) and a body, which another form writes. JSON bodies are
+not encoded as text, because each transport for messages has its own encoding.
 """
 
 from collections.abc import Callable, Mapping
@@ -71,7 +71,7 @@ def place_writer(name: str, tree: object) -> PathTemplate | None:
 
 
 def _path(text: str, is_whole: bool) -> str:
-    """Return a value in the form for a URL path."""
+    """Return a value, quoted for a URL path."""
     parts = text.split("/") if is_whole else [text]
     if any(part in _UP for part in parts):
         raise NotWritable(f"{quoted(text)} would change the path")
@@ -79,7 +79,7 @@ def _path(text: str, is_whole: bool) -> str:
 
 
 def _name(text: str, is_whole: bool, *, what: str) -> str:
-    """Return a value in the form for the name of a topic, service or action."""
+    """Return a value, checked for use in the name of a topic, service or action."""
     for sign in (*_WILD, *(() if is_whole else ("/",))):
         if sign in text:
             raise NotWritable(f"{quoted(text)} would change the {what}: {sign!r} is not allowed")
@@ -95,7 +95,7 @@ _WRITTEN: Final[Mapping[str, Callable[[str, bool], str]]] = {
 _ADDRESS: Final = ("topic", "service", "action", "method", "path", "url", "query")
 """Attributes that identify an envelope; all other attributes are delivery options."""
 _TEXTS: Final = ("query", "headers")
-"""Attributes with mappings of text values."""
+"""Attributes that are mappings of text values."""
 
 
 class EnvelopeWriter:

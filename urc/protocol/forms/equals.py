@@ -29,7 +29,7 @@ class EqualsReader:
         self._payload = encoded(cast("str", spec.options["text"]), context.encoding)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return no fields for the expected frame, and None for any other frame."""
+        """Return an empty mapping for the expected frame, and None for any other frame."""
         return NOTHING if frame.payload == self._payload else None
 
     def write(self, fields: Mapping[str, object]) -> Payload:
@@ -48,7 +48,7 @@ class AnyReader:
         return NOTHING
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return an empty frame."""
+        """Return an empty frame, which matches."""
         return b""
 
 

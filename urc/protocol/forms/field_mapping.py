@@ -1,6 +1,6 @@
 """Field conversions of one frame, ``set`` and ``when``.
 
-Pure. The reader wraps the reader of the form for reading and writing.
+Pure. `ShapedReader` wraps the reader of a form, for reading and writing.
 """
 
 from collections.abc import Mapping

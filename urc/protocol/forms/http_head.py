@@ -1,6 +1,6 @@
 """Status and headers of an HTTP response as fields.
 
-Pure. The reader wraps the reader of the body for reading and writing.
+Pure. The reader for the head wraps the reader of the body, for reading and writing.
 """
 
 from collections.abc import Mapping
@@ -29,7 +29,7 @@ def is_redirect(frame: Frame) -> bool:
 class HeadReader:
     """A reader for the status and headers, with another reader for the body.
 
-    Fields of missing headers are omitted.
+    Fields of missing HTTP headers are omitted.
     """
 
     def __init__(self, reader: PayloadReader, spec: ReadSpec) -> None:

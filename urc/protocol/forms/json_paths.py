@@ -1,11 +1,10 @@
 """The form ``json`` for reading: fields at paths in a document.
 
 Theory of operation. Plain paths become `msgspec` types with one member for each path step. The
-decoder of `msgspec` skips everything else, and a generated function picks the fields
-(`urc.protocol.compile.source`). The decoder raises an error for a document with another structure.
-The document is then decoded completely, and the paths are followed step by step. JMESPath
-expressions always need complete decoding. Both methods return the same fields for the same
-document.
+decoder of `msgspec` skips all other data, and a generated function extracts the fields
+(`urc.protocol.compile.source`). If a document has another structure, the decoder raises an error.
+The reader then decodes the whole document, and follows the paths step by step. JMESPath expressions
+always require decoding the whole document. Typed and complete decoding return the same fields.
 """
 
 import json
@@ -44,7 +43,7 @@ class JsonReader:
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields found; None for an invalid document or one without fields."""
+        """Return the fields found; None for an invalid document or a document without fields."""
         if self.pick is not None and isinstance(frame.payload, bytes):
             try:
                 return self.pick(frame.payload)

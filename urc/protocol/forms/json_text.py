@@ -41,13 +41,13 @@ class JsonWriter:
             raise NotWritable("JSON has no infinite number and no not-a-number") from None
 
     def value(self, namespace: Mapping[str, object]) -> object:
-        """Return the data before encoding; raise `NotWritable` or `ExpressionError`."""
+        """Return the JSON data before encoding; raise `NotWritable` or `ExpressionError`."""
         value = filled(self._tree, namespace)
         self._text(value)
         return value
 
     def completed(self, value: object) -> object:
-        """Return a ROS message with zeros for missing members, like a ROS bridge."""
+        """Return a ROS message, with zeros for missing members as in a ROS bridge."""
         return _completed(self._tree, value)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
@@ -62,7 +62,7 @@ class JsonWriter:
 
 
 def filled(tree: Any, namespace: Mapping[str, object]) -> Any:
-    """Return `tree` with all templates evaluated."""
+    """Return a copy of `tree` with all templates evaluated."""
     if isinstance(tree, Template):
         return tree.evaluate(namespace)
     if isinstance(tree, dict):

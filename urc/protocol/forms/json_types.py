@@ -28,7 +28,7 @@ class _Shape:
         self.is_leaf = False
 
     def below(self, step: str | int) -> "_Shape":
-        """Return the shape after one path step, creating a missing shape."""
+        """Return the shape after one more path step, creating the shape if missing."""
         if isinstance(step, str):
             return self.names.setdefault(step, _Shape())
         if self.element is None:
@@ -47,7 +47,7 @@ class _Shape:
 
 
 class PathNode:
-    """The fields at one path, and the next steps of longer paths."""
+    """A node in the tree of paths: its fields, and the nodes of longer paths."""
 
     def __init__(self, shape: _Shape) -> None:
         self.shape = shape
@@ -57,7 +57,7 @@ class PathNode:
 
 
 class ExtractionPlan(NamedTuple):
-    """The plan for extracting the fields of some paths from a document."""
+    """A plan for extracting the fields at given paths from a document."""
 
     decode: Callable[[bytes], Any]
     """Function that decodes a document, or raises `msgspec.DecodeError` for another structure."""

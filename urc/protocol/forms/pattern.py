@@ -49,22 +49,22 @@ class PatternReader:
         self._holes = cast("tuple[PatternField, ...]", spec.options["holes"])
         self._tail = cast("str", spec.options["tail"])
         self._start = _start(self._holes, self._tail)
-        """First literal word of the pattern; "": unknown."""
+        """First literal word of the pattern; "": the pattern begins with a field."""
         self._match: Callable[[str], re.Match[str] | None] | None = None
-        """Regular expression of the pattern. Compilation waits for the first use, because a test
-        needs few of a driver's patterns."""
+        """Regular expression of the pattern. Patterns are compiled on first use, because a test
+        uses only few patterns of a driver."""
         self._casts = [
             (place, hole.name, _cast_of(hole))
             for place, hole in enumerate(self._holes, 1)
             if hole.name
         ]
         self._words = _words(self._holes, self._tail)
-        """Words of a pattern of whole words; None for a pattern that needs a regular expression."""
+        """Words of the pattern; None if the pattern needs a regular expression."""
         self._has_widths = any(hole.width for hole in self._holes)
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields, with numbers converted."""
+        """Return the fields with converted numbers; None if the text does not match."""
         return self._read(frame.text)
 
     def _read(self, text: str) -> dict[str, object] | None:

@@ -40,7 +40,7 @@ class RegexReader:
         return encoded(text, self._encoding)
 
     def _text(self, name: str, value: object) -> str:
-        """Return a field in the spelling that its group requires, such as leading zeros."""
+        """Return the text of a field as its group requires, for example with leading zeros."""
         text = field_text(value)
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not is_number or len(text) > _WIDEST or name not in self._pattern.groups:
@@ -55,7 +55,7 @@ class RegexReader:
 
 
 def _padded(text: str) -> Iterator[str]:
-    """Yield other spellings of a number: leading zeros, a sign, more or fewer decimals."""
+    """Yield alternative spellings of a number: leading zeros, a sign, more or fewer decimals."""
     own = len(text.partition(".")[2])
     number = float(text)
     for places in (*range(own, -1, -1), *range(own + 1, _PLACES + 1)):

@@ -12,7 +12,7 @@ __all__ = ["KeyvalueReader", "SplitReader"]
 
 
 class SplitReader:
-    """A reader for values by position. An empty part means "not available"."""
+    """A reader for values by position. An empty part between separators means "not available"."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         options = spec.options
@@ -53,7 +53,7 @@ class SplitReader:
         return found
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return the joined parts; a missing part becomes empty text or a dash."""
+        """Return the joined parts, with an empty text or a dash for missing parts."""
         filler = "" if self._by else "-"
         names = self._names[:-1] if self._tail else self._names
         parts = [field_text(fields.get(name)) or filler for name in names]
@@ -71,7 +71,7 @@ class SplitReader:
 
 
 class KeyvalueReader:
-    """A reader for values by key. An empty value means "not available"."""
+    """A reader for values by key. An empty value of a key means "not available"."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         options = spec.options

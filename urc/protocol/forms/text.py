@@ -38,8 +38,7 @@ class TextWriter:
     def read(self, frame: Frame) -> Mapping[str, object] | None:
         """Return the text at the positions of plain names, by name; None for an unexpected text.
 
-        The number of a counter has the key ``seq.NAME``. A field ends at the first possible
-        position.
+        The number of a counter has the key ``seq.NAME``. A field extends to the first possible end.
         """
         try:
             text = frame.text
@@ -79,7 +78,7 @@ class _Piece(NamedTuple):
     """A field and the following literal text; the first piece has no field."""
 
     name: str
-    """Name of the field; "": unknown."""
+    """Name of the field; "" for an expression that cannot be read back."""
     literal: str
 
 

@@ -71,7 +71,7 @@ def matches(topic: str) -> Callable[[str], bool]:
 
 
 def topic_of(spec: ReadSpec, settings: Mapping[str, object]) -> str:
-    """Return the topic of a frame; raise `UrcError` when its template fails."""
+    """Return the topic of a declaration; raise `UrcError` if the template fails."""
     try:
         return "" if spec.topic is None else str(spec.topic.evaluate({"settings": settings}))
     except ExpressionError as error:
@@ -79,7 +79,7 @@ def topic_of(spec: ReadSpec, settings: Mapping[str, object]) -> str:
 
 
 def frame_of(payload: Payload, encoding: str) -> Frame:
-    """Return a received payload as a frame; the bytes of an envelope become its payload."""
+    """Return a received payload as a frame; bytes in an envelope become the payload."""
     if not isinstance(payload, Envelope):
         return Frame(payload, encoding)
     attributes, body = payload.attributes, payload.body

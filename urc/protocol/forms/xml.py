@@ -1,7 +1,8 @@
 """The form ``xml``: fields at element paths in a document.
 
 The form uses the parser of the standard library. A document with a document type declaration is
-rejected before parsing. Entities therefore cannot expand, and external resources are never loaded.
+rejected before parsing. Entities in XML therefore cannot expand, and external resources are never
+loaded.
 """
 
 from collections.abc import Iterator, Mapping
@@ -17,7 +18,7 @@ from urc.protocol.values.text_values import encoded, field_text, written_differe
 __all__ = ["XmlReader"]
 
 _MAX_DEPTH = 100
-"""Largest nesting depth of elements."""
+"""Maximum nesting depth of XML elements."""
 
 
 class XmlReader:
@@ -28,7 +29,7 @@ class XmlReader:
         self._encoding = context.encoding
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields found; None for an invalid document or one without fields."""
+        """Return the fields found; None for an invalid document or a document without fields."""
         return self._read(frame.text)
 
     def _read(self, text: str) -> dict[str, object] | None:

@@ -1,1 +1,1 @@
-"""All framings, with one module per family that is imported on first use."""
+"""All framings. Each family of framings is a module that is imported on first use."""

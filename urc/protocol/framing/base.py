@@ -44,14 +44,17 @@ class FrameFault(NamedTuple):
     """A violation: received bytes that are not a valid frame."""
 
     code: str
-    """Code of the violation: ``frame-too-long``, ``bad-checksum``, ``no-frame`` …"""
+    """Code of the violation: ``frame-too-long``, ``bad-checksum``, ``no-frame`` and others."""
     message: str
     closes: bool = False
-    """Whether the violation closes the connection."""
+    """Whether the connection must be closed because of the violation."""
 
 
 class Decoder(Protocol):
-    """A decoder that cuts one byte stream into frames. Each connection has a new decoder."""
+    """A decoder that cuts one byte stream into frames.
+
+    Every connection starts with a new decoder.
+    """
 
     @property
     def pending(self) -> int:
@@ -88,7 +91,7 @@ class Framing(Protocol):
 
 
 class StreamDecoder:
-    """Base class of the decoders. A subclass implements `next`."""
+    """Base class of the decoders. Each decoder class implements `next`."""
 
     def __init__(self, stream: ReceiveBuffer | None, max_bytes: int) -> None:
         self._stream = ReceiveBuffer() if stream is None else stream
@@ -105,7 +108,7 @@ class StreamDecoder:
 
     @property
     def deadline(self) -> float | None:
-        """None, because only received bytes complete a frame."""
+        """None, because silence completes no frame."""
         return None
 
     def push(self, data: bytes, now: float = 0.0) -> None:
@@ -150,7 +153,7 @@ class StreamDecoder:
         return found - stream.at
 
     def _skip(self, count: int) -> FrameFault | None:
-        """Discard bytes outside any frame; return a violation, or None if already reported."""
+        """Discard `count` bytes outside any frame; return a violation if not yet reported."""
         stream = self._stream
         first = stream.data[stream.at : stream.at + 1]
         stream.at += count
@@ -159,7 +162,7 @@ class StreamDecoder:
         )
 
     def _lost(self, code: str, message: str, *, closes: bool = False) -> FrameFault | None:
-        """Return a violation, or None if the run of invalid bytes is already reported."""
+        """Return a violation; None if the current invalid bytes are already reported."""
         if self._is_lost:
             return None
         self._is_lost = True

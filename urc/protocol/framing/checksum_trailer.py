@@ -1,7 +1,7 @@
 """Checksums after a text of variable length.
 
 Pure. A `ChecksumTrailer` adds the checksum to the content between a frame's markers, or removes the
-checksum. The remaining content has fixed positions.
+checksum. The content without the checksum has fixed positions.
 """
 
 from urc.model.framing import TrailerSpec

@@ -24,7 +24,7 @@ class BadFrame(UrcError):
 
 
 class Checksum:
-    """A checksum of a frame layout."""
+    """A checksum in a frame layout."""
 
     def __init__(self, spec: ChecksumSpec) -> None:
         self.spec = spec

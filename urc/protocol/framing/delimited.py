@@ -1,4 +1,4 @@
-"""The framing ``delimiter``: frames that end with fixed bytes."""
+"""The framing ``delimiter``: frames that end with a delimiter."""
 
 from typing import NamedTuple, cast
 
@@ -19,7 +19,7 @@ __all__ = ["DelimiterDecoder", "DelimiterFraming"]
 
 
 class DelimiterFraming(NamedTuple):
-    """Frames that end with fixed bytes; sent and received delimiters may differ."""
+    """Frames that end with a delimiter, which may differ for sent and received frames."""
 
     tx: bytes
     rx: bytes
@@ -55,8 +55,8 @@ class DelimiterFraming(NamedTuple):
 class DelimiterDecoder(StreamDecoder):
     """A decoder for frames with a delimiter, in linear time even for slow frames.
 
-    A frame over the size limit is dropped and reported once. Decoding continues after the next
-    delimiter.
+    A frame over the size limit is dropped and reported once. After a dropped frame, decoding
+    continues at the next delimiter.
     """
 
     def __init__(
@@ -113,7 +113,8 @@ class DelimiterDecoder(StreamDecoder):
     def ahead(self) -> list[bytes]:
         """Return all complete frames if several are buffered, without removing any frame.
 
-        The list is empty if a frame needs a check. `skip` removes the used frames.
+        The list of frames is empty if any frame needs a check. `skip` removes processed frames from
+        the stream.
         """
         stream, delimiter = self._stream, self._delimiter
         if self._open or self._credit or self._is_skipping or self._skips_empty:
@@ -140,7 +141,7 @@ class DelimiterDecoder(StreamDecoder):
             return self._refused(error)
 
     def _wait(self, credit: RescanBudget | None) -> FrameFault | None:
-        """Keep the bytes of an incomplete frame; return a violation if there are too many."""
+        """Keep the bytes of an incomplete frame; return a violation if over the size limit."""
         stream, keep = self._stream, len(self._delimiter) - 1
         fault = None
         if credit is not None and len(stream) >= self._max_bytes + len(self._delimiter):

@@ -1,7 +1,7 @@
 """Length fields with a variable number of digits: ``#3512``, ``512:``.
 
-Pure. The payload starts after the last digit, so the length counts from the end of the field, and
-`adjust` is relative to the end.
+Pure. The payload starts after the last digit, so the length and `adjust` count from the end of the
+length field.
 """
 
 from urc.model.framing import LengthSpec

@@ -1,10 +1,10 @@
-"""Framings with byte stuffing of the whole content, including markers.
+"""Framings with byte stuffing of the whole content between two markers.
 
-Theory of operation. Markers (start, end, delimiter) are sent unchanged. The content between them is
-stuffed last: length and checksum count the original bytes. If every marker byte in the content is
-escaped, an ordinary search finds the markers. If a doubled escape byte may begin a marker, the
-decoder processes all escapes in order. A frame with a length field is decoded byte by byte up to
-its length.
+Theory of operation. Markers (start, end, delimiter) are sent unchanged. The content between the
+markers is stuffed last, so length field and checksum refer to the original bytes. If every marker
+byte in the content is escaped, an ordinary search finds the markers. If a doubled escape byte may
+begin a marker, the decoder processes all escapes in order. A frame with a length field is decoded
+byte by byte up to its length.
 """
 
 from functools import partial

@@ -1,6 +1,6 @@
 """Conversion between a payload and its frame, according to the frame layout.
 
-Pure. A `FrameCodec` implements one layout. The framings only find the frames in the stream.
+Pure. A `FrameCodec` implements one layout. The framings only search the stream for frames.
 """
 
 import binascii
@@ -140,7 +140,7 @@ class FrameCodec:
         return self._spelt(bytes(frame)) if self._is_text else bytes(frame)
 
     def _read(self, frame: bytes) -> bytes:
-        """Return the frame without the trailing checksum and with decoded digits."""
+        """Return a received frame without the trailing checksum and with decoded digits."""
         start, end = self.layout.start, self.layout.end
         if len(frame) < len(start) + len(end):
             raise BadFrame("short-frame", f"{len(frame)} bytes are too few for this kind of frame")
@@ -181,7 +181,7 @@ def _digits_of(data: bytes, digits: Digits) -> bytes:
 
 
 def length_of(spec: LengthSpec) -> "LengthField | DigitLength":
-    """Return the length field for `spec`."""
+    """Return a length field of the kind that `spec` declares."""
     return DigitLength(spec) if spec.is_loose else LengthField(spec)
 
 

@@ -92,14 +92,14 @@ class _WholeDecoder(StreamDecoder):
 class _IdleDecoder(_WholeDecoder):
     """A decoder for frames that end with silence.
 
-    `now` is the time of receipt. Without a clock, only `tick` ends frames.
+    The parameter `now` of `push` is the time of receipt. Without time, only `tick` ends frames.
     """
 
     def __init__(self, stream: ReceiveBuffer | None, framing: IdleFraming) -> None:
         super().__init__(stream, framing.codec, framing.max_bytes)
         self._gap_s = framing.gap_s
         self._newest: float | None = None
-        """Time of the newest byte; None for an empty buffer."""
+        """Time of the newest received byte; None for an empty buffer."""
         self._done: list[bytes | FrameFault] = []
         self._is_too_long = False
 
@@ -134,7 +134,7 @@ class _IdleDecoder(_WholeDecoder):
         return frames
 
     def _end(self, now: float) -> None:
-        """Complete the frame if the silence until `now` is long enough."""
+        """Complete the frame if `now` is `gap_s` or more after the newest byte."""
         if self._newest is None:
             if len(self._stream):
                 self._newest = now  # bytes left by another decoder

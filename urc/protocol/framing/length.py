@@ -2,9 +2,9 @@
 
 Theory of operation. With start bytes, the decoder advances to the next start bytes; otherwise,
 every byte may begin a frame. After a bad length, wrong end bytes or a wrong checksum, only the
-first byte is dropped. A valid frame may begin at the second byte. Checksums may then scan the same
-bytes repeatedly, so `RescanBudget` limits rescanning. Beyond the budget, the whole invalid frame is
-dropped.
+first byte is dropped. A valid frame may begin at the second byte of an invalid frame. Checksums may
+therefore scan the same bytes repeatedly, so `RescanBudget` limits rescanning. After the budget is
+spent, an invalid frame is dropped as a whole.
 """
 
 from typing import NamedTuple
@@ -105,7 +105,7 @@ class _MeasuredDecoder(StreamDecoder):
                 return fault
 
     def _to_start(self) -> FrameFault | None:
-        """Advance to the next start bytes, or to their possible beginning."""
+        """Advance to the next start bytes, or to incomplete start bytes at the end."""
         stream, start = self._stream, self._start
         if not start or stream.data.startswith(start, stream.at):
             return None

@@ -28,8 +28,8 @@ Search = Callable[[bytes | bytearray, int], Any]
 _SMALL: Final = 256
 """Maximum buffer size for a new search after every receive, in bytes."""
 _GROWTH: Final = 8
-"""Growth of a larger buffer before a new search, as a divisor of its size; silence for `_QUIET_S`
-also starts a search."""
+"""Divisor of the buffer size: a larger buffer is searched again after growing by this fraction, or
+after silence for `_QUIET_S`."""
 _QUIET_S: Final = 0.005
 
 
@@ -158,7 +158,7 @@ class _RegexDecoder(StreamDecoder):
         return None
 
     def _wait(self) -> FrameFault | None:
-        """Keep the newest bytes, because a frame may begin there."""
+        """Keep the newest bytes, which may contain the start of a frame."""
         fault = None
         surplus = len(self._stream) - self._max_bytes
         if surplus > 0:
@@ -168,7 +168,7 @@ class _RegexDecoder(StreamDecoder):
 
 
 class BracketsFraming(NamedTuple):
-    """Frames between an opening and a closing marker. The payload excludes the markers.
+    """Frames between an opening and a closing marker. The markers are not part of the payload.
 
     Frames are not nested: a second opening marker restarts the frame.
     """
@@ -178,7 +178,7 @@ class BracketsFraming(NamedTuple):
 
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> Framing:
-        """Return the framing for the option ``layout``, with its start and end."""
+        """Return the framing for the option ``layout``, which has start and end markers."""
         return cls(frame_codec_of(spec) or FrameCodec(FrameLayout()), spec.max_bytes)
 
     def encode(self, payload: bytes) -> bytes:

@@ -1,8 +1,8 @@
 """Declared byte stuffing: escape sequences for bytes with a special meaning in the framing.
 
-Pure. Three methods are sufficient for common robots. An escape byte precedes a replaced byte (HDLC
-and PPP: 7D and the byte xor 20; SLIP: a table). An escape byte is doubled (DLE DLE). An additional
-byte follows a sequence (FF FF FD is followed by FD).
+Pure. Three methods of byte stuffing are sufficient for common robots. Method 1: an escape byte
+precedes a replaced byte (HDLC and PPP: 7D and the byte xor 20; SLIP: a table). Method 2: an escape
+byte is doubled (DLE DLE). Method 3: an additional byte follows a sequence (FD after FF FF FD).
 """
 
 import re
@@ -26,7 +26,7 @@ class Stuffing:
         self.is_doubled = not spec.after and spec.table.get(spec.byte) == spec.byte
         """Whether the escape byte may also begin a marker."""
         self.meant = _meant(spec)
-        """Decoded bytes, by the byte after the escape byte."""
+        """Decoded byte for each byte that may follow the escape byte."""
         if spec.after:
             self._plain, self._inserted = spec.after, bytes((spec.insert,))
             self._pair = re.compile(re.escape(spec.after) + b"(.?)", re.DOTALL)
@@ -81,7 +81,7 @@ class Unstuffer:
         self.plain = bytearray()
         self._is_escaped = False
         self._tail = b""
-        """Newest bytes, for recognising the sequence before an inserted byte."""
+        """Newest decoded bytes, for recognising the sequence before an inserted byte."""
 
     def feed(self, byte: int) -> bool:
         """Process one byte; return False for an invalid byte."""

@@ -1,7 +1,8 @@
 """The framing ``switch``: several framings on one stream, selected by the first bytes.
 
-Theory of operation. All cases share one `ReceiveBuffer`. The first bytes of a frame select the
-case. After each frame or violation, a new selection starts. Bytes that match no case are skipped.
+Theory of operation. All cases of a switch share one `ReceiveBuffer`. The first bytes of a frame
+select the case. After each frame or violation, a new selection starts. Bytes that match no case are
+skipped.
 """
 
 import re
@@ -28,9 +29,9 @@ class SwitchFraming(NamedTuple):
     cases: tuple[tuple[bytes, Framing], ...]
     max_bytes: int
     otherwise: Framing | None = None
-    """Framing of frames that match no case; None: such frames are invalid."""
+    """Framing of frames that match no case; None: frames that match no case are invalid."""
     is_robot: bool = False
-    """Whether the framing is for the robot's end of the connection, in an emulated robot."""
+    """Whether the framing is for an emulated robot, at the robot's end of the connection."""
 
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> "SwitchFraming":

@@ -1,7 +1,7 @@
 """Framings: conversion between byte streams and frames.
 
 Pure. This module contains the table of framings, and builds a framing from its declaration. Each
-family is imported on first use. The interfaces are in `urc.protocol.framing.base`.
+family of framings is imported on first use. The interfaces are in `urc.protocol.framing.base`.
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ __all__ = ["FRAMINGS", "build_framing"]
 
 
 class AsymmetricFraming(NamedTuple):
-    """Different framings for sent and received data."""
+    """A framing with different framings for sent and received data."""
 
     sent: Framing
     received: Framing

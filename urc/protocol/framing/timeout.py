@@ -1,8 +1,8 @@
 """Timeouts and removal of terminal escape sequences, for any framing.
 
 Theory of operation. An incomplete frame blocks all later frames: a corrupted length field may
-require bytes that never arrive. With a timeout, silence after the newest byte ends the wait. The
-first bytes are then dropped one by one, until the remaining bytes contain valid frames. Terminal
+require bytes that never arrive. With a timeout, silence after the newest byte ends the wait. After
+the timeout, bytes are dropped one by one, until the remaining bytes contain valid frames. Terminal
 escape sequences are removed before framing, because a sequence could split a marker or a text.
 """
 
@@ -29,7 +29,7 @@ _LONGEST: Final = 300
 
 
 class TimeoutFraming(NamedTuple):
-    """A framing with a timeout for incomplete frames, or without terminal escape sequences."""
+    """A framing with a timeout for incomplete frames, or with removal of escape sequences."""
 
     framing: Framing
     timeout_s: float | None
@@ -58,7 +58,7 @@ class _PatientDecoder:
         self._newest: float | None = None
         """Time of the newest byte; None before the first byte."""
         self._told: list[bytes | FrameFault] = []
-        """Frames and violations found after the timeout."""
+        """Frames and violations found after the timeout, to be returned by `next`."""
         self._held = b""
         """Received bytes of an incomplete escape sequence."""
 
@@ -103,7 +103,7 @@ class _PatientDecoder:
         return self._decoder.next(now)
 
     def tick(self, now: float) -> list[bytes | FrameFault]:
-        """Return the frames and violations after silence until `now`."""
+        """Return the frames and violations that silence until `now` has completed."""
         frames = self._decoder.tick(now)
         self._discard(now)
         told, self._told = self._told, []

@@ -3,8 +3,7 @@
 Theory of operation. A stream of elements has no root, so each top-level element is a frame. Tags,
 comments, declarations and CDATA determine the end of an element. Quoted attribute values may
 contain markup characters. The scan jumps from marker to marker, and reads every byte once. Blanks,
-comments and declarations may separate frames. At a mismatched closing tag, all data up to the tag
-is dropped.
+comments and declarations may separate frames. Data up to a mismatched closing tag is dropped.
 """
 
 import re
@@ -71,7 +70,7 @@ class _XmlDecoder(StreamDecoder):
         self._open: list[bytes] = []
         """Names of the open elements, outermost first."""
         self._looked = 0
-        """Number of scanned bytes of the stream."""
+        """Number of scanned bytes of the current element."""
         self._tag = -1
         """Offset of an incomplete tag; -1 outside of tags."""
         self._quote = b""
@@ -124,7 +123,7 @@ class _XmlDecoder(StreamDecoder):
                 return self._looked
 
     def _to_piece(self) -> int:
-        """Find the next tag or section; return 1, `_WAIT` or `_BAD`."""
+        """Find the next tag or section; return 1 if found, otherwise `_WAIT` or `_BAD`."""
         stream, data = self._stream, self._stream.data
         place = data.find(b"<", stream.at + self._looked)
         if place < 0:
@@ -177,7 +176,7 @@ class _XmlDecoder(StreamDecoder):
                 return self._closed(bytes(data[stream.at + self._tag : place]))
 
     def _closed(self, tag: bytes) -> int:
-        """Process a complete tag; return `_BAD` for an invalid one."""
+        """Process a complete tag; return `_BAD` for an invalid tag."""
         self._tag = -1
         found = _NAME.match(tag)
         if found is None:

@@ -10,7 +10,7 @@ from urc.model.values import Alarm, AlarmLimits, Reading
 __all__ = ["AlarmMonitor"]
 
 _LEVELS: tuple[Alarm, ...] = ("lolo", "hihi", "low", "high")
-"""Alarm levels, most serious levels first."""
+"""Alarm levels in order of severity, most severe first."""
 _LOWER = ("lolo", "low")
 _DEEPER = {"lolo": "low", "hihi": "high"}
 
@@ -28,7 +28,7 @@ class AlarmMonitor:
             (level, limit) for level in _LEVELS if (limit := getattr(limits, level)) is not None
         ]
         self._due: dict[Alarm, float] = {}
-        """Start times of alarms, by exceeded level."""
+        """Start times of pending and active alarms, by crossed level."""
 
     @property
     def deadline(self) -> float | None:

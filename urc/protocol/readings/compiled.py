@@ -1,7 +1,8 @@
 """Generated decoders of text frames: one function per declaration, from text to samples.
 
-The function handles only the common case, in which every field is present and valid. In all other
-cases, the closures (`slow`) read the frame again. The tests compare the function with the closures.
+A generated decoder handles only the common case, in which every field is present and valid. In all
+other cases, the closures (`slow`) read the frame again. Tests compare the generated decoders with
+the closures.
 """
 
 from typing import TYPE_CHECKING, Final, cast

@@ -1,7 +1,7 @@
 """Generated decoders of binary frames: one function per declaration, from bytes to samples.
 
-Pure. Only frames with fixed positions of all items are supported. The closures read frames with
-invalid values, as in `urc.protocol.readings.compiled`.
+Pure. Generated decoders support only frames in which all items have fixed positions. The closures
+read frames with invalid values, as in `urc.protocol.readings.compiled`.
 """
 
 from typing import cast
@@ -21,7 +21,7 @@ __all__ = ["build_fast_struct"]
 def build_fast_struct(
     spec: ReadSpec, encoding: str, readings: Readings, slow: Compiled
 ) -> Compiled | None:
-    """Return the function for frames of `spec`, or None if they are unsupported."""
+    """Return a generated function for frames of `spec`; None if `spec` is not supported."""
     items = cast("tuple[Item, ...]", spec.options["items"])
     source = SourceBuilder()
     source.scope |= {"not_valid": not_valid, "BadItem": BadItem}
@@ -57,7 +57,7 @@ def build_fast_struct(
 
 
 def _numbers(items: tuple[Item, ...]) -> list[Item]:
-    """Return the integer items of the outermost level with at most a scale as conversion."""
+    """Return the integer items of the outermost level without conversions other than a scale."""
     return [
         item
         for item in items

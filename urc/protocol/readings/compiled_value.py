@@ -1,8 +1,8 @@
 """Shared code of the generated decoders for converting a raw field to a sample.
 
 Each engine builds the source text once: the field conversions, the checks and the samples. For a
-value of the wrong type or range, the function calls the closures (`slow`), which read the frame
-again.
+value of the wrong type or range, the generated function calls the closures (`slow`), which read the
+frame again.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -42,15 +42,15 @@ class Value(NamedTuple):
     convert: str
     """Expression over the raw text; "": no conversion."""
     checks: tuple[str, ...]
-    """Conditions over the value ``{v}`` for a valid value."""
+    """Conditions for a valid value, over the value ``{v}``."""
     raw_checks: tuple[str, ...] = ()
-    """Conditions over the raw text ``{r}`` for a valid value."""
+    """Conditions for a valid value, over the raw text ``{r}``."""
     is_finite: bool = True
     """Whether the value is always finite, or `checks` reject infinity and not-a-number."""
 
 
 def of_json_type(type_name: str, raw: str) -> str:
-    """Return the condition that a raw value has the JSON type and is within the supported range."""
+    """Return source text that checks the JSON type and the supported range of a raw value."""
     return _JSON_TYPES[type_name].format(r=raw)
 
 

@@ -20,7 +20,7 @@ class DataChangeFilter:
         self._told: Sample | None = None
         self._pending: Sample | None = None
         self._since = 0.0
-        """Time of the first sample with the value of `_pending`, in seconds."""
+        """Arrival time of the first sample with the value of `_pending`, in seconds."""
 
     @property
     def deadline(self) -> float | None:

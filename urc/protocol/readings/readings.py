@@ -33,7 +33,7 @@ class _Computed(NamedTuple):
 
 
 class Readings:
-    """The newest values of the inputs of formulas, and the alarm states of all signals.
+    """The conversion of fields to samples, with formula inputs and alarm states.
 
     Args:
         signals: loaded signals by name; no computed signal depends on itself.
@@ -96,11 +96,11 @@ class Readings:
     def set_values(
         self, values: Mapping[str, object], now: float
     ) -> tuple[list[Sample], list[str]]:
-        """Convert values from a source other than a frame, like fields."""
+        """Convert values that do not originate from a frame, in the same way as fields."""
         return self.decoder(values)(values, now)
 
     def alarm(self, name: str, value: Reading, now: float) -> Alarm:
-        """Update the alarm state of a signal, and return it."""
+        """Update and return the alarm state of a signal."""
         alarm_monitor = self._alarm_monitors.get(name)
         return "" if alarm_monitor is None else alarm_monitor.alarm_monitor(value, now)
 
@@ -109,12 +109,12 @@ class Readings:
         return name in self._alarm_monitors
 
     def keeps(self, name: str) -> bool:
-        """Return whether a formula or a timed alarm uses the signal; if so, `follow` is needed."""
+        """Return whether a formula or a timed alarm uses the signal, so `follow` is needed."""
         return name in self._kept
 
     @property
     def is_timed(self) -> bool:
-        """Whether a sample can change with time alone."""
+        """Whether a sample can change without new data, only with time."""
         return bool(self._timed or self._change_filter)
 
     @property
@@ -127,9 +127,9 @@ class Readings:
         return min((time for time in times if time is not None), default=None)
 
     def tick(self, now: float) -> list[Sample]:
-        """Return samples that changed with time alone until `now`, with their original times.
+        """Return samples that changed only with time until `now`, with their original times.
 
-        The list contains the newest samples of signals with a new alarm, and debounced samples.
+        The result contains the newest samples of signals with a new alarm, and debounced samples.
         """
         samples: list[Sample] = []
         if self._change_filter:

@@ -1,6 +1,7 @@
 """Limits of a command: maximum duration, and transports in use.
 
-Pure. Every wait of an engine has a timeout; the maximum duration is the sum of the timeouts.
+Pure. Every wait of an engine has a timeout, and the maximum duration of a command is the sum of all
+timeouts.
 """
 
 from collections.abc import Callable, Mapping
@@ -48,10 +49,10 @@ def longest_s(driver: Driver, name: str) -> float:
 
 
 def calm_s(driver: Driver) -> float:
-    """Return the minimum delay to a deadline after any frame or command, in seconds; 0 if unknown.
+    """Return the minimum delay between a frame or command and the next deadline; 0 if unknown.
 
-    Deadlines come from replies, polls and stale connections. Sequences and framing timeouts are not
-    considered.
+    Deadlines come from replies, polls and stale connections. Deadlines of sequences and framing
+    timeouts are not considered.
     """
     if any(one.verify or one.rate_per_s for one in driver.commands.values()):
         return 0.0

@@ -1,8 +1,9 @@
 """Generated encoders: one function per command, which encodes arguments to bytes.
 
-The function handles only the common case, in which every argument is a number of the declared type.
-The closures of `urc.protocol.requests.encode` handle all other cases. The tests compare the
-function with the closures. Only sums, products and ``fixed`` over numbers are supported.
+A generated encoder handles only the common case, in which every argument is a number of the
+declared type. The closures of `urc.protocol.requests.encode` handle all other cases. The tests
+compare the function with the closures. Only sums, products and ``fixed`` over numbers are
+supported.
 """
 
 import ast
@@ -35,7 +36,7 @@ _LARGEST: Final = 1e308
 
 
 class _Unsupported(Exception):
-    """A part of a template cannot be translated."""
+    """A part of the template cannot be translated."""
 
 
 def build_fast_encode(
@@ -119,7 +120,7 @@ def build_fast_check(
 
 
 def _range(variable: str, argument: Argument) -> str:
-    """Return the condition that a variable is a valid value of the argument."""
+    """Return source text that checks that a variable is a valid value of the argument."""
     low = -_LARGEST if argument.min is None else argument.min
     high = _LARGEST if argument.max is None else argument.max
     whole = f"type({variable}) is int"

@@ -25,7 +25,7 @@ class SignalState:
         self._last: dict[str, Sample] = {}
 
     def latch(self, reason: str) -> None:
-        """Record the reason of a stop; "" resets the stop."""
+        """Record a stop with its reason, or the reset of the stop with ""."""
         self.latched = reason
         self.stops += reason != ""
 
@@ -49,7 +49,7 @@ class SignalState:
         *,
         since: float = float("-inf"),
     ) -> "ConditionScope":
-        """Return a namespace of fresh signals.
+        """Return a namespace of fresh signals, settings and `names`.
 
         Args:
             now: current time, in seconds.

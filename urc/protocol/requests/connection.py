@@ -54,7 +54,7 @@ class Connection:
         self.held = HoldReplies()
         """Handler of the replies to held commands."""
         self.is_behind = False
-        """Whether received frames wait for a call of `process_frames`."""
+        """Whether buffered frames wait for a call of `process_frames`."""
         self._askers: dict[object, object] = {}
         """Sequences that made numbered requests, by request number."""
         self._is_leaving = False
@@ -106,7 +106,7 @@ class Connection:
         return events + self._pump(now)
 
     def fail(self, reason: str, now: float) -> list[LineEvent]:
-        """Close the connection with a reason; all pending requests fail."""
+        """Close the connection for the given reason; all pending requests fail."""
         if self.state == "closed":
             return []
         reason = self.receiver.secrets.hide(reason)

@@ -9,9 +9,9 @@ afterwards (`Close`). The module is pure: callers pass the time.
 Requests in flight are kept in the order of sending. A received frame is offered to all requests in
 flight, oldest first. A request with a correlation accepts only its own reply. Of the other
 requests, only the oldest accepts the frame, because replies arrive in order. Real-time requests
-have a separate order. After a timeout, a request stays in flight as *late* for another reply
-timeout. A late reply is dropped, so the next request does not accept the late reply. Until the late
-reply arrives or times out, requests with similar replies wait. After `MISSES_UNTIL_CLOSED`
+have a separate order of replies. After a timeout, a request stays in flight as *late* for another
+reply timeout. A late reply is dropped, because the next request must not accept a late reply. Until
+the late reply arrives or times out, requests with similar replies wait. After `MISSES_UNTIL_CLOSED`
 consecutive missing replies, the connection is closed and reopened.
 """
 
@@ -56,7 +56,7 @@ MOST_IN_FLIGHT = 256
 
 
 class Conversation(Connection):
-    """The conversation on one transport."""
+    """The conversation on one transport: requests, replies and messages."""
 
     def __init__(self, spec: TransportSpec, messages: list[Matcher]) -> None:
         super().__init__(spec, messages)
@@ -66,7 +66,7 @@ class Conversation(Connection):
         self._free_at = float("-inf")
         """Earliest time of the next request after the reply to motion."""
         self._may_recut = False
-        """Whether the framing may have to change for a pending reply or step."""
+        """Whether the framing may differ for a pending reply or step."""
         self._number = 0
         """Number of the last envelope that expects a reply; numbers are never reused."""
 
@@ -292,8 +292,9 @@ class Conversation(Connection):
     def _ahead(self, now: float) -> list[LineEvent]:
         """Process messages at the front of the stream, and report their samples together.
 
-        Processing many short frames one by one takes almost twice as long (decision 27). The batch
-        ends with the expected reply, with a refused value, or before a frame that is not a message.
+        Processing many short frames one by one takes almost twice as long (decision 27). A batch of
+        messages ends with the expected reply, with a refused value, or before a frame that is not a
+        message.
         """
         receiver, decoder, pending = (
             self.receiver,
@@ -488,8 +489,8 @@ class Conversation(Connection):
     ) -> list[LineEvent]:
         """Return the events of a frame with the match result `offer` for a request.
 
-        A provisional reply may also be a message. Without a `frame`, the message has already been
-        reported.
+        A provisional reply may also be a message. If `frame` is missing, the message has already
+        been reported.
         """
         exchange = pending.exchange
         events: list[LineEvent] = self.receiver.dropped(offer) if offer.dropped else []
@@ -552,13 +553,13 @@ class Conversation(Connection):
             return []
         else:
             self._pending_replies.remove(pending)
-            text = f"the answer to {exchange.ask.label} was late and has been dropped"
+            text = f"the late answer to {exchange.ask.label} has been dropped"
             return [Violation(self.spec.name, "late-reply", text)]
         pending.is_late = False
         return None
 
     def _silent(self, pending: PendingReply, now: float) -> list[LineEvent]:
-        """Treat the silence of the robot as success."""
+        """Treat silence of the robot as a successful reply."""
         if pending.next_stage(now):
             return []
         self._pending_replies.remove(pending)

@@ -1,6 +1,6 @@
-"""Encoding of command arguments: checked values, then the bytes of one frame.
+"""Check of command arguments, and encoding into the bytes of a frame.
 
-Pure. The server checks all arguments here, for browsers, scripts and tests alike.
+Pure. This module checks the arguments from browsers, scripts and tests.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -37,7 +37,7 @@ def build_encode(
 ) -> Encode:
     """Return a function that encodes and frames `send`; constant frames are encoded once.
 
-    The frames of a group are joined, so all frames are sent together.
+    The frames of a group are joined, so all frames of the group are sent together.
     """
     if send.form == "frames":
         return _together([build_encode(one, framing, context, arguments) for one in each_of(send)])
@@ -74,7 +74,7 @@ def _together(encodes: Sequence[Encode]) -> Encode:
 def build_check(
     command: Command, *, is_compiled: bool = False
 ) -> Callable[[Mapping[str, object]], dict[str, Reading]]:
-    """Return `check_arguments` for one command."""
+    """Return a function that checks the arguments of one command."""
     check = partial(check_arguments, command)
     if not is_compiled:
         return check

@@ -38,7 +38,7 @@ class ExchangeOutcome(NamedTuple):
     """The result of a request."""
 
     code: str = ""
-    """"" for success; otherwise a code of `urc.protocol.events.Failed`."""
+    """Failure code as in `urc.protocol.events.Failed`; "" for success."""
     message: str = ""
     values: Mapping[str, Reading] = NOTHING
 
@@ -77,24 +77,25 @@ class CompiledRequest(NamedTuple):
     """Whether a missing reply also causes a retry, not only a retransmission request by the
     robot."""
     retry: Retry = Retry()
-    """Delays before the retries."""
+    """Delays before retries of the request."""
     has_counters: bool = False
     is_motion: bool = False
     """Whether the request moves the robot. On a connection that is not ready, motion requests fail
     immediately."""
     learnt: frozenset[str] = frozenset()
-    """Names in the templates that the login reads."""
+    """Names in the request's templates that the login reads."""
     is_fresh: bool = False
     """Whether the request contains the time or a nonce."""
     is_local: bool = False
-    """Whether the templates use only arguments and counters."""
+    """Whether the request's templates use only arguments and counters."""
     queue_s: float = 0.0
     """Maximum time in the queue, in seconds."""
     plain: Matcher | None = None
-    """Reader of the only reply, if the reply contains only samples; otherwise None."""
+    """Reader of the reply, for a request with a single reply that contains only samples; otherwise
+    None."""
     is_miss_harmless: bool = False
-    """Whether a missing reply does not count as a fault of the connection, because the poll counts
-    missing replies."""
+    """Whether only the poll counts missing replies, so a missing reply does not indicate a lost
+    connection."""
     is_numbered: bool = False
     """Whether the request is an envelope with a number that the reply repeats."""
 
@@ -102,7 +103,7 @@ class CompiledRequest(NamedTuple):
         """Return the payload; None if the payload must be rendered at the time of sending.
 
         Raises:
-            BadArgument: the payload cannot be written with these names.
+            BadArgument: the payload cannot be encoded with `names`.
         """
         if self.learnt:
             return None
@@ -113,7 +114,7 @@ class CompiledRequest(NamedTuple):
 
     @property
     def is_in_order(self) -> bool:
-        """Whether the reply to this request is identified only by the order of replies."""
+        """Whether only the order of replies identifies the reply."""
         return self.match is None and not self.is_numbered
 
 
@@ -176,7 +177,7 @@ class Exchange:
         on_sent: Callable[[Payload], None] | None = None,
         unless: Callable[[], str] | None = None,
     ) -> "Exchange":
-        """Set the rarely used attributes, and return the exchange."""
+        """Set rarely used attributes, and return the exchange."""
         self.on_sent = on_sent
         self.is_privileged = is_privileged
         self.is_secret = is_secret

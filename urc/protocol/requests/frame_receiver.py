@@ -35,7 +35,7 @@ __all__ = ["FrameReceiver"]
 _HIDDEN: Final = "•••"
 _MOST_SECRETS: Final = 8
 _SHORTEST: Final = 3
-"""Minimum length of a secret for partial redaction. Shorter secrets occur in many words, so the
+"""Minimum length of a secret for partial redaction. A shorter secret occurs in many words, so the
 whole message is hidden."""
 
 
@@ -90,7 +90,7 @@ class FrameReceiver:
         self._stray: tuple[float, str] = (float("-inf"), "")
 
     def reset(self, *, is_new: bool) -> None:
-        """Clear the state of a connection.
+        """Clear the received data and all expectations of a connection.
 
         Secrets are kept until the next connection, because late messages may still contain a
         secret.
@@ -113,14 +113,14 @@ class FrameReceiver:
 
     @property
     def has_more(self) -> bool:
-        """Whether undecoded bytes remain."""
+        """Whether the buffer contains undecoded bytes."""
         return self._stream.at < len(self._stream.data)
 
     def _cut(self, framing: Framing) -> None:
         self._cut_by = framing
         self.decoder: Decoder = framing.decoder(self._stream)
         self.is_timed = getattr(type(self.decoder), "deadline", None) is not StreamDecoder.deadline
-        """Whether a timeout may complete a frame."""
+        """Whether the decoder has timeouts."""
 
     def publish(self, frame: Frame, now: float) -> list[LineEvent]:
         """Return the events of a frame that is not a reply."""
@@ -133,11 +133,11 @@ class FrameReceiver:
         return told or [] if heard is None else heard + (told or [])
 
     def came_since(self, since: float, instead: str) -> str:
-        """Return an addition to "no answer" with the unexpected frame; "" if no frame arrived.
+        """Return a text about an unexpected frame during a wait; "" if no frame arrived.
 
         Args:
             since: start time of the wait, in seconds.
-            instead: end of the text "which is …", such as "no answer to home".
+            instead: description of the unexpected frame, such as "no answer to home".
         """
         time_s, text = self._stray
         if time_s < since:
@@ -223,7 +223,7 @@ class FrameReceiver:
         """Return the events of a reply to a request of `asker`, for the expecting step.
 
         Args:
-            asker: the sequence that made the request, and alone receives the reply.
+            asker: the sequence that made the request; only this sequence receives the reply.
             frame: the reply.
             refusal: the robot's refusal as text; "": no refusal.
             now: current time, in seconds.

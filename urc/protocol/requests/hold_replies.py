@@ -1,15 +1,15 @@
 """Replies to frames of motion: acknowledgements and refusals.
 
-Pure. Frames of motion bypass the queue of the connection, so frames of motion have no pending
-reply. This module handles robots that reply to each frame: an acknowledgement is expected, and a
-refusal ends the motion. An unsolicited refusal also ends the motion, such as a refusal because of
-an open safety guard.
+Pure. Frames of motion bypass the queue of the connection, and have no `PendingReply`. This module
+handles robots that reply to each frame: an acknowledgement is expected, and a refusal ends the
+motion. An unsolicited refusal also ends the motion, such as a refusal because of an open safety
+guard.
 
 In half duplex, frames of motion wait for a pending reply, and queued requests wait for replies to
-motion. These waits are short, because a lost reply must not prevent motion. A stop bypasses this
-module and never waits.
+motion. Waits for replies to motion are short, because a lost reply must not prevent motion. A stop
+never waits for replies.
 
-A command expects replies from the first frame until the reply timeout of the newest frame.
+A held command expects replies from its first frame until the reply timeout of the newest frame.
 """
 
 from collections.abc import Mapping
@@ -124,7 +124,7 @@ class HoldReplies:
         return found
 
     def refuse(self, frame: Frame, reason: str, now: float) -> list[HoldRejected]:
-        """Return the refusals by an error response, with the driver's texts if declared."""
+        """Return the refusals in an error response, with the driver's texts if declared."""
         plain = [
             HoldRejected(name, MatchResult(refusal=reason)) for name, _ in self._listening(now)
         ]

@@ -1,8 +1,8 @@
 """Additional effects of messages: values from several frames, and acknowledgements.
 
-Pure. Both effects occur during the conversion from fields to samples, exactly once per message.
-Collected values are cleared with the connection. Acknowledgements wait in `Acknowledgements` until
-the conversation has reported the frame.
+Pure. Both effects of a message occur during the conversion from fields to samples, exactly once per
+message. Incomplete collected values are discarded when the connection is lost. Acknowledgements
+wait in `Acknowledgements` until the conversation has reported the frame.
 """
 
 from collections.abc import Callable, Mapping
@@ -55,7 +55,7 @@ class Collector:
             value = spec.value.evaluate(names)
         except ExpressionError as error:
             self._parts = None
-            return Unusable(f"a part cannot be collected: {error}")
+            return Unusable(f"part of the value cannot be computed: {error}")
         self._size += len(value) if isinstance(value, (list, tuple, bytes)) else 1
         if self._size > spec.max:
             self._parts = None
@@ -115,7 +115,7 @@ def answering(
         names: function that returns the namespace for a time and fields.
         counters: function that returns the connection's counters; None for a frame without
             counters.
-        replies: list that receives the acknowledgement.
+        replies: list of pending acknowledgements, which receives the acknowledgement.
         decode: function that converts the fields to samples.
     """
 
@@ -124,7 +124,7 @@ def answering(
         try:
             reply = made(now, found)
         except BadArgument as error:
-            return samples, [*refused, f"the answer cannot be sent: {error}"]  # type: ignore[return-value]
+            return samples, [*refused, f"the acknowledgement cannot be sent: {error}"]  # type: ignore[return-value]
         if len(replies) < MOST_REPLIES:
             replies.append(reply)
         return samples, refused  # type: ignore[return-value]

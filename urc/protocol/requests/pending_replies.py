@@ -18,7 +18,7 @@ __all__ = ["PendingReply", "PendingReplies"]
 
 
 class PendingReply:
-    """One transmission of a request, until its last reply arrives or times out."""
+    """One transmission of a request that waits for its last reply or a timeout."""
 
     __slots__ = (
         "_expectation",
@@ -45,7 +45,7 @@ class PendingReply:
         self.since = now
         """Start time of the wait for the current reply, in seconds."""
         self.is_extended = False
-        """Whether the robot has extended the timeout."""
+        """Whether the robot has extended the reply timeout."""
         self.is_late = False
         """Whether the reply has timed out. A late reply may still arrive, and must not match
         another request."""
@@ -94,7 +94,7 @@ class PendingReply:
         self.due = min(now + answer.timeout_s, self.since + answer.extend_s + late_s)
 
     def waited(self, now: float) -> str:
-        """Return the elapsed timeout as text for messages."""
+        """Return the elapsed reply timeout as text, for messages."""
         answer = self.expectation.answer
         if not self.is_extended:
             return f"within {answer.timeout_s:g} s"
@@ -103,7 +103,7 @@ class PendingReply:
         return f"within {answer.timeout_s:g} s after the robot reported that it was busy"
 
     def next_stage(self, now: float) -> bool:
-        """Start the wait for the next reply; return False after the last one."""
+        """Start the wait for the next reply; return False after the last reply."""
         answers = self.exchange.ask.answers
         self.stage += 1
         if self.stage == len(answers):
@@ -161,7 +161,7 @@ class PendingReplies(list[PendingReply]):
 
     @property
     def deadline(self) -> float | None:
-        """Time of the first timeout."""
+        """Time of the first timeout of all pending replies; None without a pending reply."""
         if len(self) == 1:
             return self[0].due
         return min((pending.due for pending in self), default=None)
@@ -247,7 +247,7 @@ class PendingReplies(list[PendingReply]):
 
 
 def _plain(raw: object) -> Reading:
-    """Return the plain value of a raw field, for a reply."""
+    """Return a raw field as a plain reply value."""
     if isinstance(raw, (list, tuple)):
         return tuple(map(_plain, raw))
     if raw is None or isinstance(raw, (bool, int, float, str, bytes, Mapping)):

@@ -1,4 +1,4 @@
-"""Admission of frames: the queue of a connection, rate limits, counters.
+"""Queue of a connection, rate limits and counters.
 
 Pure. All queues are bounded, and dropped requests are returned for reporting.
 """
@@ -20,7 +20,7 @@ REALTIME: Final = 0
 class GcraLimiter:
     """A rate limiter: the generic cell rate algorithm, with one period of tolerance.
 
-    After a pause, two calls may pass immediately; the long-term rate stays constant. A minimum gap
+    After a pause, two calls may pass immediately; the average rate stays constant. A minimum gap
     would reduce the rate, because a call that is slightly early would have to wait.
     """
 
@@ -65,7 +65,7 @@ class FrameCounters:
 
     @property
     def count(self) -> Count:
-        """The effect of the frame on the counters."""
+        """Effect of the frame on the counters of the connection."""
         before = {name: self._last[name] for name in self.values if name in self._last}
         return Count(before, dict(self.values))
 
@@ -73,18 +73,18 @@ class FrameCounters:
 class Counters:
     """The counters of one connection.
 
-    Numbers are assigned in the order of transmission. If the engine is the only sender, this order
-    is certain. If the guard also sends motion, the counters are *shared*: the engine only proposes
-    numbers, and receives the actual numbers later.
+    Numbers are assigned in the order of transmission. If the engine is the only sender, the order
+    of transmission is known. If the guard also sends motion, the counters are *shared*: the engine
+    only proposes numbers, and receives the actual numbers later.
     """
 
     __slots__ = ("_known", "_last", "ahead", "is_shared")
 
     def __init__(self) -> None:
         self._last: Mapping[str, int] = {}
-        """Counter values after the transmission of all pending frames."""
+        """Last numbers after the transmission of all pending frames, by counter."""
         self._known: Mapping[str, int] = {}
-        """Last confirmed counter values."""
+        """Last confirmed numbers of the counters, by counter."""
         self.ahead = 0
         """Number of frames counted since the last confirmation."""
         self.is_shared = False
@@ -150,7 +150,10 @@ class Counters:
         return place + self.ahead < most
 
     def reset(self) -> None:
-        """Reset the counters for a new connection. Shared counters wait for confirmed values."""
+        """Reset the counters for a new connection.
+
+        Shared counters keep their values until `set_counters`.
+        """
         if not self.is_shared:
             self._last = self._known = {}
 

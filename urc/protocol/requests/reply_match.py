@@ -36,7 +36,8 @@ _MOST_COLLECTED: Final = 1 << 20
 
 
 Aside = Literal["resend", "extend"]
-"""Kind of a provisional reply: a request for retransmission, or for more time."""
+"""Kind of a provisional reply: ``resend`` requests a retransmission, ``extend`` requests more
+time."""
 
 
 class Matcher:
@@ -56,8 +57,8 @@ class Matcher:
         self.reader = reader
         self.decode = decode
         self.take: Compiled = compiled or self._take
-        """Function that returns samples and refused values; None for a frame that does not
-        match."""
+        """Function that returns the samples and refused values of a frame; None for a frame that
+        does not match."""
 
     def _take(self, frame: Frame, now: float) -> Taken | None:
         found = self.read(frame)
@@ -90,7 +91,7 @@ class CompiledReply(NamedTuple):
     extend_s: float = 0.0
     """Maximum total extension of the timeout, in seconds."""
     is_silence: bool = False
-    """Whether silence until the timeout counts as success."""
+    """Whether silence until the reply timeout counts as success."""
     takes_redirects: bool = False
     """Whether the reply reads the target of a redirect; a redirect is then not a failure."""
 
@@ -150,7 +151,7 @@ class Expectation:
         return self._refusal(self._so_far(frame), is_mine)
 
     def _so_far(self, frame: Frame) -> Frame:
-        """Return the text to search for a refusal: all frames so far of a counted reply."""
+        """Return the frame to search for a refusal; for a counted reply, all frames so far."""
         if not (self._lines and isinstance(self.answer.lines, int)):
             return frame
         if not isinstance(frame.payload, bytes):

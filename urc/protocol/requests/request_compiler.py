@@ -1,4 +1,4 @@
-"""Compiler for the declared requests of a driver, used once per engine. Pure."""
+"""Compilation of a driver's declared requests, once per engine. Pure."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -32,8 +32,8 @@ class RequestCompiler:
     """A compiler for the requests of one driver.
 
     Raises:
-        BadArgument: a constant frame contains its own delimiter, or cannot be encoded (from every
-            method).
+        BadArgument: a constant frame contains its own delimiter, or cannot be encoded. Every method
+            may raise this error.
     """
 
     def __init__(
@@ -117,7 +117,7 @@ class RequestCompiler:
     def compile_step(self, label: str, step: SendStep) -> CompiledRequest:
         """Return the compiled request of a step.
 
-        All steps have normal rank, so the requests keep the order of the steps.
+        Requests of steps have normal rank, and therefore keep the order of the steps.
         """
         return self.plain(label, step.transport, step.send)._replace(rank=RANKS["normal"])
 

@@ -89,7 +89,7 @@ class RequestQueue(PriorityQueue[Exchange]):
         return self._has_room(exchange) and _free_at(exchange) <= now
 
     def wants_line(self, now: float) -> bool:
-        """Return whether a queued request needs only a connection."""
+        """Return whether a queued request waits only for a connection."""
         return any(_free_at(exchange) <= now for exchange in self)
 
     def may_send_at(self, *, is_ready: bool) -> float | None:
@@ -122,12 +122,12 @@ def written(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]
     """Render a frame with the next counter numbers; a retry keeps the numbers.
 
     Args:
-        exchange: a request to render at the time of sending.
+        exchange: request that must be rendered at the time of sending.
         counters: counters of the connection.
         learnt: values that the login has read, by name.
 
     Raises:
-        BadArgument: the frame cannot be encoded; its numbers are still used.
+        BadArgument: the frame cannot be encoded; its counter numbers remain used.
     """
     draw = counters.draw()
     count = Count({}, {})

@@ -1,4 +1,4 @@
-"""Conditions of commands: requirements before sending, and verification after the reply. Pure."""
+"""Conditions of commands: requirements, confirmations, and verification after the reply. Pure."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -97,7 +97,7 @@ def why_refused(
     confirmed_by: tuple[str, ...],
     now: float,
 ) -> ExchangeOutcome | None:
-    """Return the failure for an unmet requirement or missing confirmation; None if allowed."""
+    """Return the failure for an unmet requirement or missing confirmation, or None."""
     why_not = why_not_allowed(command, known, values, now)
     if why_not:
         return ExchangeOutcome("not-allowed", why_not)
@@ -127,7 +127,7 @@ def exchange_of(
         sink: function that receives the outcome.
         now: current time, in seconds.
         known: state of the robot, for conditions.
-        verifications: collection that receives a run with verification after the reply.
+        verifications: receives the run of a command with verification.
 
     Raises:
         BadArgument: the frame cannot be encoded with these arguments.
@@ -150,7 +150,7 @@ def exchange_of(
 
 
 def _written(value: object) -> str:
-    """Return a value in the notation of a document key."""
+    """Return an argument value in the notation of a document key."""
     if isinstance(value, bool):
         return "true" if value else "false"
     return f"{value:g}" if isinstance(value, float) else str(value)
@@ -179,7 +179,7 @@ class Verifications:
 
     @property
     def is_full(self) -> bool:
-        """Whether the maximum number of verifications is reached."""
+        """Whether the number of waiting commands has reached the maximum."""
         return len(self._waiting) >= _MOST
 
     @property
@@ -227,7 +227,7 @@ class UnverifiedRun:
     __slots__ = ("_sink",)
 
     def __init__(self, sink: Sink) -> None:
-        """Initialise with a `sink` for the outcome."""
+        """Initialise the run with a `sink` for the outcome."""
         self._sink = sink
 
     def ended(self, exchange: Exchange, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
@@ -247,7 +247,7 @@ class VerifiedRun:
         sink: Sink,
         verifications: Verifications,
     ) -> None:
-        """Initialise with a `sink` for the outcome after reply and verification."""
+        """Initialise the run with a `sink` for the outcome after reply and verification."""
         self.verify = verify
         self.values = values
         self.sink = sink

@@ -1,7 +1,7 @@
 """Control of a running sequence: pause, single step, resume and abort.
 
-Pure. Requests may arrive at any time. A request takes effect between two steps, so no step is
-interrupted.
+Pure. Control requests may arrive at any time. Control requests take effect between two steps, so no
+step is interrupted.
 """
 
 from typing import Final, Literal
@@ -30,9 +30,9 @@ class SequenceControl:
         self.is_paused = False
         self.is_aborted = False
         self.reason = ""
-        """Reason for the failure; "" without a failure."""
+        """Reason for the failure of the last run; "" without a failure."""
         self.count = 0
-        """Counter of changes to the public attributes."""
+        """Number of changes to the public attributes."""
         self._halt: Literal["", "now", "next", "outer"] = ""
         """Position of the next pause: ``now`` before any step, ``outer`` before the next outermost
         step, ``next`` after one more outermost step; "": no pause."""
@@ -52,7 +52,7 @@ class SequenceControl:
     # -- for the runner
 
     def start(self) -> None:
-        """Record the start of a run."""
+        """Record the start of a run of the sequence."""
         self.place, self.reason = 0, ""
         self.is_running, self.is_paused, self.is_aborted = True, False, False
         self.count += 1
@@ -65,7 +65,7 @@ class SequenceControl:
             self._halt = "outer"
 
     def end(self, reason: str) -> None:
-        """Record the end of a run."""
+        """Record the end of a run of the sequence."""
         self._halt, self.reason = "", reason
         self.is_running, self.is_paused, self.is_aborted = False, False, False
         self.count += 1

@@ -2,8 +2,8 @@
 
 Pure. Each step becomes a function when the engine is built. A `SequenceRunner` calls the functions
 in order, until a step must wait for a reply, a frame, a prompt, a condition or a delay. The engine
-handles the events and calls `advance` again. Every loop is bounded and every wait has a timeout, so
-every sequence ends.
+processes the returned events and calls `advance` again. Every loop is bounded and every wait has a
+timeout, so every sequence ends.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -23,11 +23,11 @@ __all__ = ["Action", "SequenceHost", "CompiledSequence", "SequenceRunner", "Sink
 Sink = Callable[[ExchangeOutcome, float], list[LineEvent]]
 """Function that receives an outcome and the time, and returns the resulting events."""
 Unless = Callable[[], str]
-"""Function that returns why a request is obsolete; "" if not obsolete."""
+"""Function that returns why a request is obsolete; "" for a valid request."""
 
 
 class SequenceHost(Protocol):
-    """The interface between sequences and the engine."""
+    """The engine's interface for sequences."""
 
     lines: Mapping[str, Conversation]
     known: SignalState
@@ -177,7 +177,7 @@ class SequenceRunner:
             self._resume()
 
     def expire(self, now: float) -> None:
-        """Handle the timeout of the current wait."""
+        """Process the timeout of the current wait."""
         if self.ends_at is not None and self.ends_at <= now:
             self.stop("timed-out", "it took too long")
             return
@@ -258,7 +258,7 @@ class SequenceRunner:
         self.is_waiting, self.due = True, due
 
     def wait(self) -> None:
-        """Wait until `done` is called."""
+        """Wait for a call of `done`."""
         self.is_waiting = True
 
     def listen(

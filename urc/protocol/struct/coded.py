@@ -2,8 +2,8 @@
 
 Pure. ``varint`` is LEB128 as in Protocol Buffers, and ``zigzag`` is its signed form. ``bcd`` has
 two decimal digits per byte. ``f32cdab`` has swapped 16-bit words, and ``u14by7le`` has seven bits
-per byte. Packed arrays have consecutive numbers of any width, across byte boundaries. All numbers
-have at most 64 bits.
+per byte. Packed arrays have consecutive numbers of any width, across byte boundaries. No number has
+more than 64 bits.
 """
 
 from collections.abc import Callable, Mapping
@@ -34,7 +34,7 @@ FAULT: Final = ""
 
 
 class OtherFrame(Exception):
-    """The bytes do not match the declared frame."""
+    """The received bytes do not match the declared frame."""
 
 
 def note(out: Out, name: str, meaning: Callable[[Any], Any], raw: Any) -> None:
@@ -46,7 +46,7 @@ def note(out: Out, name: str, meaning: Callable[[Any], Any], raw: Any) -> None:
 
 
 def coded_reader(number: Number) -> Callable[[bytes, int, int], tuple[Any, int]]:
-    """Return a function that reads a raw number within bounds, and returns the number and its end.
+    """Return a function that reads a raw number from data between two offsets.
 
     The function raises `OtherFrame` for an invalid number.
     """
@@ -104,7 +104,7 @@ def _shifts(item: Item, count: Extent) -> list[int]:
 
 
 def packed_writer(item: Item, count: Extent) -> Callable[[Mapping[str, Any], bool], bytes]:
-    """Return a function that encodes a packed array; parameters: scope, missing values are zero."""
+    """Return a function ``(scope, is_lenient)`` that encodes a packed array as bytes."""
     size, shifts = packed_size(item.number, count), _shifts(item, count)
     checked, mask, name = checked_raw(item), (1 << item.number.bits) - 1, item.id
     zero = (

@@ -68,7 +68,7 @@ class StructWriter:
 
 
 def _with_counters(items: tuple[Item, ...]) -> tuple[tuple[Item, ...], dict[str, str]]:
-    """Return the items with an id for each counter, and ``seq.NAME`` by id."""
+    """Return the items with an id for each counter, and a mapping of these ids to ``seq.NAME``."""
     named, counters = list(items), dict[str, str]()
     for place, item in enumerate(items):
         counter = counter_in(item.value.source) if item.value is not None else ""

@@ -20,12 +20,12 @@ GAP = "gap of "
 
 
 class Backpatch(NamedTuple):
-    """The gap for a number that is filled in later."""
+    """A gap in the frame for a number that is computed later."""
 
     at: int
     item: Item
     container: Number
-    """Type of the number that contains the gap's number, at `shift`."""
+    """Type of the number that contains the missing number, at bit `shift`."""
     shift: int = 0
 
 
@@ -54,7 +54,7 @@ class FrameBuilder:
                 scope[name] = _moved(value, at, len(data))
 
     def fill(self, gap: Backpatch, value: object) -> None:
-        """Write `value` into a gap."""
+        """Write `value` into a gap; raise `NotWritable` if impossible."""
         raw = raw_of(gap.item)(value)
         container, end = gap.container, gap.at + gap.container.size
         if end > len(self.bytes):

@@ -4,8 +4,8 @@ Pure. The module is the readable version of `urc.protocol.struct.read_source`, w
 runs of fixed items. Tests compare the results of both modules. Theory of operation: every item
 becomes a step ``(data, at, end, out) -> after``. A step reads bytes from `at` to at most `end`, and
 stores the value in `out`. A step raises `OtherFrame` for a frame that does not match. The first
-invalid value is recorded under the key `FAULT`, and reading continues: only a frame that matches to
-its end counts as invalid.
+invalid value is recorded under the key `FAULT`, and reading continues, because only a frame that
+matches to its end counts as invalid.
 """
 
 from collections.abc import Callable, Mapping
@@ -160,7 +160,7 @@ def _bits_step(item: Item, encoding: str) -> Step:
 
 
 def bit_parts(item: Item) -> list[BitPart]:
-    """Return the parts of ``bits``."""
+    """Return the parts of a ``bits`` item."""
     parts = []
     left = item.number.bits
     for part in item.items:

@@ -1,8 +1,8 @@
 """Generated functions that read struct items, one per declaration.
 
 Pure. Each run of fixed items becomes one `struct.Struct` and straight-line Python code. The
-closures of `urc.protocol.struct.read` read all other items. Tests compare the results of the
-function and the closures for the same bytes.
+closures of `urc.protocol.struct.read` read all other items. Tests require equal results from the
+generated functions and the closures.
 """
 
 from collections.abc import Callable, Mapping
@@ -61,7 +61,8 @@ def add_fixed(
         data: name of the variable that contains the frame.
 
     Returns:
-        The lines that follow, and field → expression that is valid after these lines.
+        The source lines for decoding, and an expression for each field that is valid after these
+        lines.
     """
     has_open_end = bool(items) and _is_open_end(items[-1])
     parts = list(runs_of(items[:-1] if has_open_end else items))

@@ -22,7 +22,7 @@ class FixedField(NamedTuple):
 
     item: Item
     name: str
-    """Name of the field, including outer structs; "": no field."""
+    """Name of the field, including the names of outer structs; "": no field."""
     outer: str
     """Joined name of the outer structs."""
     code: str
@@ -31,7 +31,7 @@ class FixedField(NamedTuple):
     values: int = 1
 
     def bit_parts(self) -> list[BitPart]:
-        """Return the parts of ``bits`` with their field names."""
+        """Return the parts of a ``bits`` item with their field names."""
         outer = self.outer
         return [
             (part._replace(id=joined_name(outer, part.id) if part.id else ""), at, mask, sign, told)

@@ -1,8 +1,8 @@
 """Conversion between raw forms and values of struct items.
 
-Pure. The closures and the slow paths of generated functions share this conversion. The raw form is
-the number or the bytes in the frame. The value is the field or argument: a scaled number, a word of
-an enum, or a text.
+Pure. The closures and the slow paths of generated functions share this conversion. The raw form of
+an item is the number or the bytes in the frame. The value of an item is a field or argument: a
+scaled number, a word of an enum, or a text.
 """
 
 import struct
@@ -119,7 +119,7 @@ def _wanted(item: Item) -> str:
 
 
 def checked_raw(item: Item) -> Callable[[Any], tuple[Any, Any]]:
-    """Return a function from a value to the raw number and the value after reading back."""
+    """Return a function that converts a value to the raw number, and reads the number back."""
     raw_from, meaning = raw_of(item), meaning_of(item)
 
     def checked(value: Any) -> tuple[Any, Any]:
@@ -133,7 +133,7 @@ def checked_raw(item: Item) -> Callable[[Any], tuple[Any, Any]]:
 
 
 def number_writer(number: Number, name: str) -> Callable[[Any], bytes]:
-    """Return the function from a raw number, which must fit, to its bytes."""
+    """Return a function that encodes a raw number within the range of the type."""
     pack = plain_writer(number)
 
     def write(raw: Any) -> bytes:
@@ -208,7 +208,7 @@ def fixed_bytes(item: Item) -> Callable[[bytes], bytes]:
 
 
 def hex_bytes(text: str, name: str) -> bytes:
-    """Return the bytes of a text of hex digits."""
+    """Return the bytes that a text of hex digits represents."""
     try:
         return bytes.fromhex(text)
     except ValueError:

@@ -1,9 +1,9 @@
 """Closures that write struct items from values to bytes.
 
 Pure. The module is the reverse of `urc.protocol.struct.read`. Theory of operation: every item
-becomes a step ``(pen, scope)`` that appends its bytes. Two kinds of values leave a gap that is
-filled in later. The `Backpatch` for the size of a later item waits in the scope. Values that depend
-on the size of the whole frame wait in `FrameBuilder.late`.
+becomes a step ``(pen, scope)`` that appends its bytes. Two kinds of values leave a gap in the
+frame, which is filled in later. The `Backpatch` for the size of a later item waits in the scope.
+Values that depend on the size of the whole frame wait in `FrameBuilder.late`.
 """
 
 from collections.abc import Callable, Mapping
@@ -111,7 +111,7 @@ def _conditional(
 
 
 def _given(item: Item, scope: Scope, rules: StructWriteScope, zero: object) -> Any:
-    """Return the value of `item`, which is computed, given or zero."""
+    """Return the value of `item`: the computed value, the given value, or zero."""
     # A reply repeats the number of its request, which only the request computes.
     is_repeated = rules.is_lenient and bool(item.id) and scope.get(item.id) is not None
     if item.value is not None and not is_repeated:
@@ -125,7 +125,7 @@ def _given(item: Item, scope: Scope, rules: StructWriteScope, zero: object) -> A
 
 
 def _raw_number(item: Item, rules: StructWriteScope) -> Callable[[Scope], Any]:
-    """Return a function that returns the raw number, and stores the value in the scope."""
+    """Return a function that encodes the item's number, and stores the value in the scope."""
     checked, zero, name = checked_raw(item), _zero_of(item), item.id
 
     def raw_number(scope: Scope) -> Any:
@@ -312,8 +312,8 @@ def _array_step(item: Item, count: Extent, rules: StructWriteScope) -> WriteStep
 def _records_step(item: Item, count: Extent, rules: StructWriteScope) -> WriteStep:
     """Return the step for a list of nameless structs with different signals.
 
-    Each case with a complete set of fields becomes one struct. Without a switch, there is at most
-    one struct.
+    Each case with a complete set of fields becomes one struct. Without a switch, the list has at
+    most one struct.
     """
     own = rules._replace(derived={**rules.derived, **derived_sizes(item.items)})
     body = _struct_step(item._replace(times=None), own)
@@ -361,7 +361,7 @@ def _outer(scope: Scope) -> Scope:
 
 
 def _windowed(body: WriteStep, item: Item, size: Extent, rules: StructWriteScope) -> WriteStep:
-    """Return the step for a struct with a size field, without trimmed bytes."""
+    """Return the step for a struct with a size field and without trimmed bytes."""
     full, name = least_size(item.items), item.id or "a struct"
     is_variable = size.prefix is not None and size.prefix.is_variable
     gap = bytes(size.prefix.size) if size.prefix and not is_variable else b""

@@ -1,7 +1,7 @@
 """Generated functions that write struct items, one per declaration.
 
 Pure. The module is the reverse of `urc.protocol.struct.read_source`. Generated writers support only
-declarations of fixed items; closures handle all other items and all invalid values.
+fixed items. Closures handle all other items and all invalid values.
 """
 
 import struct
@@ -32,8 +32,8 @@ Write = Callable[[Mapping[str, object]], bytes]
 def generate_write(items: tuple[Item, ...], encoding: str) -> Write:
     """Return a function that encodes arguments to a frame, or raises `NotWritable`.
 
-    The generated code expects valid values. After an error, the closures repeat the encoding with
-    rounding and conversion, and report an invalid value.
+    The generated code requires valid values. After an error, the closures repeat the encoding. The
+    closures round and convert values, and report invalid values.
     """
     steps = build_write_steps(items, encoding, is_lenient=False)
 

@@ -1,4 +1,4 @@
-"""Conversion of raw values to values, and the inverse for the emulated robot.
+"""Conversion of raw values to values, and the inverse conversion for emulated robots.
 
 Pure. A conversion is a chain of small functions, built once for each engine. Each function converts
 the result of the previous function; None means "not available" and ends the chain.
@@ -247,7 +247,10 @@ def _line(offset: float, scale: float) -> Step:
 
 
 def divisor_of(scale: float) -> int:
-    """Return n if `scale` is 1/n, else 0. Division is exact: 3 / 10 is 0.3, but 3 * 0.1 is not."""
+    """Return n if `scale` is 1/n, else 0.
+
+    Division is more exact than multiplication: 3 / 10 is 0.3, but 3 * 0.1 is not.
+    """
     if not 1e-15 < abs(scale) < 1:
         return 0
     divisor = round(1 / scale)

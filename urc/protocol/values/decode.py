@@ -1,7 +1,8 @@
 """Decoding of raw fields into typed values.
 
 Pure. Each engine builds the converters once per signal. A value of the wrong type or range is a
-counted violation and never a sample. A wrong number on the screen is worse than an old number.
+counted violation and never a sample. A wrong number on the screen would be worse than an old
+number.
 """
 
 import math
@@ -109,7 +110,7 @@ def _states_converter(states: Mapping[str, str], *, is_number: bool) -> Callable
 
 
 def _as_number(text: str) -> str:
-    """Return a number without leading zeros (``03`` as ``3``), because only robots pad numbers."""
+    """Return a number without leading zeros (``3`` for ``03``), because robots may pad numbers."""
     try:
         return spelt(number_of(text))
     except BadValue:

@@ -42,9 +42,9 @@ class Frame:
     __slots__ = ("_text", "attributes", "encoding", "fault", "payload", "topic", "was_text_wanted")
 
     fault: str
-    """Reason why a reader rejected a matching frame; unset without a reason."""
+    """Reason why a reader rejected a matching frame; unset if no reader rejected the frame."""
     was_text_wanted: bool
-    """Whether a reader needed the text of an undecodable frame; unset if never needed."""
+    """Whether a reader needed the text of an undecodable frame; unset if no reader did."""
 
     def __init__(self, payload: Payload, encoding: str) -> None:
         self.payload = payload

@@ -1,7 +1,7 @@
 """Times and nonces for sent frames.
 
 Pure. Times and nonces have injected sources: a clock and a random generator for a robot, fixed
-sources for tests. In tests, a document therefore always results in the same frames.
+sources for tests. With fixed sources, a document always results in the same frames.
 """
 
 from collections.abc import Callable
@@ -16,7 +16,7 @@ FIXED_UNIX_S: Final = 946684800.0
 
 
 class TimeAndNonce(NamedTuple):
-    """The sources of time and randomness."""
+    """The sources of times and nonces."""
 
     unix_s: Callable[[], float]
     """Function that returns the Unix time, in seconds."""
@@ -41,4 +41,4 @@ def fixed_bytes(size: int) -> bytes:
 
 
 FIXED: Final = TimeAndNonce(lambda: FIXED_UNIX_S, fixed_bytes)
-"""Fixed sources for tests of frames."""
+"""Fixed time and nonce sources, for tests."""

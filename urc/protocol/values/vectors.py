@@ -1,7 +1,8 @@
 """Composite values: arrays, objects, and binary data such as images.
 
-Pure. The input is JSON-like data, bytes, or text. In text, blanks, commas or semicolons separate
-the elements of an array, and bytes are base64. The size of the frame limits the size of the values.
+Pure. Raw composite values are JSON-like data, bytes, or text. In text, blanks, commas or semicolons
+separate the elements of an array, and bytes are base64. The size of the frame limits the size of
+the values.
 """
 
 import re
@@ -70,7 +71,7 @@ def object_converter(raw: object) -> Reading:
 
 
 def bytes_converter(signal: Signal) -> Callable[[object], Reading]:
-    """Return a function that checks raw bytes, or decodes base64 to bytes."""
+    """Return a function that checks raw bytes, or decodes base64 text to bytes."""
     most = signal.size or MAX_BYTES
 
     def convert(raw: object) -> Reading:
