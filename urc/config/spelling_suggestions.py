@@ -25,7 +25,7 @@ def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:
     if near:
         return f"did you mean '{near[0]}'?"
     if not names:
-        return f"there are no {noun} here" if noun else ""
+        return f"there are no {noun} to choose from" if noun else ""
     return f"{noun or 'known'}: {listed(names, None if noun == 'keys' else _MOST)}"
 
 

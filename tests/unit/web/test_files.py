@@ -78,7 +78,7 @@ def test_a_file_beside_the_document_has_an_address_and_nothing_else_has(tmp_path
         ("{ urdf: /etc/passwd.urdf }", "is not a path inside this folder"),
         ("{ urdf: a/../../arm.urdf }", "is not a path inside this folder"),
         ("{ urdf: 'file:arm.urdf' }", "is not a path inside this folder"),
-        ("{ urdf: robot.yaml }", "has a type that is not served"),
+        ("{ urdf: robot.yaml }", "has a file type that is not served"),
         ("{ urdf: link.urdf }", "is outside of this folder"),
         ("{ meshes: [gone.stl] }", "there is no file 'gone.stl'"),
     ],

@@ -168,7 +168,7 @@ def _bindings(
             problems.error(
                 inner,
                 "wrong-type",
-                f"{key!r} is an output, so it needs the name of a command",
+                f"{key!r} is an output and needs the name of a command",
                 hint="only an input for several signals takes a list",
             )
         else:
@@ -188,7 +188,7 @@ def _bind_input(
         problems.error(
             part,
             "wrong-type",
-            f"{port.name!r} is an input, so it needs the name of a signal",
+            f"{port.name!r} is an input and needs the name of a signal",
             hint="only outputs take a command with its arguments",
         )
     elif isinstance(part.data, list) and not port.is_multiple:
@@ -265,20 +265,20 @@ def misfit(port: WidgetPort, signal: Signal) -> str:
     """Return the reason why a signal does not fit an input, or "" if it fits."""
     types = (*port.types, "integer") if "number" in port.types else port.types
     if signal.type not in types:
-        return f"type {' or '.join(port.types)} is expected, the signal is {signal.type}"
+        return f"type {' or '.join(port.types)} is expected, but the signal is {signal.type}"
     if signal.type == "array":
         of = (*port.items, "integer") if "number" in port.items else port.items
         if of and signal.items not in of:
             wanted = " or ".join(port.items)
-            return f"an array of {wanted} is expected, the signal is of {signal.items}"
+            return f"an array of {wanted} is expected, but the signal is an array of {signal.items}"
         if None not in (port.size, signal.size) and port.size != signal.size:
-            return f"an array of {port.size} elements is expected, the signal has {signal.size}"
+            return f"an array of {port.size} elements is expected, but the signal has {signal.size}"
     if port.unit and conversion(signal.unit, port.unit) is None:
         has = f"in {signal.unit!r}" if signal.unit else "without a unit"
-        return f"unit {port.unit!r} is expected, the signal is {has}"
+        return f"unit {port.unit!r} is expected, but the signal is {has}"
     measured = quantity_of(signal.unit)
     if port.quantity and measured not in ("", port.quantity):
-        return f"unit of {port.quantity} is expected, the signal is in {signal.unit!r}"
+        return f"unit of {port.quantity} is expected, but the signal is in {signal.unit!r}"
     return ""
 
 

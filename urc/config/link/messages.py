@@ -89,7 +89,7 @@ def _check_send(part: Node | None, spec: TransportSpec | None, problems: Problem
         problems.error(
             part,
             "wrong-form",
-            f"{spec.type} carries messages, and {form or 'text'} has no address",
+            f"{spec.type} carries messages, but {form or 'text'} has no address",
             hint=f"on {spec.type} use: {verbs}; put the text inside, as text: …",
         )
     elif kind is None and form in _VERBS and spec.type not in MESSAGING:

@@ -75,7 +75,7 @@ def _given(part: Node, port: WidgetPort, widget: Widget, problems: Problems) -> 
             problems.error(
                 inner,
                 "given-twice",
-                f"{name!r} is set here, and {names[name]!r} of {port.name!r} sets it too",
+                f"{name!r} is set here, but {names[name]!r} of {port.name!r} also gives a value",
                 key=True,
                 hint="each argument takes one value",
             )
@@ -183,7 +183,7 @@ def _remedy(
 def _giver(argument: Argument) -> str:
     """Return a hint with the names of widgets that give a value for an argument."""
     widgets = "select" if argument.choices else _GIVERS.get(argument.type, "")
-    return f"use a widget with a value for {argument.name}: {widgets}" if widgets else ""
+    return f"use a widget that gives a value for {argument.name}: {widgets}" if widgets else ""
 
 
 def _check_nothing(
@@ -198,10 +198,10 @@ def _check_nothing(
     what = f"{port.name!r} of widget {widget.name!r} gives {listed(port.arguments)}"
     free = [name for name in command.arguments if name not in given.fixed]
     if free:
-        where = f"and command {command.name!r} takes {listed(command.arguments)}"
+        where = f"but command {command.name!r} takes {listed(command.arguments)}"
         hint = _remedy(command, port, {}, free)
     else:
-        where = f"and command {command.name!r} takes no value from it"
+        where = f"but command {command.name!r} takes no value"
         plain = "hold-button" if port.is_held else "button"
         hint = f"use a widget without values: {plain}"
     if not port.is_held or _stands_still(command, given):
@@ -229,9 +229,9 @@ def _misfit(port: WidgetPort, argument: Argument) -> str:
     """Return the reason why an argument cannot take an output's value, or "" if it can."""
     if not _is_of_type(port, argument):
         given = "number" if port.is_held else " or ".join(port.types)
-        return f"the value is {given}, and the argument is {argument.type}"
+        return f"the value is {given}, but the argument is {argument.type}"
     if port.unit and are_apart(port.unit, argument.unit):
-        return f"unit {port.unit!r} is given, and the argument is in {argument.unit!r}"
+        return f"unit {port.unit!r} is given, but the argument is in {argument.unit!r}"
     return ""
 
 

@@ -85,7 +85,7 @@ def _file_fault(name: str) -> str:
     if path.is_absolute() or ".." in path.parts or "\\" in name or ":" in name or "\0" in name:
         return "is not a path inside this folder"
     if path.suffix.lower() not in FILE_TYPES:
-        return f"has a type that is not served; types are {', '.join(FILE_TYPES)}"
+        return f"has a file type that is not served; allowed types are {', '.join(FILE_TYPES)}"
     return ""
 
 
@@ -120,14 +120,14 @@ def _page_fault(url: str) -> str:
     if "@" in authority:
         return "has a user name or password, which every viewer of the page could read"
     if authority.startswith("["):
-        return "has an IPv6 address, which a page's policy cannot hold; use a host name"
+        return "has an IPv6 address, which a page's security policy cannot contain; use a host name"
     host = _HOST.fullmatch(authority)
     if host is None or not _is_host(host["host"]):
         return "has an ambiguous or missing host"
     if host["port"] is not None and not 0 < int(host["port"]) <= _LAST_PORT:
         return f"has a port outside of 1 to {_LAST_PORT}"
     if not _REST.fullmatch(parts["rest"]):
-        return "has a character that a URL needs as %XX"
+        return "has a character that must be written as %XX"
     return ""
 
 

@@ -152,11 +152,11 @@ def _of_command(linker: Linker, part: Node, rule: SimulatorRule) -> set[str]:
         return set()
     if command.steps:
         text = f"{rule.request!r} is a sequence, which sends several frames"
-        hint = "write a rule with 'match' for each of its steps"
+        hint = "write a rule with 'match' for each step of the sequence"
         linker.problems.error(inner, "wrong-command", text, hint=hint)
     elif command.send.form == "frames":
         text = f"{rule.request!r} sends several frames, but a rule matches only one"
-        hint = "write a rule with match: for each of its frames"
+        hint = "write a rule with match: for each frame of the command"
         linker.problems.error(inner, "wrong-command", text, hint=hint)
     elif command.transport != rule.transport:
         _elsewhere(linker, inner, rule, command.transport)

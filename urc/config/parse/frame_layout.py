@@ -227,7 +227,7 @@ def _check_checksum(
         )
         return
     if frame_size is not None and not -frame_size <= at <= frame_size - size:
-        text = f"a checksum of {size} bytes at {at} is not inside a frame of {frame_size}"
+        text = f"a checksum of {size} bytes at {at} is outside a frame of {frame_size}"
         problems.error(part, "outside-frame", text, at="at" if "at" in part.data else "")
         return
     if at < 0 and at + size > -len(layout.end):

@@ -187,8 +187,7 @@ def _check_case(
             problems.error(
                 part,
                 "unreachable-case",
-                f"frames that start with {first.hex(' ')} go to the earlier case of"
-                f" {other.hex(' ')}",
+                f"frames that start with {first.hex(' ')} match the earlier case {other.hex(' ')}",
                 hint="put the longer case first",
             )
             return
@@ -230,7 +229,7 @@ def _check_pattern(part: Node, problems: Problems) -> None:
             part,
             "misplaced-anchor",
             "'^', '$' and '\\b' have no effect inside a stream",
-            hint="a frame starts where the pattern matches; add the bytes that end it",
+            hint="a frame starts where the pattern matches; add the bytes at the end of a frame",
         )
     elif _is_open(tree):
         problems.error(

@@ -58,7 +58,7 @@ def _check_line(part: Node, spec: TransportSpec, problems: Problems) -> None:
         problems.warn(
             part.must("keepalive").must("every"),
             "slow-keepalive",
-            f"the watchdog of the robot runs out first, after {shown_duration(watchdog_s)}",
+            f"the watchdog of the robot expires first, after {shown_duration(watchdog_s)}",
             hint="half of this time allows for one lost frame",
         )
     waits_s = sum(_wait_s(step) for step in all_steps(spec.on_close))
@@ -180,7 +180,8 @@ def _check_secrets(part: Node, driver: Driver, secrets: frozenset[str], problems
                 place,
                 "secret-not-redacted",
                 f"the secret {used[0]!r} is visible in the traffic of every request",
-                hint="send it once, in a step of 'on_connect' or of a sequence, with redact: true",
+                hint="send the secret once, in a step of 'on_connect' or of a sequence, with"
+                " redact: true",
             )
     for inner, step in _sends(part, driver):
         used = sorted((step.send.settings & secrets) - _digested(inner.must("send"), step.send))

@@ -87,8 +87,8 @@ def _check_line(part: Node, spec: TransportSpec | None, problems: Problems) -> N
         problems.error(
             part,
             "motion-unconnected",
-            f"a held command needs an open connection, and {spec.name!r} opens one for each"
-            " request",
+            f"a held command needs an open connection, but {spec.name!r} opens a connection for"
+            " each request",
             key=True,
             hint="remove 'connection: per_request', or send the command over another transport",
         )
@@ -100,7 +100,7 @@ def _check_watchdog(part: Node, command: Command, hold: Hold, problems: Problems
         problems.warn(
             part,
             "unknown-watchdog",
-            f"the robot's own watchdog after the last {command.name!r} is unknown",
+            f"the time of the robot's own watchdog after the last {command.name!r} is unknown",
             key=True,
             hint="write watchdog: with the time from the manual, or watchdog: none if the robot"
             " never stops itself",
@@ -110,7 +110,7 @@ def _check_watchdog(part: Node, command: Command, hold: Hold, problems: Problems
         problems.error(
             part.get("lease") or part.must("watchdog"),
             "lease-too-long",
-            f"the lease is {shown_duration(hold.lease_s)}, and the robot stops itself after"
+            f"the lease is {shown_duration(hold.lease_s)}, but the robot stops itself after"
             f" {shown_duration(watchdog_s)}",
             hint="make 'lease' shorter than 'watchdog', so that the lease ends first",
         )
@@ -172,7 +172,7 @@ def _check_baud(
     problems.error(
         part.must("repeat"),
         "line-too-slow",
-        f"{what} {bits_per_s:.0f} bit/s or more, and the line carries {baud:g}",
+        f"{what} {bits_per_s:.0f} bit/s or more, but the line carries only {baud:g}",
         hint=f"repeat less often: every {_bearable_ms(bits_per_s / baud, held)}ms and slower",
     )
 

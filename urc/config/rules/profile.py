@@ -186,6 +186,6 @@ def _check_rate(part: Node, driver: Driver, problems: Problems) -> None:
                 part.must("transports").must(name),
                 "too-many-polls",
                 f"the polls need {rate:g} requests a second, but a min_gap of"
-                f" {shown_duration(transport.min_gap_s)} allows {1 / transport.min_gap_s:g}",
+                f" {shown_duration(transport.min_gap_s)} allows only {1 / transport.min_gap_s:g}",
                 at="min_gap",
             )

@@ -150,13 +150,13 @@ def type_hint(
         return f'quote it: "{_written(document, path) or value}"'
     if isinstance(value, str):
         if _is_filled_in(document, path):
-            return 'only a text with nothing but a name in braces becomes a value: "{i}"'
+            return 'only a text that consists of a name in braces becomes a value: "{i}"'
         if {"integer", "number"} & set(types) and _looks_like_number(value):
             return f"remove the quotes: {value}"
         if "boolean" in types:
             return "yes, no, on and off are text in YAML 1.2; write true or false"
         if "object" in types:
-            return "indent its keys below it, or write { key: value }"
+            return "indent the inner keys, or write { key: value }"
     if "array" in types:
         return "write a list: '- ' before each item, or [a, b]"
     return ""

@@ -57,7 +57,7 @@ def _digits(part: Node, literal: str, offset: int, problems: Problems) -> bytes 
     if odd is not None:
         text = f"{odd[0]!r} has an odd number of hex digits"
         at = offset + odd.start()
-        hint = "two digits make a byte"
+        hint = "each byte needs two digits"
         problems.error(part, "not-hex", text, offset=at, length=len(odd[0]), hint=hint)
         return None
     return bytes.fromhex(literal)

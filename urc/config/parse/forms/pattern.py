@@ -86,7 +86,7 @@ def _hole(inside: str, before: str, offset: int, holes: list[PatternField]) -> P
     if name and any(hole.name == name for hole in holes):
         raise _Fault(f"the field {name!r} occurs twice", offset, len(name))
     if found[3] and kind == "rest":
-        text = "a field of kind 'rest' has no width: it takes everything to the end"
+        text = "a field of kind 'rest' has no width, because it extends to the end of the frame"
         raise _Fault(text, offset + found.start(3), len(found[3]))
     return PatternField(before, name, cast("FieldKind", kind), int(found[3] or 0))
 
@@ -99,9 +99,9 @@ def _check_after(holes: list[PatternField], literal: str, last: tuple[int, int])
     if kind == "rest":
         raise _Fault("nothing can follow a field of kind 'rest'", start, end - start)
     if not literal:
-        hint = "write the text between them, or give a width: {name:number:6}"
+        hint = "write the text between both fields, or give a width: {name:number:6}"
         text = "there is no text between this field and the next"
         raise _Fault(text, start, end - start, hint)
     if literal[0] in _EATS.get(kind, ""):
-        text = f"{literal[0]!r} after it could be part of the {kind}"
+        text = f"{literal[0]!r} after the field could be part of the {kind}"
         raise _Fault(text, start, end - start, "use a regex")

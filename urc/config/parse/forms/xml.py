@@ -30,7 +30,7 @@ def parse_read(part: Node, problems: Problems, context: FormContext) -> ReadSpec
             root = root or path.steps[0]
             if path.steps[0] != root:
                 start, other = _spelt(path.steps[0]), _spelt(root)
-                text = f"this path starts at {start!r}, and another at {other!r}"
+                text = f"this path starts at {start!r}, but another path starts at {other!r}"
                 hint = "a document has one root element: write one message for each root"
                 problems.error(inner, "bad-path", text, hint=hint)
                 paths[name] = None

@@ -158,8 +158,8 @@ def parse_enum(part: Node, number: Number, enums: Mapping[str, Enum], problems: 
             problems.error(
                 places.get(raw, inner),
                 "does-not-fit",
-                f"{raw} ({word}) does not fit into {number.bits} bits,"
-                f" which hold {number.least} to {number.most}",
+                f"{raw} ({word}) does not fit into {number.bits} bits with the range"
+                f" {number.least} to {number.most}",
                 key=not is_named,
             )
             break
