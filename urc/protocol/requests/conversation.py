@@ -292,9 +292,8 @@ class Conversation(Connection):
     def _ahead(self, now: float) -> list[LineEvent]:
         """Process messages at the front of the stream, and report their samples together.
 
-        Processing many short frames one by one takes almost twice as long (decision 27). A batch of
-        messages ends with the expected reply, with a refused value, or before a frame that is not a
-        message.
+        Processing short frames one by one takes almost twice as long (decision 27). A batch of
+        messages ends with the expected reply, a refused value, or before another kind of frame.
         """
         receiver, decoder, pending = (
             self.receiver,
