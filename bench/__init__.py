@@ -1,1 +1,1 @@
-"""Benchmarks: each figure is a ratio against a baseline measured in the same run."""
+"""Benchmarks: each result is a ratio to a baseline that is measured in the same run."""

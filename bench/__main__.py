@@ -1,4 +1,7 @@
-"""`./dev bench [--full] [NAME…]`: run all or the named benchmarks; return 1 for a missed goal."""
+"""`./dev bench [--full] [NAME…]`: run all or some benchmarks.
+
+The exit code is 1 after a missed goal.
+"""
 
 import argparse
 import os
@@ -41,7 +44,7 @@ PROGRAMS = {
     "browser_roslibjs": "chromium",
     "motion_input": "chromium",
 }
-"""Benchmark → required program in addition to Python, by its name in `scripts.needs`."""
+"""Benchmark → name of its required program in `scripts.needs`, in addition to Python."""
 
 
 def main() -> int:
@@ -56,7 +59,7 @@ def main() -> int:
     arguments = parser.parse_args()
     for name in arguments.names:
         if name not in NAMES:
-            parser.error(f"there is no benchmark {name!r}; there are: {', '.join(NAMES)}")
+            parser.error(f"unknown benchmark {name!r}; the benchmarks are: {', '.join(NAMES)}")
     names = arguments.names or NAMES
     left_out = bring_programs(names)
     missed = int(bool(left_out))
@@ -70,7 +73,7 @@ def main() -> int:
 
 
 def bring_programs(names: Sequence[str]) -> set[str]:
-    """Install what these benchmarks need; return those whose program is missing."""
+    """Install the programs for these benchmarks; return the benchmarks without their program."""
     wanted = {PROGRAMS[name] for name in names if name in PROGRAMS}
     brought = bring([need for need in NEEDS if need.name in wanted])
     os.environ.update(brought.environment)

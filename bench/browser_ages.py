@@ -1,4 +1,4 @@
-"""The ages of the values that a page shows, for `browser_peers`."""
+"""The ages of values shown on a page, for `browser_peers`."""
 
 import asyncio
 import json
@@ -10,7 +10,7 @@ from bench.peers.robot import MODULUS, START
 __all__ = ["LEAST_SHARE", "TooFew", "ages"]
 
 LEAST_SHARE = 0.5
-"""Smallest share of the robot's values for a valid measurement."""
+"""Smallest share of the robot's values that the page must show in a valid measurement."""
 FIRST_S = 20.0
 MODULUS_MS = MODULUS / 10
 # The text in the layout of a frame counts, because a page that writes outside of frames may change
@@ -72,15 +72,15 @@ class TooFew(Exception):
 
 
 async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:
-    """Return the ages of the values on a page during `seconds`, in milliseconds.
+    """Return the ages of the values shown on a page during `seconds`, in milliseconds.
 
     Args:
         one: the page.
-        seconds: duration, from the first value.
-        rate_hz: rate of the robot's clock values.
+        seconds: duration of the measurement, starting with the first value.
+        rate_hz: rate at which the robot sends its clock.
 
     Raises:
-        TooFew: the page showed less than `LEAST_SHARE` of the values.
+        TooFew: the page showed less than the share `LEAST_SHARE` of the values.
     """
     try:
         async with asyncio.timeout(FIRST_S + seconds * 4):
@@ -97,5 +97,5 @@ async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:
 
 
 def _age_ms(now_ms: float, told_ms: float) -> float:
-    """Return the difference of two times, the second of which is modulo the clock's period."""
+    """Return the difference between a time and a time modulo the clock's period."""
     return (now_ms - told_ms + MODULUS_MS / 2) % MODULUS_MS - MODULUS_MS / 2

@@ -1,7 +1,7 @@
 """Measurements of a page in a real Chromium: ages of values, frames, processor time.
 
-Ages use one clock, the machine's monotonic clock. Robots send the time of this clock
-(``peers/robot.py``), and the browser reports the page's start by the same clock.
+Ages are measured by a single clock, the machine's monotonic clock. Robots send the time of this
+clock (``peers/robot.py``), and the browser reports the start of the page by the same clock.
 """
 
 import asyncio
@@ -54,21 +54,21 @@ COUNT = """
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """A page with its debugging connection."""
+    """A browser page with its debugging connection."""
 
     page: Page
     line: CDPSession
     origin_ms: float
-    """Start of the page, on the monotonic clock, in milliseconds."""
+    """Start time of the page on the monotonic clock, in milliseconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """Cost of the frames of a page."""
+    """Frame rate and processor time of a page."""
 
     fps: float
     frame_ms: float
-    """Time of the main thread for each frame, in milliseconds."""
+    """Processor time of the main thread for each frame, in milliseconds."""
 
 
 @contextmanager
@@ -77,8 +77,8 @@ def served(robot_port: int, document: str, work: Path) -> Iterator[str]:
 
     Args:
         robot_port: port of the robot.
-        document: the profile without its name and its transport.
-        work: its working folder.
+        document: text of the profile without name and transport.
+        work: working folder of the server.
     """
     file = work / "bench.yaml"
     file.write_text(TRANSPORT.format(port=robot_port) + document, "utf-8")
@@ -110,12 +110,12 @@ async def opened(browser: Browser, address: str, *, script: str = "") -> AsyncIt
 
 
 async def cost_of(one: Opened, seconds: float, *, slowed: int = 1) -> Cost:
-    """Let a page run for a while; its processor time is little affected by other programs.
+    """Measure a running page. Other programs have little effect on its processor time.
 
     Args:
-        one: the page, which already draws.
-        seconds: for how long.
-        slowed: factor by which the page's processor is slowed.
+        one: page that already shows values.
+        seconds: duration of the measurement.
+        slowed: factor by which the browser slows the page's processor.
     """
     page, line = one.page, one.line
     await page.evaluate(COUNT)
@@ -143,7 +143,7 @@ async def _metrics(line: CDPSession) -> dict[str, float]:
 
 
 def kept(name: str, costs: Sequence[Cost], *, of: Mapping[str, str] | None = None) -> Result:
-    """Return the time of a frame, relative to the longest allowed time."""
+    """Return the ratio of the time between frames to the longest allowed time."""
     periods = sorted(1000 / cost.fps for cost in costs)
     most = 1000 / LEAST_FPS
     middle = periods[len(periods) // 2]
@@ -160,5 +160,5 @@ def kept(name: str, costs: Sequence[Cost], *, of: Mapping[str, str] | None = Non
 
 
 def at_share(ordered: Sequence[float], share: float) -> float:
-    """Return the quantile of the values."""
+    """Return the value at a quantile of the values."""
     return round(ordered[min(len(ordered) - 1, int(len(ordered) * share))], 3)

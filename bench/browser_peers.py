@@ -1,9 +1,9 @@
-"""Ages of shown values: URC against a hand-written page, Node-RED and NiceGUI.
+"""Ages of shown values: URC compared with a hand-written page, Node-RED and NiceGUI.
 
-One robot sends its clock 50 times a second, over TCP, to each of the four. A real Chromium opens
-each in turn. After the drawing of every frame, the age of a new value on the screen is measured.
-Node-RED and NiceGUI come from npm and PyPI at their first use. Missing dashboards are left out,
-with a message.
+One robot sends its clock 50 times a second, over TCP, to each of the four dashboards. A real
+Chromium opens one dashboard after another. After each drawn frame, the page measures the age of a
+new value on the screen. Node-RED and NiceGUI are installed from npm and PyPI at first use. A
+dashboard that can't be installed is skipped with a message.
 """
 
 import asyncio
@@ -61,7 +61,7 @@ Ages = dict[str, list[list[float]]]
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Compare the medians and the 99th percentiles."""
+    """Compare the medians and the 99th percentiles of the ages."""
     seconds = LOOK_IF_FULL_S if full else LOOK_S
     rounds = ROUNDS_IF_FULL if full else ROUNDS
     with ExitStack() as stack, tempfile.TemporaryDirectory(prefix="urc-bench-") as folder:
@@ -101,7 +101,7 @@ async def _look_all(addresses: Mapping[str, str], seconds: float, rounds: int) -
 
 
 async def _look(browser: Browser, address: str, seconds: float) -> list[float]:
-    """Return the ages of one measurement; repeat a disturbed measurement."""
+    """Return the ages of one measurement; repeat the measurement if too few values were shown."""
     for tries_left in reversed(range(TRIES)):
         async with opened(browser, address) as one:
             await ages(one, SETTLE_S, 0.0)  # it shows values: what it does at its start is over

@@ -1,8 +1,9 @@
-"""Processor time of a browser: the page of URC against a page of roslibjs, with the same topics.
+"""Processor time of a browser: URC's page compared with a roslibjs page for the same topics.
 
-Both show a map with a trail, an attitude, a stick, a camera and a value, in places of the same
-size. Both are fed by the same rosbridge server: URC's page through a real ``urc serve``, the other
-one directly. The time is that of all processes of Chromium. Rounds of both alternate.
+Both pages show a map with a trail, an attitude, a stick, a camera and a value, in areas of equal
+size. Both pages get data from the same rosbridge server: URC's page through a real ``urc serve``,
+the roslibjs page directly. The processor time includes all processes of Chromium. Rounds of the two
+pages alternate.
 """
 
 import asyncio
@@ -28,7 +29,7 @@ from bench.rig.programs import Server, peer
 __all__ = ["run"]
 
 Row = dict[str, Any]
-"""Page → share of a core, and shown images a second."""
+"""Page → share of a core, and number of shown images a second."""
 GOAL = 1.2
 SETTLE_S = 4.0
 LOOK_S, LOOK_IF_FULL_S = 5.0, 15.0
@@ -117,7 +118,7 @@ OURS, THEIRS = "URC", "roslibjs"
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Compare the processor times; each round is stored."""
+    """Compare the processor times of the two pages; the result of each round is stored."""
     look_s, rounds = (LOOK_IF_FULL_S, ROUNDS_IF_FULL) if full else (LOOK_S, ROUNDS)
     kept = Kept("browser_roslibjs-full" if full else "browser_roslibjs")
     with ExitStack() as stack, tempfile.TemporaryDirectory(prefix="urc-bench-") as folder:
@@ -145,7 +146,7 @@ async def _round(ours: str, theirs: str, look_s: float) -> Row:
 
 
 async def _cost(browser: Browser, page: Page, look_s: float) -> tuple[float, float]:
-    """Return the processor time of Chromium as a share of a core, and shown images a second."""
+    """Return the processor time of Chromium as a share of a core, and the shown images a second."""
     await asyncio.sleep(SETTLE_S)
     line = await browser.new_browser_cdp_session()
     images, before, began_s = await _images(page), await _cpu_s(line), time.monotonic()

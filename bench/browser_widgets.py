@@ -1,9 +1,9 @@
-"""Sixty widgets that receive ten thousand values a second: the number of frames.
+"""Frame rate of a page with sixty widgets that receive ten thousand values a second.
 
-Real widgets show values of a real server, also with the page's processor slowed six times, as on an
-old phone. If a frame is too short for all sixty, widgets take turns
-(``static/widgets/draw_scheduler.js``). Each widget is drawn with its newest value in every
-twentieth frame or more often.
+Real widgets show values from a real server. A second measurement slows the page's processor six
+times, like an old phone. If all sixty widgets don't fit into a frame, widgets take turns
+(``static/widgets/draw_scheduler.js``). Each widget is drawn with its newest value at least once in
+twenty frames.
 """
 
 import asyncio
@@ -25,7 +25,7 @@ LOOK_S, LOOK_IF_FULL_S = 3.0, 8.0
 ROUNDS, ROUNDS_IF_FULL = 2, 9
 COLUMNS, ROWS = 10, 6
 EVERY = 3
-"""Step between shown signals: every third signal is shown, and the page receives only those."""
+"""Step between shown signals: the page shows and receives every third signal."""
 KINDS = (
     ("value", "value", ""),
     ("gauge", "value", "V"),
@@ -54,7 +54,7 @@ READY = """
 
 
 def document() -> str:
-    """Return the robot's signals, its one message, and its sixty widgets."""
+    """Return the robot's profile: its signals, one message, and sixty widgets."""
     names = [f"s{each}" for each in range(CHANNELS)]
     signals: dict[str, dict[str, object]] = {
         name: {"type": "integer" if is_whole(each) else "number", "min": 0, "max": 100}

@@ -1,6 +1,6 @@
-"""Cost of a flood of lines over a real socket, against a hand-written driver.
+"""Processor time of a flood of lines over a real socket, compared with a hand-written driver.
 
-The cost is the CPU time of this process, from the request until the newest value of each signal is
+Measured is the CPU time of this process, from the request until the newest value of each signal is
 stored.
 """
 
@@ -21,10 +21,10 @@ WARM_UP = 1000
 
 
 class Driver(Protocol):
-    """The interface of all drivers."""
+    """The interface of the compared drivers."""
 
     async def flood(self, count: int) -> None:
-        """Request `count` lines, and return when all have arrived."""
+        """Request `count` lines, and wait until all lines have arrived."""
 
 
 async def _measure(driver: Driver) -> float:

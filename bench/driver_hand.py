@@ -1,17 +1,16 @@
 """A typical hand-written driver for the robot of `bench.driver_robot`.
 
-The code is tidy, and like URC, has the parts that every driver of a real robot needs:
+The code is tidy and, like URC, has the features that every driver of a real robot needs:
 
-- A speed is clamped, and a value that is not a number is refused: `max` and `min` would turn it
-  into full speed.
-- Readings are accepted at any time, and the newest of every signal is stored. Values out of range
-  or not finite are dropped, and invalid lines are counted.
-- A request has a timeout. A late reply is not used for the next request, and a missing reply does
-  not shift all later ones.
+- A speed is clamped, and NaN is refused, because `max` and `min` would turn NaN into full speed.
+- Readings are accepted at any time, and the newest reading of every signal is stored. Values that
+  are out of range or not finite are dropped, and invalid lines are counted.
+- A request has a timeout. A late reply is not assigned to the next request, and after a missing
+  reply, later replies are still assigned correctly.
 - Every buffer has a limit: unterminated lines, pending requests, and output.
-- When the connection is lost, all pending requests fail at once.
+- If the connection is lost, all pending requests fail immediately.
 
-Other features of URC are missing, such as link states, reconnecting, alarms and priorities.
+The driver lacks other features of URC, such as link states, reconnecting, alarms and priorities.
 """
 
 import asyncio
@@ -25,7 +24,7 @@ __all__ = ["StreamDriver"]
 
 REPLY_S = 1.0
 LATE_S = 2 * REPLY_S
-"""Time after which a reply is no longer expected, in seconds."""
+"""Time after which a request no longer expects its reply, in seconds."""
 MOST_WAITING = 256
 MOST_LINE = 8192
 MOST_UNSENT = 262_144
@@ -74,17 +73,17 @@ def read(line: bytes, now: float) -> list[Sample] | None:
 
 
 class _Robot:
-    """The robot's values and the pending requests, shared by both drivers."""
+    """The robot's values and the pending requests of a driver."""
 
     def __init__(self) -> None:
         self.latest: dict[str, Sample] = {}
         self.faults = 0
         self._waiting: deque[tuple[asyncio.Future[list[Sample]], float]] = deque()
-        """Futures that wait for an odometry line, with their start times."""
+        """Futures of pending requests for an odometry line, with their start times."""
         self.done = asyncio.Event()
 
     def take(self, line: bytes, now: float) -> None:
-        """Store the readings of a line, and complete a pending request."""
+        """Store the readings of a line, and complete the request that waits for this line."""
         samples = read(line, now)
         if samples is None:
             self.faults += 1
@@ -148,16 +147,16 @@ class StreamDriver:
 
     @property
     def latest(self) -> dict[str, Sample]:
-        """The newest reading of every signal."""
+        """The newest reading of each signal, by name."""
         return self._robot.latest
 
     @property
     def faults(self) -> int:
-        """Number of invalid lines."""
+        """Number of invalid lines received."""
         return self._robot.faults
 
     async def _read(self) -> None:
-        """Store the readings, and complete pending requests."""
+        """Read and store lines until the connection ends, and complete pending requests."""
         try:
             while True:
                 try:

@@ -1,7 +1,7 @@
-"""Cost of a request and its reply over a real socket, against a hand-written driver.
+"""Processor time of a request and its reply over a socket, compared with a hand-written driver.
 
-The cost is the CPU time of this process; the robot runs in another process, the same for all
-drivers. Each round opens a new connection, and sends `TIMES` requests after a warm-up.
+Measured is the CPU time of this process; all drivers use the same robot in another process. Each
+round opens a new connection, and sends `TIMES` requests after a warm-up.
 """
 
 import asyncio
@@ -46,7 +46,7 @@ async def _by_hand(port: int) -> float:
 
 
 def run(*, full: bool = False) -> Sequence[Result]:
-    """Measure a command and its reply."""
+    """Compare the processor times of a command and its reply."""
     loaded = profile()
 
     async def ours(port: int) -> float:

@@ -25,12 +25,13 @@ ODOMETRY = LINES[1] + b"\n"
 
 @contextmanager
 def robot(*, is_beside: bool) -> Iterator[int]:
-    """Run the robot during the context; yield its port.
+    """Run the robot inside a `with` block; yield the robot's port.
 
     Args:
-        is_beside: whether the robot shares the processor of the driver, if the system allows that.
-            On another processor, a reply sometimes arrives before and sometimes after the driver
-            sleeps. Then the cost of waking up would decide the figure, instead of the work.
+        is_beside: whether the robot shares the driver's processor, if the system supports this. On
+            another processor, a reply sometimes arrives before and sometimes after the driver
+            sleeps. The result would then measure the cost of waking up instead of the driver's
+            work.
     """
     allowed = (
         os.sched_getaffinity(0) if is_beside and hasattr(os, "sched_getaffinity") else set[int]()

@@ -1,4 +1,4 @@
-"""The driver of `bench.driver_hand` as a declaration, run as URC runs it for an operator."""
+"""The driver of `bench.driver_hand` as a URC profile, run in the same way as for an operator."""
 
 import tempfile
 from collections.abc import AsyncIterator
@@ -58,7 +58,7 @@ commands:
 
 
 def profile() -> Profile:
-    """Return the profile, loaded from its document."""
+    """Return the loaded profile."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bench.yaml"
         path.write_text(DOCUMENT, encoding="utf-8")
@@ -66,7 +66,7 @@ def profile() -> Profile:
 
 
 class DeclaredDriver:
-    """A session with the interface of the hand-written drivers."""
+    """A URC session with the interface of the hand-written drivers."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -83,6 +83,6 @@ class DeclaredDriver:
 
 @asynccontextmanager
 async def declared(loaded: Profile, port: int) -> AsyncIterator[DeclaredDriver]:
-    """Open a session on the robot at `port`; the first command waits for the connection."""
+    """Open a session with the robot at `port`; the first command waits for the connection."""
     async with Session(loaded, {"port": port}, built_in_catalog().transports) as session:
         yield DeclaredDriver(session)

@@ -1,8 +1,8 @@
-"""Cost of a binary frame of 24 bytes, 8 fields and a CRC, against tidy hand-written code.
+"""Processor time of a binary frame (24 bytes, 8 fields, CRC), compared with hand-written code.
 
-URC and that code convert a frame from its bytes to a mapping of named, scaled values, and back. The
-declaration is from a normal profile. The hand-written code is what an author would write without
-URC. The code uses one precompiled `struct.Struct`, and the CRC of the standard library, which is
+URC and the hand-written code convert a frame from bytes to a mapping of named, scaled values, and
+back. URC uses a normal declaration of a profile. The hand-written code is tidy code of an author
+without URC. It uses one precompiled `struct.Struct`, and the CRC of the standard library, which is
 written in C.
 """
 
@@ -69,7 +69,7 @@ VALUES: Mapping[str, object] = {
     "fault": "over_voltage",
 }
 FRAMES = 10
-"""Number of frames in one piece, as from a fast connection."""
+"""Number of frames in one chunk, as received from a fast connection."""
 LAYOUT = Struct(">BhhihihIB")
 FAULTS = {0: "none", 1: "over_voltage", 2: "under_voltage"}
 FAULT_NUMBERS = {name: number for number, name in FAULTS.items()}
@@ -105,13 +105,13 @@ def driver_of(text: str) -> Driver:
 
 
 class ByHand:
-    """A hand-written decoder, from a stream to the samples of each frame."""
+    """A hand-written decoder from a byte stream to the samples of each frame."""
 
     def __init__(self) -> None:
         self._left = b""
 
     def receive(self, data: bytes, now: float) -> list[Sample]:
-        """Return the samples of the complete frames."""
+        """Return the samples of all complete frames."""
         data = self._left + data if self._left else data
         samples: list[Sample] = []
         start = 0
@@ -139,7 +139,7 @@ def encode_by_hand(values: Mapping[str, Any]) -> bytes:
 
 
 def run(*, full: bool = False) -> Sequence[Result]:
-    """Measure reading, alone and through the whole engine, and writing."""
+    """Measure decoding, decoding through the whole engine, and encoding."""
     codec = FrameCodec(FrameLayout(tail=2, size=24, checksum=CHECKSUM))
     open_frame, read, write = codec.open, reader(DECLARED).read, writer(DECLARED).write
     data = codec.close(encode_by_hand(VALUES))
@@ -193,7 +193,7 @@ def run(*, full: bool = False) -> Sequence[Result]:
 def _seconds(
     function: Callable[..., object], argument: object, times: int = 20_000
 ) -> Callable[[], float]:
-    """Return a function that measures a number of calls, in seconds of CPU time."""
+    """Return a function that measures the CPU time of a number of calls, in seconds."""
 
     def measure() -> float:
         began = time.process_time()

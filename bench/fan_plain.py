@@ -1,7 +1,7 @@
-"""A bare loop of sends, the baseline of `fanout`: ``fan_plain.py CLIENTS SIZE FRAMES RATE``.
+"""A plain loop of sends, the baseline of `fanout`: ``fan_plain.py CLIENTS SIZE FRAMES RATE``.
 
-The loop accepts the clients, answers each with status 101, and sends a frame to each at the rate.
-The program prints its port, and at the end its processor time in seconds.
+The program accepts the clients, answers each handshake with status 101, and sends frames to each
+client at the rate. The program prints its port, and at the end its processor time in seconds.
 """
 
 import socket
@@ -12,7 +12,7 @@ HEAD_BYTES = 4
 
 
 def accepted(server: socket.socket) -> socket.socket:
-    """Accept a client, and send the reply that allows the next client to connect."""
+    """Accept a client and answer its handshake, so that the next client connects."""
     page, _ = server.accept()
     page.recv(4096)
     page.sendall(b"HTTP/1.1 101 Switching Protocols\r\n\r\n")

@@ -1,8 +1,8 @@
-"""Two hundred values to 50 pages: URC against a bare loop of sends.
+"""Processor time of sending 200 values to 50 pages: URC compared with a plain loop of sends.
 
-The figure is the processor time of the server, with the readings and their encoding. The pages run
-in another process, and so does the robot. The loop sends the same number of bytes to the same
-number of pages, without any knowledge of values or WebSockets.
+Measured is the processor time of the server, including readings and encoding. Pages and robot run
+in other processes. The loop sends the same number of bytes to the same number of pages, but knows
+nothing of values or WebSockets.
 """
 
 import subprocess
@@ -34,12 +34,12 @@ _sample = partial(tuple.__new__, Sample)
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Compare the processor times."""
+    """Compare the processor times of URC and the loop."""
     ticks = TICKS_IF_FULL if full else TICKS
     rounds = ROUNDS_IF_FULL if full else ROUNDS
     _, size = run_loop(_urc(CLIENTS, ticks))
     result = compare(
-        Goal(f"fan-out to {CLIENTS} pages / a bare loop of sends", GOAL),
+        Goal(f"fan-out to {CLIENTS} pages / a plain loop of sends", GOAL),
         lambda: _loop(CLIENTS, size, ticks),
         lambda: run_loop(_urc(CLIENTS, ticks))[0],
         rounds=rounds,
@@ -48,7 +48,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 async def _urc(clients: int, ticks: int) -> tuple[float, int]:
-    """Return the processor time, and the bytes per page and tick."""
+    """Return URC's processor time, and the number of bytes for each page and tick."""
     signals = {f"s{place}": Signal(f"s{place}") for place in range(CHANNELS)}
     robot = FakeRobot(dashboard_profile(signals=signals, uses=[]))
     app = build_app({"puppet": Robot(robot.profile, {}, robot.open)}, access=ACCESS)
@@ -67,7 +67,7 @@ async def _urc(clients: int, ticks: int) -> tuple[float, int]:
 
 
 def _loop(clients: int, size: int, ticks: int) -> float:
-    """Run the loop; return its processor time."""
+    """Run the plain loop; return its processor time."""
     words = [sys.executable, "-m", "bench.fan_plain"]
     words += map(str, (clients, size, ticks, RATE_HZ))
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as loop:

@@ -1,7 +1,7 @@
-"""Cost of slow pages for the others: of twenty pages, two read nothing.
+"""Effect of slow pages on other pages: two of twenty pages read nothing.
 
-One more page reads a quarter of its data. The baseline is a server with an unbounded queue for each
-page. The age of the baseline's data at the slow page grows with the queue.
+A third page reads only a quarter of its data. The baseline is a server with an unbounded queue for
+each page. In the baseline, the data's age at the third page grows with the queue.
 """
 
 import asyncio
@@ -33,7 +33,7 @@ CHANNELS, RATE_HZ = 600, 50
 HEALTHY, STOPPED = 17, 2
 SLOW_SHARE = 0.25
 FRAME_BYTES = 7000
-"""Approximate size of a frame of all channels."""
+"""Approximate size of a frame with all channels, in bytes."""
 LOOK_S, LOOK_IF_FULL_S = 15.0, 30.0
 WARM_S = 3.0
 MISSED_GOAL, GROWTH_MB, AGE_GOAL = 0.01, 2.0, 0.06
@@ -45,11 +45,11 @@ class Look(NamedTuple):
 
     ticks: int
     healthy: int
-    """Smallest number of frames of a healthy page."""
+    """Smallest number of frames that a healthy page received."""
     age_ms: float
-    """Age of the data at the slow page in the last quarter, in milliseconds."""
+    """Age of the data at the slow page in the last quarter of the run, in milliseconds."""
     growth_mb: float
-    """Growth of the server's memory after its start, in MB."""
+    """Growth of the server's memory since its start, in MB."""
 
 
 class Naive:
@@ -92,7 +92,7 @@ class Naive:
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Compare the age at the slow page with that of unbounded queues."""
+    """Compare the age of the data at the slow page with the age in the baseline."""
     seconds = LOOK_IF_FULL_S if full else LOOK_S
     ours = asyncio.run(_urc(seconds))
     naive = Naive()
@@ -155,7 +155,7 @@ async def _look(
         try:
             said = await asyncio.wait_for(pages.stdout.readline(), READY_S)
             if said.strip() != b"ready":
-                raise SystemExit("bench: the pages did not come up")
+                raise SystemExit("bench: the pages did not connect")
             await asyncio.sleep(0.2)  # the first state of every page
             ticks, growth_mb = await _play(tick, seconds)
             pages.stdin.close()
@@ -176,7 +176,7 @@ async def _in_time(reading: Awaitable[bytes]) -> bytes:
 
 
 async def _play(tick: Callable[[int], None], seconds: float) -> tuple[int, float]:
-    """Send values; return the number of ticks, and the growth of the memory after its start."""
+    """Send values; return the number of ticks and the growth of the server's memory."""
     began_s = time.monotonic()
     number, before = 0, 0.0
     while (passed_s := time.monotonic() - began_s) < seconds:

@@ -1,7 +1,7 @@
-"""Figures of a run: printed as JSON, one line each, and optionally written into the documentation.
+"""Results of a run: printed as lines of JSON, and optionally written into the documentation.
 
-`./dev bench --full --write-docs` writes them into docs/motion.md and docs/performance.md, between
-marks.
+`./dev bench --full --write-docs` writes the results into docs/motion.md and docs/performance.md,
+between marks.
 """
 
 import json
@@ -17,20 +17,23 @@ BARS = 40
 """Longest bar of a histogram, in characters."""
 
 _UNITS = {"ms": "ms", "us": "us", "mb": "MB", "hz": "Hz"}
-"""End of a name → its unit in a title."""
+"""Suffix of a name → unit in the title of its column."""
 
 told: list[dict[str, object]] = []
-"""Figures of this run."""
+"""Results of this run."""
 
 
 def tell(figures: Mapping[str, object]) -> None:
-    """Print and store figures."""
+    """Print and store one result."""
     told.append(dict(figures))
     print(json.dumps(figures), flush=True)
 
 
 def distribution(times_ms: Sequence[float], bin_ms: float) -> dict[str, object]:
-    """Return the quantiles of times, and their histogram: lower bound in ms → count."""
+    """Return quantiles and a histogram of times.
+
+    The histogram maps lower bounds in ms to counts.
+    """
     times = sorted(one for one in times_ms if one < inf)
     if not times:
         return {}
@@ -49,14 +52,14 @@ def distribution(times_ms: Sequence[float], bin_ms: float) -> dict[str, object]:
 
 
 def write_docs(pages: Sequence[Path] = PAGES) -> None:
-    """Write the figures of this run into the pages; older figures of other benchmarks stay."""
+    """Write the results of this run into the pages; results of other benchmarks stay."""
     texts = {page: page.read_text("utf-8") for page in pages}
     for kind in sorted({str(one["figure"]) for one in told if "figure" in one}):
         rows = [one for one in told if one.get("figure") == kind]
         begin, end = f"<!-- figures: {kind} -->", "<!-- end -->"
         page = next((page for page, text in texts.items() if begin in text), None)
         if page is None:
-            raise SystemExit(f"bench: no page has a place {begin!r}")
+            raise SystemExit(f"bench: no page contains the mark {begin!r}")
         before, _, rest = texts[page].partition(begin)
         texts[page] = f"{before}{begin}\n{_section(rows)}{end}{rest.partition(end)[2]}"
     for page, text in texts.items():

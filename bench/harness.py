@@ -1,6 +1,6 @@
-"""Measurement of ratios: baseline and subject in turn, then the median of the pairs' ratios.
+"""Measurement of ratios: baseline and subject alternate; the result is the median ratio.
 
-Machines are noisy and drift; a ratio inside one run is stable, unlike a time.
+Times vary with the load of a machine, but the ratio of two times in one run is stable.
 """
 
 import json
@@ -18,10 +18,10 @@ PROCESS_TIMEOUT_S = 60
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """The goal of a benchmark."""
+    """The goal of a benchmark: a name and an upper bound of the ratio."""
 
     name: str
-    """Subject / baseline."""
+    """Name of the measured ratio: subject / baseline."""
     at_most: float
 
 
@@ -31,18 +31,18 @@ class Result:
 
     name: str
     ratio: float
-    """Median of the ratios of the pairs."""
+    """Median of the ratios of all pairs of rounds."""
     goal: float
     baseline_ms: float
     subject_ms: float
     spread: float
-    """Slowest baseline round over its median; above 2, the machine was busy."""
+    """Slowest round of the baseline divided by the median; a value above 2 means a busy machine."""
     rounds: int
     versions: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def is_met(self) -> bool:
-        """Whether the ratio is within its goal."""
+        """Whether the ratio meets its goal."""
         return self.ratio <= self.goal
 
 
@@ -73,7 +73,7 @@ def compare(
     rounds: int = 11,
     versions: Mapping[str, str] | None = None,
 ) -> Result:
-    """Measure baseline and subject in turn, after one round that does not count."""
+    """Measure baseline and subject alternately, after one warm-up round."""
     return compare_all([(goal, baseline)], subject, rounds=rounds, versions=versions)[0]
 
 
@@ -84,7 +84,7 @@ def compare_all(
     rounds: int = 11,
     versions: Mapping[str, str] | None = None,
 ) -> list[Result]:
-    """Measure a subject and all its baselines in turn, after one round that does not count."""
+    """Measure a subject and several baselines alternately, after one warm-up round."""
     measured: list[list[float]] = []
     for _ in range(rounds + 1):
         measured.append([*(baseline() for _, baseline in baselines), subject()])
@@ -107,7 +107,7 @@ def compare_all(
 
 
 def report(results: Sequence[Result]) -> int:
-    """Print each result as a line of JSON; return 1 after a missed goal."""
+    """Print each result as a line of JSON; return 1 if a goal is missed, otherwise 0."""
     for result in results:
         print(json.dumps({**asdict(result), "met": result.is_met}))
     return int(not all(result.is_met for result in results))

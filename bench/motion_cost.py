@@ -1,8 +1,8 @@
 """Processor time of the server and its guards for each driven robot.
 
-Rounds with idle and with driven robots alternate; the difference is the cost. Pages are open in
-both. A page repeats the values of a finger at rest 20 times a second. A moving finger changes them
-in every frame.
+Rounds with idle and with driven robots alternate; the difference is the processor time of driving.
+Pages are open in all rounds. A page repeats the values of a finger at rest 20 times a second. A
+moving finger changes the values in every frame.
 """
 
 import statistics
@@ -23,10 +23,10 @@ from bench.rig.programs import Robots, Server
 __all__ = ["run"]
 
 GOAL = 0.02
-"""Share of a processor for each driven robot."""
+"""Goal: largest share of a processor for each driven robot."""
 ROBOTS = 6
 FINGERS = {"at rest": 20, "moving": 60}
-"""Finger → ticks a second, as ``static/control/input.js`` sends them."""
+"""State of the finger → ticks a second, the same rates as in ``static/control/input.js``."""
 LOOK_S, LOOK_IF_FULL_S = 4.0, 10.0
 ROUNDS, ROUNDS_IF_FULL = 3, 9
 SETTLE_S = 0.5
@@ -48,7 +48,7 @@ commands:
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Measure both fingers; each round is stored."""
+    """Measure a resting and a moving finger; the result of each round is stored."""
     look_s, rounds = (LOOK_IF_FULL_S, ROUNDS_IF_FULL) if full else (LOOK_S, ROUNDS)
     kept = Kept("motion_cost-full" if full else "motion_cost")
     for _ in range(rounds - len(kept.rows)):
@@ -58,7 +58,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def _round(rate_hz: int, look_s: float) -> tuple[float, float]:
-    """Return the processor time per robot and second of the server, and of the guards."""
+    """Return the processor time of the server and of the guards, per robot and second."""
     with ExitStack() as stack, tempfile.TemporaryDirectory(prefix="urc-bench-") as folder:
         robots = stack.enter_context(Robots(["tcp:127.0.0.1:0"] * ROBOTS))
         files = [Path(folder, f"cost{number}.yaml") for number in range(ROBOTS)]
@@ -85,7 +85,7 @@ def _round(rate_hz: int, look_s: float) -> tuple[float, float]:
 def _spent(
     server: Server, pages: Sequence[TimedPage], rate_hz: int, look_s: float
 ) -> tuple[float, float]:
-    """Return the processor times of server and guards, with ticks of all pages or without."""
+    """Return the processor times of server and guards, with or without ticks of all pages."""
     _drive(pages, rate_hz, SETTLE_S)
     before = cpu_s([server.pid]), cpu_s(server.guards)
     _drive(pages, rate_hz, look_s)
@@ -94,7 +94,7 @@ def _spent(
 
 
 def _drive(pages: Sequence[TimedPage], rate_hz: int, seconds: float) -> None:
-    """Send ticks of each page at the rate, the pages out of step; with 0, only listen."""
+    """Send ticks from each page at the rate, at different times; with rate 0, only listen."""
     step_ns = int(1e9 / (rate_hz or FINGERS["at rest"]) / len(pages))
     next_ns = time.monotonic_ns()
     end_ns = next_ns + int(seconds * 1e9)

@@ -1,7 +1,7 @@
-"""Counters of held motion over UDP, together with polls, a keepalive and another control.
+"""Frame counters of held motion over UDP, shared with polls, a keepalive and another control.
 
-Gestures of 5 to 60 s run in parallel. The receiving socket checks that the counters have no gap,
-only rise, and end with a stop. An interrupted run can continue.
+Gestures of 5 to 60 s run in parallel. The receiving socket checks that counters increase without
+gaps, and that the last frame is a stop. An interrupted run can continue.
 """
 
 import asyncio
@@ -22,7 +22,7 @@ SHORTEST_S, LONGEST_S, LONGEST_IF_FULL_S = 5.0, 10.0, 60.0
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Run gestures until enough have counted."""
+    """Run gestures until enough gestures are valid."""
     wanted, robot_count = (GESTURES_IF_FULL, ROBOTS_IF_FULL) if full else (GESTURES, ROBOTS)
     longest_s = LONGEST_IF_FULL_S if full else LONGEST_S
     dice = random.Random(5)  # noqa: S311 - the same gestures in every run

@@ -1,9 +1,10 @@
-"""Motion after a cut of a robot's link while it is driven, on every kind of transport.
+"""Motion after a cut of the link to a driven robot, on every kind of transport.
 
 Real programs run on both sides of a relay between two network namespaces: `urc serve` with its
 guards, and robots, brokers and login servers. The link of each robot is cut at different moments.
-The lengths of the cuts are spread evenly over their logarithm. Every second control is released
-during the cut. The benchmark needs root and /dev/net/tun; otherwise it is left out, with a message.
+The lengths of the cuts are evenly distributed on a logarithmic scale. Every second control is
+released during the cut. The benchmark needs root and /dev/net/tun; otherwise, the benchmark is
+skipped with a message.
 """
 
 import json
@@ -24,14 +25,14 @@ __all__ = ["run"]
 
 EACH, EACH_IF_FULL = 8, 200
 ROBOTS, ROBOTS_IF_FULL = 2, 6
-"""Number of robots of each kind, all in parallel."""
+"""Number of robots on each kind of transport, all in parallel."""
 SHORTEST_S = 0.2
 LONGEST_S, LONGEST_IF_FULL_S = 3.0, 60.0
 BIN_MS = 10
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Cut the links; compare the worst result of each kind with its bounds."""
+    """Cut the links; compare the worst result of each kind of transport with its limits."""
     if not can_relay():
         print(json.dumps({"left_out": "motion_cuts: needs root and /dev/net/tun"}))
         return []
@@ -52,7 +53,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def _spread(count: int, longest_s: float, dice: random.Random) -> list[tuple[float, float]]:
-    """Return lengths of cuts in random order, each with its share before the release."""
+    """Return the lengths of cuts, each with the share before the release, in random order."""
     ratio = longest_s / SHORTEST_S
     times = [SHORTEST_S * ratio ** (place / (count - 1)) for place in range(count)]
     dice.shuffle(times)
@@ -60,7 +61,7 @@ def _spread(count: int, longest_s: float, dice: random.Random) -> list[tuple[flo
 
 
 def _cut_one(rig: CutRig, index: int, plan: list[tuple[float, float]]) -> list[Cut]:
-    """Run the rest of the plan in one of several parallel threads; repeat an invalid cut."""
+    """Run the remaining cuts of the plan, in one of several threads; repeat invalid cuts."""
     cuts: list[Cut] = []
     while True:
         try:

@@ -1,7 +1,7 @@
 """Time until robots stop after the server hangs or dies while they are driven.
 
-The server is stopped by a signal, killed, or blocked by a pattern that backtracks. The guards have
-the leases, so the bound is the same as for the loss of an operator.
+A signal freezes or kills the server, or a backtracking pattern blocks the server. The guards check
+the leases, so the limit is the same as for the loss of an operator.
 """
 
 import tempfile
@@ -21,11 +21,11 @@ ROBOTS = 20
 EACH, EACH_IF_FULL = 40, 1000
 BIN_MS = 10
 MOST_BOUTS = 3
-"""Limit of the bouts on a machine that is too busy, as a multiple of the needed bouts."""
+"""Maximum number of bouts on a busy machine, as a multiple of the required number."""
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Disturb the server; compare the slowest stop with the bound."""
+    """Disturb the server; compare the slowest stop with the limit."""
     wanted = EACH_IF_FULL if full else EACH
     results: list[Result] = []
     with (
@@ -40,7 +40,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def repeated(bout: Callable[[], list[Trial]], wanted: int, robot_count: int) -> list[Trial]:
-    """Repeat until enough trials are valid, or the machine is too busy."""
+    """Repeat bouts until enough trials are valid, or the maximum number of bouts is reached."""
     trials: list[Trial] = []
     for _ in range(MOST_BOUTS * wanted // robot_count):
         trials += bout()
@@ -50,7 +50,7 @@ def repeated(bout: Callable[[], list[Trial]], wanted: int, robot_count: int) -> 
 
 
 def said(figure: str, death: str, trials: Sequence[Trial], wanted: int, bin_ms: float) -> Result:
-    """Print the result of one kind of death, and compare the slowest stop with the bound."""
+    """Print the result of one kind of failure, and compare the slowest stop with the limit."""
     counted = [one for one in trials if not one.is_excused]
     figures = {
         "figure": figure,

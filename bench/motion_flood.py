@@ -1,9 +1,10 @@
-"""Effect of a page with a thousand ticks a second on another page that drives another robot.
+"""Effect of a page that sends a thousand ticks a second on a page that drives another robot.
 
-The benchmark measures, in short windows, the other page's latency from its socket to its robot. The
-windows alternate between a normal page, a page that floods another server, and a page that floods
-the same server. A flood uses processor time of this machine in any case, in its page and in its
-server. So the goal compares the two floods, and the result of the normal page is only printed.
+In short windows, the benchmark measures the latency from the driving page's socket to its robot.
+The windows alternate between a normal page, a page that floods another server, and a page that
+floods the same server. Any flood uses processor time of the machine, in the flooding page and in
+its server. So the goal compares the two floods, and the result with the normal page is only
+printed.
 """
 
 import statistics
@@ -30,7 +31,7 @@ WAYS = {"quiet": "outside", "flood elsewhere": "flood", "flood": "flood"}
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Measure the three cases in turn."""
+    """Measure the three cases alternately."""
     ticks = TICKS_IF_FULL if full else TICKS
     rounds = ROUNDS_IF_FULL if full else ROUNDS
     taken: dict[str, list[list[float]]] = {way: [] for way in WAYS}

@@ -1,8 +1,8 @@
-"""Data that arrives after the counterpart of a driven robot was frozen for 5 s.
+"""Data received after the program of a driven robot was frozen for 5 s.
 
-A substitute for rosbridge is stopped and continued by signals; its kernel continues to accept data.
-Several robots run in parallel, each with its own program, session and guard. An interrupted run can
-continue.
+Signals freeze and resume a substitute for rosbridge, while its kernel continues to accept data.
+Several robots are driven in parallel, each with its own program, session and guard. An interrupted
+run can continue.
 """
 
 import asyncio
@@ -23,7 +23,7 @@ BIN_MS = 10
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Freeze until enough trials have counted."""
+    """Freeze programs until enough trials are valid."""
     wanted, robot_count = (TRIALS_IF_FULL, ROBOTS_IF_FULL) if full else (TRIALS, ROBOTS)
     kept = Kept(f"motion_freeze-{wanted}")
     while (left := wanted - len(_counted(kept.rows))) > 0:

@@ -1,6 +1,6 @@
-"""Time until a robot stops after its guard is killed while the robot is driven.
+"""Time until a driven robot stops after its guard is killed.
 
-A new guard replaces the killed guard within half a second, and sends the stop first.
+A new guard replaces the killed guard within half a second, and first sends the stop.
 """
 
 import tempfile
@@ -19,7 +19,7 @@ BIN_MS = 50
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Kill guards; compare the slowest stop with the bound."""
+    """Kill guards; compare the slowest stop with the limit."""
     wanted = KILLED_IF_FULL if full else KILLED
     with (
         tempfile.TemporaryDirectory() as folder,

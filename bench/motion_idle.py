@@ -1,9 +1,9 @@
-"""Silence after a stop, on every kind of transport in parallel.
+"""Data sent to robots at rest after a stop, on every kind of transport in parallel.
 
-Each robot is driven once and released, while its page keeps the controls and continues to get
-beats. After the stop and its repetitions, not one byte may arrive, because zeros would disturb
-another driver of the robot. Real programs run over a relay between two network namespaces. The
-benchmark needs root and /dev/net/tun; otherwise it is left out, with a message.
+Each robot is driven once and released. Its page keeps the controls and continues to receive
+heartbeats. After the stop and its repetitions, no byte may arrive, because zero commands would
+disturb another controller of the robot. Real programs communicate over a relay between two network
+namespaces. The benchmark needs root and /dev/net/tun; otherwise it is left out, with a message.
 """
 
 import json
@@ -23,12 +23,12 @@ __all__ = ["run"]
 
 LASTS_S, LASTS_IF_FULL_S = 20.0, 600.0
 SETTLED_S = STOP_FOR_S + 0.5
-"""Time after the first stop until its repetitions have arrived, also over a broker, in seconds."""
+"""Time in seconds after the first stop in which its repetitions arrive, even over a broker."""
 SPARE_S = 120.0
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Count the bytes after the stop."""
+    """Count the frames that arrive after the stop."""
     if not can_relay():
         print(json.dumps({"left_out": "motion_idle: needs root and /dev/net/tun"}))
         return []

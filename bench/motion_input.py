@@ -1,9 +1,9 @@
-"""Time until a robot gets the stop after a release, for each of the twelve ways to release.
+"""Time from a release to the stop at the robot, for each of the twelve ways to release.
 
-A real Chromium drives through a real ``urc serve`` with its guard. The robot stamps received data.
-The time runs from the page's event to the first byte of the stop at the robot, on the machine's
-monotonic clock. The lease is one second here, so a stop by the lease would be visible. A late trial
-is repeated if the delay came from this machine.
+A real Chromium drives through a real ``urc serve`` with its guard. The robot timestamps received
+data. Each time is measured from the page's event to the first byte of the stop at the robot, by the
+machine's monotonic clock. The lease is one second, so a stop by the lease would be visible. A late
+trial is repeated if the machine caused the delay.
 """
 
 import asyncio
@@ -28,7 +28,7 @@ __all__ = ["run"]
 
 EACH, EACH_IF_FULL = 5, 50
 MOST_TIMES = 3
-"""Limit of the trials on a machine that is too busy, as a multiple of the needed trials."""
+"""Maximum number of trials on a busy machine, as a multiple of the required number."""
 MOST_MS = 100.0
 WAIT_S = 15.0
 DOCUMENT = """\
@@ -67,7 +67,7 @@ EVENTS = {
     "context menu": "contextmenu",
     "pad lost": "gamepaddisconnected",
 }
-"""Way to release → event in the page."""
+"""Way to release → event that the page receives."""
 # Before any script of the page: its own listeners run after these.
 STAMP = f"""
 window.stamps = {{}};
@@ -81,27 +81,27 @@ class Trial(NamedTuple):
     """One release."""
 
     stop_ms: float
-    """Time from the event to the stop, in milliseconds; infinite without a stop."""
+    """Time from the event to the stop, in milliseconds; infinite if no stop arrived."""
     late_ms: float
-    """Delay of this machine during the trial, in milliseconds."""
+    """Delay caused by the machine during the trial, in milliseconds."""
 
     @property
     def is_excused(self) -> bool:
-        """Whether the delay of the machine makes the trial invalid."""
+        """Whether the trial is invalid because of the machine's delay."""
         return 0 < self.stop_ms - MOST_MS <= self.late_ms
 
 
 class Scene(NamedTuple):
-    """A page, its robot, and a monitor of the machine's delays."""
+    """A page, its robot, and a program that measures the machine's delays."""
 
     one: Opened
     robots: Robots
     witness: Robots
-    """A program that measures its own late wake-ups, and watches server, guard and browser."""
+    """A program that measures its late wake-ups, and the waits of server, guard and browser."""
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Release the control again and again."""
+    """Release the control repeatedly in each way; compare the slowest stop with the limit."""
     each = EACH_IF_FULL if full else EACH
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))

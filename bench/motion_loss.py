@@ -1,9 +1,9 @@
 """Unwanted stops of a robot on a link that loses packets.
 
-Pages drive over a relay with a round trip of 100 ms and random loss in both directions. After each
-stop, a page starts a new gesture. One run has a single connection, for comparison; the other run
-has URC's second connection for lossy links. The benchmark needs root and /dev/net/tun; otherwise it
-is left out, with a message.
+Pages drive over a relay with a round-trip time of 100 ms and random loss in both directions. After
+each stop, a page starts a new gesture. For comparison, one run has a single connection; the other
+run has URC's second connection for lossy links. The benchmark needs root and /dev/net/tun;
+otherwise, the benchmark is skipped with a message.
 """
 
 import json
@@ -25,15 +25,18 @@ DELAY_MS = 50
 LOOK_S = 0.25
 CALM_S = 20.0
 LATE_MS, LATE_WITHIN_NS = 50.0, 600_000_000
-"""Time after a delay of the machine in which a stop may be caused by this delay."""
+"""Limits for blaming a delay of the machine for a stop: minimum delay, maximum time after it."""
 MOST = {0: None, 1: 0.1, 3: 4.0}
-"""Loss in percent → limit of stops a minute; None if only the machine causes stops."""
+"""Loss in percent → largest allowed number of stops a minute.
+
+With None, only stops caused by the machine are allowed.
+"""
 LASTS_S, LASTS_IF_FULL_S = {0: 10, 1: 15, 3: 10}, {0: 60, 1: 180, 3: 60}
-"""Loss in percent → duration of the run, in seconds, with all robots in parallel."""
+"""Loss in percent → duration of the run with all robots in parallel, in seconds."""
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Drive at each rate of loss."""
+    """Drive robots at each rate of loss."""
     if not can_relay():
         print(json.dumps({"left_out": "motion_loss: needs root and /dev/net/tun"}))
         return []
@@ -60,7 +63,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def _calm(rig: Rig) -> None:
-    """Wait until the last pages are forgotten, so that their stops do not count later."""
+    """Wait until the server has forgotten the last pages; their stops must not count later."""
     for index in rig.indexes:
         rig.robots.wait_until(partial(_is_still, rig, index), CALM_S, "a robot at rest")
     time.sleep(LOOK_S)
@@ -71,7 +74,7 @@ def _is_still(rig: Rig, index: int) -> bool:
 
 
 def _drive(rig: Rig, seconds: float, *, has_spare: bool) -> tuple[float, int, int]:
-    """Drive every robot; return the minutes of motion, and the numbers of stops.
+    """Drive every robot; return the minutes of motion and three numbers of stops.
 
     The third number counts the stops after a delay of the machine.
     """

@@ -1,7 +1,7 @@
-"""Latency of a tick from the page's socket to the robot's socket, against a bare Python relay.
+"""Latency of a tick from the page's socket to the robot's socket, compared with a Python relay.
 
-Each tick is stamped before the page's socket accepts it, and after the robot has read its line, on
-one clock. URC and the relay alternate in one run. The path in URC includes the checks of the motion
+One clock timestamps each tick before the page's socket accepts the tick, and after the robot has
+read its line. URC and the relay alternate in one run. URC's path includes the checks of the motion
 contract, the engine, and the pipe to the guard.
 """
 
@@ -23,14 +23,14 @@ from bench.rig.programs import Program, Robots, Server
 __all__ = ["PROFILE", "TimedPage", "run", "ticks_of"]
 
 TIMES_RELAY = 1.5
-"""Goal for the median and for the 99th percentile."""
+"""Largest allowed ratio of the median and of the 99th percentile."""
 TICKS, TICKS_IF_FULL = 150, 600
 ROUNDS, ROUNDS_IF_FULL = 3, 7
 TICK_NS = 20_000_000
-"""Interval of 50 ticks a second: faster than pages, slower than the limit of the profile."""
+"""Interval between ticks in seconds: shorter than a page's, longer than the profile's limit."""
 SETTLE_NS = 100_000_000
 LEAST_SHARE = 0.5
-"""Smallest valid share of arrived ticks, because a busy machine drops some."""
+"""Smallest share of ticks that must arrive, because a busy machine drops some ticks."""
 PROFILE = """\
 urc: 1
 kind: robot
@@ -50,10 +50,10 @@ Ticker = Callable[[int], int]
 
 
 class TimedPage(Page):
-    """A page that stamps each tick."""
+    """A page that timestamps each tick."""
 
     def begin_anew(self) -> None:
-        """Release, and take the controls for a new gesture, as a person does after a stop."""
+        """Release, and take the controls for a new gesture, like an operator after a stop."""
         self.let_go()
         self.has_let_go = False
         self.say({"t": "drive", "verb": "leave"})
@@ -82,7 +82,7 @@ class TimedPage(Page):
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Measure both paths in turn."""
+    """Measure both paths alternately."""
     ticks = TICKS_IF_FULL if full else TICKS
     rounds = ROUNDS_IF_FULL if full else ROUNDS
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
@@ -105,7 +105,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 @contextmanager
 def _bare(command: Sequence[str], ticks: int) -> Iterator[Callable[[], list[float]]]:
-    """Run a bare relay, which checks nothing."""
+    """Run a plain relay without any checks."""
     with Robots(["tcp:127.0.0.1:0"]) as robots, Program([*command, str(robots.ports[0])]) as relay:
         port = int(relay.wait_for("ready")[1])
         page = TimedPage(Plan(1, "127.0.0.1", port, "", "", 0))
@@ -116,7 +116,7 @@ def _bare(command: Sequence[str], ticks: int) -> Iterator[Callable[[], list[floa
 
 @contextmanager
 def _urc(folder: Path, ticks: int) -> Iterator[Callable[[], list[float]]]:
-    """Run the real server with its guard."""
+    """Run a real server with its guard."""
     with Robots(["tcp:127.0.0.1:0"]) as robots:
         file = folder / "path.yaml"
         file.write_text(PROFILE.format(port=robots.ports[0]), "utf-8")
@@ -179,7 +179,7 @@ def _quantile(ordered: Sequence[float], share: float) -> float:
 def _result(
     name: str, relays: Sequence[Sequence[float]], ours: Sequence[Sequence[float]], share: float
 ) -> Result:
-    """Compare a quantile round by round."""
+    """Compare a quantile of both paths in each round."""
     bases = [_quantile(times, share) for times in relays]
     subjects = [_quantile(times, share) for times in ours]
     pairs = zip(bases, subjects, strict=True)

@@ -1,8 +1,9 @@
-"""Time until a robot gets the stop after its operator vanishes, for each way to vanish.
+"""Time from the loss of an operator to the stop at the robot, for each kind of loss.
 
-Pages, `urc serve` with its guards, and robots that stamp received data are real processes. The time
-runs from the last effective tick to the first byte of the stop. As root, a relay between network
-namespaces adds two failures of the link; otherwise they are left out, with a message.
+Pages, `urc serve` with its guards, and robots that timestamp received data are real processes. Each
+time is measured from the last effective tick to the first byte of the stop. With root, a relay
+between network namespaces adds two failures of the link. Without root, these failures are skipped
+with a message.
 """
 
 import json
@@ -22,11 +23,11 @@ EACH, EACH_IF_FULL = 100, 1000
 ROBOTS = 20
 BIN_MS = 10
 MOST_BOUTS = 3
-"""Limit of the bouts, relative to the needed ones, on a machine that is too busy."""
+"""Maximum number of bouts on a busy machine, as a multiple of the required number."""
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Let pages vanish in every way; compare the slowest stop with the bound."""
+    """Let pages vanish in every way; compare the slowest stop with the limit."""
     wanted = EACH_IF_FULL if full else EACH
     results: list[Result] = []
     has_relay = can_relay()
@@ -68,7 +69,7 @@ def _figures(death: str, trials: Sequence[Trial], excused: int) -> dict[str, obj
 
 
 def _result(death: str, trials: Sequence[Trial], wanted: int) -> Result:
-    """Return the slowest stop over the bound, or infinity after another violation."""
+    """Return the slowest stop divided by the limit, or infinity after any other violation."""
     is_whole = len(trials) >= wanted and not any(one.fault for one in trials)
     slowest = max((one.stop_ms for one in trials), default=inf) if is_whole else inf
     return Result(

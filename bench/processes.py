@@ -12,7 +12,7 @@ _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 
 def cpu_s(processes: Iterable[int]) -> dict[int, float]:
-    """Return the processor time of each running process since its start."""
+    """Return the total processor time of each running process."""
     # After the name, which can contain spaces: field 3 on, see proc(5).
     stats = {one: _read(one, "stat").rpartition(")")[2].split() for one in processes}
     return {
@@ -21,7 +21,7 @@ def cpu_s(processes: Iterable[int]) -> dict[int, float]:
 
 
 def spent_s(before: Mapping[int, float], after: Mapping[int, float]) -> float:
-    """Return the processor time between two looks; ended processes do not count."""
+    """Return the processor time between two measurements; ended processes do not count."""
     return sum(total_s - before.get(one, 0.0) for one, total_s in after.items())
 
 
@@ -32,7 +32,7 @@ def resident_mb(process: int) -> float:
 
 
 def own_mb(process: int) -> float:
-    """Return the memory of a process; of shared memory, it counts its share."""
+    """Return the memory of a process, including its proportional share of shared memory (PSS)."""
     words = re.search(r"(?m)^Pss: +(\d+) kB", _read(process, "smaps_rollup"))
     return int(words[1]) * 1024 / 1e6 if words else 0.0
 

@@ -1,4 +1,4 @@
-"""A minimal relay in Python, from a WebSocket to the robot's connection. See `motion_path`."""
+"""A minimal Python relay from a WebSocket to the robot's connection. See `motion_path`."""
 
 import asyncio
 import json

@@ -1,6 +1,6 @@
 """A robot that sends a fixed text at a rate: ``python -m bench.robot LINE TICKS RATE``.
 
-`LINE` is the number of an inherited socket. The robot starts with the first received data, and
+`LINE` is the file descriptor of an inherited socket. The robot starts when it receives data, and
 closes the socket at the end.
 """
 
@@ -10,7 +10,7 @@ import time
 
 
 def main() -> None:
-    """Send the text until the last tick."""
+    """Send the text `TICKS` times at the rate."""
     number, ticks, rate_hz = sys.argv[1:]
     with socket.socket(fileno=int(number)) as line:
         line.recv(1)

@@ -1,9 +1,10 @@
-"""One server with many robots, and a page on each: processor time and memory of the server.
+"""Processor time and memory of one server with many robots and one page for each robot.
 
-Every robot sends 20 signals, 20 times a second, in lines of JSON over TCP. Its page receives each
-change. Robots are in one process, pages in another; both only send or count bytes. Further rows
-show how the cost grows with robots, signals and pages, and the share of lines that reach no page.
-Guards of robots that can be driven are other processes, and are shown apart.
+Every robot sends 20 signals, 20 times a second, in lines of JSON over TCP. The robot's page
+receives each change. Robots and pages run in two other processes, which only send or count bytes.
+Additional rows show the growth with the number of robots, signals and pages, and the share of lines
+that reach no page. Robots that can be driven have guards in separate processes, which are measured
+separately.
 """
 
 import json
@@ -51,7 +52,7 @@ commands:
 
 
 class Load(NamedTuple):
-    """The load of a server."""
+    """The load of a server: numbers of robots, signals for each robot, and pages."""
 
     robots: int
     signals: int
@@ -60,12 +61,12 @@ class Load(NamedTuple):
 
 
 class Look(NamedTuple):
-    """Totals at one time."""
+    """Totals of frames and processor times at one time."""
 
     frames: int
-    """Received frames of all pages."""
+    """Number of frames received by all pages."""
     server: dict[int, float]
-    """Process id → processor time."""
+    """Process id of the server → processor time in seconds."""
     guards: dict[int, float]
 
 
@@ -78,11 +79,11 @@ LOADS = (
     Load(100, 20, 200),
     *(Load(robots, 20, robots, can_drive=True) for robots in (10, 25)),
 )
-"""All loads; at most 256 pages, which is the limit of one visitor."""
+"""All loads; one client may have at most 256 pages."""
 
 
 def run(*, full: bool) -> Sequence[Result]:
-    """Measure the load of the goal, and with `full` all loads; each row is stored."""
+    """Measure the load of the goal, or all loads with `full`; each row is stored."""
     kept = Kept("server_robots-full" if full else "server_robots")
     rounds, loads = (ROUNDS_IF_FULL, LOADS) if full else (ROUNDS, (GOAL,))
     wanted = [load for _ in range(rounds) for load in loads]
@@ -130,7 +131,7 @@ def _measured(load: Load, look_s: float) -> Row:
 
 
 def _settle(pages: Sequence[Program]) -> None:
-    """Wait until each page has received the values of a second."""
+    """Wait until each page has received the values of one second."""
     end_s = time.monotonic() + START_S
     time.sleep(SETTLE_S)
     while min((each for program in pages for each in _counts(program)), default=RATE_HZ) < RATE_HZ:
@@ -167,7 +168,7 @@ def _pages(stack: ExitStack, server: Server, count: int) -> Program:
 
 
 def _counts(pages: Program) -> list[int]:
-    """Return the number of received frames of each page of a program."""
+    """Return the number of frames that each page of a program has received."""
     had = len(pages.lines)
     pages.order("")
     pages.wait_until(lambda: len(pages.lines) > had, START_S, "counts")
@@ -175,7 +176,7 @@ def _counts(pages: Program) -> list[int]:
 
 
 def _middle(rows: Sequence[Row]) -> Row:
-    """Return the medians of the measurements of one load."""
+    """Return the median of each measured value of one load."""
     figures = {name: median(row[name] for row in rows) for name in rows[0] if name not in FIELDS}
     return {"figure": "server_robots", **{name: rows[0][name] for name in FIELDS}, **figures}
 

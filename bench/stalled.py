@@ -1,9 +1,9 @@
 """Pages for `fanout_stall`: most read all data, some read nothing, and one reads slowly.
 
-``python -m bench.stalled PORT PATH HEALTHY STOPPED BYTES_PER_S`` prints ``ready``. At the end of
-its input it prints a JSON object. The object has the number of frames with values of each healthy
-page. It also has the times and ages of the slow page's frames, in milliseconds of the monotonic
-clock.
+``python -m bench.stalled PORT PATH HEALTHY STOPPED BYTES_PER_S`` prints ``ready``. When standard
+input closes, the program prints a JSON object. The object contains the number of frames with values
+for each healthy page. It also contains the times and ages of the slow page's frames, in
+milliseconds of the monotonic clock.
 """
 
 import json
@@ -32,7 +32,7 @@ class Page(Viewer):
         self.is_open = True
 
     def read(self, most: int, *, is_aged: bool = False) -> int:
-        """Read a limited number of bytes; return the number."""
+        """Read a limited number of bytes; return the number of bytes read."""
         try:
             data = self.line.recv(most)
         except BlockingIOError:
@@ -63,7 +63,7 @@ class Page(Viewer):
 
 
 def main() -> None:
-    """Read frames until standard input ends."""
+    """Read frames until standard input closes."""
     port, path = int(sys.argv[1]), sys.argv[2]
     healthy_count, stopped_count, rate = map(int, sys.argv[3:6])
     healthy = [Page(port, path) for _ in range(healthy_count)]

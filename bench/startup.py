@@ -1,4 +1,4 @@
-"""Time to start a command as a whole process, against common tools."""
+"""Time of commands as complete processes, compared with common tools."""
 
 import platform
 import shutil
@@ -19,7 +19,7 @@ SCHEMA = ROOT / "schemas" / "robot.schema.json"
 
 
 def run(*, full: bool = False) -> Sequence[Result]:
-    """Measure `urc --version` and `urc validate`."""
+    """Measure the times of `urc --version` and `urc validate`."""
     with tempfile.TemporaryDirectory() as folder:
         return _run(write_profiles(Path(folder), PROFILES), full=full)
 
@@ -65,5 +65,7 @@ def _beside(name: str) -> str:
     place = Path(sys.executable).with_name(name)
     found = str(place) if place.exists() else shutil.which(name)
     if found is None:
-        raise SystemExit(f"bench: {name} is not installed; './dev bench' sets everything up")
+        raise SystemExit(
+            f"bench: {name} is not installed; './dev bench' installs all required programs"
+        )
     return found

@@ -1,9 +1,9 @@
-"""Pages that only watch: they open WebSockets, select channels, and count received data.
+"""Pages that only watch: the program opens WebSockets, selects channels, and counts received data.
 
-``python -m bench.viewers PORT PATH CLIENTS [SHOWN…]`` prints ``ready``. ``{}`` in PATH is the
-number of the client. After each line of its input, and at its end, it prints a JSON list with
-messages and bytes of each client. Frames are counted and never decoded, because only the server is
-measured.
+``python -m bench.viewers PORT PATH CLIENTS [SHOWN…]`` prints ``ready``. ``{}`` in PATH is replaced
+by the number of the client. After each line on standard input, and at its end, the program prints a
+JSON list with the messages and bytes of each client. Frames are counted but not decoded, because
+only the server is measured.
 """
 
 import json
@@ -22,7 +22,7 @@ HANDSHAKE = (
     "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
 )
 KEY = os.environ.get("URC_BENCH_KEY")
-"""Start key of a real server; else that of the tests."""
+"""Start key of a real server; the default is the key of the tests."""
 CHUNK = 1 << 18
 OPEN_TIMEOUT_S = 10
 
@@ -50,7 +50,7 @@ class Viewer:
         self.skip = 0
 
     def take(self) -> bool:
-        """Count received frames; return whether the connection is still open."""
+        """Count the received frames; return whether the connection is still open."""
         data = self.line.recv(CHUNK)
         if not data:
             return False
@@ -71,7 +71,7 @@ class Viewer:
 
 
 def head_and_body(data: bytes) -> int | None:
-    """Return the length of the frame at the start, or None for an incomplete header."""
+    """Return the length of the first frame, or None if its header is incomplete."""
     if len(data) < 2:
         return None
     size = data[1] & 0x7F
@@ -84,7 +84,7 @@ def head_and_body(data: bytes) -> int | None:
 
 
 def main() -> None:
-    """Count frames until standard input ends."""
+    """Count frames until standard input closes."""
     port, path, count, *shown = sys.argv[1:]
     viewers = [Viewer(int(port), path.format(each), shown) for each in range(int(count))]
     ready = selectors.DefaultSelector()

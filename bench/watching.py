@@ -1,4 +1,4 @@
-"""A dashboard with watching pages: processor time of the server for each delivery."""
+"""A dashboard with watching pages, to measure the server's processor time for each update."""
 
 import asyncio
 import json
@@ -16,12 +16,12 @@ __all__ = ["Robot", "Tally", "cost_s", "serving", "speaking"]
 
 READY_S = 20.0
 Tally = list[tuple[int, int]]
-"""Messages and bytes of each page."""
+"""Number of messages and bytes received by each page."""
 
 
 @asynccontextmanager
 async def serving(app: ASGIApp) -> AsyncIterator[int]:
-    """Serve an application in this loop; yield its port."""
+    """Serve an application in this event loop; yield the server's port."""
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
     task = asyncio.create_task(serve(app, port=0, on_ready=ready.set_result))
     try:
@@ -35,7 +35,7 @@ async def serving(app: ASGIApp) -> AsyncIterator[int]:
 async def cost_s(
     app: ASGIApp, path: str, clients: int, shown: list[str], play: Callable[[], Awaitable[None]]
 ) -> tuple[float, Tally]:
-    """Return the processor time of `play` in this process, and the received data of each page."""
+    """Return this process's processor time during `play`, and the data received by each page."""
     async with serving(app) as port:
         command = (sys.executable, "-m", "bench.viewers", str(port), path, str(clients), *shown)
         viewers = await asyncio.create_subprocess_exec(
@@ -61,14 +61,14 @@ async def cost_s(
 
 
 class Robot:
-    """A process that sends data at a rate, as a robot does."""
+    """A process that sends data at a fixed rate, like a robot."""
 
     def __init__(self, line: socket.socket, ticks: int) -> None:
         self._line = line
         self._ticks = ticks
 
     async def heard(self, tell: Callable[[int], None]) -> None:
-        """Start the robot, and call `tell` after each received piece, until its end."""
+        """Start the robot, and call `tell` after each received chunk, until the robot ends."""
         loop = asyncio.get_running_loop()
         done = loop.create_future()
         tick = 0
@@ -94,10 +94,10 @@ class Robot:
 
 @asynccontextmanager
 async def speaking(ticks: int, rate_hz: float) -> AsyncIterator[Robot]:
-    """Start a robot, which waits for its first received data.
+    """Start a robot, which waits until it receives data.
 
-    Like a real robot, it wakes the server by a readable socket. A timer in this process would cost
-    several times as much, and its cost would be measured.
+    Like a real robot, the process wakes the server by a readable socket. A timer in the server's
+    process would cost several times as much, and would be included in the measurement.
     """
     ours, theirs = socket.socketpair()
     with ours, theirs:

@@ -1,1 +1,1 @@
-"""Other dashboards with the same task, for `bench.browser_peers`."""
+"""Other dashboards for comparison with URC, used by `bench.browser_peers`."""

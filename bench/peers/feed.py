@@ -1,4 +1,4 @@
-"""A robot that sends 200 values in one JSON line, 50 times a second; it prints its port."""
+"""A robot that sends 200 values in one JSON line, 50 times a second, and prints its port."""
 
 import asyncio
 import contextlib
@@ -9,12 +9,12 @@ CHANNELS, CHANNELS_HZ = 200, 50
 
 
 def is_whole(channel: int) -> bool:
-    """Return whether a value is a whole number, for widgets that show states."""
+    """Return whether a value is an integer, for widgets that show states."""
     return channel % 30 == 15
 
 
 def channels(tick: int) -> dict[str, float]:
-    """Return all values, from 0 to 100; each changes in each tick."""
+    """Return all values, from 0 to 100; every value changes in every tick."""
     values = [(tick * 1.7 + each * 3.1) % 100 for each in range(CHANNELS)]
     return {
         f"s{each}": round(value) if is_whole(each) else round(value, 1)
@@ -23,7 +23,7 @@ def channels(tick: int) -> dict[str, float]:
 
 
 async def tell(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Send lines at fixed times, until the client disconnects."""
+    """Send lines at a fixed rate until the client disconnects."""
     began_s = time.monotonic()
     tick = 0
     with contextlib.suppress(ConnectionError):

@@ -1,6 +1,7 @@
-"""Robots in one process, a connection each: ``python fleet.py SIGNALS RATE_HZ``; prints its port.
+"""Robots in one process, one for each connection: ``python fleet.py SIGNALS RATE_HZ``.
 
-A line has all signals of a robot, as JSON. Each value changes in each line.
+The program prints its port. A line contains all signals of a robot, as JSON. Every value changes in
+every line.
 """
 
 import asyncio
@@ -12,11 +13,11 @@ from itertools import cycle
 
 LINES = 50
 GOLDEN = 0.6180339887
-"""Robots are out of step by this share of a period, so no two send at the same time."""
+"""Phase shift between two robots, as a share of a period; no two robots send at the same time."""
 
 
 def lines(signals: int) -> list[bytes]:
-    """Return the lines of a robot, for a cycle."""
+    """Return the lines that a robot sends repeatedly."""
     return [
         json.dumps(
             {f"s{each}": round((tick * 1.7 + each * 3.1) % 100, 1) for each in range(signals)},
@@ -28,7 +29,7 @@ def lines(signals: int) -> list[bytes]:
 
 
 async def main() -> None:
-    """Serve every client, as a robot of its own."""
+    """Serve every client as a separate robot."""
     told, period_s = lines(int(sys.argv[1])), 1 / float(sys.argv[2])
     robots = 0
 

@@ -1,6 +1,7 @@
 """A page written by hand for one robot: ``python plain.py ROBOT_PORT``.
 
-A line from the robot goes to the page's WebSocket at once; the page shows it in its next frame.
+The server forwards each line of the robot immediately to the page's WebSocket; the page shows the
+line in its next frame.
 """
 
 import asyncio
@@ -25,7 +26,7 @@ new WebSocket(`ws://${location.host}/ws`).onmessage = ({ data }) => {
 
 
 def page(_: ServerConnection, request: Request) -> Response | None:
-    """Answer every other request with the page."""
+    """Answer every request that is no WebSocket handshake with the page."""
     if request.path == "/ws":
         return None
     headers = Headers({"Content-Type": "text/html", "Content-Length": str(len(PAGE))})
@@ -33,7 +34,7 @@ def page(_: ServerConnection, request: Request) -> Response | None:
 
 
 async def stay(line: ServerConnection) -> None:
-    """Keep the page's connection open."""
+    """Keep a page's WebSocket open until it closes."""
     await line.wait_closed()
 
 

@@ -1,9 +1,10 @@
-"""A robot that sends the time: ``python robot.py RATE_HZ``; it prints its port.
+"""A robot that sends the time and prints its port: ``python robot.py RATE_HZ``.
 
 Each line is the machine's monotonic clock in tenths of milliseconds, modulo `MODULUS`, plus
-`START`. So each line has ten digits, and a page that shows it shows its age. At 50 lines a second,
-there are five phases between robot and display, a fifth of a frame apart. Each line is shifted by
-up to half of that interval, in the same way in each run, so that all phases are equally frequent.
+`START`. So each line has ten digits, and its age is known when a page shows it. At 50 lines a
+second, robot and display have only five relative phases, a fifth of a frame apart. Each line is
+therefore shifted by up to half of this interval, so that all phases are equally frequent. The
+shifts are the same in every run.
 """
 
 import asyncio
@@ -18,7 +19,7 @@ GOLDEN = 0.6180339887
 
 
 async def tell(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Send the time at the rate, at fixed times, until the client disconnects."""
+    """Send the time at a fixed rate until the client disconnects."""
     period_s = 1 / float(sys.argv[1])
     began_s = time.monotonic()
     number = 0

@@ -1,7 +1,7 @@
-"""A rosbridge server with a robot, and a page of roslib: ``python rosbridge.py``; prints its port.
+"""A rosbridge server with a robot, and a roslib page: ``python rosbridge.py`` prints its port.
 
-Each subscriber of a topic gets its messages at the topic's rate. The page is ``roslib.html``, with
-the modules of ``node_modules``.
+Each subscriber of a topic gets messages at the topic's rate. The page is ``roslib.html``, with the
+modules of ``node_modules``.
 """
 
 import asyncio
@@ -28,18 +28,18 @@ HERE = Path(__file__).resolve().parent
 MODULES = HERE.parents[1] / "node_modules"
 PICTURE = (640, 480)
 GRAIN, QUALITY = 11, 75
-"""Noise and quality of an image for about 47 kB."""
+"""Noise and JPEG quality that result in images of about 47 kB."""
 
 
 def header() -> dict[str, object]:
-    """Return a header with the time."""
+    """Return a ROS message header with the time."""
     now_s = time.time()
     stamp = {"secs": int(now_s), "nsecs": int(now_s % 1 * 1e9)}
     return {"seq": 0, "stamp": stamp, "frame_id": "odom"}
 
 
 def quaternion(roll: float, pitch: float, yaw: float) -> dict[str, float]:
-    """Return the orientation of three angles."""
+    """Return the quaternion of three angles."""
     sines = [math.sin(angle / 2) for angle in (roll, pitch, yaw)]
     cosines = [math.cos(angle / 2) for angle in (roll, pitch, yaw)]
     (sr, sp, sy), (cr, cp, cy) = sines, cosines
@@ -52,7 +52,7 @@ def quaternion(roll: float, pitch: float, yaw: float) -> dict[str, float]:
 
 
 def odometry(at_s: float) -> dict[str, object]:
-    """Return the pose on a circle with a radius of three metres."""
+    """Return a pose on a circle with a radius of three metres."""
     turn = at_s / 6
     position = {"x": 3 * math.cos(turn), "y": 3 * math.sin(turn), "z": 0.0}
     pose = {"position": position, "orientation": quaternion(0, 0, turn + math.pi / 2)}
@@ -70,7 +70,7 @@ def odometry(at_s: float) -> dict[str, object]:
 
 
 def imu(at_s: float) -> dict[str, object]:
-    """Return an orientation that sways."""
+    """Return an IMU message with a swaying orientation."""
     turning = {"x": 0.1, "y": 0.2, "z": 0.3}
     return {
         "header": header(),
@@ -84,12 +84,12 @@ def imu(at_s: float) -> dict[str, object]:
 
 
 def battery(at_s: float) -> dict[str, object]:
-    """Return a voltage that falls."""
+    """Return a battery message with a falling voltage."""
     return {"header": header(), "voltage": 12 - at_s % 40 / 20, "percentage": 0.8}
 
 
 def pictures() -> list[str]:
-    """Return different images, as base64."""
+    """Return a list of different images, encoded in base64."""
     chance = random.Random(1)  # noqa: S311 - noise, the same in each run
     made = []
     for number in range(15):
@@ -107,7 +107,7 @@ CAMERA_HZ = 15
 
 
 def camera(at_s: float) -> dict[str, object]:
-    """Return the next image."""
+    """Return a message with the next image."""
     data = PICTURES[int(at_s * CAMERA_HZ) % len(PICTURES)]
     return {"header": header(), "format": "jpeg", "data": data}
 
@@ -118,11 +118,11 @@ TOPICS: dict[str, tuple[Callable[[float], dict[str, object]], int]] = {
     "/camera/compressed": (camera, CAMERA_HZ),
     "/battery_state": (battery, 10),
 }
-"""Topic → its message at a time, and its rate."""
+"""Topic → function from a time to its message, and rate of the messages."""
 
 
 async def publish(line: ServerConnection, topic: str) -> None:
-    """Send the messages of a topic at fixed times."""
+    """Send the messages of a topic at its rate."""
     make, rate_hz = TOPICS[topic]
     began_s = time.monotonic()
     number = 0
@@ -135,7 +135,7 @@ async def publish(line: ServerConnection, topic: str) -> None:
 
 
 async def meet(line: ServerConnection) -> None:
-    """Serve a client; its own publications are dropped."""
+    """Serve a client; messages published by the client are dropped."""
     tasks: dict[str, asyncio.Task[None]] = {}
     try:
         async for text in line:
@@ -151,7 +151,7 @@ async def meet(line: ServerConnection) -> None:
 
 
 def page(_: ServerConnection, request: Request) -> Response | None:
-    """Answer a request for the page or a module; others are WebSockets."""
+    """Answer a request for the page or a module; return None for a WebSocket handshake."""
     if "Upgrade" in request.headers:
         return None
     path = request.path.partition("?")[0]

@@ -1,1 +1,1 @@
-"""The test rig: separate programs that emulate robots, operators and the network between them."""
+"""The test rig: separate programs that emulate robots, operators and a network."""

@@ -1,9 +1,9 @@
-"""Robots driven over UDP together with polls, whose frames share one counter.
+"""Robots driven over UDP, with polls on the same frame counter.
 
-Each robot is a socket that stores received frames in order and answers polls. A session with its
-guard drives the robots. Each gesture uses its own connection. A control is held for seconds,
-sometimes together with a second control. Then all held controls are released, or their leases
-expire.
+Each robot is a socket that stores received frames in order and answers polls. A session with a
+guard drives the robots. Each gesture uses a separate connection. A control is held for some
+seconds, sometimes together with a second control. Then all held controls are released, or the
+leases expire.
 """
 
 import asyncio
@@ -65,13 +65,13 @@ class Gesture(NamedTuple):
     frames: int
     motions: int
     fault: str
-    """First fault in the frames, or ""."""
+    """Description of the first error in the frames, or ""."""
 
 
 class _Robot(asyncio.DatagramProtocol):
     def __init__(self) -> None:
         self.heard: list[tuple[int, int, str]] = []
-        """Source port (one for each connection), counter and words of each frame."""
+        """Source port (different for each connection), counter and words of each frame."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast("asyncio.DatagramTransport", transport)
@@ -90,7 +90,7 @@ async def gestures(
     seed: int = 1,
     told: Callable[[Gesture], None] | None = None,
 ) -> Sequence[Gesture]:
-    """Hold a control for each of these times, with `robot_count` robots in parallel."""
+    """Run one gesture for each duration, with `robot_count` robots in parallel."""
     dice = random.Random(seed)  # noqa: S311 - the same gestures in every run
     left, done = list(lasts_s), list[Gesture]()
 
@@ -130,7 +130,7 @@ def _profile(port: int) -> Profile:
 
 
 async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
-    """Hold one control all the time and another sometimes; then release both, or stop sending."""
+    """Hold one control permanently and another at times; then release both, or stop sending."""
     controller, loop = MotionController(session.profile.driver), asyncio.get_running_loop()
     controller.join(Operator("hand", "hand", "drive"))
     controller.attach(session)
@@ -170,7 +170,7 @@ async def _drive(session: Session, lasts_s: float, dice: random.Random) -> str:
 
 
 async def _follow(session: Session, controller: MotionController) -> None:
-    """Report stops to the motion controller until cancelled."""
+    """Forward reported stops to the motion controller until cancelled."""
     assert session.backend is not None
     while True:
         for command, reason in await session.backend.stops():
@@ -178,7 +178,7 @@ async def _follow(session: Session, controller: MotionController) -> None:
 
 
 def _judged(lasts_s: float, heard: Sequence[tuple[int, int, str]], fault: str) -> Gesture:
-    """Return the first gap, or motion without a later stop."""
+    """Return the first gap in the counters, or the first motion without a later stop, or ""."""
     motions = [words for _, _, words in heard if words.startswith(("DRIVE", "LIFT"))]
     places: dict[int, int] = {}
     for port, number, words in heard:

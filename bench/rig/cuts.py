@@ -1,6 +1,6 @@
-"""Cuts of the link between server and robots while the robots are driven.
+"""Cuts of the link between server and driven robots.
 
-Each value of the motion is the send time of its tick, so the robot knows its age at arrival. One
+Each motion value is the send time of its tick, so the robot knows the age of received motion. One
 rig has robots on every kind of transport. A cut affects the whole link or the link of a single
 robot.
 """
@@ -28,59 +28,62 @@ from bench.rig.programs import Heard, Operators, Relay, Robots, Server
 __all__ = ["LATE_MS", "Cut", "CutRig"]
 
 LATE_MS = 300.0
-"""Age above which motion is late."""
+"""Age above which motion counts as late, in milliseconds."""
 BURST_MS = 100.0
-"""Limit of the time from late motion to the stop, where late motion is allowed."""
+"""Longest time from late motion to the stop in milliseconds, if late motion is allowed."""
 LEAD_S = 0.2
 WATCH_S = 1.0
 READY_S = 25.0
 ATTEMPTS = 3
-"""Attempts to start driving a robot."""
+"""Number of attempts to start driving a robot."""
 
 
 class NotDrivenError(AssertionError):
-    """A page failed to move its robot; a single case is tolerated."""
+    """A page failed to move its robot; a single failure is tolerated."""
 
 
 class Cut(NamedTuple):
-    """Result of one cut for one robot."""
+    """The result of one cut for one robot."""
 
     kind: str
     lasted_s: float
     was_held: bool
-    """Whether the control was held all the time; otherwise it was released during the cut."""
+    """Whether the control was held during the whole cut; if False, the control was released."""
     oldest_ms: float
-    """Age of the oldest motion that arrived after the cut; 0 without motion."""
+    """Age of the oldest motion received after the cut, in milliseconds; 0 without motion."""
     stop_ms: float
-    """Time from the end of the cut to the stop; infinite without a stop."""
+    """Time from the end of the cut to the stop, in milliseconds; infinite without a stop."""
     fault: str
     late_ms: float
-    """Delay of this machine during the trial."""
+    """Delay caused by the machine during the trial, in milliseconds."""
     was_moving: bool = True
-    """Whether the robot moved when the link was cut; a busy machine may have stopped it before."""
+    """Whether the robot moved when the link was cut.
+
+    On a busy machine, the robot may have stopped.
+    """
 
     @property
     def bounds(self) -> Bounds:
-        """Bounds for this kind of transport."""
+        """Limits for this kind of transport."""
         return bounds_of(self.kind)
 
     @property
     def is_stop_needed(self) -> bool:
-        """Whether the robot must get a stop."""
+        """Whether the robot must receive a stop."""
         if not self.bounds.is_told:
             return False
         return not self.was_held or self.lasted_s >= self.bounds.unnoticed_s
 
     @property
     def is_good(self) -> bool:
-        """Whether the robot's motion kept the contract."""
+        """Whether the robot's motion complied with the motion contract."""
         is_stopped = self.stop_ms <= self.bounds.stop_ms or not self.is_stop_needed
         is_fresh = self.oldest_ms <= self.bounds.oldest_ms
         return self.was_moving and not self.fault and is_fresh and is_stopped
 
     @property
     def is_excused(self) -> bool:
-        """Whether the machine's own delay makes the trial invalid."""
+        """Whether the trial is invalid because of the machine's delay."""
         if not self.was_moving:
             return not self.fault
         late = self.oldest_ms - self.bounds.oldest_ms
@@ -90,14 +93,14 @@ class Cut(NamedTuple):
 
 
 class CutRig:
-    """Robots behind a relay, and a server with its pages on this side of the relay. Needs root."""
+    """A rig with robots behind a relay, and a server with pages on this side. Needs root."""
 
     def __init__(self, folder: Path, kinds: Sequence[str]) -> None:
-        """Start all programs; the robots' documents and the server's data go into `folder`.
+        """Start all programs; store the robots' documents and the server's data in `folder`.
 
         Args:
-            folder: an empty folder.
-            kinds: kind of transport of each robot.
+            folder: empty folder for documents and data.
+            kinds: the kind of transport of each robot.
         """
         self.kinds = tuple(kinds)
         self._dice = random.Random(11)  # noqa: S311 - the same moments in every run
@@ -131,7 +134,7 @@ class CutRig:
         self._witness = enter(Robots([]))
 
     def __enter__(self) -> Self:
-        """Return self; all programs end with the block."""
+        """Return self; all programs end with the `with` block."""
         return self
 
     def __exit__(
@@ -145,11 +148,11 @@ class CutRig:
 
     @property
     def indexes(self) -> range:
-        """Indexes of the robots."""
+        """Indexes of all robots of the rig."""
         return range(len(self.kinds))
 
     def port(self, index: int) -> int:
-        """Return the port for cuts of one robot's link."""
+        """Return the port that identifies one robot's link for cuts."""
         first = FIRST_PORT.get(self.kinds[index])
         return self.robots.ports[index] if first is None else first + index
 
@@ -158,17 +161,18 @@ class CutRig:
 
         Args:
             seconds: length of the cut.
-            order: ``cut``, or ``cut a`` or ``cut b`` for one direction, or ``down a``.
+            order: order to the relay: ``cut``, ``cut a`` or ``cut b`` for one direction, or ``down
+            a``.
         """
         return self._trial(self.indexes, seconds, order, self._share())
 
     def cut_one(self, index: int, seconds: float, share: float) -> Cut:
-        """Cut the link of one robot; safe to call from its own thread.
+        """Cut the link of one robot; several threads may call this method for different robots.
 
         Args:
-            index: index of the robot.
+            index: index of the robot in the rig.
             seconds: length of the cut.
-            share: share of the cut after which the control is released, in every second cut.
+            share: share of the cut before the release of the control, in every second cut.
         """
         for _ in range(ATTEMPTS - 1):
             try:
@@ -178,7 +182,10 @@ class CutRig:
         return self._trial((index,), seconds, f"cut {self.port(index)}", share)[0]
 
     def drive_once(self, index: int, life_s: float) -> None:
-        """Let a page drive and release a robot; the page keeps running, and keeps the controls."""
+        """Let a page drive and release a robot.
+
+        The page continues to run and keeps the controls.
+        """
         began_ns = time.monotonic_ns()
         number = self._drive(index, life_s)
         self._await_motion(index, began_ns)
@@ -250,7 +257,7 @@ class CutRig:
         self, pages: Sequence[int] | dict[int, int], released: dict[int, int],
         cut_ns: int, healed_ns: int,
     ) -> None:  # fmt: skip
-        """Wait for the required stops, and then for forbidden events."""
+        """Wait for the required stops, then for events that must not happen."""
         for index in pages:
             bounds = bounds_of(self.kinds[index])
             is_short = (healed_ns - cut_ns) / 1e9 < bounds.unnoticed_s
@@ -307,13 +314,13 @@ def _fault(
     was_held: bool,
     burst_ms: float,
 ) -> str:
-    """Return the violation after a cut, or ""."""
+    """Return the violation of the motion contract after a cut, or ""."""
     texts = [one.text for one in heard]
     moved = [text for text in texts if text != "M 0"]
     stop = texts.index("M 0") if "M 0" in texts else len(texts)
     late = sum(age > LATE_MS for age in ages_ms)
     if any(text != "M 0" for text in texts[stop:]):
-        return "the robot moved again after the stop"
+        return "the robot moved again after its stop"
     if len(moved) != len(set(moved)):
         return "the same motion arrived twice"
     if bounds.most_late is not None and late > bounds.most_late:

@@ -1,7 +1,7 @@
-"""Times until the stop after an operator vanishes, for eight ways of vanishing.
+"""Times from the loss of an operator to the stop, for eight kinds of loss.
 
-In a *bout*, one page drives each of the robots, all in parallel, and vanishes. Each value of the
-motion is the send time of its tick, so the robots' logs contain all results.
+In a *bout*, all robots are driven in parallel, each by one page, and all pages vanish. Each motion
+value is the send time of its tick, so the robots' logs contain all results.
 """
 
 import random
@@ -20,18 +20,18 @@ __all__ = ["BOUND_MS", "DEATHS", "LEASE_MS", "LINK_DEATHS", "Rig", "Trial", "rob
 
 LEASE_MS = 250.0
 BOUND_MS = LEASE_MS + 50.0
-"""Limit of the time from the last accepted tick to the first byte of the stop."""
+"""Longest time from the last accepted tick to the first byte of the stop, in milliseconds."""
 LINK_DEATHS = ("black-hole", "interface-down")
-"""Ways of vanishing that need the relay."""
+"""Kinds of loss that need the relay."""
 DEATHS = ("close", "kill", "freeze", "block", "reset", "kick", *LINK_DEATHS)
 HEALED_S = 0.4
-"""Time to check for motion after the link is restored, in seconds."""
+"""Time after the link is restored in which no motion may arrive, in seconds."""
 STOP_WITHIN_S = 3.0
 LIFE_S = 600.0
 LOOK_NS = 25_000_000
-"""Delay until the processor wait of a process is known, in nanoseconds."""
+"""Delay until the processor waits of a process are measured, in nanoseconds."""
 WITNESSES = 2
-"""Number of idle programs that measure late wake-ups; the server has the same delays."""
+"""Number of idle programs that measure late wake-ups, because the server has similar delays."""
 
 _PROFILE = """\
 urc: 1
@@ -56,23 +56,26 @@ def robot_profile(index: int, host: str, port: int, kind: str = "tcp") -> str:
 
 
 class Trial(NamedTuple):
-    """Result of a trial with one vanished operator."""
+    """The result of a trial with one vanished operator."""
 
     death: str
     stop_ms: float
-    """Time from the last effective tick to the first byte of the stop."""
+    """Time from the last effective tick to the first byte of the stop, in milliseconds."""
     fault: str
     """Violation, or ""."""
     late_ms: float
-    """Delay of the busy machine: late wake-ups of idle programs and robots, or the time in which
-    the server or a guard could not run."""
+    """Delay caused by the machine, in milliseconds.
+
+    The delay is the largest of all late wake-ups of idle programs and robots, and of all times in
+    which the server or a guard waited for a processor.
+    """
     bound_ms: float = BOUND_MS
     has_moved: bool = True
-    """Whether the robot moved before the failure; otherwise the trial is invalid."""
+    """Whether the robot moved before the failure; if False, the trial is invalid."""
 
     @property
     def is_good(self) -> bool:
-        """Whether the contract was kept."""
+        """Whether the trial complied with the motion contract."""
         return not self.fault and self.stop_ms <= self.bound_ms
 
     @property
@@ -84,10 +87,10 @@ class Trial(NamedTuple):
 
 
 class Rig:
-    """Robots, a real server, and pages that vanish, with an optional relay between them."""
+    """A rig with robots, a real server, pages that vanish, and optionally a relay."""
 
     can_hang = False
-    """Whether the server can be blocked, see `bench.rig.programs.Server`."""
+    """Whether a signal can block the server; see `bench.rig.programs.Server`."""
 
     def __init__(
         self,
@@ -101,11 +104,11 @@ class Rig:
         """Start everything.
 
         Args:
-            folder: folder for the documents and the server's data.
-            robot_count: number of robots, and of pages in parallel.
-            has_relay: whether a relay, which needs root, is between pages and server.
-            options: further options of ``urc serve``.
-            inside: command prefix that starts the server in another namespace.
+            folder: folder for the robots' documents and the server's data.
+            robot_count: number of robots, and number of parallel pages.
+            has_relay: whether a relay connects pages and server; a relay needs root.
+            options: additional options of ``urc serve``.
+            inside: command prefix that starts the server in another network namespace.
         """
         self._dice = random.Random(5)  # noqa: S311 - the same phases in every run
         self._numbers = 0
@@ -134,11 +137,11 @@ class Rig:
             raise
 
     def _watch(self) -> None:
-        """Let the robots' process measure the processor waits of the server and its guards."""
+        """Tell the robots' process to measure the processor waits of the server and its guards."""
         self._watcher = self._programs.enter_context(Robots([f"pid:{self.server.pid}"]))
 
     def __enter__(self) -> Self:
-        """Return self; everything ends with the block."""
+        """Return self; all programs end with the `with` block."""
         return self
 
     def __exit__(
@@ -151,7 +154,7 @@ class Rig:
         self._programs.close()
 
     def bout(self, death: str) -> list[Trial]:
-        """Let one page on each robot vanish; return the results."""
+        """Drive each robot by one page and let all pages vanish; return the results."""
         began_ns = time.monotonic_ns()
         pages = self._begin(death)
         self._let_die(death, pages)
@@ -170,13 +173,13 @@ class Rig:
         return range(len(self.robots.heard))
 
     def weather(self, *orders: str) -> None:
-        """Send orders to the relay, which make it slow or lossy."""
+        """Send orders to the relay, for example for delay or loss."""
         self._link().do(*orders)
 
     def drive(
         self, index: int, death: str = "outside", drive_s: float = 0.0, *, has_spare: bool = False
     ) -> int:
-        """Let a page drive a robot until it vanishes; return the page's number."""
+        """Let a page drive a robot until the page vanishes; return the page's number."""
         self._numbers += 1
         plan = Plan(
             self._numbers, self.host, self.server.port, f"robot-{index}", death, drive_s,
@@ -200,7 +203,7 @@ class Rig:
             self._link().do("down a")
 
     def _heal(self, death: str, pages: Mapping[int, int]) -> None:
-        """Restore the link; the pages' queued data then arrives, and must not move a robot."""
+        """Restore the link; queued data of the pages then arrives, but must not move a robot."""
         if death == "black-hole":
             self._link().do(*(f"heal {self.operators.news['port', one]}" for one in pages.values()))
         elif death == "interface-down":
@@ -214,7 +217,7 @@ class Rig:
         return self.relay
 
     def _await_stop(self, index: int, began_ns: int) -> int:
-        """Wait until a robot has received motion, and then a stop; return the number of lines."""
+        """Wait until a robot has received motion and then a stop; return the number of lines."""
 
         def is_still() -> bool:
             texts = [one.text for one in self.robots.since(index, began_ns)]
@@ -237,18 +240,18 @@ class Rig:
             fault = "no stop came" if moved else f"nothing moved ({said})"
             return Trial(death, float("inf"), fault, 0.0, has_moved=bool(moved))
         sent_ns = int(heard[moved[-1]].text[2:]) * 1000
-        fault = "" if moved[-1] < until_stop else "it moved again after the stop"
+        fault = "" if moved[-1] < until_stop else "the robot moved again after the stop"
         late_ms = self.late_ms(sent_ns, stop.time_ns + 20_000_000)
         return Trial(death, (stop.time_ns - sent_ns) / 1e6, fault or _order(heard), late_ms)
 
     def late_ms(self, from_ns: int, until_ns: int) -> float:
-        """Return the largest delay of the robots and of other processes needed for a stop."""
+        """Return the largest delay of all processes that are needed for a stop, in milliseconds."""
         others = max(one.latest_ms(from_ns, until_ns) for one in self._witnesses)
         kept_ms = self._watcher.waited_ms(from_ns, until_ns + LOOK_NS)
         return self.robots.latest_ms(from_ns, until_ns) + max(others, kept_ms)
 
 
 def _order(heard: Sequence[Heard]) -> str:
-    """Return "" if no value is older than an earlier value; otherwise the fault."""
+    """Return a message if a value is older than an earlier value, otherwise ""."""
     sent = [int(one.text[2:]) for one in heard if one.text != "M 0"]
     return "" if sent == sorted(sent) else "an older value arrived after a newer value"

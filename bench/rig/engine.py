@@ -1,4 +1,4 @@
-"""Trials of stops after the server hangs or dies, or after one of its guards is killed."""
+"""Trials of stops after a server hangs or dies, or after one of its guards is killed."""
 
 import os
 import signal
@@ -10,9 +10,9 @@ __all__ = ["ENGINE_DEATHS", "RESTART_MS", "EngineRig"]
 
 ENGINE_DEATHS = ("engine-stopped", "engine-killed", "engine-blocked")
 RESTART_MS = 500.0
-"""Time limit for replacing a killed guard, in ms; the new guard sends a stop first."""
+"""Time limit for replacing a killed guard, in ms; the new guard first sends a stop."""
 OPEN_MS = 100.0
-"""Additional time for a new connection and for transfer, in ms."""
+"""Additional time for reconnecting and for the transfer, in ms."""
 AGAIN_S = 10.0
 BLOCKED_S = 30.0
 
@@ -23,7 +23,7 @@ class EngineRig(Rig):
     can_hang = True
 
     def engine_bout(self, death: str) -> list[Trial]:
-        """Drive every robot, and kill or block the engine; return the results."""
+        """Drive every robot, and freeze, kill or block the server; return the results."""
         began_ns = time.monotonic_ns()
         pages = dict(self._begin("outside"))
         for number in pages.values():
@@ -59,7 +59,7 @@ class EngineRig(Rig):
             self._watch()
 
     def guard_bout(self) -> list[Trial]:
-        """Drive every robot, and kill one guard after another; return the results."""
+        """Drive every robot, kill one guard after another, and return the results."""
         began_ns = time.monotonic_ns()
         pages = dict(self._begin("outside"))
         for number in pages.values():
@@ -72,14 +72,14 @@ class EngineRig(Rig):
         return trials
 
     def _kill(self, guard: int) -> list[Trial]:
-        """Return one trial, or None if the robot already stood still because of a busy machine."""
+        """Return one trial, or None if a busy machine had already stopped the robot."""
         killed_ns = time.monotonic_ns()
         os.kill(guard, signal.SIGKILL)
         robots = self.robots
         indexes = range(len(robots.visits))
 
         def again() -> list[tuple[int, int]]:
-            """Return the reconnected robots, with times."""
+            """Return the reconnected robots, with the times of their new connections."""
             return [
                 (index, at)
                 for index in indexes

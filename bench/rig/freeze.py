@@ -1,8 +1,8 @@
-"""Trials of driven robots whose counterpart is frozen for seconds.
+"""Trials of driven robots with a program that is frozen for some seconds.
 
-The counterpart is a separate program (`bench.rig.robot_process`). Signals suspend and resume it,
-while its kernel still accepts bytes. The driver is a session with its guard. Each motion frame
-holds the time of its sending, and the counterpart stamps each line that it receives.
+The robot's program is separate (`bench.rig.robot_process`). Signals suspend and resume this
+program, while its kernel still accepts bytes. A session with a guard drives the robot. Each motion
+frame contains its send time, and the robot's program timestamps each received line.
 """
 
 import asyncio
@@ -29,9 +29,9 @@ from urc.runtime.session import Session
 __all__ = ["HEARD_MS", "STOP_MS", "Freeze", "freeze"]
 
 HEARD_MS: Final = 500.0
-"""Latest send time of arriving motion, after the start of the freeze."""
+"""Latest allowed send time of received motion, in milliseconds after the start of the freeze."""
 STOP_MS: Final = 200.0
-"""Limit of the time from the end of the freeze to the stop."""
+"""Longest allowed time from the end of the freeze to the stop, in milliseconds."""
 _TICK_S: Final = 0.05
 _AFTERWARDS_S: Final = 1.2
 _READY_S: Final = 10.0
@@ -50,30 +50,31 @@ commands:
 
 
 class Freeze(NamedTuple):
-    """Result of one freeze."""
+    """The result of one freeze."""
 
     lasted_s: float
     newest_ms: float
-    """Send time of the newest arrived motion, relative to the start of the freeze."""
+    """Send time of the newest received motion, in milliseconds after the start of the freeze."""
     stop_ms: float
-    """Time from the end of the freeze to the stop; `inf` without a stop."""
+    """Time from the end of the freeze to the stop, in milliseconds; `inf` without a stop."""
     is_last: bool
-    """Whether nothing arrived after the stop."""
+    """Whether no data arrived after the stop."""
     late_ms: float
-    """Delay of this machine during the trial."""
+    """Delay caused by the machine during the trial, in milliseconds."""
     was_moving: bool = True
-    """Whether the robot moved at the start of the freeze. On a slow machine, an expired lease may
-    have stopped it before.
+    """Whether the robot moved at the start of the freeze.
+
+    On a slow machine, an expired lease may have stopped the robot before.
     """
 
     @property
     def is_good(self) -> bool:
-        """Whether the trial kept all bounds."""
+        """Whether the trial met all limits."""
         return self.newest_ms <= HEARD_MS and self.stop_ms <= STOP_MS and self.is_last
 
     @property
     def is_excused(self) -> bool:
-        """Whether the machine was so slow that the trial is invalid."""
+        """Whether the trial is invalid because the machine was too slow."""
         is_late = not self.is_good and self.is_last and self.late_ms > STOP_MS / 2
         return is_late or not self.was_moving
 
@@ -86,7 +87,7 @@ async def freeze(
     seed: int = 1,
     told: Callable[[Freeze], None] | None = None,
 ) -> Sequence[Freeze]:
-    """Freeze each of `robot_count` robots for `lasts_s`, `rounds` times."""
+    """Freeze each of `robot_count` robots `rounds` times, for `lasts_s` seconds each."""
     dice = random.Random(seed)  # noqa: S311 - the same moments in every run
     moments = [[0.4 + dice.random() for _ in range(rounds)] for _ in range(robot_count)]
     done: list[Freeze] = []
@@ -123,7 +124,7 @@ def _profile(port: int) -> Profile:
 
 
 async def _one(session: Session, robots: Robots, moment_s: float, lasts_s: float) -> Freeze:
-    """Drive a robot, freeze and resume its counterpart, and check the received data."""
+    """Drive a robot, freeze and resume its program, and check the received data."""
     backend = session.backend
     assert backend is not None
     ends_s = time.monotonic() + _READY_S

@@ -1,8 +1,8 @@
-"""The kinds of transport of the rig's robots, with real third-party programs.
+"""The kinds of transport for robots of the rig, with real third-party programs.
 
-Each kind has the robot's place (see `bench.rig.robot_process`), its document, and the bounds after
-a cut. For a connection that reopens at once, no motion older than 300 ms may arrive, and the stop
-must come within 100 ms. Slow or undetected reconnects have other bounds.
+Each kind defines the robot's address (see `bench.rig.robot_process`), its document, and limits
+after a cut. If a connection reopens immediately, no motion older than 300 ms may arrive, and the
+stop must arrive within 100 ms. Slow or undetected reconnects have other limits.
 """
 
 import shutil
@@ -35,28 +35,28 @@ KINDS: Final = (
 )
 _AT_ONCE: Final = ("tcp", "telnet", "websocket", "http")
 FIRST_PORT: Final = {"ssh": 2200, "mqtt": 18830}
-"""First port of third-party programs; each robot has its program, in a separate namespace."""
+"""First port of third-party programs; each robot has a program in a separate namespace."""
 
 
 class Bounds(NamedTuple):
-    """Bounds after a cut."""
+    """Limits of a kind of transport after a cut."""
 
     oldest_ms: float
-    """Largest age of motion that may reach the robot, in ms."""
+    """Largest allowed age of received motion, in ms."""
     most_late: int | None
-    """Largest number of motions older than 300 ms."""
+    """Largest allowed number of motion frames older than 300 ms."""
     stop_ms: float
-    """Limit of the time from the restored link to the stop."""
+    """Longest allowed time from the end of the cut to the stop, in ms."""
     unnoticed_s: float
-    """Length of a cut that may leave a held control unaffected."""
+    """Longest cut that may leave a held control unaffected, in seconds."""
     is_told: bool = True
-    """Whether URC can detect lost data; otherwise even a stop may be lost."""
+    """Whether URC can detect lost data; if False, even a stop may be lost."""
     is_repeated: bool = False
     """Whether a stop is sent several times."""
 
 
 def bounds_of(kind: str) -> Bounds:
-    """Return the bounds of a kind."""
+    """Return the limits of a kind of transport."""
     if kind in _AT_ONCE:
         return Bounds(300.0, 0, 100.0, 0.45)
     if kind == "udp":
@@ -108,20 +108,20 @@ _ASIDE: Final = {
 
 
 class Counterpart(Program):
-    """A third-party program for a robot; it ends on request or with its parent."""
+    """A third-party program for a robot, which ends on request or with its parent process."""
 
     def __init__(self, command: list[str], *, inside: tuple[str, ...], port: int) -> None:
-        """Run `command`, which listens on `port`."""
+        """Run `command`, and wait until it listens on `port`."""
         self.port = port
         self.options: dict[str, str] = {}
-        """Values to fill into the robot's document."""
+        """Values for the placeholders of the robot's document."""
         script = '"$@" & child=$!; cat > /dev/null; kill -9 $child; wait $child'
         # Killed by force, because unshare ignores other signals.
         super().__init__(["sh", "-c", script, "sh", *command], inside=inside)
 
 
 def place_of(kind: str, index: int) -> str:
-    """Return the place of a robot of this kind, as an argument of `robot_process`."""
+    """Return the address of a robot of this kind, as an argument of `robot_process`."""
     if kind == "mqtt":
         return f"mqtt:127.0.0.1:{FIRST_PORT[kind] + index}"
     if kind == "ssh":
@@ -132,7 +132,7 @@ def place_of(kind: str, index: int) -> str:
 
 
 def document(kind: str, index: int, port: int, other: Counterpart | None) -> str:
-    """Return the document of a robot with its `port`, and its third-party program, if any."""
+    """Return the document of a robot at `port`, and its third-party program, or None."""
     options = _OPTIONS[kind].replace("HOST", SERVER_ADDRESS).replace("PORT", str(port))
     if other is not None:
         options = options.replace("OTHER", str(other.port))
@@ -171,7 +171,7 @@ _ENTER: Final = (
 
 
 def _login(port: int, folder: Path, inside: tuple[str, ...]) -> Counterpart:
-    """Start OpenSSH's server with a separate user, without changes to the machine."""
+    """Start OpenSSH's server as a separate user, without changing the machine's configuration."""
     folder.mkdir(mode=0o755)
     for name in ("host", "user"):
         make = ["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(folder / name)]

@@ -1,8 +1,9 @@
-"""Operators at pages that vanish in several ways: a separate program that imports nothing of URC.
+"""Operators at pages that vanish in several ways: a separate program without imports from URC.
 
-The program reads plans from standard input, one JSON object a line, and forks a process for each.
-The process acts as a page that takes the controls, ticks every 50 ms, and vanishes as planned. For
-each event, it prints one line, with times of the monotonic clock in nanoseconds::
+The program reads plans from standard input, one JSON object on each line, and forks a process for
+each plan. The process acts like a page: it takes the controls, sends a tick every 50 ms, and
+vanishes as planned. For each event, it prints one line, with times of the monotonic clock in
+nanoseconds::
 
     pid NUMBER PID          the process of plan NUMBER
     port NUMBER PORT        its source port, for cuts by a relay
@@ -11,8 +12,8 @@ each event, it prints one line, with times of the monotonic clock in nanoseconds
     failed NUMBER TEXT      it could not drive
     ended NUMBER TIME       it was killed by order, a plan ``{"kill": NUMBER}``
 
-The value of every tick is its send time, in microseconds, so a robot knows its age. The program
-ends with its standard input, and ends every forked process.
+The value of every tick is its send time in microseconds, so a robot knows the age of each tick.
+When its standard input closes, the program ends, and kills every forked process.
 """
 
 import base64
@@ -33,7 +34,7 @@ FLOOD_NS = 1_000_000
 ANSWER_S = 20.0
 _PR_SET_PDEATHSIG = 1
 FLOOD = 400
-"""Number of messages at once for which a server disconnects a page."""
+"""Number of messages in a burst that makes a server disconnect the page."""
 
 
 class Plan(NamedTuple):
@@ -44,24 +45,25 @@ class Plan(NamedTuple):
     port: int
     robot: str
     death: str
-    """``close``, ``kill``, ``freeze``, ``block``, ``reset`` or ``kick``. ``outside``: the page
-    continues to drive while another program cuts the link. ``flood``: the page sends a thousand
-    ticks a second.
+    """Way of vanishing: ``close``, ``kill``, ``freeze``, ``block``, ``reset`` or ``kick``.
+
+    With ``outside``, the page continues to drive while another program cuts the link. With
+    ``flood``, the page sends a thousand ticks a second.
     """
     drive_s: float
-    """Time of driving before the page vanishes, in seconds."""
+    """Duration of driving before the page vanishes, in seconds."""
     life_s: float = 120.0
-    """Longest further life of the page's process, in seconds."""
+    """Longest time for which the page's process continues to run, in seconds."""
     command: str = "go"
     argument: str = "t"
     key: str = ""
-    """Start key of the server; "" for an unknown visitor."""
+    """Start key of the server; "" for a page without a key."""
     has_spare: bool = False
-    """Whether the page sends held controls on a second connection, too."""
+    """Whether the page also sends held controls on a second connection."""
 
 
 class Page:
-    """A WebSocket client that acts like the dashboard's own page."""
+    """A WebSocket client that acts like a page of the dashboard."""
 
     def __init__(self, plan: Plan, path: str = "/ws") -> None:
         self.plan = plan
@@ -74,7 +76,10 @@ class Page:
         self.is_mine = False
         self.is_latched = False
         self.is_live = False
-        """Whether the robot is connected; before that, the page's controls are off."""
+        """Whether the robot is connected.
+
+        Without a connection, the page's controls are disabled.
+        """
         self.holder = ""
         self.refusal = ""
         self.has_let_go = False
@@ -109,11 +114,11 @@ class Page:
         self._sort()  # the first messages may have arrived with the handshake
 
     def say(self, message: dict[str, Any]) -> bool:
-        """Send a message if that needs no waiting; return whether it was sent."""
+        """Send a message if possible without waiting; return whether the message was sent."""
         return self._frame(1, json.dumps(message).encode())
 
     def close(self) -> None:
-        """Send a close message and disconnect, as a closed tab does."""
+        """Send a close message and disconnect, like a closed browser tab."""
         self._frame(8, struct.pack("!H", 1001))
         self.socket.close()
 
@@ -133,7 +138,7 @@ class Page:
         return True
 
     def wait(self, until_ns: int) -> None:
-        """Handle messages until `until`."""
+        """Handle received messages until the time `until`."""
         while not self.is_closed:
             left_s = (until_ns - time.monotonic_ns()) / 1e9
             lines = [one for one in (self, self.spare) if one is not None and not one.is_closed]
@@ -187,7 +192,7 @@ class Page:
             self.refusal = message.get("message", "")
 
     def tick(self) -> int:
-        """Send a sample of the held control, the time in microseconds; return it."""
+        """Send the time in microseconds as a sample of the held control; return this time."""
         self.sent += 1
         value = time.monotonic_ns() // 1000
         self._say_twice(
@@ -208,7 +213,7 @@ class Page:
             self.spare.say(message)
 
     def double(self) -> None:
-        """Open a second connection."""
+        """Open the second connection for held controls."""
         self.spare = Page(self.plan, "/ws/spare")
         self.spare.say({"t": "spare", "key": self.key})
 
@@ -220,7 +225,10 @@ class Page:
         self._say_twice(message)
 
     def take_controls(self) -> None:
-        """Wait for the lease, a beat and a robot; raise `TimeoutError` at the limit."""
+        """Wait for the lease, a heartbeat and a connected robot.
+
+        Raise `TimeoutError` at the time limit.
+        """
         until_ns = time.monotonic_ns() + int(ANSWER_S * 1e9)
         asked_ns = 0
         while not (self.is_mine and self.is_live and self.heartbeat >= 0):
@@ -237,7 +245,7 @@ class Page:
 
 
 def _frame_of(data: bytes) -> tuple[int, bytes, bytes] | None:
-    """Return kind, body and rest of the first frame, or None for an incomplete one."""
+    """Return opcode and payload of the first frame, and the remaining data, or None."""
     if len(data) < 2:
         return None
     head, size = 2, data[1] & 0x7F
@@ -253,12 +261,12 @@ def _frame_of(data: bytes) -> tuple[int, bytes, bytes] | None:
 
 
 def tell(*words: object) -> None:
-    """Write one line in a single call, because the processes share the pipe."""
+    """Write one line with a single system call, because the processes share the pipe."""
     os.write(1, (" ".join(map(str, words)) + "\n").encode())
 
 
 def live(plan: Plan) -> None:
-    """Act as one page from its first byte to its end."""
+    """Act as one page until the page vanishes."""
     page = Page(plan)
     signal.signal(signal.SIGUSR1, lambda *_: page.let_go())
     tell("port", plan.number, page.socket.getsockname()[1])
@@ -273,7 +281,7 @@ def live(plan: Plan) -> None:
 
 
 def _drive(page: Page, next_ns: int, until_ns: int, every_ns: int = TICK_NS) -> None:
-    """Send ticks at fixed times until `until`."""
+    """Send ticks at a fixed rate until the time `until`."""
     while next_ns < until_ns:
         page.wait(next_ns)
         if not page.has_let_go:
@@ -321,13 +329,13 @@ def start(plan: Plan) -> int:
 
 
 def _end_with_parent() -> None:
-    """Let the kernel end this process with its parent, because a frozen one cannot end itself."""
+    """Let the kernel kill this process with its parent; a frozen process can't end itself."""
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _reap(children: dict[int, int]) -> None:
-    """Forget ended processes, because their ids may be reused soon."""
+    """Forget ended processes, because process ids may soon be reused."""
     for number, child in list(children.items()):
         if os.waitpid(child, os.WNOHANG)[0]:
             del children[number]
@@ -342,9 +350,9 @@ def _kill(children: dict[int, int], number: int) -> None:
 
 
 def main() -> None:
-    """Fork a page for every plan, until standard input ends; ``{"kill": NUMBER}`` ends one.
+    """Fork a page for every plan until standard input closes; ``{"kill": NUMBER}`` ends a page.
 
-    ``{"let_go": NUMBER}`` lets a page release its controls and keep running.
+    After ``{"let_go": NUMBER}``, a page releases its controls and continues to run.
     """
     children: dict[int, int] = {}
     try:

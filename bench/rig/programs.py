@@ -1,8 +1,8 @@
-"""The programs of the test rig: robots, operators, the network between them, and a real server.
+"""The programs of the test rig: robots, operators, a network, and a real server.
 
-Each program is a separate process. All programs stamp events by the monotonic clock of the machine,
-so their times can be compared. A program ends when its standard input closes, so it never outlives
-the test that started it.
+Each program is a separate process. All programs timestamp events by the machine's monotonic clock,
+so their times can be compared. A program ends when its standard input closes, so no program
+outlives the test that started it.
 
 Linux only. `Relay` needs root and /dev/net/tun; see `can_relay`.
 """
@@ -35,28 +35,27 @@ __all__ = [
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 SERVER_ADDRESS = "10.77.0.2"
-"""Address of side ``b`` of the relay, see `bench.rig.relay_process`."""
+"""IP address of side ``b`` of the relay; see `bench.rig.relay_process`."""
 READY_S = 40.0
 ANSWER_S = 10.0
 END_S = 5.0
 PATIENCE_S = 25.0
-"""Timeout for a page to get the controls and to drive, in seconds; the page itself gives up
-earlier.
+"""Timeout in seconds for a page to get the controls and drive; the page itself gives up earlier.
 """
 
 
 class Program:
-    """A process that receives orders as lines, and reports events as lines."""
+    """A process that receives orders and reports events, both as lines of text."""
 
     def __init__(self, arguments: Sequence[str], *, inside: Sequence[str] = ()) -> None:
         """Start it.
 
         Args:
             arguments: command line.
-            inside: command prefix for another namespace, from `Relay.inside`.
+            inside: command prefix of a network namespace, from `Relay.inside`.
         """
         self.lines: list[str] = []
-        """Complete output of the program, including standard error."""
+        """All output lines of the program so far, including standard error."""
         self.changed = threading.Condition()
         self._has_ended = False
         self._ordering = threading.Lock()
@@ -77,7 +76,7 @@ class Program:
         self._reader.start()
 
     def __enter__(self) -> Self:
-        """Return self; the program ends with the block."""
+        """Return self; the program ends with the `with` block."""
         return self
 
     def __exit__(
@@ -100,13 +99,13 @@ class Program:
         return self._process.poll() is None
 
     def order(self, text: str) -> None:
-        """Write one line to the program, from any thread."""
+        """Write one line to the program; any thread may call this method."""
         with self._ordering:
             self._orders.write(text + "\n")
             self._orders.flush()
 
     def wait_until(self, is_so: Callable[[], bool], timeout_s: float, what: str) -> None:
-        """Wait until `is_so` accepts the output; fail at the limit."""
+        """Wait until `is_so` returns True for the output; fail at the time limit."""
         with self.changed:
             self.changed.wait_for(lambda: is_so() or self._has_ended, timeout_s)
             if not is_so():
@@ -114,7 +113,7 @@ class Program:
                 raise AssertionError(f"{what}: not within {timeout_s:g} s; it said:\n{said}")
 
     def wait_for(self, word: str, timeout_s: float = ANSWER_S, *, after: int = 0) -> list[str]:
-        """Return the words of the first line that begins with `word`, from line `after` on."""
+        """Return the words of the first line from index `after` that begins with `word`."""
 
         def found() -> list[str]:
             lines = (line.split() for line in self.lines[after:])
@@ -128,7 +127,7 @@ class Program:
         self._process.send_signal(number)
 
     def close(self) -> None:
-        """End the program, by force if necessary; a second call does nothing."""
+        """End the program, by force if necessary; further calls do nothing."""
         with contextlib.suppress(BrokenPipeError):  # it has already ended
             self._orders.close()
         self._end()
@@ -153,12 +152,12 @@ class Program:
             self.changed.notify_all()
 
     def take(self, line: str) -> None:
-        """Handle a line, in the reader's thread; for subclasses."""
+        """Handle an output line in the reader's thread; subclasses override this method."""
 
 
 @contextlib.contextmanager
 def peer(script: str, *arguments: object) -> Iterator[int]:
-    """Run a program of ``peers/``; yield its port."""
+    """Run a program from ``peers/``; yield the program's port."""
     command = [sys.executable, "-P", str(HERE.parent / "peers" / script), *map(str, arguments)]
     with Program(command) as program:
         yield int(program.wait_for("ready", 30.0)[1])
@@ -178,17 +177,17 @@ class Heard(NamedTuple):
 
 
 class Robots(Program):
-    """Robots in one process, see `bench.rig.robot_process`."""
+    """Robots in one process; see `bench.rig.robot_process`."""
 
     def __init__(self, places: Sequence[str], *, inside: Sequence[str] = ()) -> None:
         self.heard: list[list[Heard]] = [[] for _ in places]
         """Received lines of each robot."""
         self.late: list[tuple[int, float]] = []
-        """Times of late wake-ups of the robots' process, with the delay in milliseconds."""
+        """Times of late wake-ups of the robots' process, with delays in milliseconds."""
         self.waits: dict[int, list[tuple[int, float]]] = {}
-        """Process id → ends and lengths of its waits for a processor, in milliseconds."""
+        """Process id → waits of the process for a processor, with end times and durations in ms."""
         self.visits: list[list[tuple[int, bool]]] = [[] for _ in places]
-        """Times of the connects (true) and disconnects (false) of each robot."""
+        """Times at which each robot was connected (True) and disconnected (False)."""
         super().__init__(_script("robot_process.py", *places), inside=inside)
         self.ports = [int(port) for port in self.wait_for("ready")[1:]]
 
@@ -206,7 +205,7 @@ class Robots(Program):
             self.visits[int(words[1])].append((int(words[2]), words[0] == "open"))
 
     def since(self, robot: int, time_ns: int) -> list[Heard]:
-        """Return the lines that a robot received from `since` on."""
+        """Return the lines that a robot has received since the time `since`."""
         with self.changed:
             return [one for one in self.heard[robot] if one.time_ns >= time_ns]
 
@@ -227,11 +226,11 @@ class Robots(Program):
 
 
 class Operators(Program):
-    """Pages that vanish, see `bench.rig.operator_process`."""
+    """Pages that vanish; see `bench.rig.operator_process`."""
 
     def __init__(self, *, inside: Sequence[str] = ()) -> None:
         self.news: dict[tuple[str, int], str] = {}
-        """(word, number of the plan) → the rest of the line."""
+        """Reports of the pages: (word, number of the plan) → rest of the line."""
         super().__init__(_script("operator_process.py"), inside=inside)
 
     def take(self, line: str) -> None:
@@ -242,11 +241,11 @@ class Operators(Program):
             self.news[word, int(number)] = rest
 
     def start(self, plan: Mapping[str, object]) -> None:
-        """Start a page by a plan with the fields of `operator_process.Plan`."""
+        """Start a page with a plan; `plan` contains fields of `operator_process.Plan`."""
         self.order(json.dumps(plan))
 
     def await_told(self, word: str, number: int, timeout_s: float = PATIENCE_S) -> str:
-        """Return the report `word` about a plan; fail if the plan failed."""
+        """Return the report `word` of a plan; fail if the plan has failed."""
 
         def is_told() -> bool:
             return (word, number) in self.news or ("failed", number) in self.news
@@ -257,19 +256,19 @@ class Operators(Program):
         return self.news[word, number]
 
     def kill(self, number: int) -> None:
-        """End the page of a plan, and wait for its end."""
+        """End the page of a plan, and wait for the end of its process."""
         self.order(json.dumps({"kill": number}))
         self.wait_until(lambda: ("ended", number) in self.news, ANSWER_S, f"end of {number}")
 
 
 def can_relay() -> bool:
-    """Return whether `Relay` works here: Linux, root, and a TUN device."""
+    """Return whether this system can run `Relay`, which needs Linux, root and a TUN device."""
     is_root = sys.platform == "linux" and os.geteuid() == 0
     return is_root and os.access("/dev/net/tun", os.R_OK | os.W_OK)
 
 
 class Relay(Program):
-    """A link between two network namespaces, see `bench.rig.relay_process`."""
+    """A link between two network namespaces; see `bench.rig.relay_process`."""
 
     def __init__(self) -> None:
         self._done = 0
@@ -279,15 +278,15 @@ class Relay(Program):
         self._descriptors = dict(zip("ab", found, strict=True))
 
     def take(self, line: str) -> None:
-        """Count the executed orders."""
+        """Number of orders that the relay has executed."""
         self._done += line.startswith("done")
 
     def inside(self, side: str) -> tuple[str, ...]:
-        """Return the command prefix for a program at side ``a`` or ``b``."""
+        """Return the command prefix that starts a program at side ``a`` or ``b``."""
         return ("nsenter", f"--net=/proc/{self.pid}/fd/{self._descriptors[side]}", "--")
 
     def do(self, *orders: str) -> int:
-        """Execute orders such as ``cut a``; return the time of the last, in nanoseconds."""
+        """Execute orders such as ``cut a``; return the time of the last order, in nanoseconds."""
         with self._doing:
             wanted = self._done + len(orders)
             self.order("\n".join(orders))
@@ -310,12 +309,12 @@ class Server(Program):
         """Start the server, and wait until it listens.
 
         Args:
-            profiles: the robots' documents.
+            profiles: paths of the robots' documents.
             data: data folder of the server.
             options: further options of ``urc serve``.
             host: address to listen on.
-            inside: command prefix for another namespace, as of `Program`.
-            can_hang: whether a signal can block the server, see `bench.rig.server_process`.
+            inside: command prefix of a network namespace, from `Relay.inside`.
+            can_hang: whether a signal can block the server; see `bench.rig.server_process`.
         """
         script = ["-P", str(HERE / "server_process.py")] if can_hang else ["-m", "urc.cli.main"]
         command = [sys.executable, *script, "serve", *map(str, profiles)]
@@ -328,7 +327,7 @@ class Server(Program):
 
     @property
     def guards(self) -> list[int]:
-        """Process ids of the server's guards."""
+        """Process ids of all guards of the server."""
         found = Path(f"/proc/{self.pid}/task/{self.pid}/children").read_text("ascii").split()
         return [int(child) for child in found if _is_guard(child)]
 
@@ -348,5 +347,5 @@ def _is_guard(process: str) -> bool:
 
 
 def now_ns() -> int:
-    """Return the time of the monotonic clock."""
+    """Return the time of the monotonic clock, in nanoseconds."""
     return time.monotonic_ns()

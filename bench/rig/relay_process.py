@@ -1,9 +1,10 @@
-"""A link between two network namespaces that can be slow, lossy, or cut: a separate program.
+"""A slow, lossy or interrupted link between two network namespaces: a separate program.
 
-The program needs Linux, root and /dev/net/tun, and nothing of URC. ``python relay_process.py``
-creates two namespaces with a TUN device in each, and moves packets between them. Side ``a`` is
-10.77.0.1, side ``b`` 10.77.0.2, and each has its own loopback. Other programs enter by ``nsenter
---net=/proc/PID/fd/FD``. Reports on standard output::
+The program needs Linux, root and /dev/net/tun, and imports nothing from URC. ``python
+relay_process.py`` creates two namespaces with a TUN device each, and forwards packets between the
+devices. Side ``a`` has the address 10.77.0.1, side ``b`` has 10.77.0.2, and both have their own
+loopback. ``nsenter --net=/proc/PID/fd/FD`` starts other programs in a namespace. The program
+reports on standard output::
 
     ready FD_A FD_B         descriptors of the two namespaces in this process
     done TIME               the last order was executed, monotonic nanoseconds
@@ -17,7 +18,7 @@ Orders on standard input, one for each line, with times in milliseconds::
     cut PORT a              the same, only from that side; `heal PORT` ends it too
     down a | up a           the network interface of a side
 
-The program ends when its standard input closes; a namespace ends with the last program inside.
+The program ends when its standard input closes. A namespace ends with its last program.
 """
 
 import ctypes
@@ -41,7 +42,7 @@ SIDES = ("a", "b")
 ADDRESSES = {"a": "10.77.0.1", "b": "10.77.0.2"}
 DEVICE = b"tun0"
 MOST_WAITING = 4096
-"""Limit of packets in transit; further packets are lost, as on any link."""
+"""Largest number of packets in transit; additional packets are lost, as on any link."""
 
 
 @dataclass
@@ -50,27 +51,27 @@ class Side:
 
     name: str
     namespace: int
-    """Descriptor of the end's network namespace."""
+    """File descriptor of the end's network namespace."""
     tun: int
     control: socket.socket
-    """A socket inside the namespace, for settings of its interfaces."""
+    """A socket inside the namespace, for configuring its network interfaces."""
 
 
 @dataclass
 class Weather:
-    """Quality of the link."""
+    """The quality of the link: delay, loss and cuts."""
 
     delay_ns: int = 0
     jitter_ns: int = 0
     loss: float = 0.0
     is_cut: dict[str, bool] = field(default_factory=lambda: {"a": False, "b": False})
-    """Side → whether packets from this side are lost."""
+    """Side → whether all packets from this side are lost."""
     ports: dict[str, set[int]] = field(default_factory=lambda: {"a": set(), "b": set()})
-    """Side → ports; packets from this side, from or to these ports, are lost."""
+    """Side → ports; packets from this side that use one of these ports are lost."""
 
 
 def made(name: str) -> Side:
-    """Move this process into a new namespace; return the end, with its device up."""
+    """Move this process into a new namespace; return the end of the link with its active device."""
     if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNET) != 0:
         raise OSError(ctypes.get_errno(), "cannot create a network namespace; this needs root")
     tun = os.open("/dev/net/tun", os.O_RDWR | os.O_NONBLOCK)
@@ -109,7 +110,7 @@ def ports_of(packet: bytes) -> tuple[int, int]:
 
 
 class Relay:
-    """The loop that moves packets."""
+    """The loop that forwards packets."""
 
     def __init__(self) -> None:
         self.weather = Weather()
@@ -125,7 +126,7 @@ class Relay:
         tell("ready", *(side.namespace for side in self._sides.values()))
 
     def run(self) -> None:
-        """Move packets until standard input ends."""
+        """Forward packets until standard input closes."""
         while True:
             wait_s = None
             if self._waiting:

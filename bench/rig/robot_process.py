@@ -1,11 +1,11 @@
-"""Robots that stamp every received line: a separate program that imports nothing of URC.
+"""Robots that timestamp every received line: a separate program without imports from URC.
 
-``python robot_process.py tcp:127.0.0.1:0 udp:127.0.0.1:0 …`` plays one robot for each argument.
-``ws`` is a WebSocket whose messages are the lines. ``bridge`` speaks the protocol of rosbridge, and
-receives ``M NUMBER`` for ``{"data": NUMBER}`` on ``/go``. ``http`` is a server that receives ``M
-NUMBER`` by a request for ``/go?t=NUMBER``. ``mqtt:HOST:PORT`` subscribes to the topic ``go`` of
-that broker. The program prints one line for each event, with times of the monotonic clock in
-nanoseconds::
+``python robot_process.py tcp:127.0.0.1:0 udp:127.0.0.1:0 …`` emulates one robot for each argument.
+``ws`` is a WebSocket server; each message is a line. ``bridge`` implements the protocol of
+rosbridge; ``{"data": NUMBER}`` on ``/go`` counts as the line ``M NUMBER``. ``http`` is an HTTP
+server; a request for ``/go?t=NUMBER`` counts as the line ``M NUMBER``. ``mqtt:HOST:PORT``
+subscribes to the topic ``go`` of a broker. The program prints one line for each event, with times
+of the monotonic clock in nanoseconds::
 
     ready 40001 40002 …     their ports, once
     open ROBOT TIME         a connection opened, or a broker accepted the subscription
@@ -15,7 +15,7 @@ nanoseconds::
     waited TIME PID MICROSECONDS  another runnable process had to wait: the argument
                             ``pid:NUMBER`` watches a process and its children
 
-The program ends when its standard input closes, and so with its parent.
+The program ends when its standard input closes, so it ends with its parent.
 """
 
 import base64
@@ -34,9 +34,9 @@ BEAT_NS = 5_000_000
 LOOK_NS = 20_000_000
 """Interval of checks for waiting processes, in nanoseconds."""
 WAITED_NS = 2_000_000
-"""Shortest reported wait, in nanoseconds."""
+"""Shortest reported wait for a processor, in nanoseconds."""
 LATE_NS = 5_000_000
-"""Shortest reported delay, in nanoseconds."""
+"""Shortest reported delay of a wake-up, in nanoseconds."""
 LONGEST_LINE = 65536
 BROKER_S = 20.0
 """Timeout for the start of a broker, in seconds."""
@@ -47,7 +47,7 @@ class Ear:
     """A decoder of lines from one connection."""
 
     opening = b""
-    """First bytes to send on a new connection."""
+    """Bytes that the robot sends first on a new connection."""
 
     def __init__(self) -> None:
         self.rest = b""
@@ -55,10 +55,13 @@ class Ear:
         self.reply = b""
         """Reply to send."""
         self.is_ready = True
-        """Whether the connection can carry lines; before that, it is not reported as open."""
+        """Whether the connection is ready for lines.
+
+        Only a ready connection is reported as open.
+        """
 
     def take(self, data: bytes) -> list[str]:
-        """Return the lines that end in `data`."""
+        """Return the lines completed by `data`."""
         *lines, rest = (self.rest + data).split(b"\n")
         self.rest = rest[-LONGEST_LINE:]
         return [line.decode("latin-1").rstrip("\r") for line in lines]
@@ -72,7 +75,7 @@ class WebEar(Ear):
         self.is_ready = False
 
     def take(self, data: bytes) -> list[str]:
-        """Answer the handshake, then return each message."""
+        """Answer the handshake, then return each received message as a line."""
         self.rest += data
         if not self.is_ready:
             head, end, self.rest = self.rest.partition(b"\r\n\r\n")
@@ -113,7 +116,7 @@ class WebEar(Ear):
         return data[0] & 0x0F, body
 
     def read(self, body: bytes) -> list[str]:
-        """Return the lines of a message."""
+        """Return the lines in a message."""
         return body.decode().splitlines()
 
 
@@ -121,17 +124,17 @@ class BridgeEar(WebEar):
     """A decoder of messages published through a rosbridge."""
 
     def read(self, body: bytes) -> list[str]:
-        """Return a line for a message on the topic of motion, otherwise nothing."""
+        """Return a line for a message on the topic of motion, and no line for other messages."""
         said = json.loads(body)
         is_motion = said["op"] == "publish" and said["topic"] == "/go"
         return [f"M {said['msg']['data']}"] if is_motion else []
 
 
 class HttpEar(Ear):
-    """A decoder of requests without a body, such as ``GET /go?t=5``; connections are persistent."""
+    """A decoder of HTTP requests without a body, such as ``GET /go?t=5``."""
 
     def take(self, data: bytes) -> list[str]:
-        """Return ``M 5`` for each complete request."""
+        """Return a line such as ``M 5`` for each complete request."""
         *heads, self.rest = (self.rest + data).split(b"\r\n\r\n")
         self.reply += b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nok" * len(heads)
         return [f"M {head.split(b' ')[1].decode().rpartition('=')[2]}" for head in heads]
@@ -184,12 +187,12 @@ class Visit:
     socket: socket.socket
     expectation: Ear
     began_ns: int = 0
-    """Time of the first byte of an incomplete line."""
+    """Time at which the first byte of an incomplete line arrived."""
     is_told: bool = False
 
 
 def opened(place: str, robot: int) -> Door | Visit:
-    """Listen at ``KIND:HOST:PORT``, or connect to a broker there."""
+    """Listen at an address ``KIND:HOST:PORT``, or connect to a broker at this address."""
     kind, host, port = place.split(":")
     if kind == "mqtt":
         line = dialled(host, int(port))
@@ -219,14 +222,14 @@ def dialled(host: str, port: int) -> socket.socket:
 
 
 class Others:
-    """A process and its children, with the waits of each for a processor."""
+    """A process and its children, with the times that each process waits for a processor."""
 
     def __init__(self, process: str) -> None:
         self._process = process
         self._waited: dict[str, int] = {}
 
     def look(self) -> list[tuple[str, int]]:
-        """Return the processes that waited since the last check, with nanoseconds."""
+        """Return processes that have waited since the last check, with durations in nanoseconds."""
         found: list[tuple[str, int]] = []
         with contextlib.suppress(OSError):  # the process has ended
             with open(f"/proc/{self._process}/task/{self._process}/children") as children:
@@ -242,7 +245,7 @@ class Others:
 
 
 class Robots:
-    """All robots of this program, in one loop."""
+    """The event loop with all robots of this program."""
 
     def __init__(self, places: list[str]) -> None:
         self._selector = selectors.DefaultSelector()
@@ -257,7 +260,7 @@ class Robots:
         self._tell("ready", *ports)
 
     def run(self) -> None:
-        """Run until standard input ends."""
+        """Run the robots until standard input closes."""
         look_ns = due_ns = time.monotonic_ns() + BEAT_NS
         while True:
             self._flush()
@@ -320,7 +323,7 @@ class Robots:
         self._look(visit, now_ns)
 
     def _look(self, visit: Visit, now_ns: int) -> None:
-        """Report once that a connection can carry lines."""
+        """Report once that a connection is ready for lines."""
         if visit.expectation.is_ready and not visit.is_told:
             visit.is_told = True
             self._tell("open", visit.robot, now_ns)

@@ -1,7 +1,7 @@
-"""A real ``urc serve`` that a pattern can block: a separate program.
+"""A real ``urc serve`` that a signal can block: a separate program.
 
-``python server_process.py serve …``. At SIGUSR2 its only thread matches a pattern whose work
-doubles with each letter. The interpreter is blocked during the match. It then prints::
+``python server_process.py serve …``. At SIGUSR2, the main thread matches a pattern that takes twice
+as long for each additional letter. The interpreter is blocked during the match. It then prints::
 
     backtracked TIME TIME   from when to when, monotonic nanoseconds
 """
@@ -15,7 +15,7 @@ from types import FrameType
 from urc.cli.main import main
 
 HELD_UP_NS = 800_000_000
-"""Length of the block, longer than any lease in the rig and than the age limit of inputs."""
+"""Duration of the block: longer than any lease in the rig and than the age limit of inputs."""
 FIRST_LETTERS = 20
 
 
