@@ -1,6 +1,6 @@
 """`./dev bench [--full] [NAME…]`: run all or some benchmarks.
 
-The exit code is 1 after a missed goal.
+The exit code is 1 if a goal is missed.
 """
 
 import argparse
@@ -54,7 +54,7 @@ def main() -> int:
     parser.add_argument(
         "--write-docs",
         action="store_true",
-        help=f"write the figures into {' and '.join(page.name for page in PAGES)}",
+        help=f"write the results into {' and '.join(page.name for page in PAGES)}",
     )
     arguments = parser.parse_args()
     for name in arguments.names:
@@ -81,7 +81,7 @@ def bring_programs(names: Sequence[str]) -> set[str]:
     left_out = {name for name in names if PROGRAMS.get(name) in missing}
     for name in sorted(left_out):
         remedy = f"to install it: {brought.remedy}"
-        print(f"bench: {name} left out: no {PROGRAMS[name]}; {remedy}", file=sys.stderr)
+        print(f"bench: {name} skipped: no {PROGRAMS[name]}; {remedy}", file=sys.stderr)
     return left_out
 
 

@@ -91,7 +91,7 @@ async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:
     if len(found) < LEAST_SHARE * seconds * rate_hz:
         said = json.dumps(answer["said"])
         raise TooFew(
-            f"{len(found)} of {seconds * rate_hz:.0f} values were shown; the page says: {said}"
+            f"{len(found)} of {seconds * rate_hz:.0f} values were shown; text on the page: {said}"
         )
     return [_age_ms(one.origin_ms + now_ms, (clock - START) / 10) for now_ms, clock in found]
 

@@ -105,7 +105,7 @@ LIVE = """
 (count) => document.querySelectorAll(".urc-grid [data-state=live]").length >= count
 """
 SHOWS = 4
-"""Number of widgets that show values; the stick only sends."""
+"""Number of widgets that show values; the stick only sends values."""
 COUNT = """
 window.benchImages = 0;
 const decode = window.createImageBitmap;

@@ -182,7 +182,7 @@ class StreamDriver:
         return {sample.signal: sample.value for sample in samples}
 
     async def flood(self, count: int) -> None:
-        """Request `count` lines, and return when all have arrived."""
+        """Request `count` lines, and wait until all lines have arrived."""
         self._robot.done.clear()
         self._writer.write(b"FLOOD %d\n" % count)
         async with asyncio.timeout(60):

@@ -22,7 +22,7 @@ ANSWER = {"x": 1.25, "y": -0.337, "heading": 90.5}
 
 
 class Driver(Protocol):
-    """The interface of all drivers."""
+    """The interface of the compared drivers."""
 
     async def drive(self, vx: float, wz: float) -> dict[str, object]:
         """Send a speed, and return the robot's reply."""

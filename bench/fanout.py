@@ -62,7 +62,7 @@ async def _urc(clients: int, ticks: int) -> tuple[float, int]:
         path = "/ws?robot=puppet"
         spent_s, sent_counters = await cost_s(app, path, clients, [], lambda: line.heard(tell))
     if min(messages for messages, _ in sent_counters) < ticks * 0.9:
-        raise SystemExit("bench: the machine was too busy for every frame")
+        raise SystemExit("bench: the machine was too busy to send every frame")
     return spent_s, sent_counters[0][1] // ticks
 
 

@@ -94,7 +94,7 @@ def _drawing(row: Mapping[str, object], name: str) -> str:
     assert isinstance(bins, dict)
     most = max(bins.values())
     wide = max(len(start) for start in bins)
-    lines = [f"{row[name]}: lower bound in ms, and count"]
+    lines = [f"{row[name]}: lower bound in ms, count"]
     for start, count in bins.items():
         lines.append(f"{start:>{wide}} {'█' * max(1, round(count / most * BARS))} {count}")
     return "\n".join(lines) + "\n"

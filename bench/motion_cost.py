@@ -78,7 +78,9 @@ def _round(rate_hz: int, look_s: float) -> tuple[float, float]:
         came = sum(map(len, robots.heard)) - before
         if came < LEAST_LINES_HZ * look_s * ROBOTS:
             said = [page.refusal for page in pages]
-            raise SystemExit(f"bench: {came} lines came to the robots; the server said {said}")
+            raise SystemExit(
+                f"bench: {came} lines reached the robots; output of the server: {said}"
+            )
     return tuple((late - early) / look_s / ROBOTS for early, late in zip(idle, driven, strict=True))  # type: ignore[return-value]
 
 

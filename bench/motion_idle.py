@@ -3,7 +3,8 @@
 Each robot is driven once and released. Its page keeps the controls and continues to receive
 heartbeats. After the stop and its repetitions, no byte may arrive, because zero commands would
 disturb another controller of the robot. Real programs communicate over a relay between two network
-namespaces. The benchmark needs root and /dev/net/tun; otherwise it is left out, with a message.
+namespaces. The benchmark needs root and /dev/net/tun; otherwise, the benchmark is skipped with a
+message.
 """
 
 import json

@@ -25,11 +25,11 @@ DELAY_MS = 50
 LOOK_S = 0.25
 CALM_S = 20.0
 LATE_MS, LATE_WITHIN_NS = 50.0, 600_000_000
-"""Limits for blaming a delay of the machine for a stop: minimum delay, maximum time after it."""
+"""Smallest delay of the machine that can cause a stop, and longest time until this stop."""
 MOST = {0: None, 1: 0.1, 3: 4.0}
 """Loss in percent → largest allowed number of stops a minute.
 
-With None, only stops caused by the machine are allowed.
+For a limit of None, only stops caused by the machine are allowed.
 """
 LASTS_S, LASTS_IF_FULL_S = {0: 10, 1: 15, 3: 10}, {0: 60, 1: 180, 3: 60}
 """Loss in percent → duration of the run with all robots in parallel, in seconds."""

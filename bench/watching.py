@@ -46,7 +46,7 @@ async def cost_s(
         try:
             said = await asyncio.wait_for(viewers.stdout.readline(), READY_S)
             if said.strip() != b"ready":
-                raise SystemExit("bench: the pages did not come up")
+                raise SystemExit("bench: the pages did not connect")
             await asyncio.sleep(0.2)  # the first state of every page
             began_s = time.process_time()
             await play()

@@ -26,7 +26,7 @@ new WebSocket(`ws://${location.host}/ws`).onmessage = ({ data }) => {
 
 
 def page(_: ServerConnection, request: Request) -> Response | None:
-    """Answer every request that is no WebSocket handshake with the page."""
+    """Reply with the page to every request other than a WebSocket handshake."""
     if request.path == "/ws":
         return None
     headers = Headers({"Content-Type": "text/html", "Content-Length": str(len(PAGE))})

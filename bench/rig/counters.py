@@ -184,10 +184,10 @@ def _judged(lasts_s: float, heard: Sequence[tuple[int, int, str]], fault: str) -
     for port, number, words in heard:
         place = places[port] = places.get(port, -1) + 1  # each connection starts at 0
         if number != place % NUMBERS and not fault:
-            fault = f"{number} {words} in the place of {place % NUMBERS}"
+            fault = f"{number} {words} instead of {place % NUMBERS}"
     last = {words.split()[0]: words for words in motions}
     moving = [words for words in last.values() if not words.endswith(" 0")]
     fault = fault or (f"nothing stops {moving[0]}" if moving else "")
     if len(motions) < lasts_s:
-        fault = fault or f"found only {len(motions)} frames of motion"
+        fault = fault or f"received only {len(motions)} frames of motion"
     return Gesture(lasts_s, len(heard), len(motions), fault)

@@ -59,7 +59,7 @@ class Cut(NamedTuple):
     was_moving: bool = True
     """Whether the robot moved when the link was cut.
 
-    On a busy machine, the robot may have stopped.
+    On a busy machine, the robot may have stopped before the cut.
     """
 
     @property
@@ -93,7 +93,10 @@ class Cut(NamedTuple):
 
 
 class CutRig:
-    """A rig with robots behind a relay, and a server with pages on this side. Needs root."""
+    """A rig with robots on one side of a relay, and a server with pages on the other side.
+
+    Needs root.
+    """
 
     def __init__(self, folder: Path, kinds: Sequence[str]) -> None:
         """Start all programs; store the robots' documents and the server's data in `folder`.
@@ -161,7 +164,7 @@ class CutRig:
 
         Args:
             seconds: length of the cut.
-            order: order to the relay: ``cut``, ``cut a`` or ``cut b`` for one direction, or ``down
+            order: the relay's order ``cut``, ``cut a`` or ``cut b`` for one direction, or ``down
             a``.
         """
         return self._trial(self.indexes, seconds, order, self._share())
@@ -314,7 +317,7 @@ def _fault(
     was_held: bool,
     burst_ms: float,
 ) -> str:
-    """Return the violation of the motion contract after a cut, or ""."""
+    """Describe the violation of the motion contract after a cut, or return ""."""
     texts = [one.text for one in heard]
     moved = [text for text in texts if text != "M 0"]
     stop = texts.index("M 0") if "M 0" in texts else len(texts)

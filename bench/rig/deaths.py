@@ -66,7 +66,7 @@ class Trial(NamedTuple):
     late_ms: float
     """Delay caused by the machine, in milliseconds.
 
-    The delay is the largest of all late wake-ups of idle programs and robots, and of all times in
+    This is the largest of two values: a late wake-up of an idle program or robot, and a time in
     which the server or a guard waited for a processor.
     """
     bound_ms: float = BOUND_MS
@@ -80,7 +80,7 @@ class Trial(NamedTuple):
 
     @property
     def is_excused(self) -> bool:
-        """Whether the machine's own delay makes the trial invalid."""
+        """Whether the trial is invalid because of the machine's delay."""
         if not self.has_moved:
             return True
         return not self.fault and 0 < self.stop_ms - self.bound_ms <= self.late_ms
@@ -169,7 +169,7 @@ class Rig:
 
     @property
     def indexes(self) -> range:
-        """Indexes of the robots."""
+        """Indexes of all robots of the rig."""
         return range(len(self.robots.heard))
 
     def weather(self, *orders: str) -> None:
@@ -213,7 +213,7 @@ class Rig:
 
     def _link(self) -> Relay:
         if self.relay is None:
-            raise ValueError("this rig has no relay")
+            raise ValueError("this rig was started without a relay")
         return self.relay
 
     def _await_stop(self, index: int, began_ns: int) -> int:

@@ -147,7 +147,10 @@ def document(kind: str, index: int, port: int, other: Counterpart | None) -> str
 def start_counterpart(
     kind: str, index: int, folder: Path, inside: tuple[str, ...]
 ) -> Counterpart | None:
-    """Start the third-party program for a robot of this kind; None if it needs none."""
+    """Start the third-party program for a robot of this kind.
+
+    Return None for kinds without a program.
+    """
     if kind == "mqtt":
         return _broker(FIRST_PORT[kind] + index, folder / f"broker-{index}.conf", inside)
     if kind == "ssh":

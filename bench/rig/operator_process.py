@@ -2,8 +2,8 @@
 
 The program reads plans from standard input, one JSON object on each line, and forks a process for
 each plan. The process acts like a page: it takes the controls, sends a tick every 50 ms, and
-vanishes as planned. For each event, it prints one line, with times of the monotonic clock in
-nanoseconds::
+vanishes as planned. For each event, the process prints one line, with times of the monotonic clock
+in nanoseconds::
 
     pid NUMBER PID          the process of plan NUMBER
     port NUMBER PORT        its source port, for cuts by a relay

@@ -311,7 +311,7 @@ class Server(Program):
         Args:
             profiles: paths of the robots' documents.
             data: data folder of the server.
-            options: further options of ``urc serve``.
+            options: additional options of ``urc serve``.
             host: address to listen on.
             inside: command prefix of a network namespace, from `Relay.inside`.
             can_hang: whether a signal can block the server; see `bench.rig.server_process`.

@@ -47,7 +47,7 @@ MOST_WAITING = 4096
 
 @dataclass
 class Side:
-    """One end of the link."""
+    """One end of the link between the namespaces."""
 
     name: str
     namespace: int

@@ -142,7 +142,7 @@ def test_a_benchmark_without_its_program_is_left_out_by_name(
     said = capsys.readouterr()
     assert said.out == ""
     remedy = Brought(left_out=browser).remedy
-    line = f"bench: browser_peers left out: no chromium; to install it: {remedy}"
+    line = f"bench: browser_peers skipped: no chromium; to install it: {remedy}"
     assert said.err.splitlines() == [line]
 
 
