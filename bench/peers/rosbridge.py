@@ -52,7 +52,7 @@ def quaternion(roll: float, pitch: float, yaw: float) -> dict[str, float]:
 
 
 def odometry(at_s: float) -> dict[str, object]:
-    """Return a pose on a circle with a radius of three metres."""
+    """Return an odometry message on a circle with a radius of three metres."""
     turn = at_s / 6
     position = {"x": 3 * math.cos(turn), "y": 3 * math.sin(turn), "z": 0.0}
     pose = {"position": position, "orientation": quaternion(0, 0, turn + math.pi / 2)}

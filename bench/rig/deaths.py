@@ -66,8 +66,8 @@ class Trial(NamedTuple):
     late_ms: float
     """Delay caused by the machine, in milliseconds.
 
-    This is the largest of two values: a late wake-up of an idle program or robot, and a time in
-    which the server or a guard waited for a processor.
+    The value is the latest wake-up of an idle program or robot, or the server's or a guard's
+    longest wait for a processor.
     """
     bound_ms: float = BOUND_MS
     has_moved: bool = True
