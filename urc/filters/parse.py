@@ -110,7 +110,7 @@ def _signed(value: Any, bits: Any) -> int:
 
 
 class _Short(ValueError):
-    """The bytes do not contain a number of this type."""
+    """The error for bytes that are too short for a number."""
 
 
 @cache  # the type names are few
@@ -174,4 +174,5 @@ CUT_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "signed": (_signed, (1, 1)),
     "unpack": (_unpack, (1, 2)),
 }
-"""Filter → function, and its least and largest number of arguments after the subject."""
+"""Each filter with its function, and its minimum and maximum number of arguments after the
+subject."""

@@ -11,8 +11,7 @@ _TURNS = 30
 """Number of loop turns after which all ready tasks have run; longer than every chain of tasks in
 URC."""
 _QUIET_TURNS = 3
-"""Number of consecutive idle turns after which no task is ready, because chains of tasks have no
-gaps."""
+"""Number of consecutive idle loop turns that prove that no task is ready."""
 
 
 async def settle() -> None:

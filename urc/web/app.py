@@ -142,7 +142,7 @@ def _recorder(audit: AuditLog | None, name: str, robot: Robot) -> AuditRecorder 
 
 
 class _Dashboard(Starlette):
-    """Starlette with the page policy outermost, so that error responses get its headers."""
+    """Starlette with the page policy as outermost middleware, even for error responses."""
 
     def __init__(
         self,

@@ -163,7 +163,7 @@ class BrowserClient:
     def _flushed(self) -> None:
         """Send a flush of the fan-out now if the socket is free; leave all else to the writer.
 
-        Waking the writer for every flush would take three times as long as sending it here.
+        Waking the writer for every flush would take three times as long as the direct send.
         """
         live = self._live
         if live is not None and self._flow.is_free() and not self._closing:

@@ -33,7 +33,7 @@ _NO_STORE = {"cache-control": "no-store"}
 
 @dataclass(frozen=True, slots=True)
 class PinnedRobot:
-    """One robot, and the values that are fixed for it."""
+    """One robot with its fixed values."""
 
     name: str
     title: str

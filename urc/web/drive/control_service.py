@@ -169,7 +169,7 @@ class ControlService:
         self.controller.part(operator.client.id)
 
     def operator_of(self, key: str) -> OperatorSession | None:
-        """Return the session of the page with this key, or None."""
+        """Return the session of the page with the key `key`; None for an unknown key."""
         said = key.encode()
         return next(
             (one for one in self._operators.values() if compare_digest(one.key.encode(), said)),

@@ -75,7 +75,7 @@ class OperatorSession:
         self.moved_at_s = float("-inf")
         """Time of the last applied tick of any control."""
         self.key = secrets.token_urlsafe(16)
-        """Secret key with which a redundant socket joins this page."""
+        """Secret key with which a redundant socket joins the page."""
         self.spare: RedundantLine | None = None
         self.doubled: DuplicateElimination | None = None
         """Filter of duplicate messages, used once the page has a redundant socket."""

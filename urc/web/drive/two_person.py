@@ -68,7 +68,7 @@ class TwoPersonRule:
         self._tokens: dict[str, _Yes] = {}
 
     def prepare(self, asker: OperatorSession, said: wire.ApprovalRequest) -> str:
-        """Return a new token for a confirmation on this page."""
+        """Return a new token for a confirmation on the page `asker`."""
         now = self._clock.now()
         self._tokens = {key: yes for key, yes in self._tokens.items() if yes.until_s > now}
         mine = [key for key, yes in self._tokens.items() if yes.asker is asker]

@@ -24,7 +24,7 @@ __all__ = ["FRAMES_PER_SECOND", "Fanout", "FanoutPosition", "Pacer", "Place"]
 FRAMES_PER_SECOND = 60.0
 LOG_LINES_FOR_NEWCOMERS = 50
 SHARED_FOR_S = 0.005
-"""Time for which an encoded frame is reused, in seconds. The ages in a frame are those at the time
+"""Time for which an encoded frame is reused, in seconds. The ages in a frame are valid at the time
 of its encoding."""
 
 

@@ -41,7 +41,7 @@ class RobotOptions:
     data: Path
     """Folder of the settings and packages."""
     make: Callable[[Profile, Mapping[str, Value]], Robot]
-    """Returns a robot with these settings."""
+    """Returns the robot of a profile with the given settings."""
     tried: Callable[[Profile, Mapping[str, Value]], AbstractAsyncContextManager[Session]]
     """Opens a session that only tests the transports, without any control of the robot."""
     given: Callable[[Profile], Mapping[str, Value]]

@@ -1,8 +1,8 @@
 """A robot that the dashboard serves, and the lifetime of its session.
 
 Layer 5. The session opens when the first client connects. The session closes a short time after the
-last client has disconnected. So a reload of the page keeps the robot connected, but leaving the
-page disconnects it.
+last client has disconnected. Therefore a reload of the page keeps the robot connected, but leaving
+the page disconnects the robot.
 """
 
 import asyncio
@@ -212,7 +212,7 @@ class RobotService:
         self._next: asyncio.Future[LiveSession] | None = None
         self._is_open = False
         self._held_off = 0
-        """Number of callers that need the robot disconnected."""
+        """Number of callers that require a disconnected robot."""
         self._successor: tuple[Robot, LatchStore | None] | None = None
 
     @property

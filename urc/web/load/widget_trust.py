@@ -21,8 +21,7 @@ OURS = frozenset({
     "slider", "speed", "state", "stop", "switch", "table", "terminal", "text", "tilt", "value",
     "vector-pad",
 })  # fmt: skip
-"""Names of the widgets that ship with URC; the list excludes folders that others add next to
-them."""
+"""Names of the widgets that ship with URC; other folders next to these widgets are not trusted."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -72,7 +72,7 @@ class PackageCatalog:
         return [entry for some in self.found.values() for entry, _ in some]
 
     def hits(self, words: str, kinds: tuple[str, ...]) -> list[IndexEntry]:
-        """Return the newest version of each package of these kinds that matches all words."""
+        """Return the newest version of each package of the given kinds that matches all words."""
         entries = [entry for entry in self.entries() if entry.kind in kinds]
         return search(entries, words.split())
 
@@ -127,4 +127,4 @@ class PackageCatalog:
 
 
 def _unheard(_: str) -> None:
-    """Ignore a warning, because the result already contains it."""
+    """Ignore a warning, because the result of the request already contains the warning."""

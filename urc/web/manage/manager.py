@@ -304,7 +304,7 @@ class Manager:
     # Data for pages
 
     def cache(self, words: str, kinds: tuple[str, ...], *, may_manage: bool) -> PackageList:
-        """Return the package lists for a page; call this in a thread, because it reads files.
+        """Return the package lists for a page; the caller needs a thread, because files are read.
 
         Args:
             words: search words for packages of repositories.

@@ -113,7 +113,7 @@ def settings_page(
         given: settings given at the start of the server.
         withheld: names of secrets that are unused because they were entered for another
             destination.
-        ways: the pages of this server, for links.
+        ways: navigation links of this server.
         driver: the name of the package or file in use.
         versions: installed versions of the driver, newest first.
         may_manage: whether the visitor may change packages and settings.

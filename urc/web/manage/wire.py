@@ -267,7 +267,7 @@ class Timeline(ManageMessage, frozen=True):
 
     entries: list[dict[str, Any]]
     fault: str
-    """Reason why the log is no longer written; "" while it is written."""
+    """Reason why the log is no longer written; "" if the log is written."""
 
 
 class ReloadResult(ManageMessage, frozen=True):

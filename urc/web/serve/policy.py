@@ -1,7 +1,7 @@
 """Access checks and page policy for every request, before any route is looked up.
 
 Layer 5. Pure ASGI middleware around the whole application, so that error responses also get its
-headers. The check of Host prevents foreign host names that resolve to this machine. The check of
+headers. The check of Host refuses foreign host names that resolve to this machine. The check of
 Origin prevents foreign pages from opening a WebSocket or posting a form. The response headers block
 injected markup. The module depends on no route, robot or template.
 """
@@ -95,7 +95,7 @@ REFUSAL_HEADERS = (
     (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'"),
     *_FIXED_HEADERS,
 )
-"""Headers of a plain-text refusal from outside the application; they forbid all scripts and
+"""Headers of a plain-text refusal from outside the application; the headers forbid all scripts and
 resources."""
 
 
@@ -117,7 +117,7 @@ def parse_host(text: str) -> Authority | None:
 def is_host_allowed(
     authority: Authority, names: frozenset[str], *, is_loopback: bool = False
 ) -> bool:
-    """Return whether the server accepts requests for this host.
+    """Return whether the server accepts requests for the host in `authority`.
 
     DNS rebinding from a foreign name server affects neither a literal address nor ``localhost``.
     All other names must be among `names`, because any device on the network may claim a name under
@@ -330,7 +330,7 @@ def _authority(match: re.Match[str]) -> Authority | None:
 
 
 def _is_loopback(scope: Scope) -> bool:
-    """Return whether a request comes over loopback, so from a program on this machine."""
+    """Return whether a request comes over loopback, and therefore from this machine."""
     client = scope.get("client")
     try:
         return client is not None and unmapped(ipaddress.ip_address(client[0])).is_loopback

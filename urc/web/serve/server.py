@@ -221,7 +221,7 @@ def reachable_urls(host: str, port: int) -> tuple[str, ...]:
 
     For ``0.0.0.0`` and ``::``, these are the addresses of all network interfaces of this machine,
     or else loopback. For any other host, the URL contains `host`. Network addresses precede
-    loopback. No packet is sent for this purpose.
+    loopback. The function sends no packet.
 
     Args:
         host: the address or name on which the server listens.

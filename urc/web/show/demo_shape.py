@@ -28,7 +28,7 @@ _TYPES: Final = [*_ELEMENTS, "array", "object", "image", "blob"]
 
 
 def _mapping(title: str, properties: Mapping[str, Any], *required: str) -> dict[str, Any]:
-    """Return the schema of a mapping that allows exactly these keys."""
+    """Return the schema of a mapping that allows exactly the keys in `properties`."""
     return {
         "title": title,
         "type": "object",

@@ -119,7 +119,7 @@ _TICK_OF = b'{"t":"tick","command":"'
 
 
 def command_of(data: bytes) -> str:
-    """Return the command of a tick from its first bytes; "" if it is not in these bytes."""
+    """Return the command of a tick from its first bytes; "" if these bytes do not contain it."""
     end = data.find(b'"', len(_TICK_OF)) if data.startswith(_TICK_OF) else -1
     return data[len(_TICK_OF) : end].decode("ascii", "replace") if end > 0 else ""
 
