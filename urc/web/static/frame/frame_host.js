@@ -2,7 +2,7 @@
 /**
  * The page's side of a third-party widget: its frame, and the messages in and out of it.
  *
- * The frame has no origin, so it cannot reach the page. It has one port, whose messages `border.js`
+ * The frame has no origin, so it cannot reach the page. It has one port, whose messages `frame_protocol.js`
  * checks. It gets the readings and outputs of its cell, and may run the bound commands. A frame that
  * throws, floods, navigates or stops responding is removed, and its cell shows a card.
  *
