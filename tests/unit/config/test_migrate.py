@@ -291,4 +291,4 @@ def test_an_old_code_is_explained_under_its_new_name(
     assert main(["explain", new]) == 0
     page = capsys.readouterr().out
     assert main(["explain", old]) == 0
-    assert capsys.readouterr().out == f"{old} is called {new} now.\n\n{page}"
+    assert capsys.readouterr().out == f"The new name of {old} is {new}.\n\n{page}"
