@@ -125,7 +125,7 @@ def check_range(part: Node, kind: str, problems: Problems) -> tuple[float | None
                     hint="a range needs the type integer or number",
                 )
     elif low is not None and high is not None and low >= high:
-        hint = "swap them" if low > high else "remove one, or make the range wider"
+        hint = "swap them" if low > high else "remove 'min' or 'max', or make the range wider"
         text = f"min {low:g} is not below max {high:g}"
         problems.error(part, "wrong-order", text, at="min", hint=hint)
     return low, high

@@ -133,7 +133,7 @@ def _check_body(part: Node, body: BodySpec, problems: Problems) -> None:
     for key in part.data:
         kinds = BODY_KEYS.get(key)
         if kinds is not None and body.type not in kinds:
-            text = f"'{key}' has no effect for {body.type}; it is for {' and '.join(kinds)}"
+            text = f"'{key}' has no effect for {body.type}, only for {' and '.join(kinds)}"
             problems.error(part, "misplaced-key", text, at=key, key=True)
 
 

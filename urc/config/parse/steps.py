@@ -92,7 +92,9 @@ def _step(part: Node, context: StepContext, problems: Problems) -> sequence.Step
             text = f"'{key}' has no effect with '{verb}'"
             problems.error(part, "misplaced-key", text, at=key, key=True)
     if not context.is_named:
-        refuse(part, ("to", "from"), "is for sequences: these steps have one transport", problems)
+        refuse(
+            part, ("to", "from"), "is only for sequences: these steps have one transport", problems
+        )
     return _one(verb, part, context, problems)
 
 

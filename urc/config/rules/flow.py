@@ -59,7 +59,7 @@ def _check_line(part: Node, spec: TransportSpec, problems: Problems) -> None:
             part.must("keepalive").must("every"),
             "slow-keepalive",
             f"the watchdog of the robot expires first, after {shown_duration(watchdog_s)}",
-            hint="half of this time allows for one lost frame",
+            hint="use half of this time, so that one frame may be lost",
         )
     waits_s = sum(_wait_s(step) for step in all_steps(spec.on_close))
     if waits_s > _GOOD_BYE_S:

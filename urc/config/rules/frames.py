@@ -242,7 +242,7 @@ def _check_refusals(part: Node, reply: Reply, problems: Problems) -> None:
                 "ambiguous-frame",
                 f"the reply on success also matches, such as {good.samples[0][:_SHOWN]!r}, and"
                 f" would count as {what}",
-                hint=f"make the pattern match {whose} only; it is tried first",
+                hint=f"make the pattern match {whose} only, because it is tried first",
             )
     _check_struct_refusals(part, reply, problems)
 

@@ -189,8 +189,8 @@ def _check_will(
         "motion-without-will",
         f"if the connection to the broker is lost, nothing ends {command.name!r}",
         key=True,
-        hint=f"give {spec.name!r} a will: with the topic and payload of the stop, which the broker"
-        " publishes in this case",
+        hint=f"give {spec.name!r} a will: with the topic and payload of the stop, for the broker"
+        " to publish",
     )
 
 

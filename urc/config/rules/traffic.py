@@ -55,8 +55,8 @@ def _check_counted(part: Node, driver: Driver, problems: Problems) -> None:
             problems.warn(
                 inner.must("send"),
                 "uncounted",
-                f"{transport!r} counts the unread bytes of the robot, and no reply shows"
-                " when it has read these bytes",
+                f"{transport!r} counts the unread bytes of the robot, but no reply shows when the"
+                " robot has read these bytes",
                 hint="add the 'reply' of the robot, or priority: realtime if the robot does not"
                 " buffer the command",
             )

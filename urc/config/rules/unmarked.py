@@ -65,7 +65,7 @@ def check_unmarked(part: Node, driver: Driver, problems: Problems) -> None:
                     inner,
                     "unmarked-motion",
                     f"{name!r} seems to move the robot ({why}) and is not marked: STOP does not"
-                    " block it",
+                    " block this command",
                     key=True,
                     hint=_HINT if key == "commands" else _HINT_OF_STEPS,
                 )
@@ -86,8 +86,8 @@ def check_unguarded(part: Node, driver: Driver, problems: Problems) -> None:
                 problems.warn(
                     inner.must("moves"),
                     "unguarded-motion",
-                    f"{name!r} starts autonomous motion: STOP has no command to end it,"
-                    " and it needs no confirmation",
+                    f"{name!r} starts autonomous motion without a stop command and without a"
+                    " confirmation",
                     key=True,
                     hint="mark the command that ends the motion with stop: true; if the robot has"
                     " no stop, add 'confirm' to this command",

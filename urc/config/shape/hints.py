@@ -121,7 +121,7 @@ def mapping_hint(document: Document, path: Path, value: object, schema: Mapping[
     text = value.upper() if isinstance(value, str) else ""
     if {"tx", "rx"} <= example.keys() and text in _DELIMITERS:
         example = {**example, "tx": text, "rx": text}
-    return f"write its keys, such as {_flow(example)}"
+    return f"write a mapping, such as {_flow(example)}"
 
 
 def _flow(example: Mapping[str, Any]) -> str:

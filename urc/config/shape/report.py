@@ -156,7 +156,7 @@ def _wrong_name(document: Document, path: Path, error: _Error) -> list[Problem]:
         return [_other_one(document, path, error)]
     message = f"{_cut(error.value)} is not a valid name here"
     if error.keyword == "maxLength":
-        message += f": it has more than {error.limit} characters"
+        message += f": the name has more than {error.limit} characters"
     return [
         document.problem(
             (*path, error.value),

@@ -98,8 +98,8 @@ class Scope:
     def _hint(self, name: str) -> str:
         if name in ("settings", COUNTERS) and self._purpose == "type":
             return (
-                "only the 'value' of an item in a type may use settings and seq():"
-                " frames are decoded without them"
+                "only the 'value' of an item in a type may use settings and seq(), because"
+                " received frames have neither"
             )
         if name == "settings":
             return "compare a frame with a setting in 'when', next to the struct"
