@@ -42,7 +42,7 @@ def read_bytes(path: str, most: int) -> bytes:
             path,
             "not-readable",
             "permission to read this file is denied",
-            "allow it with 'chmod u+r'",
+            "allow reading with 'chmod u+r'",
         ) from None
     except OSError as error:
         reason = (error.strerror or str(error)).lower()

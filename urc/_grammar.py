@@ -1,7 +1,7 @@
 """Translation of expressions into Python source, for the supported subset of Jinja.
 
-Private to `urc.expressions`. Grammar and precedence are those of Jinja ("Expressions" in its
-template designer documentation). A custom parser can report the column of every error, and avoids
+Private to `urc.expressions`. Grammar and precedence follow Jinja ("Expressions" in the template
+designer documentation of Jinja). A custom parser can report the column of every error, and avoids
 40 ms for importing a template engine. `tests/unit/test_expressions.py` compares this parser with
 Jinja.
 

@@ -166,7 +166,7 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
     if cost > MAX_COST:
         raise PatternError(
             f"this pattern has {cost} parts, and the limit is {MAX_COST}: use smaller numbers in"
-            " {…}, or start it with '^' and keep every repeat distinct from the next part"
+            " {…}, or start the pattern with '^' and keep every repeat distinct from the next part"
         )
     return Pattern(text, groups, _re2_search(text), False)
 
@@ -347,8 +347,8 @@ def _re2_search(text: str) -> Any:
         import re2
     except ImportError:
         raise PatternError(
-            "this pattern needs the package google-re2, which is not installed here: start it with"
-            f" '^' and keep every repeat distinct from the next part: {text!r}"
+            "this pattern needs the package google-re2, which is not installed: start the pattern"
+            f" with '^' and keep every repeat distinct from the next part: {text!r}"
         ) from None
     options = re2.Options()
     options.log_errors = False

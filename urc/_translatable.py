@@ -18,7 +18,7 @@ class Phrase(str):
     """English text with a placeholder ``{name}`` for each of `names`."""
     names: Mapping[str, str]
     pieces: tuple[str, ...]
-    """Parts of a joined phrase; a joined phrase has no `text`."""
+    """Parts of a joined phrase, for which `text` is empty."""
     between: str
 
 

@@ -125,8 +125,8 @@ def _escape(at: _Clue) -> SyntaxFault | None:
         column,
         "bad-escape",
         f"'{shown}' is not an escape in double quotes",
-        "write the text in single quotes: there a backslash is a backslash, and a quote is written"
-        " twice: ''; in double quotes a backslash is written \\\\",
+        "use single quotes, in which a backslash is plain text and a quote is written"
+        " twice: ''; in double quotes, write a backslash as \\\\",
     )
 
 

@@ -106,7 +106,7 @@ def to_text(problem: Problem) -> str:
 
 
 def to_json(problem: Problem) -> dict[str, object]:
-    """Return the problem as a JSON object; its keys are a stable interface."""
+    """Return the problem as a JSON object; the keys are a stable interface."""
     return {
         "file": problem.file,
         "line": problem.line,

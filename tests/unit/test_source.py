@@ -311,11 +311,11 @@ def test_file_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         ("a: [1, 2\n", "open-bracket", (1, 4),
          "close it with ']'; a value with special characters needs quotes"),
         ('a: "\\d"\n', "bad-escape", (1, 5),
-         "write the text in single quotes: there a backslash is a backslash, and a quote is written"
-         " twice: ''; in double quotes a backslash is written \\\\"),
+         "use single quotes, in which a backslash is plain text and a quote is written"
+         " twice: ''; in double quotes, write a backslash as \\\\"),
         ('a: "\\xZZ"\n', "bad-escape", (1, 5),
-         "write the text in single quotes: there a backslash is a backslash, and a quote is written"
-         " twice: ''; in double quotes a backslash is written \\\\"),
+         "use single quotes, in which a backslash is plain text and a quote is written"
+         " twice: ''; in double quotes, write a backslash as \\\\"),
     ],
 )  # fmt: skip
 def test_traps_of_yaml_are_told_with_their_remedy(

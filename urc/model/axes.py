@@ -20,7 +20,7 @@ _HALF: Final = math.sqrt(0.5)
 
 
 def turns(here: Axes, there: Axes) -> bool:
-    """Return whether values convert between two conventions: body to body, or world to world."""
+    """Return whether two conventions are convertible: both for a body, or both for a world."""
     if here == there or not here or not there:
         return here == there
     world = (*_WORLD, "bearing")

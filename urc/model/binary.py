@@ -44,11 +44,11 @@ class Extent(NamedTuple):
 
     kind: Literal["fixed", "rest", "prefix", "expression"]
     number: int = 0
-    """Size or length, for ``fixed``."""
+    """Size in bytes or length in items, for the kind ``fixed``."""
     prefix: Number | None = None
-    """Length field before the data, for ``prefix``."""
+    """Number type of the length field before the data, for the kind ``prefix``."""
     expression: Template | None = None
-    """Formula over earlier items, for ``expression``."""
+    """Formula over earlier items for the size or length, for the kind ``expression``."""
 
 
 class Item(NamedTuple):
@@ -107,7 +107,7 @@ class Switch(NamedTuple):
     by: Template
     cases: tuple[tuple[int | str, tuple[Item, ...]], ...]
     default: tuple[Item, ...] | None = None
-    """Items for any other value; None: a frame with another value does not match."""
+    """Items for values without a case; None: a frame with such a value does not match."""
 
 
 def packed_size(number: Number, count: Extent) -> int:
@@ -211,7 +211,7 @@ def _least(item: Item) -> int:
 def derived_sizes(items: tuple[Item, ...]) -> Mapping[str, Template]:
     """Return the formulas for sizes and counts, by the name of the item that contains the number.
 
-    URC computes the values of these items from the data to send.
+    URC computes sizes and counts from the data to send.
     """
     given = {
         one.id

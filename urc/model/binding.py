@@ -11,11 +11,11 @@ __all__ = ["targets"]
 
 
 def targets(command: Command, port: WidgetPort, given: OutputBinding) -> dict[str, str]:
-    """Return the output arguments by the names of the command arguments that receive them.
+    """Return the name of the output argument for each command argument.
 
-    The binding decides. Without a binding, a value goes to the argument of the same name. If a
-    command has one free argument, a single value goes to this argument even under a different name.
-    Hold-to-run controls are an exception.
+    The binding decides. Without a binding, a value goes to the argument of the same name. A single
+    value goes to the command's only free argument, even under a different name. This rule does not
+    apply to hold-to-run controls.
     """
     open_ones = [name for name in command.arguments if name not in given.fixed]
     if not port.is_held and not given.names and len(port.arguments) == 1 and len(open_ones) == 1:

@@ -40,7 +40,7 @@ __all__ = [
 ]
 
 ScalarOrTemplate = bool | int | float | str | None | Template
-"""An option as written: a plain value, or a template over ``settings``."""
+"""Value of an option in a document: a plain value, or a template over ``settings``."""
 
 
 class Timeouts(NamedTuple):
@@ -71,7 +71,7 @@ class TransportSpec(NamedTuple):
     type: str
     options: Mapping[str, object] = NOTHING
     """Options of the transport, such as ``host`` and ``port``. The values of options are plain
-    values, templates over settings, or lists and mappings of both."""
+    values, templates over settings, or lists and mappings of plain values and templates."""
     connection: Literal["persistent", "per_request"] = "persistent"
     framing: FramingSpec = FramingSpec()
     encoding: str = "utf-8"
@@ -174,7 +174,7 @@ class Argument(NamedTuple):
 
 
 STOPPED: Final = "STOP was pressed meanwhile: give it anew"
-"""Reason for refusing motion that was requested before a STOP."""
+"""Reason for refusing a motion request that is older than the last STOP."""
 
 
 class Command(NamedTuple):

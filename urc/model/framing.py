@@ -113,7 +113,7 @@ class LengthSpec(NamedTuple):
     adjust: int = 0
     unit: int = 1
     bits: int = 64
-    """Number of low bits with the length; the remaining bits belong to the payload."""
+    """Number of low bits that contain the length; the remaining bits belong to the payload."""
     spelling: Spelling = "raw"
     is_counted: bool = False
     """Whether the first `size` digits are the number of length digits that follow."""

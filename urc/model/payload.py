@@ -1,8 +1,8 @@
 """Declarations for reading and writing frames: a form and its parsed options.
 
 A *form* is one notation for the content of a frame (``regex``, ``struct``, ``json`` …). Each form
-has a parser in `urc.config`, which fills `options`, and a factory in `urc.protocol`, which reads
-them. Only the parser and the factory of a form use the content of `options`.
+has a parser in `urc.config`, which writes `options`, and a factory in `urc.protocol`, which reads
+`options`. Only the parser and the factory of a form use the content of `options`.
 
 Decoding returns *fields*: raw values by name. A field with the name of a signal sets that signal. A
 field name that starts with ``_`` is private to the document (conditions, correlation, command
@@ -59,9 +59,9 @@ class Count(NamedTuple):
     """The effect of a frame on the counters of its connection."""
 
     before: dict[str, int]
-    """Last number of each counter before the frame; unused counters are missing."""
+    """Last number of each used counter before the frame, by counter."""
     after: dict[str, int]
-    """Last number of each counter after the frame."""
+    """Last number of each counter after the frame, by counter."""
 
 
 class Numbered(NamedTuple):
@@ -150,7 +150,7 @@ class ReadSpec(NamedTuple):
     """Expressions over the converted fields, by signal."""
     when: Template | None = None
     """Condition over the converted fields; if false, the frame does not match. Without a condition,
-    every frame with these fields matches."""
+    every frame with the fields matches."""
     lines: int | Pattern | None = None
     """Number of frames in the reply, or a pattern for the last frame. The reader receives the
     frames of a reply joined by LF."""
@@ -178,6 +178,6 @@ class WriteSpec(NamedTuple):
 
 
 def each_of(send: WriteSpec) -> tuple[WriteSpec, ...]:
-    """Return all frames of `send`: only `send`, or the frames of a group."""
+    """Return the frames of a group, or only `send` for a single frame."""
     frames = send.options.get("frames")
     return frames if send.form == "frames" and isinstance(frames, tuple) else (send,)

@@ -44,13 +44,13 @@ class Setting(NamedTuple):
 
     @property
     def empty(self) -> Value:
-        """Value of an empty setting in templates: "", or None for numbers and booleans."""
+        """Value of an empty setting in templates: None for numbers and booleans, otherwise ""."""
         return None if self.type in ("port", "integer", "number", "boolean") else ""
 
     def is_missing(self, value: Value) -> bool:
         """Return whether `value` is missing, so that the robot cannot connect.
 
-        An empty default from a document is a valid value.
+        If the document declares an empty default, an empty value is valid.
         """
         return self.is_required and (value is None or (value == "" and self.default != ""))
 

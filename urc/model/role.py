@@ -1,6 +1,6 @@
-"""Roles of people, devices and programs: their rights at a robot. Each contains those before it.
+"""Roles of people, devices and programs, which define rights for a robot.
 
-Layer 2.
+Layer 2. Each role includes the rights of the previous roles.
 """
 
 from typing import Final, Literal
@@ -8,14 +8,14 @@ from typing import Final, Literal
 __all__ = ["ROLES", "Role", "includes"]
 
 Role = Literal["watch", "drive", "maintain", "administer"]
-"""``watch`` reads and may press STOP. ``drive`` gives commands, drives and resets STOP.
-``maintain`` changes settings and packages, and takes the controls by force. ``administer`` manages
-people, devices and tokens."""
+"""The role ``watch`` may read and press STOP. The role ``drive`` may also send commands, drive and
+reset STOP. The role ``maintain`` may also change settings and packages, and take the controls by
+force. The role ``administer`` may also manage people, devices and tokens."""
 ROLES: Final[tuple[Role, ...]] = ("watch", "drive", "maintain", "administer")
-"""All roles, by increasing rights."""
+"""All roles, in order of increasing rights."""
 _RANK: Final = {role: rank for rank, role in enumerate(ROLES)}
 
 
 def includes(role: Role | None, needed: Role) -> bool:
-    """Return whether `role` contains the rights of `needed`; None is no role at all."""
+    """Return whether `role` includes the rights of `needed`; None means no role."""
     return role is not None and _RANK[role] >= _RANK[needed]

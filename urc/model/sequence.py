@@ -49,7 +49,7 @@ class SendStep(NamedTuple):
 
 
 class ExpectStep(NamedTuple):
-    """Wait for a frame; later steps can use its private fields."""
+    """Wait for a frame; later steps can use the frame's private fields."""
 
     transport: str
     read: ReadSpec
@@ -118,7 +118,7 @@ class SetStep(NamedTuple):
 
 
 class IfStep(NamedTuple):
-    """Run one of two branches."""
+    """Run one of two branches, depending on a condition."""
 
     condition: Template
     then: "tuple[Step, ...]"

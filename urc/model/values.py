@@ -54,11 +54,11 @@ class AlarmLimits(NamedTuple):
     hysteresis: float = 0.0
     """Hysteresis of the alarm, in the unit of the signal."""
     for_s: float = 0.0
-    """Minimum time beyond a limit before the alarm, in seconds."""
+    """Minimum time beyond a limit before the alarm begins, in seconds."""
 
 
 class Conversion(NamedTuple):
-    """The conversion from a raw field to a value, with its steps in the order of the attributes."""
+    """The conversion from a raw field to a value, step by step in the order of the attributes."""
 
     base: int = 0
     """Base of whole numbers in text, 2 to 36; 0: text is not converted."""

@@ -52,9 +52,10 @@ class Widget(NamedTuple):
     options: Mapping[str, object] = NOTHING
     """JSON Schema ``properties`` of the widget's options."""
     at_least_one_of: tuple[str, ...] = ()
-    """Inputs, outputs and options, at least one of them required; (): no requirement."""
+    """Group of inputs, outputs and options; at least one is required. The default () means no
+    requirement."""
     required_together: tuple[tuple[str, ...], ...] = ()
-    """Groups of inputs or outputs; a group works only when all its members are bound."""
+    """Groups of inputs or outputs that work only when all members of the group are bound."""
     min_cells: tuple[int, int] = (1, 1)
     """Minimum numbers of columns and rows."""
     is_dead_man: bool = False

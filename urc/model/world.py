@@ -78,7 +78,7 @@ READINGS: Final[Mapping[str, frozenset[str]]] = {
         " cliff_front_right drop"
     ),
 }
-"""Names of sensor values for ``world.NAME``, and of their parts for ``world.NAME.PART``."""
+"""Names of sensor values (``world.NAME``), with the names of parts (``world.NAME.PART``)."""
 
 
 class Wall(NamedTuple):
@@ -98,9 +98,9 @@ class Box(NamedTuple):
     x: float
     y: float
     width: float
-    """Size along the x axis."""
+    """Size of the box along the x axis, in metres."""
     depth: float
-    """Size along the y axis."""
+    """Size of the box along the y axis, in metres."""
     height: float = 0.8
     colour: str = "#a5794b"
 
@@ -120,7 +120,7 @@ class BodySpec(NamedTuple):
 
     type: BodyType = "differential"
     radius: float = 0.18
-    """Radius of the collision circle of the body."""
+    """Radius of the collision circle of the body, in metres."""
     speed: float = 1.0
     """Maximum speed, in m/s."""
     turn: float = 2.0
@@ -147,7 +147,7 @@ class BodySpec(NamedTuple):
     climb: float = 0.8
     """Maximum climb rate, in m/s."""
     hover: float = 0.8
-    """Hover height after take-off."""
+    """Hover height after take-off, in metres."""
 
 
 class OdometrySpec(NamedTuple):
@@ -162,13 +162,13 @@ class LaserSpec(NamedTuple):
 
     rays: int = 36
     first: float = -pi
-    """Direction of the first ray."""
+    """Direction of the first ray, in radians."""
     last: float = pi
     """End of the field of view, one step after the last ray; the rays are evenly spaced."""
     max: float = 8.0
-    """Maximum range of the laser scanner."""
+    """Maximum range of the laser scanner, in metres."""
     noise: float = 0.01
-    """Standard deviation of the range noise."""
+    """Standard deviation of the range noise, in metres."""
 
 
 class CameraSpec(NamedTuple):
@@ -177,11 +177,11 @@ class CameraSpec(NamedTuple):
     width: int = 320
     height: int = 240
     fov: float = 1.2
-    """Horizontal field of view of the camera."""
+    """Horizontal field of view of the camera, in radians."""
     mount_height: float = 0.25
-    """Height of the camera above the ground."""
+    """Height of the camera above the ground, in metres."""
     tilt: float = 0.0
-    """Upward tilt angle of the camera."""
+    """Upward tilt angle of the camera, in radians."""
     flip: Template | bool = False
     """Whether the picture is upside down."""
     mirror: Template | bool = False
@@ -195,9 +195,9 @@ class BatterySpec(NamedTuple):
     level: float = 90.0
     """Initial charge level of the battery, in %."""
     full: float = 12.6
-    """Voltage of the full battery."""
+    """Voltage of the full battery, in V."""
     empty: float = 10.2
-    """Voltage of the empty battery."""
+    """Voltage of the empty battery, in V."""
     idle: float = 0.3
     """Current at standstill, in A."""
     drive: float = 2.0

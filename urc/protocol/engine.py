@@ -1,8 +1,8 @@
 """The engine: the synchronous state machine of one driver.
 
-The engine is pure: no I/O, no clock, no callbacks, no tasks. The owner of a transport reports
-events with their time, and executes the returned events. Live robots, document tests, playback and
-the simulator share this engine.
+The engine is pure: no I/O, no clock, no callbacks, no tasks. The owner of a transport reports timed
+events, and executes the returned events. Live robots, document tests, playback and the simulator
+share this engine.
 
     events = engine.start("wire", now)            # the transport is connected
     events = engine.receive("wire", data, now)    # bytes were received
@@ -142,7 +142,7 @@ class Engine:
 
     @property
     def deadline(self) -> float | None:
-        """Time for the next `tick`; minus infinity before the first call, None for never."""
+        """Time for the next `tick`; minus infinity before the first `tick`, None for never."""
         if not self._is_begun:
             return float("-inf")
         first: float | None = None

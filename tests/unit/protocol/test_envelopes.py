@@ -194,7 +194,7 @@ def test_a_response_that_is_not_as_declared_says_so(engine: Engine) -> None:
     answer = Envelope("response", {"id": asked.attributes["id"], "ok": True}, b"<html>")
     (failed,) = engine.receive("web", answer, 1.1)
     assert isinstance(failed, Failed)
-    assert failed.message == "its reply does not match the declaration: '<html>'"
+    assert failed.message == "the reply does not match the declaration: '<html>'"
 
 
 def test_an_answer_that_comes_too_late_is_nobodys(engine: Engine) -> None:

@@ -163,7 +163,7 @@ def test_a_sequence_ends_with_an_answer_of_another_form(talk: Talk) -> None:
     talk.answer(202, b"", location="/api/jobs/9")
     talk.answer(200, b"no json")
     assert isinstance(talk.outcome, Failed)
-    assert talk.outcome.message == "its reply does not match the declaration: 'no json'"
+    assert talk.outcome.message == "the reply does not match the declaration: 'no json'"
 
 
 def test_the_answer_to_a_request_that_nobody_expects_is_dropped(talk: Talk) -> None:

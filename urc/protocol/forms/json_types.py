@@ -47,7 +47,7 @@ class _Shape:
 
 
 class PathNode:
-    """A node in the tree of paths: its fields, and the nodes of longer paths."""
+    """A node in the tree of paths, with the fields at the path and the nodes of longer paths."""
 
     def __init__(self, shape: _Shape) -> None:
         self.shape = shape

@@ -123,7 +123,7 @@ def _words(holes: tuple[PatternField, ...], tail: str) -> list[str | PatternFiel
 
 
 def _by_words(words: list[str | PatternField], found: list[str]) -> dict[str, object] | None:
-    """Return the fields of a text with these words; None if the text does not match."""
+    """Return the fields of a text that is split into words; None if the text does not match."""
     if len(found) != len(words):
         return None
     fields: dict[str, object] = {}

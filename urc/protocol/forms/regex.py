@@ -40,7 +40,7 @@ class RegexReader:
         return encoded(text, self._encoding)
 
     def _text(self, name: str, value: object) -> str:
-        """Return the text of a field as its group requires, for example with leading zeros."""
+        """Return the text of a field as required by the group, for example with leading zeros."""
         text = field_text(value)
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not is_number or len(text) > _WIDEST or name not in self._pattern.groups:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["build_fast_read"]
 
 _KEEPS_ASCII: Final = frozenset(("utf-8", "ascii", "latin-1"))
-"""Encodings in which ASCII characters have their ASCII codes."""
+"""Encodings that are supersets of ASCII."""
 
 
 def build_fast_read(

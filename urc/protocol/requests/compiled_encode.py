@@ -2,8 +2,8 @@
 
 A generated encoder handles only the common case, in which every argument is a number of the
 declared type. The closures of `urc.protocol.requests.encode` handle all other cases. The tests
-compare the function with the closures. Only sums, products and ``fixed`` over numbers are
-supported.
+compare the function with the closures. Generated encoders support only sums, products and ``fixed``
+over numbers.
 """
 
 import ast

@@ -28,7 +28,7 @@ __all__ = ["Connection"]
 
 
 class Connection:
-    """Base class of a conversation: its parts, and the handling of opened and closed transports."""
+    """Base class of conversations, which handles the opening and closing of transports."""
 
     def __init__(self, spec: TransportSpec, messages: list[Matcher]) -> None:
         self.spec = spec
@@ -47,7 +47,7 @@ class Connection:
         self.learnt: dict[str, object] = {}
         """Values of private fields that the login has read, by name."""
         self.has_motion = False
-        """Whether the connection has held commands; their frames bypass the queue."""
+        """Whether the connection has held commands, which bypass the queue."""
         self._pending_replies = PendingReplies()
         self._request_queue = RequestQueue(spec, self._pending_replies, self._size_of)
         self.receiver = FrameReceiver(spec, self.framing, messages)

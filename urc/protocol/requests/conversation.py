@@ -2,17 +2,17 @@
 
 Theory of operation. A connection is closed, opening or open. An open connection is *ready* after
 the steps of ``on_connect`` and until the steps of ``on_close``. A connection that is not ready
-sends only the privileged exchanges of these steps. The session opens persistent connections. A
-per-request conversation requests a connection (`Open`) for each request, and closes the connection
-afterwards (`Close`). The module is pure: callers pass the time.
+sends only the privileged exchanges of ``on_connect`` and ``on_close``. The session opens persistent
+connections. A per-request conversation requests a connection (`Open`) for each request, and closes
+the connection afterwards (`Close`). The module is pure: callers pass the time.
 
 Requests in flight are kept in the order of sending. A received frame is offered to all requests in
-flight, oldest first. A request with a correlation accepts only its own reply. Of the other
-requests, only the oldest accepts the frame, because replies arrive in order. Real-time requests
-have a separate order of replies. After a timeout, a request stays in flight as *late* for another
-reply timeout. A late reply is dropped, because the next request must not accept a late reply. Until
-the late reply arrives or times out, requests with similar replies wait. After `MISSES_UNTIL_CLOSED`
-consecutive missing replies, the connection is closed and reopened.
+flight, oldest first. A request with a correlation accepts only its own reply. Of the requests
+without a correlation, only the oldest accepts the frame, because replies arrive in order. Real-time
+requests have a separate order of replies. After a timeout, a request stays in flight as *late* for
+another reply timeout. A late reply is dropped, because the next request must not accept a late
+reply. Until the late reply arrives or times out, requests with similar replies wait. After
+`MISSES_UNTIL_CLOSED` consecutive missing replies, the connection is closed and reopened.
 """
 
 from collections.abc import Mapping, Sequence
@@ -293,7 +293,7 @@ class Conversation(Connection):
         """Process messages at the front of the stream, and report their samples together.
 
         Processing short frames one by one takes almost twice as long (decision 27). A batch of
-        messages ends with the expected reply, a refused value, or before another kind of frame.
+        messages ends after the expected reply or a refused value, or before another kind of frame.
         """
         receiver, decoder, pending = (
             self.receiver,
@@ -349,7 +349,7 @@ class Conversation(Connection):
                 self._request_queue.remove(exchange)
                 events.append(
                     ExchangeEnded(
-                        exchange, ExchangeOutcome("timed-out", "it could not be sent in time")
+                        exchange, ExchangeOutcome("timed-out", "the request was not sent in time")
                     )
                 )
         if self._pending_replies:

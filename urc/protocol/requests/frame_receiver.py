@@ -236,7 +236,7 @@ class FrameReceiver:
         if refusal and not is_redirected and (offer is None or not offer.refusal):
             offer = MatchResult(refusal=refusal)
         if offer is None:
-            offer = MatchResult(refusal=f"its reply does not match the declaration: {shown(frame)}")
+            offer = MatchResult(refusal=f"the reply does not match the declaration: {shown(frame)}")
         return self._match(expectation, offer, now)
 
     def dropped(self, offer: MatchResult) -> list[LineEvent]:

@@ -64,7 +64,7 @@ class PendingReply:
         """Return the match result of a frame with the number of this request."""
         offer = self.expectation.offer(frame)
         if offer is None:
-            return MatchResult(refusal=f"its reply does not match the declaration: {shown(frame)}")
+            return MatchResult(refusal=f"the reply does not match the declaration: {shown(frame)}")
         return offer
 
     def refused(self, frame: Frame, reason: str) -> MatchResult:

@@ -113,7 +113,7 @@ class MatchResult(NamedTuple):
 
 _MORE: Final = MatchResult()
 IsMine = Callable[[Fields], bool]
-"""Function that returns whether a frame with these fields belongs to the pending request."""
+"""Function that returns whether a frame with the given fields belongs to the pending request."""
 
 
 class Expectation:

@@ -38,7 +38,7 @@ class RequestQueue(PriorityQueue[Exchange]):
         """End time of the minimum gap after the last request, in seconds."""
 
     def submit(self, exchange: Exchange) -> tuple[Exchange, ExchangeOutcome] | None:
-        """Queue a request; return the displaced request with its outcome, or None."""
+        """Queue a request; return a displaced request with the outcome, or None."""
         gone = self.push(exchange)
         if gone is None:
             return None

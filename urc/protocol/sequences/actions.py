@@ -36,7 +36,7 @@ def build_program(
 def programs_of_lines(
     driver: Driver, builder: RequestCompiler, key: Literal["on_connect", "on_close"]
 ) -> dict[str, CompiledSequence]:
-    """Compile the login or close sequences of all transports that declare such a sequence."""
+    """Compile the declared login or close sequences of all transports."""
     return {
         name: build_program(f"{name}.{key}", getattr(spec, key), frozenset((name,)), builder)
         for name, spec in driver.transports.items()
@@ -220,7 +220,7 @@ class _Nothing:
         return None
 
     def write(self, fields: Mapping[str, object]) -> bytes:
-        raise NotWritable("a prompt cannot be written: it is not a frame")
+        raise NotWritable("a prompt is not a frame and cannot be written")
 
 
 def _running(step: sequence.RunStep) -> Action:

@@ -259,7 +259,7 @@ def _put_size(
             builder.fill(gap, scope[only])
         elif evaluate(extent.expression, scope) != number:
             wanted = f"{extent.expression.source.strip()!r} gives another length"
-            raise NotWritable(f"{name}: it is {number} long, but {wanted}")
+            raise NotWritable(f"{name}: the length is {number}, but {wanted}")
 
 
 def _padding_step(item: Item, rules: StructWriteScope) -> WriteStep:
@@ -376,7 +376,7 @@ def _windowed(body: WriteStep, item: Item, size: Extent, rules: StructWriteScope
         number = len(builder.bytes) - start
         if size.kind == "fixed":
             if number != size.number:
-                raise NotWritable(f"{name}: it has {number} bytes, expected {size.number}")
+                raise NotWritable(f"{name}: expected {size.number} bytes, found {number}")
         elif size.prefix is not None and is_variable:
             builder.insert(start, coded_writer(size.prefix, name)(number), scope)
         elif size.prefix is not None:
