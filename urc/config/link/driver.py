@@ -244,7 +244,9 @@ def link_driver(
     for name, inner in part.named("transports").items():
         link_refusals(linker, inner, driver.transports[name].faults)
         if name not in answered:
-            refuse(inner, ("errors",), "has no effect: this transport has no replies", problems)
+            refuse(
+                inner, ("errors",), "has no effect, because this transport has no replies", problems
+            )
         for place, template in option_templates(inner, driver.transports[name]):
             linker.template(place, template)
             check_option(place, driver.transports[name].type, template, settings, problems)

@@ -165,7 +165,7 @@ def link_reply(
             "the request has no counter",
             offset=reply.match.source.find("seq"),
             length=3,
-            hint="write {{ seq('number', 0, 255) }} at the place of the counter in the request",
+            hint="write {{ seq('number', 0, 255) }} in place of the counter in the request",
         )
 
 

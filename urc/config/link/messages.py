@@ -144,7 +144,7 @@ def _check_read(
                 f"{spec.type} has no topics to subscribe to",
                 at="subscribe",
                 key=True,
-                hint="remove 'subscribe': the form reads everything on this transport",
+                hint="remove 'subscribe', because the form reads everything on this transport",
             )
         return
     if subscribe is None:

@@ -49,11 +49,18 @@ def line_with_flow(
     """Return the transport with its queue, keepalive, timeouts, login and close steps."""
     queue = part.get("queue")
     if spec.connection == "per_request":
-        refuse(part, ("keepalive",), "has no effect: each request opens a connection", problems)
+        refuse(
+            part, ("keepalive",), "has no effect, because each request opens a connection", problems
+        )
         if queue is not None:
-            refuse(queue, ("in_flight",), "is always 1: each request opens a connection", problems)
+            refuse(
+                queue,
+                ("in_flight",),
+                "is always 1, because each request opens a connection",
+                problems,
+            )
     if spec.is_half_duplex and queue is not None:
-        refuse(queue, ("in_flight",), "is always 1: the transport is half-duplex", problems)
+        refuse(queue, ("in_flight",), "is always 1, because the transport is half-duplex", problems)
     timeouts = part.get("timeouts")
     if timeouts is not None and "on_connect" not in part.data:
         refuse(timeouts, ("on_connect",), "has no effect without steps", problems)
@@ -61,7 +68,7 @@ def line_with_flow(
     on_connect, on_close = part.get("on_connect"), part.get("on_close")
     errors, faults = parse_errors(part, problems, context)
     if queue is not None and spec.type in MESSAGING:
-        refuse(queue, ("bytes",), "counts bytes, and this transport carries messages", problems)
+        refuse(queue, ("bytes",), "counts bytes, but this transport carries messages", problems)
     return spec._replace(
         errors=errors,
         faults=faults,
@@ -152,7 +159,7 @@ def command_with_flow(command: Command, part: Node, problems: Problems) -> Comma
 def _refuse_asides(reply: Node | None, problems: Problems) -> None:
     """Report `resend` and `extend` of a held command, because its next value follows anyway."""
     for inner in [reply, *reply.listed("stages")] if reply is not None else ():
-        why = "has no effect with 'hold': the next value follows anyway"
+        why = "has no effect with 'hold', because the next value follows anyway"
         refuse(inner, ("resend", "extend"), why, problems)
 
 
@@ -160,7 +167,7 @@ def _check_stop(command: Command, part: Node, problems: Problems) -> None:
     """Report keys that would block or delay a stop command."""
     moves = () if part.data.get("moves") is False else ("moves",)  # false is the default of a stop
     hindering = (*moves, "confirm", "requires", "coalesce", "rate_limit")
-    refuse(part, hindering, "has no effect with 'stop': nothing may delay a stop", problems)
+    refuse(part, hindering, "has no effect with 'stop', because nothing may delay a stop", problems)
     for name, one in command.arguments.items():
         if one.confirm or (one.is_required and one.default is None):
             what = "asks people" if one.confirm else "has no default"
@@ -295,7 +302,7 @@ def _hold(part: Node, problems: Problems) -> Hold:
     release, step = part.get("release"), part.get("step")
     step_s = problems.duration(part, "step", 0.0, least=0.001, most=10) if step else None
     if step is not None:
-        text = "has no effect with 'step': the robot stops itself after each step"
+        text = "has no effect with 'step', because the robot stops itself after each step"
         refuse(part, ("release", "watchdog"), text, problems)
     elif release is None:
         problems.error(

@@ -70,7 +70,7 @@ def _digits(part: Node, problems: Problems) -> Digits:
     """Return the digit encoding of the framing at `part`."""
     digits: Any = part.text("decode") if part.text("type") in _SPELT else ""
     if digits and "escape" in part.data:
-        text = "'escape' has no effect with 'decode': digits need no escape"
+        text = "'escape' has no effect with 'decode', because digits need no escape"
         problems.error(part, "misplaced-key", text, at="escape", key=True)
     return digits  # type: ignore[no-any-return]  # the schema has the words
 

@@ -41,7 +41,7 @@ def parse_setting(part: Node, problems: Problems) -> Setting:
         problems.error(
             part,
             "misplaced-key",
-            "'required' has no effect with 'default': the setting is never empty",
+            "'required' has no effect with 'default', because the setting is never empty",
             at="required",
             key=True,
             hint="remove one of the two keys",

@@ -93,7 +93,10 @@ def _step(part: Node, context: StepContext, problems: Problems) -> sequence.Step
             problems.error(part, "misplaced-key", text, at=key, key=True)
     if not context.is_named:
         refuse(
-            part, ("to", "from"), "is only for sequences: these steps have one transport", problems
+            part,
+            ("to", "from"),
+            "is only for sequences, because these steps have only one transport",
+            problems,
         )
     return _one(verb, part, context, problems)
 
