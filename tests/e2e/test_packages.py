@@ -208,7 +208,7 @@ def test_what_is_not_sound_is_not_listed(tmp_path: Path, person: Person) -> None
     told = person.does("repo", "index", str(lab), code=1)
     assert "it has changed since widgets/dial 1.0.0 was listed; give it a new version" in told
     assert "drivers/broken/driver.yaml:4:" in told
-    assert "robots/nosy/robot.yaml: it refers to" in told
+    assert "robots/nosy/robot.yaml: the document refers to" in told
     assert "which is not in this repository" in told
     assert "9.9.9.zip: the archive is truncated" in told
     listed = json.loads((lab / "index.json").read_bytes())["packages"]

@@ -4,7 +4,7 @@ The guard imports the transports and `urc.motion`; sessions import the guard. Th
 part of a document: no template, no pattern, no parser. The guard receives rendered frames only, and
 receives the stop frame before any motion.
 
-The engine uses `GuardClient` from `guard_client`, which exchanges the `messages` with the guard
-over a `Channel`. A `PipeChannel` connects to a `GuardServer` in a separate process, a
-`LocalChannel` to a `GuardServer` in this process.
+The engine uses `GuardClient` from `guard_client` to exchange the `messages` with the guard over a
+`Channel`. A `PipeChannel` connects to a `GuardServer` in a separate process, a `LocalChannel` to a
+`GuardServer` in this process.
 """

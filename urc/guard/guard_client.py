@@ -7,7 +7,7 @@ guard receives the list of transports, a pending stop for each possibly moving c
 terms of the other armed commands. For each pending stop, the guard opens the connection and writes
 the stop first. Motion never resumes automatically.
 
-A control *may be moving* from its first tick or stop request. This state lasts until the guard
+A control *may be moving* from its first tick or stop request. The state lasts until the guard
 reports that the stop after the newest tick was written. A pending stop therefore survives the death
 of the guard process.
 """
@@ -51,7 +51,7 @@ class _Control:
     number: int = 0
     """Number of the newest tick, counted since the present guard started."""
     at_s: float = 0.0
-    """Time of the newest tick, in seconds of the guard's clock."""
+    """Time of the newest tick on the guard's clock, in seconds."""
     counted: CountedFrame | None = None
     """Frame of the newest tick of a held control, if the frame carries counters; otherwise None."""
     may_move: bool = False

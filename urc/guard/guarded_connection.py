@@ -3,7 +3,7 @@
 Theory of operation. One task at a time opens the transport, reads until the connection ends, and
 closes the transport. The engine requests opening and closing, and receives data within its
 flow-control credit. If the connection is lost while the robot may be moving, the guard does not
-wait for the engine, which may be frozen or dead. The guard itself reopens the connection (a
+wait for the engine. The engine may be frozen or dead. The guard itself reopens the connection (a
 *rescue*) and writes the stop first. The open connection is then kept for the engine's next attempt.
 """
 
@@ -120,7 +120,7 @@ class GuardedConnection:
         self._fault = ""
         self._patience_s = _USUAL_S
         self._took_s: deque[float] = deque(maxlen=_REMEMBERED)
-        """Durations of the last successful attempts, in seconds; the shortest one contains the
+        """Durations of the last successful attempts, in seconds; the shortest duration contains the
         least local delay.
         """
         self._hurry = ConnectRace(_SHORTEST_S)

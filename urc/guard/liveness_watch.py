@@ -28,7 +28,7 @@ class LivenessWatch:
         """Prepare.
 
         Args:
-            transport: the transport, which is probed if it is a `SupportsProbe`.
+            transport: the transport; probed if the transport is a `SupportsProbe`.
             clock: the time.
             silent_s: maximum silence of the robot without a probe, in seconds; None for no limit.
             is_moving: returns whether a control is moving.

@@ -11,11 +11,11 @@ from urc.model.payload import size_of
 __all__ = ["LocalChannel"]
 
 _OVERHEAD_BYTES = 32
-"""Size of a message without its payload, for flow control."""
+"""Assumed size of a message without payload, in bytes, for flow control."""
 
 
 class LocalChannel:
-    """The channel to a guard in this process; such a guard stops no robot if this process hangs."""
+    """A channel to a guard in this process; if the process hangs, the guard cannot stop robots."""
 
     def __init__(
         self, listener: ChannelListener, *, lines: Sequence[GuardedLineSpec], clock: LaneClock

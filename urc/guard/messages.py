@@ -1,6 +1,6 @@
 """The messages between the engine's process and the guard process.
 
-Each message is a MessagePack array whose first element is the message type. `line` is the name of a
+Each message is a MessagePack array that begins with the message type. `line` is the name of a
 transport, and `control` is the name of a held command. `turn` counts how often the engine has
 opened the connection. Messages with an earlier `turn` are dropped.
 """
@@ -53,7 +53,7 @@ class MakeTransport(msgspec.Struct, array_like=True, frozen=True, tag=1):
     options: dict[str, Any]
     subscriptions: list[tuple[str, dict[str, Any]]]
     tunnel: str
-    """Name of the tunnel that carries this transport, created before; "" without a tunnel."""
+    """Name of the previously created tunnel that carries this transport; "" without a tunnel."""
     stalled_s: float
     """Age of unsent motion data at which a connection counts as stalled, in seconds. A stalled
     connection is reset.
@@ -83,8 +83,8 @@ class SendBytes(msgspec.Struct, array_like=True, frozen=True, tag=3):
     """Number of the frame on this connection."""
     data: Payload
     count: Count | None = None
-    """Counter values of the frame, or None; the frame is sent only while these values are the next
-    ones."""
+    """Counter values of the frame, or None; the frame is sent only if all values are the next in
+    order."""
     round: int = 0
     """Expected number of `SendStale` messages on this connection; the frame is dropped if the
     numbers differ."""
@@ -121,7 +121,7 @@ class RenewLease(msgspec.Struct, array_like=True, frozen=True, tag=7):
     """Sequence number of the tick of this control."""
     data: Payload
     at_s: float
-    """Time of the sample, in seconds of this machine's monotonic clock. The time of a delayed tick
+    """Time of the sample on this machine's monotonic clock, in seconds. The time of a delayed tick
     stays unchanged."""
     count: Count | None = None
     """Counter values of the frame, as in `SendBytes`."""

@@ -61,7 +61,7 @@ class MotionScheduler:
             told: callback for each written stop, with the control, the reason and the number of the
                 newest tick.
             failed: callback with the reason when the connection stalls or refuses data.
-            sent_counters: the sent counters of the connection.
+            sent_counters: counter values sent on the connection; None for a new object.
             counted: callback after a change of the counters, with the control and number of each
                 tick that became obsolete.
         """
@@ -293,7 +293,7 @@ class MotionScheduler:
         return self._sent_counters.choose(stops) if stops else (data, None)
 
     def _leave_stop(self, control: str, data: Payload) -> Payload:
-        """Return a stop frame when it is next in the queue."""
+        """Return a stop frame at the head of the queue."""
         data, count = self._turn(control, data, is_stop=True)
         self._sent_counters.left(count)
         self._tell_soon()
@@ -384,7 +384,7 @@ class MotionScheduler:
 
     @property
     def _is_watched(self) -> bool:
-        """Whether unsent bytes matter, because they contain motion or motion waits behind them.
+        """Whether unsent bytes matter, because the bytes contain motion or delay motion.
 
         Motion waits for unsent bytes only on a transport that is slow to open. A ping sent during
         an interruption would block motion until the interruption ends, and old motion would then

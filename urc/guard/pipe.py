@@ -77,7 +77,7 @@ class Pipe:
 
     @property
     def is_backed_up(self) -> bool:
-        """Whether the other side reads slower than messages are posted."""
+        """Whether messages are posted faster than the other side reads."""
         return self._is_writing
 
     def post(self, message: object, *, slot: str = "", is_urgent: bool = False) -> int:

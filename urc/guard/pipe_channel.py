@@ -32,8 +32,8 @@ _START_LOOKS: Final = 100
 """Maximum number of checks before the first heartbeat, because Python starts slowly on a busy
 machine."""
 _STEADY_S: Final = 0.5
-"""Minimum lifetime of a guard that counts as successfully started, in seconds; an opened connection
-also counts."""
+"""Minimum lifetime of a guard that counts as successfully started, in seconds; opening a connection
+also counts as success."""
 _AT_ONCE: Final = 3
 """Number of short-lived guards that are replaced immediately; each later replacement waits
 `_AGAIN_S`."""
@@ -52,8 +52,8 @@ class PipeChannel:
 
         Args:
             listener: the client.
-            is_inherited: whether the guard process inherits its end of the pipe; otherwise, it
-                connects to a port.
+            is_inherited: whether the guard process inherits its end of the pipe instead of
+                connecting to a port.
         """
         self._listener = listener
         self._is_inherited = is_inherited

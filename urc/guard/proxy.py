@@ -163,7 +163,7 @@ class GuardedTransport:
         return True
 
     def offer_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> bool:
-        """Pass on a counted frame; render it again until its counter values are the next ones.
+        """Pass on a counted frame; render the frame again if other frames use its counter values.
 
         Returns:
             Whether the frame was accepted; `left` then receives the data that was handed over.

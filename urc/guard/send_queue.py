@@ -60,8 +60,8 @@ class SendQueue(Generic[_Tag]):
             sender: the transport.
             clock: the time.
             done: callback for each frame with its tag, and with the error or None.
-            after: queue whose frames are all sent before the frames of this queue; None for no such
-                queue.
+            after: queue with precedence: its frames are sent before the frames of this queue; None
+                without one.
         """
         self._sender = sender
         self._clock = clock
@@ -88,7 +88,7 @@ class SendQueue(Generic[_Tag]):
         """Add a frame to the queue.
 
         Args:
-            make: renders the frame when it is next in the queue; a result of None drops the frame.
+            make: renders the frame at the head of the queue; a result of None drops the frame.
             tag: argument for `done`, which is not called for a dropped frame.
         """
         if not self._waiting:

@@ -1,7 +1,7 @@
 """The counter values that were sent on one connection.
 
 The guard evaluates no templates. Each rendered frame includes its effect on the counters. A frame
-is sent only while its counter values are the next ones. The values on the wire therefore rise
+is sent only if its counter values are the next in order. The values on the wire therefore rise
 without gaps, regardless of the order of arrival and of frames that were rendered in advance.
 """
 
@@ -13,7 +13,7 @@ __all__ = ["SentCounters"]
 
 
 class SentCounters:
-    """The counter values sent on one transport; `reset` begins a new connection."""
+    """The counter values sent on one transport; `reset` prepares for a new connection."""
 
     def __init__(self) -> None:
         self.stand: dict[str, int] = {}
@@ -22,7 +22,7 @@ class SentCounters:
         """Whether sent values were not yet reported to the engine."""
 
     def reset(self) -> None:
-        """Begin a new connection, without sent values."""
+        """Begin a new connection, on which no counter values were sent."""
         self.stand = {}
         self.is_changed = False
 

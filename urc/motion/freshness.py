@@ -55,7 +55,7 @@ class Freshness:
             given: the numbers sent with the input.
             epoch: epoch of the present lease.
             now: the time.
-            of: the control. Each control has an independent order of numbers.
+            of: the control. Sequence numbers are independent for each control.
         """
         if given.epoch != epoch:
             return f"the input belongs to lease {given.epoch}, but the present lease is {epoch}"
@@ -75,7 +75,7 @@ class DuplicateElimination:
     """A filter for messages that a page sends twice, over two independent lossy connections.
 
     The first copy counts. A page's numbers only grow, and each connection keeps their order. A
-    message with a lower or equal number is a copy, or a newer message has overtaken it. A delayed
+    message without a higher number is a copy, or a newer message has arrived earlier. A delayed
     tick must not move a control that was released over the other connection.
     """
 

@@ -1,9 +1,9 @@
 """Detection of stalled connections by the age of the oldest unsent byte.
 
-The system reports only the number of unsent bytes. The number grows with each write and shrinks
-with each acknowledgement, in the same order. The history of this number therefore reveals the write
-time of the oldest unsent byte. The number alone proves no stall, because a busy connection may
-always have unsent bytes.
+The system reports only the number of unsent bytes. The number of unsent bytes grows with each write
+and shrinks with each acknowledgement, in the same order. The history of the number therefore
+reveals the write time of the oldest unsent byte. A large number alone proves no stall, because a
+busy connection may always have unsent bytes.
 """
 
 import sys
@@ -27,7 +27,7 @@ STOP_WITHIN_S: Final = 0.1
 """Maximum time from the end of a network interruption to the stop, in seconds."""
 TICK_S: Final = 0.05
 """Period of the ticks of a held control, in seconds. The first write after the beginning of an
-interruption may come this late."""
+interruption may be delayed by this period."""
 AFRESH_S: Final = 0.03
 """Time to reset and reopen a nearby connection and write the stop, in seconds."""
 STALLED_S: Final = round(SHORTEST_CUT_S + STOP_WITHIN_S - TICK_S - AFRESH_S, 3)

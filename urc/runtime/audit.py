@@ -7,7 +7,7 @@ counted; the next written entry records the count. When the file reaches its lim
 entries are deleted.
 
 Each row contains a hash of itself and the previous row, so `check` detects a changed, removed or
-inserted row. The hash does not protect against an attacker who rewrites the whole file.
+inserted row. The hashes do not protect against an attacker who rewrites the whole file.
 """
 
 import hashlib

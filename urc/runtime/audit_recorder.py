@@ -1,9 +1,10 @@
 """Audit entries of one robot: two entries per motion, instead of one per tick.
 
-This module is on layer 4 and synchronous; callers pass the time. These functions never wait or
-raise, because motion calls them. Each motion has a start entry and an end entry, with the first and
-last values of the motion. Repeated refusals are combined into one entry per second, with a count.
-The audit log therefore shows the cause of each motion, but does not grow with every tick.
+This module is on layer 4 and synchronous; callers pass the time. Functions of this module never
+block or raise an exception, because motion code calls the functions. Each motion has a start entry
+and an end entry, with the first and last values of the motion. Repeated refusals are combined into
+one entry per second, with a count. The audit log therefore shows the cause of each motion, but does
+not grow with every tick.
 """
 
 import json

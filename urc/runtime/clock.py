@@ -46,7 +46,7 @@ class LoopClock:
 
 
 class PeriodicTimer:
-    """A timer whose action returns the delay until the next call in seconds, or None to end."""
+    """A timer with an action that returns the delay until the next call in seconds; None: end."""
 
     def __init__(self, clock: Clock, delay_s: float, action: Callable[[], float | None]) -> None:
         self._clock = clock

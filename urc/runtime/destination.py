@@ -1,7 +1,7 @@
-"""The destination of a robot's transports as a short digest, to which secrets are bound.
+"""A short digest of a robot's destinations, used to bind secrets to these destinations.
 
 Secrets are sent to the hosts named in the transport options. Each secret is therefore stored with
-the destination for which it was entered, and is never used for a different destination.
+its destination, and is never used for a different destination.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""The topics of a rosbridge robot, listed and written in the form of a document."""
+"""The topics of a rosbridge robot, and their YAML form for a document."""
 
 import asyncio
 import re
@@ -71,7 +71,7 @@ async def ros_topics(transport: Transport, timeout_s: float) -> list[RosTopic]:
 
 
 def snippet(topics: Sequence[RosTopic], transport: str) -> str:
-    """Return signals and messages in YAML for the topics whose fields are known."""
+    """Return signals and messages in YAML for all topics with known fields."""
     signals: list[str] = []
     messages: list[str] = []
     for topic in topics:

@@ -80,7 +80,7 @@ class PendingCommands:
             found[0].set_result(answer)
 
     def forget(self, number: int) -> None:
-        """Forget a command whose caller has gone."""
+        """Forget a command that no caller waits for."""
         self._all.pop(number, None)
 
     def close(self, reason: str) -> None:
@@ -187,7 +187,7 @@ class LinkPort(Protocol):
 
 
 class Dispatcher:
-    """The owner of an engine; it performs the engine's events."""
+    """The owner of an engine, which performs the engine's events."""
 
     def __init__(
         self,
@@ -289,7 +289,7 @@ class Dispatcher:
         self._run(lambda now: self._engine.latch(reason, now))
 
     def forget(self, request_id: int) -> None:
-        """Forget a request whose caller no longer waits."""
+        """Forget a request that no caller waits for."""
         self._waiting.forget(request_id)
 
     def wind_up(self) -> None:
@@ -368,7 +368,7 @@ class Dispatcher:
                 port.publish()
 
     def _change(self, event: Event) -> None:
-        """Pass an event to its link, which changes its state."""
+        """Pass an event to the link that changes state."""
         match event:
             case Violation(transport):
                 self._ports[transport].count(event)

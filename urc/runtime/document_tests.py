@@ -274,12 +274,12 @@ def _check_told(trial: TestEngine, step: DialogueStep) -> list[str]:
 
 
 def _isolated(driver: Driver, *, keeps_conditions: bool) -> Driver:
-    """Return a copy of the driver with connections that need no steps and send nothing themselves.
+    """Return a copy of the driver with connections that need no steps and send nothing unprompted.
 
     Args:
         driver: the loaded driver.
         keeps_conditions: whether to keep the `requires` and `verify` conditions of commands. Byte
-            tests omit these conditions, because no robot reports the required signals.
+            tests omit the conditions, because no robot reports the required signals.
     """
     transports = {
         name: spec._replace(on_connect=(), on_close=(), keepalive=None, stale_after_s=None)

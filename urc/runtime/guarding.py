@@ -22,7 +22,8 @@ from urc.runtime.transport_chain import BuiltTransport, make_lines
 __all__ = ["start_guard_client"]
 
 _SLOW_TO_OPEN: Final = frozenset(("ssh", "serial", "mqtt", "ros"))
-"""Transport types that are not reset immediately, because they open slowly or might not reopen."""
+"""Transport types that are not reset immediately, because opening is slow or might not succeed
+again."""
 
 _SOONER: Final = 0.9
 

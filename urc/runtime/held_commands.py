@@ -28,7 +28,7 @@ class MotionFrames(Protocol):
     """The controller's interface to the engine: `urc.protocol.motion_encoder.MotionEncoder`."""
 
     def is_lasting(self, command: str) -> bool:
-        """Return whether the stop frame of a held command never changes."""
+        """Return whether the stop frame of a held command is constant."""
 
     def has_stops(self, command: str) -> bool:
         """Return whether the last rendered stop frames are still sufficient."""
@@ -46,7 +46,7 @@ class MotionFrames(Protocol):
 
 
 class MotionBackend(Protocol):
-    """The interface to the writer of motion frames: a guard process, or a guard in this process."""
+    """The interface to the writer of motion frames: a guard process or a guard in this process."""
 
     def arm(self, command: str, terms: HoldTerms) -> None:
         """Accept ticks of `command` from now on, under `terms`."""

@@ -152,7 +152,7 @@ class HubSubscription:
             await self._event.wait()
 
     def wake(self) -> None:
-        """Wake the waiting `changed` call, so that it checks again."""
+        """Wake the waiting `changed` call to check again."""
         self._event.set()
 
     def changes(self) -> list[Sample]:
@@ -242,7 +242,7 @@ class Hub:
         Args:
             signals: the driver's signals.
             redactor: removes secrets from all incoming data; None for a robot without secrets.
-            streams: names of transports whose traffic may split a message into several pieces.
+            streams: names of transports with traffic that may split a message into several pieces.
         """
         self.signals = signals
         self._redactor = redactor if redactor is not None and redactor.is_needed else None

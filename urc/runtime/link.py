@@ -1,13 +1,13 @@
 """The link to a robot: one transport, and its share of the driver's engine.
 
 Theory of operation. `run` is a loop with three waits. First, the loop waits for a reason to
-connect: always present on a persistent link, otherwise an `Open` event or a request. Then the loop
-waits for the backoff delay, and finally for the end of the connection. A reader and a writer run
-while the connection is open. The robot, the engine or a rule of the link can end a connection.
-Every end goes through `_end`, and one place stops both tasks.
+connect. A persistent link always has a reason; other links need an `Open` event or a request. Then
+the loop waits for the backoff delay, and finally for the end of the connection. A reader and a
+writer run while the connection is open. The robot, the engine or a rule of the link can end a
+connection. Every end goes through `_end`, and only `_serve` stops the reader and the writer.
 
 A connection counts as good after its first valid frame; only a good connection resets the backoff.
-URC therefore does not flood a robot that accepts connections and closes them again. With
+URC therefore does not flood a robot that closes every accepted connection again. With
 ``on_connect`` steps, frames do not count until the steps are done, because a robot may send a
 greeting and then refuse the login. Pages show the `LinkState`; while attempts fail, only the count
 of attempts changes.
@@ -182,7 +182,7 @@ class Link:
             self._greet()
 
     def count(self, fault: Violation) -> None:
-        """Count a protocol violation, and log it at a limited rate."""
+        """Count a protocol violation; log violations at a limited rate."""
         self._report.count(fault)
         if fault.code in ("reply-timeout", "no-data"):
             self._is_overdue = True
@@ -377,7 +377,7 @@ class Link:
                     size = min(size * 2, SLICE_BYTES)
 
     def _take_now(self, data: bytes) -> bool:
-        """Handle received bytes immediately, unless they are many or earlier bytes are waiting."""
+        """Handle received bytes immediately, unless there are many or earlier bytes are waiting."""
         if len(data) > _LEAST_SLICE_BYTES or not self._is_reader_waiting:
             return False
         ended = self._ended

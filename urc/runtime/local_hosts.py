@@ -1,8 +1,7 @@
 """Detection of host names that mean this machine, or a device attached to it.
 
 A package with a fixed local host would connect to local programs of the person who installs the
-package. A package may therefore address this machine only through a setting, which a person sees
-and fills in.
+package. A package may therefore address this machine only through a setting that a person fills in.
 """
 
 import ipaddress
@@ -20,7 +19,7 @@ __all__ = ["check_hosts", "is_near"]
 
 _LOCAL: Final = re.compile(r"(.*\.)?localhost(\.localdomain)?\.?|ip6-(localhost|loopback)", re.I)
 _BEGINS: Final = re.compile(r"127\.|169\.254\.|\[?(::1|fe[89ab][0-9a-f]:)|localhost", re.I)
-"""Pattern of the beginning of a local host, for hosts that settings complete."""
+"""Pattern for the beginning of a local host name, if settings supply the rest."""
 _URL: Final = re.compile(r"[a-z]+://(?P<host>\[[^\]]*\]|[^/:?#]*)", re.I)
 _OPTIONS: Final = ("host", "url")
 

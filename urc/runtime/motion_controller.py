@@ -85,7 +85,7 @@ class MotionController:
         self.on_change: Callable[[LeaseState], None] = _ignore
         """Callback after each change of the lease, and after the confirmation of a stop."""
         self.on_moved: Moved = _unseen
-        """Callback for each tick whose frame was passed to the backend; must neither block nor
+        """Callback for each tick that was passed to the backend as a frame; must neither block nor
         raise."""
         self.on_refused: Callable[[str, str], None] = _unrefused
         """Callback with the control and the message when the robot refuses to move."""

@@ -32,7 +32,8 @@ class _Waiting(NamedTuple):
     shown: Payload
     """Payload to report as traffic."""
     counted: CountedFrame | None = None
-    """Frame with counters, which are used up when the frame is sent; never joined with other data.
+    """Frame with counters, or None; never joined with other data, because sending uses the counter
+    values up.
     """
 
 

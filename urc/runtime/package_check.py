@@ -39,7 +39,7 @@ def examine(document: Path) -> list[str]:
     )
     homes = (top.resolve(), shipped("widgets").resolve())
     outside = [
-        f"{document}: it refers to {file}, which is not in this repository"
+        f"{document}: the document refers to {file}, which is not in this repository"
         for file in checked.files
         if not any(Path(file).resolve().is_relative_to(home) for home in homes)
     ]

@@ -1,8 +1,8 @@
 """A preview of a package's permissions and risks, before its installation or update.
 
-Files, keys, agents, remote programs and hosts normally come from settings. Constants are permitted
-instead, but the person who installs the package must know about the constants. The preview
-therefore lists constants separately from the permissions.
+Files, keys, agents, remote programs and hosts normally come from settings. Constants are permitted,
+but the person who installs the package must be informed. The preview therefore lists constants
+separately from the permissions.
 """
 
 import re
@@ -65,7 +65,9 @@ def _check_inside(checked: CheckResult, folder: Path) -> None:
     for file in checked.files:
         real = Path(file).resolve()
         if not any(real.is_relative_to(home) for home in homes):
-            raise UrcError(f"{checked.files[0]}: it refers to {file}, which is not in the package")
+            raise UrcError(
+                f"{checked.files[0]}: the document refers to {file}, which is not in the package"
+            )
 
 
 def _of_profile(profile: Profile) -> list[str]:
@@ -212,8 +214,8 @@ class PackagePreview(NamedTuple):
     permissions: list[str]
     """Permissions, one line per permission."""
     wire: Mapping[str, str]
-    """``commands.beep.send`` → its value, for all keys that affect sent bytes or the decoding of
-    replies."""
+    """Key path, such as ``commands.beep.send`` → value, for all keys that affect sent bytes or the
+    decoding of replies."""
     risks: list[str]
     """Local resources that the package uses without a setting; see `risks_of`."""
 

@@ -1,6 +1,6 @@
 """The running dashboards of the current user on this machine: addresses and start keys.
 
-Layer 4. Each running server keeps one small file that only its owner can read::
+Layer 4. Each running server keeps one small file, readable only by its owner::
 
     servers/1a2b3c4d.json    {"address": "http://127.0.0.1:8080/", "key": "…", "pid": 4711}
 
@@ -23,7 +23,7 @@ _MOST_BYTES = 4096
 
 
 class RunningServer(NamedTuple):
-    """A running dashboard, or one that was running when the machine lost power."""
+    """A dashboard that is running, or was running when the machine lost power."""
 
     address: str
     """Base address, such as ``http://127.0.0.1:8080/``."""

@@ -39,7 +39,7 @@ __all__ = ["CommandFailed", "Motion", "Session", "FifoEvent", "resolve_settings"
 
 
 class FifoEvent:
-    """An event whose waiters proceed in FIFO order."""
+    """An event that releases its waiters in FIFO order."""
 
     def __init__(self, event: asyncio.Event) -> None:
         """Store the event, which must never be cleared later."""
@@ -63,8 +63,8 @@ class FifoEvent:
 
 
 Motion = Literal["none", "here", "guarded"]
-"""Writer of motion frames: none, a guard in this process, or a guard process, which stops the robot
-if URC fails."""
+"""Writer of motion frames: none, a guard in this process, or a guard process. Only a guard process
+stops the robot if URC fails."""
 
 _LOOK_S = 0.02
 new = tuple.__new__
@@ -118,7 +118,7 @@ class Session:
             transports: table of the available transport types.
             clock: source of time; None for the running event loop.
             random: returns a number in [0, 1) for the jitter of the backoff.
-            motion: writer of held commands, as one of the values of `Motion`.
+            motion: writer of held-command frames; see `Motion`.
 
         Raises:
             UrcError: a setting has no value, or a transport cannot be built with the settings.
@@ -152,7 +152,8 @@ class Session:
         """Handler of the engine's held-command events, set by `MotionController.attach`."""
         self._stops = 0
         self._untried = {name: FifoEvent(link.tried) for name, link in self._links.items()}
-        """Links whose first attempt has not ended; commands wait for these links, in order."""
+        """Links that have not ended their first attempt; commands wait for these links, in order.
+        """
         self._numbers = count(1)
         self._group = asyncio.TaskGroup()
         self._tasks: list[asyncio.Task[None]] = []

@@ -97,7 +97,7 @@ class SettingsStore:
 
 
 def names_kept(folder: Path, removed: Iterable[Lock], left: Iterable[Lock]) -> list[str]:
-    """Return the robots whose settings become obsolete when packages are removed.
+    """Return the robots with settings that become obsolete when packages are removed.
 
     Args:
         folder: folder of the files.

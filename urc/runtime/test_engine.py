@@ -182,7 +182,7 @@ class TestEngine:
         self.perform(self.engine.receive(transport, data, self.now))
 
     def _envelope(self, transport: str, piece: Envelope) -> Envelope:
-        """Return the message as a transport delivers it: a response gets its request's number."""
+        """Return the message as delivered by a transport: a response has its request's number."""
         body = piece.body
         if body is not None and self.driver.transports[transport].type not in _BRINGS_OBJECTS:
             body = body if isinstance(body, bytes) else json.dumps(body).encode()

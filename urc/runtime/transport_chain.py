@@ -14,7 +14,7 @@ __all__ = ["BuiltTransport", "make_lines", "make_transports"]
 
 
 class BuiltTransport(NamedTuple):
-    """A transport, and the values from which it was built."""
+    """A transport with the values used to build the transport."""
 
     spec: TransportSpec
     factory: str
@@ -26,7 +26,7 @@ class BuiltTransport(NamedTuple):
 def make_lines(
     driver: Driver, settings: Mapping[str, Value], table: Table
 ) -> dict[str, BuiltTransport]:
-    """Return name → closed transport, with each tunnel before the transports inside it.
+    """Return name → closed transport; each tunnel precedes the transports inside the tunnel.
 
     Args:
         driver: the loaded driver; tunnels must not be circular.
@@ -62,5 +62,5 @@ def make_lines(
 def make_transports(
     driver: Driver, settings: Mapping[str, Value], table: Table
 ) -> dict[str, Transport]:
-    """Return name → closed transport; see `make_lines`."""
+    """Return name → closed transport; for details, see `make_lines`."""
     return {name: made.transport for name, made in make_lines(driver, settings, table).items()}

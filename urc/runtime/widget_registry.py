@@ -54,7 +54,7 @@ def _workshop_of(document: Path) -> Path | None:
 
 
 class WidgetRegistry(WidgetFolder):
-    """Built-in and installed widgets; an installed widget never replaces a built-in one."""
+    """Built-in and installed widgets; built-in widgets take precedence."""
 
     def __init__(self, folder: Path, brought: Path) -> None:
         super().__init__(folder)

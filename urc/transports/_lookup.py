@@ -82,7 +82,7 @@ def _look_up(host: str, port: int, kind: socket.SocketKind) -> asyncio.Future[li
 
 
 def _numeric(host: str, port: int, kind: socket.SocketKind) -> list[Address] | None:
-    """Return the addresses of a numeric host, which requires no thread."""
+    """Return the addresses of a numeric host, without starting a thread."""
     try:
         return _resolve(host, port, kind, socket.AI_NUMERICHOST)
     except (OSError, UnicodeError):

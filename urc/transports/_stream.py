@@ -59,7 +59,7 @@ _LINGER_NOT = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
 class TcpStream(asyncio.BufferedProtocol):
     """One open connection.
 
-    `asyncio.Protocol` is not used, because it would allocate 256 KiB for every read.
+    `asyncio.Protocol` is not used, because that class would allocate 256 KiB for every read.
     """
 
     def __init__(self, read_ahead_bytes: int = READ_AHEAD_BYTES) -> None:
@@ -97,7 +97,7 @@ class TcpStream(asyncio.BufferedProtocol):
         return self._buffer[self._filled :] if self._filled else self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:
-        """Pass the received bytes to the sink, or store them in the buffer."""
+        """Pass the received bytes to the sink, or store the bytes in the buffer."""
         if self.sink is not None and not self._filled and self.sink(bytes(self._buffer[:nbytes])):
             return
         self._filled += nbytes

@@ -42,7 +42,7 @@ class Tls:
     def __init__(
         self, context: ssl.SSLContext, server_name: str = "", *, is_server: bool = False
     ) -> None:
-        """Store the settings; certificates must match `server_name`, or the host if it is empty."""
+        """Store the settings; certificates must match `server_name` or, if empty, the host."""
         self._context = context
         self._server_name = server_name
         self._is_server = is_server

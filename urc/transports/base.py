@@ -1,8 +1,7 @@
 """Interfaces of transports, and the errors that transports raise.
 
-A transport carries payloads without interpreting them: bytes for streams and datagrams, envelopes
-for messages (topics, requests, calls). A transport converts every exception of a library into one
-of the errors in this module.
+A transport carries payloads without interpretation: bytes for streams and datagrams, envelopes for
+messages. A transport converts every exception of a library into one of the errors in this module.
 
 Only `urc.runtime.link` uses transports, without knowledge of the process in which a transport runs.
 """
@@ -237,7 +236,7 @@ class SupportsEnd(Protocol):
 
 
 def unsent_of(stream: ByteStream | None) -> int:
-    """Return the number of unsent bytes of a stream; 0 if the stream cannot count them."""
+    """Return the number of unsent bytes of a stream; 0 if the number is unknown."""
     if stream is not None and isinstance(stream, SupportsUnsent):
         return stream.unsent()
     return 0

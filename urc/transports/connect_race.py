@@ -1,4 +1,4 @@
-"""Fast connecting to a robot that may become reachable at any moment.
+"""Fast connections to a robot that may become reachable at any moment.
 
 The operating system repeats a failed connection attempt only after a second, and later at longer
 intervals. If `HURRY` is set, new attempts start at short intervals while earlier attempts continue,

@@ -388,7 +388,7 @@ class _Connection(httpcore2.AsyncNetworkStream):
     def is_readable(self) -> bool:
         """Return whether `read` would return immediately; an idle connection is then closed.
 
-        A stream can be tested only by a call of `read`, which is cancelled if it waits.
+        The only test of a stream is a call of `read`, which is cancelled if no data is available.
         """
         if self._early:
             return True

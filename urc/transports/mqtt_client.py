@@ -1,9 +1,9 @@
 """A transport for robots behind an MQTT broker, with version 5 or 3.1.1 of MQTT.
 
 Theory of operation. The library paho implements the protocol, but URC opens the network connection.
-Each `open` connects a socket and passes it to a new paho client, which is dropped with the
-connection. No message of an earlier connection can therefore be sent late. A reused paho client
-would keep unacknowledged messages and send them again. The transport starts no thread.
+Each `open` connects a socket and creates a paho client for this connection only. No message of an
+earlier connection can therefore be sent late. A reused paho client would store unacknowledged
+messages and send the messages again. The transport starts no thread.
 
 Every MQTT session starts clean. The broker publishes the last will after every end of the
 connection, even if URC closes the connection. An extra stop is harmless.

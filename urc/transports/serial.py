@@ -47,7 +47,7 @@ class SerialTransport(StreamTransport):
     """A transport over one serial port; may be opened several times."""
 
     def __init__(self, port: str, settings: SerialSettings) -> None:
-        """Store the settings; `port` is a device path, a port name, or an address with scheme."""
+        """Store the settings; `port` is a device path, a port name, or an address with a scheme."""
         super().__init__()
         self._port = port
         self._settings = settings

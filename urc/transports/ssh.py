@@ -1,8 +1,8 @@
 """The SSH transport: a shell, a program, or only a tunnel for other transports.
 
-All users share one connection: the transport's own channel, and the transports that name this
-transport in ``tunnel``. The first user opens the connection, the last user closes it, and a lost
-connection ends all users.
+The users of one shared connection are the transport's own channel and the transports that name this
+transport in ``tunnel``. The first user opens the connection, the last user closes the connection,
+and a lost connection ends all users.
 """
 
 import asyncio

@@ -133,10 +133,9 @@ class SshConnection:
     async def _opened(
         self, begin: Callable[[SshChannel], Awaitable[Any]], channel: SshChannel, failure: str
     ) -> SshChannel:
-        """Open `channel`; if cancelled, close the channel as soon as it is open.
+        """Open `channel`; after a cancellation, close the channel as soon as possible.
 
-        After a cancelled opening, asyncssh would forget the channel, but the server would keep it
-        open.
+        asyncssh forgets a channel after a cancelled opening, but the server keeps the channel open.
         """
         task = asyncio.ensure_future(begin(channel))
         try:
@@ -183,7 +182,7 @@ class SharedConnection:
         The caller sets the timeout; a cancelled caller does not affect other callers.
 
         Raises:
-            ConnectFailed: opening failed. After this error, `leave` must not be called.
+            ConnectFailed: opening failed. If opening fails, do not call `leave`.
         """
         self._users += 1
         try:
@@ -195,7 +194,7 @@ class SharedConnection:
             raise
 
     async def leave(self) -> None:
-        """Release the shared connection; the last user closes it."""
+        """Release the shared connection; after the last user, close the connection."""
         self._users -= 1
         if self._users:
             return

@@ -23,8 +23,8 @@ class OfferedHostKey(NamedTuple):
 
     key: asyncssh.SSHKey
     expected: str = ""
-    """Fingerprints of the expected keys, ``revoked``, or ``unknown`` for an unknown server; "" if
-    the offered key is trusted."""
+    """Fingerprints of the expected keys, or ``revoked``, or ``unknown`` for an unknown server; ""
+    if the offered key is trusted."""
 
     @property
     def fingerprint(self) -> str:
@@ -191,8 +191,8 @@ def _explain_key(target: SshTarget, offer: OfferedHostKey) -> str:
     command = f"'urc trust PROFILE {target.name}'"
     if offer.expected == "unknown":
         return (
-            f"the host key of {place} is not known: found {shown}; "
-            f"if it is the key of the robot, {command} trusts it"
+            f"the host key of {place} is unknown: found {shown}; "
+            f"if the key belongs to the robot, {command} trusts the key"
         )
     if offer.expected == "revoked":
         return f"the host key of {place} is revoked: found {shown}"

@@ -124,8 +124,8 @@ async def test_unknown_host_key_is_refused_and_told(sshd: Sshd) -> None:
     line = line_to(sshd, host_key=None)
     said = await refusal(line)
     assert said == (
-        f"the host key of 127.0.0.1:{sshd.port} is not known: found {sshd.fingerprint} "
-        "(ssh-ed25519); if it is the key of the robot, 'urc trust PROFILE gauge' trusts it"
+        f"the host key of 127.0.0.1:{sshd.port} is unknown: found {sshd.fingerprint} "
+        "(ssh-ed25519); if the key belongs to the robot, 'urc trust PROFILE gauge' trusts the key"
     )
     assert not own_file().exists()
     assert PASSWORD not in sshd.said

@@ -67,6 +67,7 @@ def test_a_failure_to_write_changes_nothing(
         ("10.0.0.5 did not answer within 3 s", "check the address"),
         ("the network is unreachable", "robot's network"),
         ("permission denied (publickey)", "check user, password and key file"),
+        ("the host key of 10.0.0.5:22 is unknown: found SHA256:x", "urc trust"),
         ("something that nobody has seen before", "check the settings of this transport"),
     ],
 )

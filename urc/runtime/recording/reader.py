@@ -75,7 +75,7 @@ def open_recording(file: Path, *, has_profile: bool = False) -> Recording:
 
     Args:
         file: path of the recording.
-        has_profile: whether the recording is shown with a different profile than the recorded one.
+        has_profile: whether the recording is shown with a profile other than the recorded profile.
 
     Raises:
         UrcError: the file is unreadable, empty, or not a URC recording.

@@ -23,14 +23,14 @@ MAX_FRAGMENTED = 8
 """Maximum number of incomplete operations; beyond this limit, the oldest is dropped."""
 MAX_FRAGMENTS = 4096
 MAX_PNG_BYTES = 2 * 1024 * 1024
-"""Maximum length of the text in an image, in bytes; decoding this much text in Python takes one
-second."""
+"""Maximum length of the text in an image, in bytes; decoding text of this length in Python takes
+one second."""
 MAX_VALUES = 2_000_000
 """Maximum number of commas and brackets, because an empty list takes three bytes as text but fifty
 in memory."""
 _MANY_VALUES = 100_000
-"""Maximum number of values in CBOR data with shared references; this many values take a tenth of a
-second."""
+"""Maximum number of values in CBOR data with shared references; processing this number takes a
+tenth of a second."""
 _CBOR_MAP = b"\xa0"
 """First byte of a CBOR map or of a higher CBOR type; JSON text never begins with these bytes."""
 _LONGEST_ID = 256
@@ -45,7 +45,7 @@ _encode_json = msgspec.json.Encoder().encode
 
 
 class BadOperation(ValueError):
-    """An error about an invalid frame or operation, with a one-line message."""
+    """An invalid frame or operation, with a one-line error message."""
 
 
 def encode_operation(operation: Mapping[str, object]) -> bytes:
