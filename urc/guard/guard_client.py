@@ -7,9 +7,9 @@ guard receives the list of transports, a pending stop for each possibly moving c
 terms of the other armed commands. For each pending stop, the guard opens the connection and writes
 the stop first. Motion never resumes automatically.
 
-A control *may be moving* from its first tick or stop request. The state lasts until the guard
-reports that the stop after the newest tick was written. A pending stop therefore survives the death
-of the guard process.
+A control *may be moving* from its first tick or stop request. The state *may be moving* ends when
+the guard reports that the stop after the newest tick was written. A pending stop therefore survives
+the death of the guard process.
 """
 
 import asyncio

@@ -257,7 +257,7 @@ class TestEngine:
 
 
 def encoded(text: str | bytes, driver: Driver, transport: str) -> bytes:
-    """Return text in the encoding of its transport; raise `UrcError` for invalid characters."""
+    """Encode `text` for its transport; raise `UrcError` for invalid characters."""
     if isinstance(text, bytes):
         return text
     spec = driver.transports[transport]

@@ -118,7 +118,9 @@ class MultipartParser:
         length = _LENGTH.search(head)
         self._length = int(length[1]) if length else 0
         if self._length > self._most:
-            raise MultipartFault(f"a part of {self._length} bytes; at most {self._most} are taken")
+            raise MultipartFault(
+                f"a part has {self._length} bytes; at most {self._most} are permitted"
+            )
         self._cut(found.end(), "counted" if length else "open")
         return True
 

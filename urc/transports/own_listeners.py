@@ -41,7 +41,7 @@ class OwnListeners:
             self._doors.remove(door)
 
     def words(self) -> list[str]:
-        """Return the addresses as words, the input of `learn` in a related process."""
+        """Return the addresses as words, for `learn` in a related process."""
         return [f"{address}#{port}" for address, port in self._doors]
 
     def learn(self, words: Iterable[str]) -> None:

@@ -95,7 +95,7 @@ def test_anything_at_all_ends_in_parts_or_a_fault(pieces: list[bytes]) -> None:
 
 
 TOO_MUCH = {
-    "a part of 1001 bytes; at most 1000 are taken": b"--B\r\nContent-Length: 1001\r\n\r\n",
+    "a part has 1001 bytes; at most 1000 are permitted": b"--B\r\nContent-Length: 1001\r\n\r\n",
     "a part without an end within 1000 bytes": b"--B\r\n\r\n" + b"x" * 2000,
     "the headers of a part exceed 8192 bytes": b"--B\r\n" + b"X: y\r\n" * 2000,
     "no boundary within 8192 bytes": b"x" * 9000,

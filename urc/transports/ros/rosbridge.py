@@ -8,8 +8,8 @@ the bridge.
 
 A bridge delivers the first message of a topic only after its publisher has connected to the
 subscribers. If the client leaves earlier, the message is dropped. Clients therefore call `settle`
-before leaving: the method queries rosapi and waits for the subscribers. The reply also shows that
-the bridge has processed all earlier data.
+before leaving: the method queries rosapi and waits for the subscribers. The reply of rosapi also
+shows that the bridge has processed all earlier data.
 
 The bridge reports no errors: a topic without a publisher, a wrong type and an access restriction
 all cause silence. The transport therefore asks rosapi for the list of topics at the start, and for

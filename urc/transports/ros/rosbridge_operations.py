@@ -106,9 +106,7 @@ class OperationReader:
         pieces[number] = data
         if self._sizes[key] > MAX_BYTES:
             self._forget(key)
-            raise BadOperation(
-                f"the fragments of an operation are more than {MAX_BYTES} characters"
-            )
+            raise BadOperation(f"the fragments of an operation exceed {MAX_BYTES} characters")
         if len(pieces) < total:
             while len(self._halves) > MAX_FRAGMENTED or sum(self._sizes.values()) > MAX_BYTES:
                 self._forget(next(iter(self._halves)))
@@ -256,7 +254,7 @@ def _unfiltered(rows: bytes, stride: int) -> bytes:
 
 
 def _undo_left(kind: int, row: bytearray, above: bytes) -> None:
-    """Reverse in place a filter that uses the pixel to the left."""
+    """Reverse, in place, a PNG filter that uses the pixel to the left."""
     for place in range(len(row)):
         left = row[place - 3] if place >= 3 else 0
         up = above[place]
