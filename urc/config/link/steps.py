@@ -133,7 +133,8 @@ class _Walk:
                     self._linker.problems.error(
                         part,
                         "too-many-steps",
-                        f"{loops!r} has a loop inside this loop, so the number of steps is not limited",
+                        f"{loops!r} has a loop inside this loop, so the number of steps is not"
+                        " limited",
                         at="repeat",
                         key=True,
                         hint="use a loop in only one of the two sequences",
