@@ -206,7 +206,7 @@ def test_what_is_not_sound_is_not_listed(tmp_path: Path, person: Person) -> None
     (tmp_path / "secret.yaml").write_text("urc: 1\nkind: driver\nname: secret\n")
     (lab / "archives/widgets/dial/9.9.9.zip").write_bytes(b"PK nonsense")
     told = person.does("repo", "index", str(lab), code=1)
-    assert "it has changed since widgets/dial 1.0.0 was listed; give it a new version" in told
+    assert "the package has changed since widgets/dial 1.0.0 was listed" in told
     assert "drivers/broken/driver.yaml:4:" in told
     assert "robots/nosy/robot.yaml: the document refers to" in told
     assert "which is not in this repository" in told

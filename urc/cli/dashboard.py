@@ -55,7 +55,7 @@ class DashboardAddress:
     tiles: Path | None = None
     """Folder of map tiles; None means maps without background tiles."""
     token: str = ""
-    """Token for package and settings management from other machines; "" forbids it."""
+    """Token for remote management of packages and settings; "" disables remote management."""
     shows_installed: bool = False
     """Whether the menu lists installed robots and drivers."""
     trusted: Sequence[str] = ()

@@ -51,8 +51,8 @@ def fetch_archive(url: str, entry: IndexEntry) -> bytes:
     data = ask(address, entry.size).body
     if len(data) != entry.size or sha256(data) != entry.sha256:
         raise PackageError(
-            f"{address}: the bytes differ from those named in the index;"
-            f" received {len(data)} of {entry.size}"
+            f"{address}: the archive does not match its digest in the index;"
+            f" received {len(data)} of {entry.size} bytes"
         )
     return data
 

@@ -306,7 +306,9 @@ def _take(
     archive = folder / entry.file
     if archive.is_file():
         if archive.read_bytes() != package.data:
-            return [f"{home}: it has changed since {entry} was listed; give it a new version"]
+            return [
+                f"{home}: the package has changed since {entry} was listed; increase its version"
+            ]
     else:
         if faults := examine(home / said.main):
             return faults
@@ -346,7 +348,7 @@ def _entry(folder: Path, file: Path, known: Mapping[str, IndexEntry]) -> IndexEn
         if signature is not None:
             signature.check(entry.key, entry.version, entry.sha256)
     if folder / entry.file != file:
-        raise PackageError(f"{file}: this is {entry}, which belongs in {folder / entry.file}")
+        raise PackageError(f"{file}: expected {entry} in {folder / entry.file}")
     return entry
 
 

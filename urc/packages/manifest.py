@@ -58,7 +58,7 @@ def parse_manifest(content: bytes, file: str) -> Manifest:
         if key not in data:
             raise reader.fault((), f"{key!r} is missing")
     if type(data["urc"]) is not int or data["urc"] != LANGUAGE:
-        raise reader.fault(("urc",), f"this URC reads language version {LANGUAGE}")
+        raise reader.fault(("urc",), f"expected language version {LANGUAGE}")
     return Manifest(
         PackageId(reader.kind(), reader.name()),
         reader.version(),

@@ -104,6 +104,5 @@ def _check_document(content: bytes, manifest: Manifest, file: str) -> None:
     for key, wanted in (("kind", manifest.key.kind), ("name", manifest.key.name)):
         if said.get(key) != wanted:
             raise PackageError(
-                f"{file}: {key}: {wanted!r} is expected, as {MANIFEST} says;"
-                f" found {said.get(key)!r}"
+                f"{file}: {key}: expected {wanted!r}, as in {MANIFEST}; found {said.get(key)!r}"
             )

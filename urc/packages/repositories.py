@@ -104,7 +104,7 @@ class Repository:
             if index is not None:
                 return index
         raise PackageError(
-            f"{self.name}{INDEX}: the bytes differ from those named in {HEAD}; try again"
+            f"{self.name}{INDEX}: the index does not match its digest in {HEAD}; try again"
         )
 
     def _asked(self) -> Index | None:
@@ -152,9 +152,9 @@ class Repository:
         is_other = kept is not None and index.number == kept[0].number > 0 and index != kept[0]
         if index.number < number or is_other:
             raise PackageError(
-                f"{address}: its number went back from {number} to {index.number}, or it"
-                f" changed without a new one; if its maintainer confirms this, run"
-                f" 'urc repo remove {self.name}' and add it again"
+                f"{address}: the index number decreased from {number} to {index.number}, or the"
+                f" index changed without a new number; if the maintainer confirms the change, run"
+                f" 'urc repo remove {self.name}' and add the repository again"
             )
 
     def fetch(self, entry: IndexEntry) -> bytes:

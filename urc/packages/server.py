@@ -254,7 +254,7 @@ class _Shop:
         with open(self._folder / entry.file, "rb") as file:
             data = file.read(PACKAGE.archive_bytes + 1)
         if sha256(data) != entry.sha256:
-            raise PackageError(f"{entry.file}: it has changed since it was listed")
+            raise PackageError(f"{entry.file}: the file has changed since it was listed")
         return data
 
     def _refresh(self) -> None:

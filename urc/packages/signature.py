@@ -66,8 +66,8 @@ class Signature(msgspec.Struct, frozen=True):
         """Raise `PackageError` unless the key's holder signed exactly these bytes."""
         if not self.verifies(_statement(package, version, sha256, self.by)):
             raise PackageError(
-                f"{package} {version}: the signature does not match these bytes: {self} never"
-                " signed them, or they were changed"
+                f"{package} {version}: the signature does not match the archive: {self} did"
+                " not sign the archive, or the archive was changed"
             )
 
     def verifies(self, statement: bytes) -> bool:

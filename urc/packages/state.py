@@ -86,11 +86,11 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
             is_kept = signature is not None and signature.key == kept
             if kept is None or is_kept or name in plan.own:
                 continue
-            found = f"signed by another key, {signature}," if signature else "not signed, other"
+            found = f"signed by another key, {signature}" if signature else "not signed"
             raise PackageError(
-                f"{name} {pin.version} is {found} than {fingerprint(kept)} that was pinned at"
-                " the first installation; install it only if its publisher confirms the change,"
-                f" after 'urc repo key forget {name}'"
+                f"{name} {pin.version} is {found}, but the key {fingerprint(kept)} was pinned at"
+                " the first installation; if its publisher confirms the change, run"
+                f" 'urc repo key forget {name}' and install the package again"
             )
 
     def _check_known(self, name: str, pin: Pin) -> None:

@@ -216,7 +216,9 @@ class StoreTransaction:
                 )
             said = open_package(data, f"{key} {pin.version}").manifest
             if (str(said.key), said.version) != (key, pin.version):
-                raise PackageError(f"{key} {pin.version}: this is {said.key} {said.version}")
+                raise PackageError(
+                    f"{key} {pin.version}: found {said.key} {said.version} in the archive"
+                )
             opened.append(said)
             if pin.sha256 in plan.archives:
                 atomic_files.put_file(store.blob_file(pin.sha256), data, store.work)

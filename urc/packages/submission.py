@@ -103,7 +103,7 @@ def _opened(file: str, data: bytes, signature: Signature | None) -> tuple[Packag
         package = open_package(data, file)
         entry = entry_of(package, signature)
         if entry.file != file:
-            raise PackageError(f"{file}: this is {entry}, which belongs to {entry.file}")
+            raise PackageError(f"{file}: expected {entry} at {entry.file}")
         check_names([entry.key])
         if signature is not None:
             signature.check(entry.key, entry.version, entry.sha256)

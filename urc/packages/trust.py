@@ -57,21 +57,24 @@ class PinnedKey:
         """
         signature = head.signed if head is not None else None
         if head is not None and not head.is_sound():
-            raise PackageError(f"{self._url}: {signature} never signed this index")
+            raise PackageError(
+                f"{self._url}: the index does not match the signature by {signature}"
+            )
         pin = self._pin()
         if pin is not None and (signature is None or signature.key != pin.key):
-            found = f"signed by another key, {signature}," if signature else "not signed, other"
+            found = f"signed by another key, {signature}" if signature else "not signed"
             raise PackageError(
-                f"{self._url}: the index is {found} than {fingerprint(pin.key)} that was pinned;"
-                f" if its maintainer confirms this, run 'urc repo remove {self._url}' and add it"
-                " again"
+                f"{self._url}: the index is {found}, but the key {fingerprint(pin.key)} is pinned;"
+                f" if its maintainer confirms the change, run 'urc repo remove {self._url}' and add"
+                " the repository again"
             )
         if head is None or signature is None:
             return
         if pin is not None and head.number < pin.number:
             raise PackageError(
-                f"{self._url}: its number went back from {pin.number} to {head.number}; if its"
-                f" maintainer confirms this, run 'urc repo remove {self._url}' and add it again"
+                f"{self._url}: the index number decreased from {pin.number} to {head.number}; if"
+                f" the maintainer confirms the change, run 'urc repo remove {self._url}' and add"
+                " the repository again"
             )
         if head.left_s(self._now()) <= 0:
             raise PackageError(
@@ -101,6 +104,6 @@ class PinnedKey:
             return None
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
             raise PackageError(
-                f"{self._file}: this file is damaged: {error}; 'urc repo remove {self._url}' and"
-                " add it again"
+                f"{self._file}: this file is damaged: {error}; run 'urc repo remove {self._url}'"
+                " and add the repository again"
             ) from None

@@ -253,7 +253,7 @@ async def test_openssh_is_forwarded_to_the_robots_other_lines_alone(tmp_path: Pa
         assert listening["hidden"].text == "tcp 10.0.0.21:6571 through shell"
         for target, expected in (
             ("10.0.0.21:6571", "level 3\n"),
-            ("127.0.0.1:22", "no server there"),
+            ("127.0.0.1:22", "no server at this address"),
         ):
             words = ssh_words(listening["shell"], tmp_path, "-W", target, "root@127.0.0.1")
             said = await runs(*words, typed="level?\n", **asked(tmp_path, PASSWORD))

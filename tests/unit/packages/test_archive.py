@@ -205,8 +205,8 @@ def test_a_folder_with_a_link_is_not_packed(tmp_path: Path) -> None:
     [
         ("package.yaml", None, "this is not a package: it has no package.yaml"),
         ("widget.yaml", None, "its document widget.yaml is missing"),
-        ("widget.yaml", "urc: 1\nkind: driver\n", "kind: 'widget' is expected, as package.yaml"),
-        ("widget.yaml", "kind: widget\nname: x\n", "name: 'dial' is expected, as package.yaml"),
+        ("widget.yaml", "urc: 1\nkind: driver\n", "kind: expected 'widget', as in package.yaml"),
+        ("widget.yaml", "kind: widget\nname: x\n", "name: expected 'dial', as in package.yaml"),
         ("widget.yaml", "a: [", "widget.yaml"),
     ],
 )

@@ -153,9 +153,15 @@ def test_nothing_but_archives_can_be_put(lab: Lab, file: str) -> None:
 def test_a_package_stands_where_it_belongs(lab: Lab) -> None:
     """Not under another version, nor another name that its token may publish."""
     status, told = lab.puts(DIAL, file="archives/widgets/dial/2.0.0.zip")
-    assert (status, "this is widgets/dial 1.0.0" in told) == (422, True)
+    assert (status, "expected widgets/dial 1.0.0 at archives/widgets/dial/1.0.0.zip" in told) == (
+        422,
+        True,
+    )
     status, told = lab.puts(DIAL, file="archives/drivers/bot/1.0.0.zip")
-    assert (status, "this is widgets/dial 1.0.0" in told) == (422, True)
+    assert (status, "expected widgets/dial 1.0.0 at archives/widgets/dial/1.0.0.zip" in told) == (
+        422,
+        True,
+    )
     assert lab.lists() == []
 
 

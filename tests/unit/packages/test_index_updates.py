@@ -131,10 +131,10 @@ def test_a_repository_that_goes_back_is_not_believed(lab: Lab) -> None:
     lab.write(entries(3))
     lab.asks()
     lab.web.instead |= old
-    with pytest.raises(PackageError, match="its number went back from 2 to 1"):
+    with pytest.raises(PackageError, match="the index number decreased from 2 to 1"):
         lab.client.refresh()
     lab.web.instead[HEAD] = None  # nor when it hides that
-    with pytest.raises(PackageError, match="'urc repo remove http://lab/' and add it again"):
+    with pytest.raises(PackageError, match="'urc repo remove http://lab/' and add the"):
         lab.client.refresh()
     assert len(lab.client.entries()) == 3
     assert "went back" in lab.said.pop()
@@ -153,7 +153,7 @@ def test_one_number_means_one_index(lab: Lab) -> None:
         )
     )
     lab.web.instead |= {INDEX: false, HEAD: head}
-    with pytest.raises(PackageError, match="or it changed without a new one"):
+    with pytest.raises(PackageError, match="or the index changed without a new number"):
         lab.client.refresh()
 
 

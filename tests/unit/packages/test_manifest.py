@@ -20,7 +20,7 @@ def test_a_manifest_is_read() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("urc: 1", "urc: 2", "p.yaml:1:6: urc: this URC reads language version 1"),
+        ("urc: 1", "urc: 2", "p.yaml:1:6: urc: expected language version 1"),
         (
             "package: driver",
             "package: script",

@@ -66,7 +66,7 @@ def test_the_first_key_is_kept_and_no_other_is_believed(lab: Signed) -> None:
     lab.write(3, lab.other)
     for instead in (None, (lab.folder / HEAD).read_bytes(), unsigned, b"{"):
         lab.web.instead[HEAD] = instead
-        lab.refuses("than SHA256:.* that was pinned; if its maintainer confirms this")
+        lab.refuses("but the key SHA256:.* is pinned; if its maintainer confirms the change")
         assert len(lab.client.entries()) == 2
         assert "what it said last is used" in lab.said.pop()
     lab.web.instead.clear()
@@ -113,7 +113,7 @@ def test_nobody_goes_back_even_where_what_was_said_is_lost(lab: Signed) -> None:
     for file in (lab.folder.parent / "client").glob("*.index.json"):
         file.unlink()
     lab.web.instead |= old
-    lab.refuses("its number went back from 2 to 1")
+    lab.refuses("the index number decreased from 2 to 1")
 
 
 def test_what_was_changed_on_the_way_is_not_believed(lab: Signed) -> None:
@@ -121,11 +121,11 @@ def test_what_was_changed_on_the_way_is_not_believed(lab: Signed) -> None:
     lab.write(1)
     false = (lab.folder / INDEX).read_bytes().replace(b"widgets", b"gadgets").replace(b"w0", b"x0")
     lab.web.instead[INDEX] = false
-    lab.refuses("the bytes differ from those named in index/head.json")
+    lab.refuses("the index does not match its digest in index/head.json")
     assert lab.client.keeper == ""
     longer = msgspec.structs.replace(lab.head(), expires="2099-01-01T00:00:00Z")
     lab.web.instead |= {HEAD: longer.to_bytes()}
-    lab.refuses("Keeper .* never signed this index")
+    lab.refuses("the index does not match the signature by Keeper")
 
 
 @pytest.mark.parametrize("signs", [False, True])
