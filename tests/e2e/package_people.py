@@ -37,7 +37,7 @@ class Person:
         told = self.does(*words, code=1)
         assert told.count("\n") == 1, told
         assert told.startswith("urc ")
-        assert "mistake in URC" not in told
+        assert "bug in URC" not in told
         assert self.holds() == before
         return told
 

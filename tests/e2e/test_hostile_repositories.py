@@ -239,7 +239,7 @@ def test_a_package_that_says_less_than_its_index_is_refused(person: Person) -> N
     with server(evil(says(DIAL.data), Index(1, "evil", (entry,)).to_bytes())) as url:
         person.does("repo", "add", url)
         told = person.refuses("install", "dial", "--yes")
-    assert "widgets/dial 9.0.0: this is widgets/dial 1.0.0" in told
+    assert "widgets/dial 9.0.0: found widgets/dial 1.0.0" in told
 
 
 @pytest.mark.parametrize(

@@ -153,7 +153,7 @@ def _is_withdrawn(lab: Lab, keeper: Person, owner: Person, other: Person) -> Non
     """The owner is told why, others get the version before, or it by name."""
     why = "It beeps too loud."
     version = (str(lab.folder), "drivers/puppet", "1.1.0")
-    assert "needs --why" in keeper.does("repo", "withdraw", *version, code=2)
+    assert "requires --why" in keeper.does("repo", "withdraw", *version, code=2)
     assert "'1.2.0'" not in keeper.refuses("repo", "withdraw", *version[:2], "1.2.0", "--why", why)
     keeper.does("repo", "withdraw", *version, "--why", why)
     assert owner.does("list", "--updates") == ""

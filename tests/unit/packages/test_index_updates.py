@@ -137,7 +137,7 @@ def test_a_repository_that_goes_back_is_not_believed(lab: Lab) -> None:
     with pytest.raises(PackageError, match="'urc repo remove http://lab/' and add the"):
         lab.client.refresh()
     assert len(lab.client.entries()) == 3
-    assert "went back" in lab.said.pop()
+    assert "decreased" in lab.said.pop()
     lab.client.forget()
     assert len(lab.client.refresh().packages) == 2
 
