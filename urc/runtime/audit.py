@@ -62,7 +62,7 @@ class AuditEntry(NamedTuple):
     """Name of the person or page that caused the event."""
     role: str = ""
     client: str = ""
-    """Identifier of the page's connection."""
+    """Identifier of the connection between page and server."""
     epoch: int = 0
     """Epoch of the lease at the time of the event."""
     command: str = ""

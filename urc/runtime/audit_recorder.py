@@ -108,7 +108,7 @@ class AuditRecorder:
         """Number of refusal entries in the current second."""
 
     def attend(self, hub: Hub | None, now: Callable[[], float]) -> None:
-        """Also report entries to the taps of a session's hub. With None as hub, the reports end."""
+        """Also report entries to the taps of a session's hub. None as the hub ends the reports."""
         self._hub, self._now = hub, now
 
     def hide(self, secrets: Iterable[str]) -> None:

@@ -34,7 +34,7 @@ destination, including options of third-party transports."""
 def destination_of(profile: Profile, package: str, values: Mapping[str, Value]) -> str:
     """Return a digest of all destinations that a robot's settings can reach.
 
-    The digest is equal for equal packages with equal transports and destinations.
+    Packages with the same transports and destinations have the same digest.
 
     Args:
         profile: profile with the transports.

@@ -1,7 +1,7 @@
 """The dispatcher: the only caller of a driver's engine.
 
 All calls to the engine run on the event loop, one after the other and never nested. Performing an
-event only changes the state of a `Link`, the hub or a future; the links' own tasks react later. A
+event only changes the state of a `Link`, the hub or a future; the tasks of the links react later. A
 driver with several transports has one engine, one dispatcher, and one link for each transport.
 """
 
@@ -74,7 +74,7 @@ class PendingCommands:
             self._arm(due_s)
 
     def settle(self, answer: Answer) -> None:
-        """Set the result of a pending command, unless its caller no longer waits."""
+        """Set the result of a pending command, if a caller still waits."""
         found = self._all.pop(answer.id, None)
         if found is not None and not found[0].done():
             found[0].set_result(answer)
@@ -136,13 +136,13 @@ class EngineLike(Protocol):
         """Handle received bytes or a received message."""
 
     def closed(self, transport: str, reason: str, now: float) -> Sequence[Event]:
-        """Handle the loss of a transport, or a failed attempt to open it."""
+        """Handle the loss of a transport, or a failed attempt to open the transport."""
 
     def command(self, request: Request, now: float) -> Sequence[Event]:
         """Start a command."""
 
     def latch(self, reason: str, now: float) -> Sequence[Event]:
-        """End every sequence and refuse autonomous motion until the next call with ""."""
+        """End every sequence and refuse autonomous motion, until a call with ""."""
 
     def finish(self, now: float) -> list[Event]:
         """Start an orderly close of every connection."""
@@ -154,7 +154,7 @@ class EngineLike(Protocol):
 class LinkPort(Protocol):
     """The interface of a `Link` that the dispatcher uses.
 
-    Implementations of these methods must not call the dispatcher.
+    Implementations of the interface must not call the dispatcher.
     """
 
     @property
@@ -174,13 +174,13 @@ class LinkPort(Protocol):
         """Handle a valid frame."""
 
     def ready(self) -> None:
-        """Handle the end of the connection's ``on_connect`` steps."""
+        """Handle the end of the ``on_connect`` steps of the connection."""
 
     def count(self, fault: Violation) -> None:
         """Count a protocol violation."""
 
     def hang_up(self, reason: str) -> None:
-        """Close the connection; the link's own task later reports the end to the engine."""
+        """Close the connection; the task of the link later reports the end to the engine."""
 
     def publish(self) -> None:
         """Publish the link state if the state has changed."""
@@ -206,8 +206,7 @@ class Dispatcher:
             hub: destination of readings and log entries.
             clock: source of time.
             commands: the driver's commands.
-            limit_s: command → time in seconds after which its wait ends, even if the engine is
-                still busy.
+            limit_s: command → maximum wait in seconds, even if the engine is still busy.
             sequence_control: control of each sequence, by name.
             motion: handler of held-command events; None ignores the events.
         """
@@ -248,7 +247,7 @@ class Dispatcher:
         self._arm_after(now)
 
     def closed(self, transport: str, reason: str) -> None:
-        """Report a lost transport, or a failed attempt to open it, to the engine."""
+        """Report a lost transport, or a failed attempt to open the transport, to the engine."""
         self._run(lambda now: self._engine.closed(transport, reason, now))
 
     def command(self, request: Request) -> asyncio.Future[Answer]:

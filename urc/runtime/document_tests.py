@@ -1,6 +1,6 @@
 """The runner of a document's tests, which uses the same engine as a real robot.
 
-This module is on layer 4, without I/O and asyncio: `urc validate` needs no robot, no network and no
+This module is on layer 4, without I/O and asyncio: `urc validate` needs no robot, network or
 secret.
 
 A test runs either in one instant or step by step on a simulated clock. In a test of one instant,
@@ -177,7 +177,7 @@ def _in_an_instant(trial: TestEngine, test: DocumentTest) -> list[str]:
 
 
 def _check_failure(trial: TestEngine, expected: str) -> list[str]:
-    """Let time pass until the declared failure; return a message if the failure does not occur."""
+    """Let time pass until the declared failure; return a message if no failure occurs."""
     for _ in range(_ROUNDS):
         if any(expected in failure for failure in trial.failures):
             return []
@@ -278,8 +278,8 @@ def _isolated(driver: Driver, *, keeps_conditions: bool) -> Driver:
 
     Args:
         driver: the loaded driver.
-        keeps_conditions: whether to keep the `requires` and `verify` conditions of commands. Byte
-            tests omit the conditions, because no robot reports the required signals.
+        keeps_conditions: whether to keep the `requires` and `verify` conditions of commands. For
+            byte tests, the conditions are left out, because no robot reports the required signals.
     """
     transports = {
         name: spec._replace(on_connect=(), on_close=(), keepalive=None, stale_after_s=None)

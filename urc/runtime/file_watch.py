@@ -31,7 +31,7 @@ class FileWatcher:
         return [file for file, state in self._states.items() if _state(file) != state]
 
     def states(self) -> list[object]:
-        """Return the state of every file; equal results mean that no file has changed."""
+        """Return the state of every file; equal results mean that the files are unchanged."""
         return [_state(file) for file in self._states]
 
 

@@ -42,7 +42,7 @@ class MotionFrames(Protocol):
     def motion_frame(
         self, command: str, arguments: Mapping[str, Reading], now: float
     ) -> Payload | CountedFrame:
-        """Return the motion frame of a held command; raise `UrcError` with a refusal's reason."""
+        """Return the motion frame of a held command; raise `UrcError` if the frame is refused."""
 
 
 class MotionBackend(Protocol):
@@ -95,7 +95,7 @@ class MotionSession(Protocol):
 
 @dataclass(slots=True)
 class HeldControl:
-    """The state of one held command, as seen by its page."""
+    """The state of one held command, as known to its page."""
 
     line: str
     hold: Hold

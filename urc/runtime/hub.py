@@ -82,7 +82,7 @@ class SampleHistory:
         return found
 
     def firsts(self, names: Sequence[str]) -> dict[str, int]:
-        """Return the sequence number of each signal's first reading in `names`, oldest first."""
+        """Return the sequence number of each signal's oldest reading in `names`."""
         counts = self._counts
         return {name: counts[name] - names.count(name) + 1 for name in counts if name in names}
 
@@ -186,7 +186,7 @@ class MotionRecord:
 
 @dataclass(frozen=True, slots=True)
 class AuditRecord:
-    """An audit log entry, as passed to taps."""
+    """An audit log entry in the form for taps."""
 
     time_s: float
     """Monotonic time of the entry, in seconds, unaffected by adjustments of the time of day."""
@@ -194,7 +194,7 @@ class AuditRecord:
 
 
 Tapped: TypeAlias = Sample | LogEntry | Traffic | LinkStatus | MotionRecord | AuditRecord
-"""One event in a tap."""
+"""One event in a tap, such as a sample or a log entry."""
 
 
 class EventTap:
@@ -274,7 +274,7 @@ class Hub:
         self._traffic_taps: set[EventTap] = set()
 
     def publish(self, samples: Iterable[Sample]) -> None:
-        """Store readings; a repeated value also counts as a change, because its time is new."""
+        """Store readings; a repeated value counts as a change, because its time is new."""
         taken = samples if type(samples) is tuple else tuple(samples)
         if self._redactor is not None:
             value = self._redactor.value

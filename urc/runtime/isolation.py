@@ -80,7 +80,7 @@ class PreviewWorker:
 
 
 def bound_this_process(processor_s: int, memory_bytes: int) -> None:
-    """Limit the resources of this process, and lower its priority below motion.
+    """Limit the resources of this process, and lower its priority to less than motion.
 
     On Windows, only the timeout of the caller applies.
     """
@@ -95,7 +95,7 @@ def bound_this_process(processor_s: int, memory_bytes: int) -> None:
 
 
 def _said(line: str) -> Any:
-    """Return a permission line as JSON, with its text in translatable form."""
+    """Return a permission line as JSON, with translatable text."""
     if not isinstance(line, Phrase):
         return line
     if line.pieces:

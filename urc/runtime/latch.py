@@ -56,9 +56,9 @@ class LatchStore:
     def load(self) -> Latch:
         """Return the stored state.
 
-        An unreadable or invalid file counts as latched, because the true state is unknown. After an
-        unreadable file, the stop is sent again, unless the file confirms an earlier delivery. Page
-        numbers restart at one in each run, so page names from an earlier run are marked.
+        An unreadable or invalid file counts as latched, because the true state is unknown. If the
+        file is unreadable, the stop is sent again, unless the file confirms an earlier delivery.
+        Page numbers restart at one in each run, so page names from an earlier run are marked.
         """
         try:
             with self._file.open("rb") as file:

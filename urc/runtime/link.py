@@ -14,8 +14,8 @@ of attempts changes.
 
 The link uses only the five transport members, so a transport may run in another process. A
 transport that implements `Prompt` saves task switches. Bytes that arrive while the reader waits are
-passed directly to the engine, and the engine's bytes directly to the kernel. The reader and writer
-tasks handle bytes that must wait, large amounts of data, and errors.
+passed directly to the engine. The engine's bytes are passed directly to the kernel. The reader and
+writer tasks handle bytes that must wait, large amounts of data, and errors.
 """
 
 import asyncio
@@ -78,7 +78,8 @@ class Link:
             clock: source of time.
             random: returns a number in [0, 1) for the jitter of the backoff.
             expects_frames: whether the robot sends frames without a request. A link that expects
-                frames becomes live with the first frame; other links, when the connection opens.
+                frames becomes live with the first frame; other links become live when the
+                connection opens.
         """
         self._spec = spec
         self._name = spec.name
@@ -377,7 +378,7 @@ class Link:
                     size = min(size * 2, SLICE_BYTES)
 
     def _take_now(self, data: bytes) -> bool:
-        """Handle received bytes immediately, unless there are many or earlier bytes are waiting."""
+        """Handle received bytes immediately, unless there are many or earlier ones are waiting."""
         if len(data) > _LEAST_SLICE_BYTES or not self._is_reader_waiting:
             return False
         ended = self._ended

@@ -54,7 +54,7 @@ class LogRateLimiter:
 
 
 class LinkReport:
-    """The state of one transport, published to the hub."""
+    """The published state of one transport, sent to the hub."""
 
     def __init__(self, transport: str, address: str, hub: Hub, clock: Clock) -> None:
         self._transport = transport

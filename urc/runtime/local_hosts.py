@@ -1,7 +1,7 @@
 """Detection of host names that mean this machine, or a device attached to it.
 
 A package with a fixed local host would connect to local programs of the person who installs the
-package. A package may therefore address this machine only through a setting that a person fills in.
+package. A package may therefore address this machine only through a setting.
 """
 
 import ipaddress

@@ -1,7 +1,7 @@
 """The manual page of a profile in Markdown: the robot, its signals and its commands.
 
-This module is on layer 4 and is a pure function: the same profile always produces the same page.
-The page is for operators and quotes the descriptions of the document.
+This module is on layer 4 and is pure: the same profile always produces the same page. The page is
+written for operators and quotes the descriptions of the document.
 """
 
 import math
@@ -253,7 +253,7 @@ def _by_itself(watchdog_s: float | None) -> str:
 
 
 def _interfaces(profile: Profile) -> Iterator[str]:
-    """Yield the widgets of each declared interface, or of the generated interface."""
+    """Yield the widgets of all declared interfaces, or of the generated interface."""
     for place, interface in enumerate(profile.interfaces.values()):
         found = {
             slot: interface.widgets.get(slot) or profile.slots.get(slot) for slot in interface.shown

@@ -7,7 +7,7 @@ the time limits. The first tick of a gesture arms the control. The first tick al
 frame, so that a stop needs neither the engine nor the document.
 
 After a stop without a release, the control stays disarmed until its page sends a release. A stick
-that is still held after a reconnection therefore moves nothing.
+that is still held after a reconnection does not move the robot.
 
 A controller outlives the sessions of its robot, because the latch persists while the robot is
 disconnected. `attach` adds the engine and the backend of a session; `detach` removes both.
@@ -85,7 +85,7 @@ class MotionController:
         self.on_change: Callable[[LeaseState], None] = _ignore
         """Callback after each change of the lease, and after the confirmation of a stop."""
         self.on_moved: Moved = _unseen
-        """Callback for each tick that was passed to the backend as a frame; must neither block nor
+        """Callback for each tick whose frame was passed to the backend; must neither block nor
         raise."""
         self.on_refused: Callable[[str, str], None] = _unrefused
         """Callback with the control and the message when the robot refuses to move."""
@@ -215,7 +215,7 @@ class MotionController:
         return halted
 
     def _moving(self) -> list[str]:
-        """Return the commands with a tick after their last reported stop."""
+        """Return the commands that had a tick after their last reported stop."""
         controls = self._controls.items()
         return [name for name, one in controls if one.is_armed and one.motion_state != "rest"]
 

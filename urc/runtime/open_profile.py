@@ -1,7 +1,7 @@
 """Loading of a robot's document, with local widgets and installed interfaces.
 
-Layer 4. An installed driver uses the interfaces that were installed for the driver, because its
-document names no interface.
+Layer 4. A driver's document names no interface. An installed driver uses the interfaces that were
+installed for the driver.
 """
 
 from os import PathLike

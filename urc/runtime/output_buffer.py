@@ -173,7 +173,7 @@ class OutputBuffer:
                 self._give_up("")
 
     def _wait_for_rest(self) -> None:
-        """Wake the writer, which then checks that the kernel accepts the remaining data in time."""
+        """Wake the writer to check that the kernel accepts the remaining data in time."""
         self._waiting.append(_Waiting(b"", b""))
         self._has_some.set()
 

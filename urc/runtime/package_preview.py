@@ -27,7 +27,7 @@ __all__ = ["PackagePreview", "look", "permissions", "risks_of"]
 
 
 def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[str]:
-    """Return the permissions of a package, one line per permission.
+    """Return the permissions of a package, one per line.
 
     Args:
         document: the document of the package.
@@ -212,7 +212,7 @@ class PackagePreview(NamedTuple):
     """The preview of a package."""
 
     permissions: list[str]
-    """Permissions, one line per permission."""
+    """Permissions, one per line."""
     wire: Mapping[str, str]
     """Key path, such as ``commands.beep.send`` → value, for all keys that affect sent bytes or the
     decoding of replies."""

@@ -123,7 +123,7 @@ class Redactor:
         return None if value in self._numbers else value
 
     def _in_bytes(self, data: bytes) -> bytes:
-        """Return the redacted form of a blob; short secrets stay, because they match by chance."""
+        """Return the redacted form of a blob, in which only long secrets are redacted."""
         for secret in self._long:
             if len(secret) >= _SHORTEST_PART:
                 data = data.replace(secret, REDACTED)

@@ -115,7 +115,7 @@ class Player:
         self._stand(0.0 if at_end else self.position_s, is_moved=at_end)
 
     def pause(self) -> None:
-        """Pause the playback at the current position."""
+        """Pause the playback at its current position."""
         self._wants_to_run = False
         self._stand(self.position_s)
 

@@ -57,7 +57,7 @@ class Recording(NamedTuple):
     def messages(self, from_ns: int) -> Generator[RecordedMessage, None, None]:
         """Yield the messages from a start time on, in order; stop at a damaged end of the file.
 
-        An unreadable piece in the middle is reported as a log message.
+        An unreadable piece in the middle of the file is reported as a log message.
         """
         yield from _messages(self, from_ns, math.inf)
 

@@ -4,8 +4,8 @@ Layer 4. Theory of operation. `Recorder.put` queues events and returns immediate
 waits for a disk, because motion uses the same event loop. A separate thread does all slow work:
 reading the document, creating the file, and writing. The thread flushes the file once a second, so
 a killed process loses at most that second and the end of the file. If the queue is full, new events
-are lost and counted in the file. If the disk is full, the recording ends, and `fault` contains the
-reason.
+are lost, and the file contains a count of the lost events. If the disk is full, the recording ends,
+and `fault` contains the reason.
 """
 
 import asyncio
@@ -265,7 +265,7 @@ def _size(event: Tapped) -> int:
 def named(folder: Path, robot: str, number: int = 1, utc_s: float | None = None) -> Path:
     """Return the path of a recording, such as ``puppet-20261123T141502Z.mcap``.
 
-    A second file of the same second gets the suffix ``-2``.
+    If a name is already in use, the suffix ``-2`` or a higher number is added.
     """
     at = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime(utc_s))
     more = "" if number == 1 else f"-{number}"
@@ -288,7 +288,7 @@ async def recorded(
         hub: hub of the session, preferably before the session opens; the hub redacts secrets.
         place: path of a new file, or of a folder, as for `Recorder`.
         profile: profile of the robot, loaded from a file.
-        is_folder: whether `place` is a folder for the new file.
+        is_folder: whether `place` is a folder; if so, a new file is created in this folder.
     """
     recorder = Recorder(place, profile, is_folder=is_folder)
     with hub.tap(with_traffic=True) as tap:
