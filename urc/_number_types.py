@@ -19,8 +19,8 @@ class Number(NamedTuple):
 
     kind: Literal["integer", "float", "boolean", "varint", "zigzag", "bcd"]
     bits: int
-    """Width of the number in bits: 8 to 64 in steps of 8; 1 to 64 inside ``bits:`` and in packed
-    arrays."""
+    """Width of the number in bits: 1 to 64 in ``bits:`` and packed arrays, otherwise 8 to 64 in
+    steps of 8."""
     is_signed: bool = False
     endian: Literal["big", "little"] = "big"
     are_words_swapped: bool = False

@@ -5,12 +5,12 @@ look-around and back-references. In this dialect, ``$`` matches only the end of 
 only ASCII digits. Patterns that `_is_linear` proves linear run on `re`, which is ten times faster
 for short lines. Other patterns run on RE2, or are refused if RE2 is not installed.
 
-Theory of operation: backtracking exceeds linear time only if two parts of a pattern can divide the
-same characters in many ways. A proven pattern must therefore have a start anchor, and alternatives
-with different first characters. Every repeat must be over one set of characters, disjoint from the
-possible next characters.
+Theory of operation: backtracking takes more than linear time only if two parts of a pattern can
+match the same characters in many ways. A proven pattern must therefore have a start anchor, and
+alternatives with different first characters. Every repeat must be over one set of characters,
+disjoint from the possible next characters.
 
-The run time of RE2 is proportional to the size of the text and of the compiled program, with
+The run time of RE2 is proportional to the size of the text and to the size of the program, with
 expanded ``{n}``. The size of an unproven pattern is therefore limited. This module computes the
 size from the source, so the result does not depend on RE2.
 """
@@ -139,7 +139,8 @@ def compile_pattern(text: str, *, is_over_bytes: bool = False) -> Pattern:
         is_over_bytes: whether the pattern matches bytes, each as one character, instead of text.
 
     Raises:
-        PatternError: the pattern is invalid or unsupported, or needs RE2, which is not installed.
+        PatternError: the pattern is invalid or unsupported, or needs RE2 while RE2 is not
+            installed.
     """
     if len(text) > MAX_SOURCE:
         raise PatternError(f"a pattern has at most {MAX_SOURCE} characters, found {len(text)}")

@@ -2,7 +2,8 @@
 
 Private to `urc.filters.table`. A quaternion is [x, y, z, w] or {x, y, z, w}, of any norm except
 zero. Roll, pitch and yaw are rotations about x, then y, then z, in the axes of REP-103. Without an
-orientation, all angles are not-a-number ("not available"), which arithmetic preserves.
+orientation, all angles are not-a-number. Arithmetic preserves not-a-number, which means "not
+available".
 """
 
 import math

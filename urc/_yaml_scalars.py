@@ -1,7 +1,7 @@
 """Meaning of an unquoted scalar in the core schema of YAML 1.2.
 
-Private to `urc.source`. In this schema ``on``, ``yes`` and ``12:30:00`` are text, 010 is ten, 1e3
-is a number, and a date is text.
+Private to `urc.source`. In the core schema, ``on``, ``yes``, ``12:30:00`` and dates are text, 010
+is ten, and 1e3 is a number.
 """
 
 import re

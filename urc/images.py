@@ -11,7 +11,7 @@ from typing import Final
 __all__ = ["MAX_PIXELS", "media_type", "picture_size", "pixels"]
 
 MAX_PIXELS: Final = 16_000_000
-"""Maximum number of pixels of an image, which takes 64 MB in a browser."""
+"""Maximum number of pixels of an image. An image of this size takes 64 MB in a browser."""
 
 _OTHER: Final = "application/octet-stream"
 _SIGNS: Final = (

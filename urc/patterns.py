@@ -1,6 +1,6 @@
 """Regular expressions in documents, limited to patterns with linear run time.
 
-The implementation is in `urc._patterns`, which expressions also use.
+The implementation is in `urc._patterns`, for patterns and for expressions.
 """
 
 from urc._patterns import (

@@ -46,7 +46,7 @@ def turn_quaternion(
     """Convert an orientation [x, y, z, w] from the axes `here` to the axes `there`.
 
     Between FLU and FRD, the result is the same rotation in the new axes. Between ENU and NED, the
-    body axes also change: an FLU body in ENU becomes an FRD body in NED, as in autopilots.
+    body axes also change, as in autopilots. An FLU body in ENU becomes an FRD body in NED.
     """
     x, y, z, w = quaternion
     if here == there:

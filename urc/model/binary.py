@@ -1,8 +1,8 @@
 """Items of a binary frame, in frame order, for reading and writing.
 
 The loader creates the items from ``struct:`` and resolves every named type. The readers and writers
-of `urc.protocol` compile the items. The loader, the readers and the writers share this module's
-rules for names of nested fields and for sizes from earlier items.
+of `urc.protocol` compile the items. The loader, the readers and the writers share the rules in this
+module, such as the names of nested fields.
 """
 
 from collections.abc import Iterator, Mapping

@@ -14,8 +14,8 @@ def targets(command: Command, port: WidgetPort, given: OutputBinding) -> dict[st
     """Return the name of the output argument for each command argument.
 
     The binding decides. Without a binding, a value goes to the argument of the same name. A single
-    value goes to the command's only free argument, even under a different name. This rule does not
-    apply to hold-to-run controls.
+    output value goes to the command's only free argument, even under a different name. Values of
+    hold-to-run controls go only to arguments of the same name.
     """
     open_ones = [name for name in command.arguments if name not in given.fixed]
     if not port.is_held and not given.names and len(port.arguments) == 1 and len(open_ones) == 1:

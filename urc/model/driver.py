@@ -75,7 +75,7 @@ class TransportSpec(NamedTuple):
     connection: Literal["persistent", "per_request"] = "persistent"
     framing: FramingSpec = FramingSpec()
     encoding: str = "utf-8"
-    """Python codec name of text on this connection."""
+    """Name of the Python codec for text on this connection."""
     timeouts: Timeouts = Timeouts()
     backoff: Backoff = Backoff()
     min_gap_s: float = 0.0

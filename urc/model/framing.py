@@ -51,8 +51,8 @@ class Salt(NamedTuple):
     table: Mapping[Any, bytes] = NOTHING
     """Secret bytes, by the selecting number in the frame."""
     otherwise: Literal["fault", "skip", "pass"] = "fault"
-    """Handling of a frame with an unknown number: ``fault`` drops and reports the frame, ``skip``
-    drops the frame silently, ``pass`` accepts the frame unchecked."""
+    """Handling of a frame with an unknown number: report and drop (``fault``), drop silently
+    (``skip``), or accept unchecked (``pass``)."""
 
     def number(self, frame: bytes | bytearray) -> int | None:
         """Return the number that selects the secret bytes; None when the frame is too short."""
@@ -123,8 +123,8 @@ class LengthSpec(NamedTuple):
     """Offset of the flag byte that marks a valid length field; -1: the length field is always
     valid."""
     flag_mask: int = 0
-    """Mask of the flag byte. If any masked bit of the flag byte is set, the length field is valid;
-    otherwise the frame has `adjust` bytes."""
+    """Mask of the flag byte. The length field is valid if any masked bit of the flag byte is set.
+    Without such a bit, the frame has `adjust` bytes."""
 
     @property
     def is_loose(self) -> bool:

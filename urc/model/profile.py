@@ -88,7 +88,7 @@ class DialogueStep(NamedTuple):
     column: int = 1
     """1-based."""
     source: str = ""
-    """Text of the line in the document."""
+    """Source line of the step in the document, for error messages."""
     feed: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
     """Input from the robot, by transport."""
     run: str = ""
@@ -135,11 +135,11 @@ class DocumentTest(NamedTuple):
     fails: str | None = None
     """Expected failure message; None: the test expects success."""
     file: str = ""
-    """Path of the document."""
+    """Path of the document file."""
     column: int = 1
     """1-based."""
     source: str = ""
-    """Text of the line in the document, for error messages."""
+    """Source line of the test in the document, for error messages."""
     settings: Mapping[str, Value] = NOTHING
     """Values that differ from the default, by setting."""
     steps: tuple[DialogueStep, ...] = ()

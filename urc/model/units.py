@@ -1,7 +1,7 @@
 """Units by quantity, and the conversion of values between them. Pure.
 
-The table contains only units that occur in robot documents. Symbols follow UCUM, except for
-uncommon UCUM symbols. An unknown unit converts only to the same unit.
+The table contains only units that occur in robot documents. Unit symbols follow UCUM, unless the
+UCUM symbol is uncommon. An unknown unit converts only to the same unit.
 """
 
 import math
@@ -129,7 +129,7 @@ def conversion(have: str, want: str) -> Scale | None:
 
 
 def are_apart(one: str, other: str) -> bool:
-    """Return whether a number certainly has different meanings in the two units.
+    """Return whether equal numbers in the two units certainly represent different values.
 
     If a unit is missing, the result is False.
     """

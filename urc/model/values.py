@@ -1,9 +1,9 @@
 """Signals (named, typed values of a robot) and their samples.
 
 All values in `urc.model` are named tuples. Named tuples are as immutable and typed as frozen
-dataclasses. Compared with a dataclass, defining a named tuple takes a tenth of the time, and
-constructing a named tuple takes a third. The definition time matters at every start of the command
-line, and the construction time at every sample.
+dataclasses. Defining a named tuple takes a tenth of the time of a dataclass, and constructing an
+instance takes a third. The definition time matters at every start of the command line, and the
+construction time at every sample.
 """
 
 from collections.abc import Mapping

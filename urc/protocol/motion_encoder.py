@@ -58,7 +58,7 @@ class MotionEncoder:
         lines: Mapping[str, Conversation],
         known: SignalState,
     ) -> None:
-        """Initialise with the tables of the engine, which are not copied."""
+        """Initialise the encoder with tables of the engine, without copying the tables."""
         self._held = {name: one for name, one in commands.items() if one.hold is not None}
         self._ways = {
             name: _Way(one, checks[name], asks[name], lines[one.transport])
@@ -82,7 +82,7 @@ class MotionEncoder:
                 self._counting[line] = self._counting.get(line, 0) + 1
 
     def share(self, repeating: Container[str]) -> None:
-        """Share the counters with the sender of motion, which confirms the counter values.
+        """Share the counters with the sender of motion, which must confirm the transmitted numbers.
 
         Args:
             repeating: connections that repeat a stop, because a frame may be lost.

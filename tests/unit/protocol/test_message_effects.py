@@ -105,7 +105,7 @@ def test_a_scan_without_an_end_is_dropped_and_told_once(tmp_path: Path) -> None:
     made = engine(tmp_path, POINT % "begin: _mark == '<', max: 3")
     events = made.receive("wire", b"<1\n.2\n.3\n.4\n.5\n<6\n<7\n", 1.0)
     assert values(events, "ranges") == [(6,)]
-    assert faults(events) == ["ranges: more than 3 values before the end; dropped"]
+    assert faults(events) == ["ranges: more than 3 values before the last frame; dropped"]
 
 
 def test_a_picture_comes_in_pieces_of_bytes(tmp_path: Path) -> None:

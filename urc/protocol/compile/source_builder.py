@@ -1,7 +1,8 @@
 """Builder of the source text of a generated struct function.
 
 Pure. WARNING: the source is compiled and run. The source may contain only text of this package, the
-`repr()` of constants, and names from `SourceBuilder.bind`, but no text of a document.
+`repr()` of constants, and names from `SourceBuilder.bind`. Text of a document must never become
+part of the source.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
 """The form of envelopes: publish, call, goal and request.
 
-Pure. An envelope has an address (attributes) and a body, which another form writes. JSON bodies are
-not encoded as text, because each transport for messages has its own encoding.
+Pure. An envelope has an address (attributes) and a body. The body has another form, such as JSON.
+JSON bodies are not encoded as text, because each transport for messages has its own encoding.
 """
 
 from collections.abc import Callable, Mapping

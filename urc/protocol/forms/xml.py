@@ -1,7 +1,7 @@
 """The form ``xml``: fields at element paths in a document.
 
 The form uses the parser of the standard library. A document with a document type declaration is
-rejected before parsing. Entities in XML therefore cannot expand, and external resources are never
+rejected before parsing. XML entities therefore cannot expand, and external resources are never
 loaded.
 """
 

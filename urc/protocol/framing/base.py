@@ -41,7 +41,7 @@ class FramingError(UrcError):
 
 
 class FrameFault(NamedTuple):
-    """A violation: received bytes that are not a valid frame."""
+    """A violation by received bytes that are not a valid frame."""
 
     code: str
     """Code of the violation: ``frame-too-long``, ``bad-checksum``, ``no-frame`` and others."""
@@ -137,7 +137,7 @@ class StreamDecoder:
         self._is_case = True
 
     def _refused(self, error: BadFrame) -> FrameFault | None:
-        """Return the violation for an invalid frame; None for a frame that is dropped silently."""
+        """Return the violation for an invalid frame; None for a silently dropped frame."""
         if error.code == SKIPPED and not self._is_case:
             return None
         return FrameFault(error.code, str(error), error.closes)

@@ -19,7 +19,7 @@ __all__ = ["DelimiterDecoder", "DelimiterFraming"]
 
 
 class DelimiterFraming(NamedTuple):
-    """Frames that end with a delimiter, which may differ for sent and received frames."""
+    """Frames that end with a delimiter; sent and received frames may have different delimiters."""
 
     tx: bytes
     rx: bytes
@@ -76,8 +76,8 @@ class DelimiterDecoder(StreamDecoder):
         """Number of scanned bytes without a delimiter."""
         self._is_skipping = False
         self._credit: RescanBudget | None = None
-        """Rescan budget within a case of a `switch`, where only the first byte of a frame over the
-        size limit is dropped."""
+        """Rescan budget for a case of a `switch`; None outside of a `switch`. In a `switch`, only
+        the first byte of a frame over the size limit is dropped."""
 
     def restart(self) -> None:
         """Reset the state for a new frame, selected by a `switch`."""

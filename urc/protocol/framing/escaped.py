@@ -31,7 +31,7 @@ __all__ = ["EscapedFraming"]
 
 
 class EscapedFraming(NamedTuple):
-    """Frames with a start, stuffed content and an end, which may differ between directions."""
+    """Frames with a start marker, stuffed content and an end marker."""
 
     codec: FrameCodec
     stuffing: Stuffing

@@ -28,9 +28,9 @@ Search = Callable[[bytes | bytearray, int], Any]
 _SMALL: Final = 256
 """Maximum buffer size for a new search after every receive, in bytes."""
 _GROWTH: Final = 8
-"""Divisor of the buffer size: a larger buffer is searched again after growing by this fraction, or
-after silence for `_QUIET_S`."""
+"""Growth of a larger buffer before a new search, as a divisor of the buffer size."""
 _QUIET_S: Final = 0.005
+"""Duration of silence after which a larger buffer is always searched, in seconds."""
 
 
 class RegexFraming(NamedTuple):

@@ -1,8 +1,9 @@
 """Declared byte stuffing: escape sequences for bytes with a special meaning in the framing.
 
 Pure. Three methods of byte stuffing are sufficient for common robots. Method 1: an escape byte
-precedes a replaced byte (HDLC and PPP: 7D and the byte xor 20; SLIP: a table). Method 2: an escape
-byte is doubled (DLE DLE). Method 3: an additional byte follows a sequence (FD after FF FF FD).
+precedes a replaced byte, as in HDLC and PPP (7D and the byte xor 20) and in SLIP (a table). Method
+2: an escape byte is doubled (DLE DLE). Method 3: an additional byte follows a sequence (FD after FF
+FF FD).
 """
 
 import re

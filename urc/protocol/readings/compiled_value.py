@@ -1,8 +1,7 @@
 """Shared code of the generated decoders for converting a raw field to a sample.
 
 Each engine builds the source text once: the field conversions, the checks and the samples. For a
-value of the wrong type or range, the generated function calls the closures (`slow`), which read the
-frame again.
+value of the wrong type or range, the closures (`slow`) read the frame again.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -26,7 +26,7 @@ class _Computed(NamedTuple):
     formula: Template
     inputs: tuple[str, ...]
     spare: frozenset[str]
-    """Names of optional inputs, which have a default in the formula."""
+    """Names of optional inputs, for which the formula has a default."""
     shortest_s: float
     """Minimum ``stale_after`` of the inputs, in seconds."""
     convert: Convert

@@ -1,6 +1,6 @@
 """Limits of a command: maximum duration, and transports in use.
 
-Pure. Every wait of an engine has a timeout, and the maximum duration of a command is the sum of all
+Pure. Every wait of an engine has a timeout. The maximum duration of a command is the sum of all
 timeouts.
 """
 

@@ -133,7 +133,7 @@ class Conversation(Connection):
             return self._send(exchange, now) + self._pump(now)
         most = self.spec.queue.most_bytes
         if most is not None and not exchange.is_realtime and self._size_of(exchange) > most:
-            text = f"the request has {self._size_of(exchange)} bytes, the robot accepts {most}"
+            text = f"the request has {self._size_of(exchange)} bytes; the robot accepts {most}"
             return [
                 ExchangeEnded(exchange, ExchangeOutcome("bad-argument", f"{text} (queue.bytes)"))
             ]

@@ -80,8 +80,8 @@ class CompiledRequest(NamedTuple):
     """Delays before retries of the request."""
     has_counters: bool = False
     is_motion: bool = False
-    """Whether the request moves the robot. On a connection that is not ready, motion requests fail
-    immediately."""
+    """Whether the request moves the robot. Motion requests fail immediately if the connection is
+    not ready."""
     learnt: frozenset[str] = frozenset()
     """Names in the request's templates that the login reads."""
     is_fresh: bool = False
@@ -134,8 +134,8 @@ class Exchange:
     numbers: Mapping[str, int] = NOTHING
     """Numbers in the last rendered frame, by counter."""
     is_privileged = False
-    """Whether the request belongs to the login or the close, and may be sent on a connection that
-    is not ready."""
+    """Whether the request belongs to the login or the close, and may be sent before the connection
+    is ready."""
     is_secret = False
     """Whether the payload is secret, and must not appear in any message."""
     condition: Callable[[float], str] | None = None
@@ -231,7 +231,7 @@ class ReplySink:
         self._request = request
 
     def __call__(self, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Return the event that ends the request."""
+        """Return the `Replied` or `Failed` event of the request."""
         number, command = self._request.id, self._request.command
         if outcome.code:
             return [Failed(number, command, outcome.code, outcome.message)]
@@ -243,7 +243,7 @@ class ReplySink:
         return self._request.on_sent
 
     def ended(self, exchange: Exchange, outcome: ExchangeOutcome, now: float) -> list[LineEvent]:
-        """Return the event that ends the request."""
+        """Return the `Replied` or `Failed` event of the request."""
         return self(outcome, now)
 
 

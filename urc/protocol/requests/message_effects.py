@@ -59,7 +59,7 @@ class Collector:
         self._size += len(value) if isinstance(value, (list, tuple, bytes)) else 1
         if self._size > spec.max:
             self._parts = None
-            return Unusable(f"more than {spec.max} values before the end; dropped")
+            return Unusable(f"more than {spec.max} values before the last frame; dropped")
         self._parts.append(value)
         if spec.end is not None and _holds(spec.end, names):
             whole = _joined(self._parts)

@@ -21,7 +21,7 @@ class GcraLimiter:
     """A rate limiter: the generic cell rate algorithm, with one period of tolerance.
 
     After a pause, two calls may pass immediately; the average rate stays constant. A minimum gap
-    would reduce the rate, because a call that is slightly early would have to wait.
+    instead would reduce the average rate, because calls that are slightly early would be delayed.
     """
 
     __slots__ = ("_next_s", "_period_s")
@@ -74,8 +74,8 @@ class Counters:
     """The counters of one connection.
 
     Numbers are assigned in the order of transmission. If the engine is the only sender, the order
-    of transmission is known. If the guard also sends motion, the counters are *shared*: the engine
-    only proposes numbers, and receives the actual numbers later.
+    of transmission is known. If the guard also sends motion, the counters are *shared*. The engine
+    then only proposes numbers, and receives the actual numbers later.
     """
 
     __slots__ = ("_known", "_last", "ahead", "is_shared")

@@ -184,7 +184,7 @@ class Verifications:
 
     @property
     def deadline(self) -> float | None:
-        """Time of the first timeout."""
+        """Time of the first verification timeout; None if no command waits."""
         return min((one.due for one in self._waiting), default=None)
 
     def add(self, run: "VerifiedRun", outcome: ExchangeOutcome, since: float, now: float) -> None:

@@ -34,8 +34,8 @@ class SequenceControl:
         self.count = 0
         """Number of changes to the public attributes."""
         self._halt: Literal["", "now", "next", "outer"] = ""
-        """Position of the next pause: ``now`` before any step, ``outer`` before the next outermost
-        step, ``next`` after one more outermost step; "": no pause."""
+        """Position of the next pause: before any step (``now``), before the next outermost step
+        (``outer``), after one more outermost step (``next``), or none ("")."""
 
     def pull(self, what: Pull) -> None:
         """Apply a control request of the operator."""

@@ -1,9 +1,9 @@
 """Execution of sequences: ordered steps on the connections of one engine.
 
 Pure. Each step becomes a function when the engine is built. A `SequenceRunner` calls the functions
-in order, until a step must wait for a reply, a frame, a prompt, a condition or a delay. The engine
-processes the returned events and calls `advance` again. Every loop is bounded and every wait has a
-timeout, so every sequence ends.
+in order, until a step must wait. Steps may wait for a reply, a frame, a prompt, a condition or a
+delay. The engine processes the returned events and calls `advance` again. Every loop is bounded and
+every wait has a timeout, so every sequence ends.
 """
 
 from collections.abc import Callable, Iterator, Mapping

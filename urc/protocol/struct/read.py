@@ -1,11 +1,11 @@
 """Closures that read struct items from bytes to fields.
 
-Pure. The module is the readable version of `urc.protocol.struct.read_source`, which is faster for
-runs of fixed items. Tests compare the results of the closures and the generated functions. Theory
-of operation: every item becomes a step ``(data, at, end, out) -> after``. A step reads bytes from
-`at` to at most `end`, and stores the value in `out`. A step raises `OtherFrame` for a frame that
-does not match. The first invalid value is recorded under the key `FAULT`, and reading continues,
-because only a frame that matches to its end counts as invalid.
+Pure. The module is a readable version of `urc.protocol.struct.read_source`. Generated functions are
+faster for runs of fixed items. Tests compare the results of the closures and the generated
+functions. Theory of operation: every item becomes a step ``(data, at, end, out) -> after``. A step
+reads bytes from `at` to at most `end`, and stores the value in `out`. A step raises `OtherFrame`
+for a frame that does not match. After the first invalid value, an error is recorded under the key
+`FAULT`, and reading continues. Only a frame that matches to its end counts as invalid.
 """
 
 from collections.abc import Callable, Mapping

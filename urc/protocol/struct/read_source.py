@@ -55,13 +55,13 @@ def add_fixed(
     """Add source for unpacking a frame of items with fixed positions, or return None.
 
     Args:
-        source: builder of the function, which returns None for a frame that does not match.
+        source: builder of a function that returns None for a frame that does not match.
         items: items of the frame.
         encoding: default encoding of texts.
         data: name of the variable that contains the frame.
 
     Returns:
-        The source lines for decoding, and an expression for each field that is valid after these
+        The source lines for decoding, and an expression for the value of each field after these
         lines.
     """
     has_open_end = bool(items) and _is_open_end(items[-1])

@@ -2,8 +2,8 @@
 
 Pure. The module is the reverse of `urc.protocol.struct.read`. Theory of operation: every item
 becomes a step ``(pen, scope)`` that appends its bytes. Two kinds of values leave a gap in the
-frame, which is filled in later. The `Backpatch` for the size of a later item waits in the scope.
-Values that depend on the size of the whole frame wait in `FrameBuilder.late`.
+frame, for a number that is computed later. The `Backpatch` for the size of a later item waits in
+the scope. Values that depend on the size of the whole frame wait in `FrameBuilder.late`.
 """
 
 from collections.abc import Callable, Mapping

@@ -31,7 +31,7 @@ _BOTH = frozenset(("true", "false"))
 
 
 def build_converter(signal: Signal) -> Convert:
-    """Return a function from a raw field to a value of `signal`, which may raise `BadValue`."""
+    """Return a function that converts a raw field to a value of `signal`, or raises `BadValue`."""
     if signal.type == "object":
         return _usable(object_converter)
     if signal.type in ("image", "blob"):

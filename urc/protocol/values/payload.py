@@ -85,7 +85,7 @@ class CodecContext(NamedTuple):
     fresh: TimeAndNonce = FIXED
     """Source of times and nonces for sent frames."""
     is_compiled: bool = False
-    """Whether to generate functions for messages and commands, which saves time only in live
+    """Whether to generate functions for messages and commands; this saves time only in live
     sessions."""
 
 
