@@ -209,7 +209,7 @@ def _load_own(
     key = _options.text(where, options, "key")
     if not certificate:
         if is_server or key:
-            raise TransportError(f"{where} it needs a certificate as cert")
+            raise TransportError(f"{where} needs a certificate as cert")
         return
     try:
         # The library reads only files, and a key may be a secret setting: it is on the disk only

@@ -155,7 +155,7 @@ class HttpClient:
         Every error inside the context is raised as `HttpFault`.
 
         Args:
-            request: a request returned by one of the request methods.
+            request: a request returned by `request` or `follow`.
             silence_s: maximum time between two parts of the response, in seconds; None: unlimited.
         """
         if silence_s is not None:

@@ -23,7 +23,7 @@ _LENGTH: Final = re.compile(rb"^content-length[ \t]*:[ \t]*(\d{1,15})[ \t]*$", r
 
 
 class MultipartFault(ValueError):
-    """An error about an invalid multipart stream, or a stream that exceeds a limit."""
+    """An invalid multipart stream, or a stream that exceeds a limit."""
 
 
 def boundary_of(content_type: str) -> bytes:

@@ -266,7 +266,7 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
     def send_ros_action_goal(
         self, message: Any, resultback: Any, feedback: Any, errback: Any
     ) -> None:
-        """Do the same as roslibpy, with JSON for not-a-number and a limit of pending requests."""
+        """Send an action goal like roslibpy; support not-a-number, and limit pending goals."""
         self.send_ros_message({**message, "feedback": self.wants_feedback})
         _keep(self._pending_action_requests, message["id"], (resultback, feedback, errback))
 

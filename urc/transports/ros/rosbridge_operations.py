@@ -156,8 +156,8 @@ def _tagged(first: Any, second: Any) -> object:
 class _Plain:
     """A converter of CBOR values to JSON-like values, with a limit on their expansion.
 
-    CBOR values may refer to earlier values, which may contain further references, so a few bytes
-    could expand to any amount of memory.
+    CBOR values may refer to earlier values with further references, so a few bytes could expand
+    without limit.
     """
 
     def __init__(self, size: int) -> None:
