@@ -30,6 +30,7 @@ TAKERS: dict[str, int | None] = {
     "_report": 1,
     "Failed": 2,
     "FrameFault": 0,
+    "Violation": 1,
     "Fault": None,
     "_failed": None,
     "_unknown": None,
@@ -94,7 +95,7 @@ def test_every_code_has_a_page() -> None:
 
 def test_every_page_is_of_a_code_that_is_used() -> None:
     """A page of a code that nothing reports any more misleads."""
-    sources = "".join(path.read_text("utf-8") for path in MODULES)
+    sources = "".join(path.read_text("utf-8") for path in MODULES if path.name != "renames.py")
     assert [code for code in PAGES if f'"{code}"' not in sources] == []
 
 

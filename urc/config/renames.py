@@ -111,7 +111,7 @@ CODES: Final = {
     "long-good-bye": "long-on-close",
     "never-answers": "never-replies",
     "other-name": "name-mismatch",
-    "sent-again": "retry-not-idempotent",
+    "sent-again": "retransmitted",
     "silent": "no-data",
     "steps-pile-up": "step-backlog",
     "unlike-values": "incompatible-values",

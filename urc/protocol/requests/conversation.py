@@ -513,7 +513,7 @@ class Conversation(Connection):
             text = f"the robot requested a retransmission of {exchange.ask.label}"
             return [
                 *events,
-                Violation(self.spec.name, "sent-again", text),
+                Violation(self.spec.name, "retransmitted", text),
                 *self._send(exchange, now),
             ]
         if offer.aside:
