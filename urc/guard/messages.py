@@ -75,7 +75,7 @@ class OpenLine(msgspec.Struct, array_like=True, frozen=True, tag=2):
 
 
 class SendBytes(msgspec.Struct, array_like=True, frozen=True, tag=3):
-    """Send a frame that is no motion; the answer is `SendDone` or `SendRefused`."""
+    """Send a frame that causes no motion; the answer is `SendDone` or `SendRefused`."""
 
     line: str
     turn: int

@@ -32,7 +32,8 @@ __all__ = ["MotionScheduler"]
 _LOOK_S: Final = 0.005
 """Minimum interval between checks of a connection with unsent data, in seconds."""
 _LONGEST_LOOK_S: Final = 0.02
-"""Maximum interval between these checks, in seconds; the interval doubles while no frame waits."""
+"""Maximum interval between checks of a connection with unsent data, in seconds; the interval
+doubles while no frame waits."""
 
 
 class MotionScheduler:
@@ -61,7 +62,7 @@ class MotionScheduler:
             told: callback for each written stop, with the control, the reason and the number of the
                 newest tick.
             failed: callback with the reason when the connection stalls or refuses data.
-            sent_counters: counter values sent on the connection; None for a new object.
+            sent_counters: counter values sent on the connection; None to create new counters.
             counted: callback after a change of the counters, with the control and number of each
                 tick that became obsolete.
         """

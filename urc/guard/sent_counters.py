@@ -42,6 +42,6 @@ class SentCounters:
     def choose(self, stops: Sequence[Numbered]) -> Numbered:
         """Return the stop frame with the next counter values; if none fits, return the last one.
 
-        A wrong value is better than no stop.
+        A wrong counter value is better than no stop.
         """
         return next((one for one in stops if self.fits(one.takes)), stops[-1])

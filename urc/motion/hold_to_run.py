@@ -2,17 +2,17 @@
 
 Theory of operation. A `HoldToRun` is idle, moving or stopping. The control moves the robot only
 while *ticks of sampled input* arrive. Each tick renews a short lease and replaces the unwritten
-value. Only the newest value is sent; values are never queued. The stop frame is sent first when the
-lease expires, the control is released, or a stop is requested. The stop frame was rendered when the
-control was armed. After the stop, nothing is sent, because repeated zeros would override other
-sources of motion.
+value. Only the newest value is sent; values are never queued. The stop frame is sent before all
+other data when the lease expires, the control is released, or a stop is requested. The stop frame
+was rendered when the control was armed. After the stop, nothing is sent, because repeated zeros
+would override other sources of motion.
 
 Motion never resumes automatically. Every stop except a release disarms the control; further ticks
 are then refused. The operator must release the control and press again, which arms the control
 again.
 
-If the connection is lost while the robot may be moving, the control owes a stop. This stop is the
-first frame on the restored connection. Other unsent values are dropped.
+If the connection is lost while the robot may be moving, the control owes a stop. The owed stop is
+the first frame on the restored connection. Other unsent values are dropped.
 """
 
 from typing import Final, Literal, NamedTuple
@@ -119,10 +119,11 @@ class HoldToRun:
     def tick(self, data: Payload | None, now: float) -> bool:
         """Accept a tick of sampled input: renew the lease, and store `data` as the newest value.
 
-        None renews the lease without a new value, because the input's value cannot be sent.
+        If `data` is None, renew the lease without a new value, because the input's value cannot be
+        sent.
 
         Returns:
-            Whether the tick was accepted. After False, the control must be armed again.
+            Whether the tick was accepted. After a result of False, the control must be armed again.
         """
         if self.state == "moving" and now >= self._expires_at:
             self.stop("expired", now)  # a tick after the lease belongs to no motion

@@ -163,7 +163,7 @@ class Lease:
         return LeaseChanged(self.state, must_stop=False)
 
     def force(self, client: Operator, now: float) -> LeaseChanged | LeaseRefused:
-        """Take the lease from its holder. The role ``maintain`` is needed."""
+        """Take the lease from its holder. The operator needs the role ``maintain``."""
         if not includes(client.role, "maintain"):
             return LeaseRefused("taking the controls by force needs an engineer")
         if self.state.latched_by:

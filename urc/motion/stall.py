@@ -27,7 +27,7 @@ STOP_WITHIN_S: Final = 0.1
 """Maximum time from the end of a network interruption to the stop, in seconds."""
 TICK_S: Final = 0.05
 """Period of the ticks of a held control, in seconds. The first write after the beginning of an
-interruption may be delayed by this period."""
+interruption may be delayed by one tick."""
 AFRESH_S: Final = 0.03
 """Time to reset and reopen a nearby connection and write the stop, in seconds."""
 STALLED_S: Final = round(SHORTEST_CUT_S + STOP_WITHIN_S - TICK_S - AFRESH_S, 3)
