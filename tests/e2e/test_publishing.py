@@ -206,7 +206,7 @@ def test_what_is_wrong_is_refused_in_one_line(
     assert "widget.js" in anna.refuses("publish", dial, *lab.to)
     module.rename(lab.home / "widgets/dial/widget.js")
     (lab.home / "widgets/dial/notes.txt").write_text("more")
-    assert "listed with other bytes" in anna.refuses("publish", dial, *lab.to)
+    assert "listed with different content" in anna.refuses("publish", dial, *lab.to)
     (lab.home / "widgets/dial/notes.py").write_text("more")
     assert "files of this type are not allowed" in anna.refuses("publish", dial, *lab.to)
     (lab.home / "widgets/dial/notes.py").unlink()

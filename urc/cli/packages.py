@@ -173,7 +173,7 @@ def is_agreed_to(
         return _is_yes_enough(gains, bool(risks), arguments)
     if risks and not arguments.takes_risks and not is_agreed("Allow this?"):
         return False
-    return is_agreed(f"It gains permissions. {question}" if gains else question)
+    return is_agreed(f"The package gains permissions. {question}" if gains else question)
 
 
 def _is_yes_enough(gains: bool, has_risks: bool, arguments: argparse.Namespace) -> bool:

@@ -117,7 +117,7 @@ def _decide(line: "SshTransport", offer: "OfferedHostKey", yes: str | None) -> i
     if yes is not None and yes.rstrip("=") != offer.fingerprint:
         raise UrcError(f"the key does not match {yes}; nothing is stored")
     file = remember(address.host, address.port, offer.key)
-    print(f"trusted from now on, in {file}")
+    print(f"stored the key in {file}")
     return 0
 
 

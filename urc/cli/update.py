@@ -68,7 +68,7 @@ def _installed(store: "Store", word: str) -> "tuple[Lock, str]":
     required = parse_requirement(word)
     lock = store.find(required._replace(range="*"))
     if lock is None:
-        raise PackageError(f"{required} is not installed; 'urc install {word}' installs it")
+        raise PackageError(f"{required} is not installed; install it with 'urc install {word}'")
     return lock, required.range
 
 

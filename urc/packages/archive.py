@@ -152,7 +152,7 @@ def read_archive(data: bytes, limits: ArchiveLimits, name: str) -> dict[str, byt
         PackageError: the archive is invalid.
     """
     if len(data) > limits.archive_bytes:
-        raise PackageError(f"{name}: an archive has at most {limits.archive_bytes >> 20} MiB")
+        raise PackageError(f"{name}: the archive is larger than {limits.archive_bytes >> 20} MiB")
     _check_end(data, limits, name)
     try:
         files = _read(data, limits, name)
@@ -176,7 +176,7 @@ def _check_end(data: bytes, limits: ArchiveLimits, name: str) -> None:
         raise PackageError(f"{name}: the archive is truncated, or has extra data at its end")
     entries, size, start = struct.unpack("<HII", end[10:20])
     if entries > limits.entries:
-        raise PackageError(f"{name}: {entries} entries, at most {limits.entries} are allowed")
+        raise PackageError(f"{name}: expected at most {limits.entries} entries, found {entries}")
     # `zipfile` reads the whole directory, even if it has more entries than its end declares.
     if start + size + _END_BYTES != len(data) or size > limits.entries * 1024:
         raise PackageError(
@@ -189,7 +189,7 @@ def _read(data: bytes, limits: ArchiveLimits, name: str) -> dict[str, bytes]:
         entries = archive.infolist()
         if len(entries) > limits.entries:
             raise PackageError(
-                f"{name}: {len(entries)} entries, at most {limits.entries} are allowed"
+                f"{name}: expected at most {limits.entries} entries, found {len(entries)}"
             )
         for entry in entries:
             _check_entry(entry, name)
@@ -214,7 +214,7 @@ def _check_entry(entry: zipfile.ZipInfo, name: str) -> None:
 def _check_names(paths: Iterable[str], name: str, limits: ArchiveLimits) -> None:
     known = list(paths)
     if len(known) > limits.entries:
-        raise PackageError(f"{name}: {len(known)} files, at most {limits.entries} are allowed")
+        raise PackageError(f"{name}: expected at most {limits.entries} files, found {len(known)}")
     for fault in (*map(name_fault, known), names_fault(known)):
         if fault:
             raise PackageError(f"{name}: {fault}")

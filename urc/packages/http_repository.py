@@ -101,7 +101,7 @@ async def _within(
     except TimeoutError:
         raise PackageError(f"{url}: the transfer was incomplete after {total_s:g} s") from None
     except httpx2.ConnectTimeout:
-        raise PackageError(f"{url}: no answer within {_CONNECT_S:g} s") from None
+        raise PackageError(f"{url}: no response within {_CONNECT_S:g} s") from None
     except httpx2.TimeoutException:
         raise PackageError(f"{url}: the server stopped sending") from None
     except (httpx2.HTTPError, httpx2.InvalidURL, OSError) as error:

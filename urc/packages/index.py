@@ -121,7 +121,7 @@ def read_index(data: bytes, where: str) -> Index:
     Versions and ranges are validated, so later code need not check them.
     """
     if len(data) > INDEX_BYTES:
-        raise PackageError(f"{where}: an index has at most {INDEX_BYTES >> 20} MiB")
+        raise PackageError(f"{where}: the index is larger than {INDEX_BYTES >> 20} MiB")
     try:
         index = msgspec.json.decode(data, type=Index)
         check_entries(index.packages)

@@ -192,7 +192,7 @@ def _listed(index: Index, key: PackageId, version: str) -> IndexEntry:
         if (one.key, one.version) == (key, version):
             return one
     there = ", ".join(one.version for one in index.packages if one.key == key)
-    raise PackageError(f"{key} {version} is not listed; listed: {there or 'nothing'}")
+    raise PackageError(f"{key} {version} is not listed; listed versions: {there or 'none'}")
 
 
 def _checked(notes: Notes) -> Notes:
@@ -301,7 +301,7 @@ def _take(
     said = package.manifest
     wanted = folder / str(said.key)
     if home != wanted:
-        return [f"{home}: {said.key} belongs in {wanted}"]
+        return [f"{home}: expected {said.key} in {wanted}"]
     entry = entry_of(package)
     archive = folder / entry.file
     if archive.is_file():

@@ -111,7 +111,7 @@ class UploadService:
         if not token.allows(key):
             may = ", ".join(token.may)
             raise SubmissionRefused(
-                403, f"the token {token.name!r} may publish {may}, and not {key}"
+                403, f"the token {token.name!r} may publish only {may}, not {key}"
             )
         return key
 
@@ -153,7 +153,7 @@ async def _body(request: Request, *, is_kept: bool) -> bytes:
         size += len(piece)
         if size > PACKAGE.archive_bytes:
             raise SubmissionRefused(
-                413, f"an archive has at most {PACKAGE.archive_bytes >> 20} MiB"
+                413, f"the archive is larger than {PACKAGE.archive_bytes >> 20} MiB"
             )
         if is_kept:
             pieces.append(piece)

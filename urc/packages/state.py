@@ -99,7 +99,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
             known = lock.packages.get(name)
             if known and known.version == pin.version and known.sha256 != pin.sha256:
                 raise PackageError(
-                    f"{name} {pin.version} is installed with other bytes (by {lock});"
+                    f"{name} {pin.version} is already installed with different content (by {lock});"
                     " a changed package needs a new version"
                 )
 

@@ -277,7 +277,7 @@ def _check_needs(said: Manifest, lock: Lock) -> None:
         if pin is None or not parse_range(wanted).allows(parse_version(pin.version)):
             found = f"is in the lock as {pin.version}" if pin else "is not in the lock"
             raise PackageError(
-                f"{said.key} {said.version} needs {need} {wanted}, which {found}:"
+                f"{said.key} {said.version} needs {need} {wanted}, but this dependency {found}:"
                 " the index and the package disagree"
             )
 

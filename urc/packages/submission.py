@@ -72,7 +72,7 @@ def take(
         if is_known and archive.read_bytes() != data:
             raise SubmissionRefused(
                 409,
-                f"{entry} is already listed with other bytes;"
+                f"{entry} is already listed with different content;"
                 " a changed package needs a new version",
             )
         before = read_signature(archive) if is_known else None

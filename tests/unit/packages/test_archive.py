@@ -105,11 +105,14 @@ HOSTILE: dict[str, tuple[Callable[[], bytes], str]] = {
     ),
     "large all": (
         lambda: zipped(*((f"{one}.txt", bytes(5 << 20)) for one in range(5))),
-        "an archive has at most 20 MiB",
+        "the archive is larger than 20 MiB",
     ),
-    "many": (lambda: zipped(*((f"{one}.txt", b"") for one in range(201))), "201 entries, at most"),
-    "a million": (lambda: crowded(1_000_000), "an archive has at most"),
-    "a crowd": (lambda: crowded(60_000), "60000 entries, at most 200 are allowed"),
+    "many": (
+        lambda: zipped(*((f"{one}.txt", b"") for one in range(201))),
+        "at most 200 entries, found 201",
+    ),
+    "a million": (lambda: crowded(1_000_000), "the archive is larger than"),
+    "a crowd": (lambda: crowded(60_000), "expected at most 200 entries, found 60000"),
     "told few": (
         lambda: crowded(5000)[:-14] + struct.pack("<2H2LH", 1, 1, 47 * 5000, 4, 0),
         "its sizes are inconsistent",

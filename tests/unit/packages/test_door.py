@@ -112,7 +112,7 @@ def test_other_bytes_of_a_version_are_refused(lab: Lab) -> None:
     status, told = lab.puts(package("widget", "dial", notes="more"))
     assert status == 409
     assert told == (
-        "widgets/dial 1.0.0 is already listed with other bytes;"
+        "widgets/dial 1.0.0 is already listed with different content;"
         " a changed package needs a new version"
     )
     assert lab.holds() == before
@@ -133,7 +133,7 @@ def test_a_token_may_only_what_it_may(lab: Lab) -> None:
     """And nothing any more once it was removed, without a restart."""
     status, told = lab.puts(package("driver", "car"))
     assert status == 403
-    assert told == "the token 'ci' may publish widgets/*, drivers/bot*, and not drivers/car"
+    assert told == "the token 'ci' may publish only widgets/*, drivers/bot*, not drivers/car"
     lab.tokens.remove("ci")
     assert lab.puts(DIAL)[0] == 401
 

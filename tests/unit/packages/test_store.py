@@ -123,7 +123,9 @@ def test_other_bytes_under_a_known_version_are_refused(store: Store) -> None:
     install(store, BOT, DIAL)
     before = files_below(store.folder)
     changed = package("widget", "dial", "1.0.0", notes="not the same")
-    with pytest.raises(PackageError, match=r"widgets/dial 1\.0\.0 is installed with other bytes"):
+    with pytest.raises(
+        PackageError, match=r"widgets/dial 1\.0\.0 is already installed with different content"
+    ):
         install(store, CAR, changed)
     assert files_below(store.folder) == before
     assert assert_whole(store) == ["drivers/bot 1.0.0"]

@@ -182,7 +182,9 @@ def test_other_bytes_of_the_version_to_go_back_to_are_refused(store: Store) -> N
     old = install(store, BOT, DIAL)
     update(store, old, BOT_2, DIAL_2)
     changed = package("widget", "dial", "1.0.0", notes="not the same")
-    with pytest.raises(PackageError, match=r"widgets/dial 1\.0\.0 is installed with other bytes"):
+    with pytest.raises(
+        PackageError, match=r"widgets/dial 1\.0\.0 is already installed with different content"
+    ):
         install(store, package("driver", "car", "1.0.0", {"widgets/dial": "^1"}), changed)
 
 

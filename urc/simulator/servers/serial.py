@@ -179,8 +179,8 @@ class _SocketServer(TcpServer):
         number = rest.rpartition(":")[2]
         if scheme != "socket" or not (number.isascii() and number.isdecimal()):
             raise UrcError(
-                f"transports.{context.name}.port: {port!r} cannot be emulated; a path and "
-                "socket://HOST:PORT can"
+                f"transports.{context.name}.port: expected a path or socket://HOST:PORT,"
+                f" found {port!r}"
             )
         super().__init__(context._replace(options={**context.options, "port": int(number)}))
 

@@ -13,7 +13,7 @@ _MASK: Final = 0xFFFFFFFFFFFFFFFF
 
 
 def _mixed(seed: int, tick: int, name: str) -> int:
-    """Return 64 well mixed bits (splitmix64, S. Vigna, public domain)."""
+    """Return 64 well-mixed bits, by Vigna's splitmix64 (public domain)."""
     bits = (seed * 0x9E3779B97F4A7C15 + tick * 0xD1B54A32D192ED03 + crc32(name.encode())) & _MASK
     bits = ((bits ^ (bits >> 30)) * 0xBF58476D1CE4E5B9) & _MASK
     bits = ((bits ^ (bits >> 27)) * 0x94D049BB133111EB) & _MASK

@@ -229,13 +229,13 @@ class Battery:
         self.charge = spec.battery.capacity * spec.battery.level / 100
         """Charge, in A·h."""
         self.current = spec.battery.idle
-        """Present current, in A."""
+        """Current drawn from the battery, in A."""
         self._stands_s = 0.0
         """Time at standstill with an empty battery, in seconds."""
 
     @property
     def level(self) -> float:
-        """Level, 0 to 100 %."""
+        """State of charge, 0 to 100 %."""
         return 100 * self.charge / self._spec.capacity
 
     def advance(self, effort: float, dt_s: float) -> None:
