@@ -353,7 +353,10 @@ async def test_server_that_sets_ports_up_is_not_emulated(tmp_path: Path) -> None
     """Nor is a name where nothing can be made; both are told before anything listens."""
     taken = tmp_path / "no" / "such" / "folder"
     for port, told in (
-        ("rfc2217://127.0.0.1:2217", "expected a path or socket://HOST:PORT"),
+        (
+            "rfc2217://127.0.0.1:2217",
+            "expected a path or socket://HOST:PORT, found 'rfc2217://127.0.0.1:2217'",
+        ),
         (str(taken), f"cannot create {taken} (no such file or directory)"),
     ):
         async with nothing_left():

@@ -198,7 +198,9 @@ def test_an_index_that_tells_other_needs_than_the_package_is_found_out(store: St
     liar = Liar("lab", [BOT], [BOT.manifest.key])
     plan = plan_requirement(parse_requirement("bot"), [liar], store, silent)
     with (
-        pytest.raises(PackageError, match=r"needs widgets/dial \^1, which is not in the lock"),
+        pytest.raises(
+            PackageError, match=r"needs widgets/dial \^1, but this dependency is not in the lock"
+        ),
         store.changing() as change,
     ):
         change.stage(plan)
