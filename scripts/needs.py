@@ -63,7 +63,7 @@ NEEDS = (
         name="chromium",
         executables=("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"),
         package="chromium",
-        purpose="the tests of framed pages and of sensors, and the benchmarks",
+        purpose="tests of framed pages and of sensors, and benchmarks",
         variable="URC_CHROMIUM",
     ),
     Need(
@@ -220,7 +220,7 @@ NEEDS = (
         name="axe",
         executables=(),
         package="",
-        purpose="the tests of the pages' accessibility",
+        purpose="tests of the pages' accessibility",
         other=lambda: os.fspath(AXE) if AXE.is_file() else None,
     ),
 )

@@ -33,7 +33,7 @@ RELEASE_TIMEOUT_S = 10
     [
         ("", 30, ""),
         ("raise SystemExit(3)", 30, "exit code 3"),
-        (SLEEP, 0.2, "not done within 0 s"),
+        (SLEEP, 0.2, "not finished within 0 s"),
     ],
 )
 def test_a_step_ends_well_or_says_how(program: str, timeout_s: float, fault: str) -> None:
@@ -48,7 +48,7 @@ def test_steps_in_parallel_have_their_own_faults_and_outputs(
     """A failed step ends no other step; the output of each is whole, and shown however it ends."""
     say = "import sys, time; print('I am', flush=True); time.sleep(0.5);"
     ends = ["", "print('late', file=sys.stderr); raise SystemExit(3)", SLEEP, ""]
-    faults = ["", "exit code 3", "not done within 5 s", ""]
+    faults = ["", "exit code 3", "not finished within 5 s", ""]
     steps = [
         Step(f"step {place}", (sys.executable, "-c", say + end), 5)
         for place, end in enumerate(ends)
