@@ -119,7 +119,7 @@ class HoldToRun:
     def tick(self, data: Payload | None, now: float) -> bool:
         """Accept a tick of sampled input: renew the lease, and store `data` as the newest value.
 
-        If `data` is None, renew the lease without a new value, because the input's value cannot be
+        Without `data`, renew the lease but store no value, because the input's value cannot be
         sent.
 
         Returns:
