@@ -36,7 +36,7 @@ class AlarmMonitor:
         active = (self.alarm, _DEEPER.get(self.alarm, ""))
         return min((due for level, due in self._due.items() if level not in active), default=None)
 
-    def alarm_monitor(self, value: Reading, now: float) -> Alarm:
+    def update(self, value: Reading, now: float) -> Alarm:
         """Process a new value, and return its alarm."""
         span = _span(value)
         if span is None:

@@ -83,7 +83,7 @@ def _careful(
     lines += ["    samples = []"]
     for name, value in values.items():
         raw, alarm = raws[name], "''"
-        if readings.alarm_monitors(name):
+        if readings.has_limits(name):
             scope["alarm"] = readings.alarm
             alarm = f"alarm({name!r}, {{v}}, now)"
         sample = f"samples.append(new(Sample, ({name!r}, {{v}}, now, {alarm})))"

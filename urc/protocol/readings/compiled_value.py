@@ -170,7 +170,7 @@ def _samples(
     samples = []
     for one, value in zip(values, shown, strict=True):
         name, alarm = one.signal.name, "''"
-        if readings.alarm_monitors(name):
+        if readings.has_limits(name):
             names["alarm"] = readings.alarm
             alarm = f"alarm({name!r}, {value}, now)"
         samples.append(f"new(Sample, ({name!r}, {value}, now, {alarm}))")

@@ -102,9 +102,9 @@ class Readings:
     def alarm(self, name: str, value: Reading, now: float) -> Alarm:
         """Update and return the alarm state of a signal."""
         alarm_monitor = self._alarm_monitors.get(name)
-        return "" if alarm_monitor is None else alarm_monitor.alarm_monitor(value, now)
+        return "" if alarm_monitor is None else alarm_monitor.update(value, now)
 
-    def alarm_monitors(self, name: str) -> bool:
+    def has_limits(self, name: str) -> bool:
         """Return whether the signal has alarm limits."""
         return name in self._alarm_monitors
 
