@@ -104,7 +104,7 @@ class UnansweredLog(logging.Handler):
         """Number of unprinted warnings without a separate count."""
         self._second = float("-inf")
         self._lines = 0
-        """Number of lines in the second that began at `_second`."""
+        """Number of lines printed in the current second, which began at `_second`."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """Count a warning, and print it unless it was printed recently."""

@@ -85,8 +85,9 @@ def names_fault(paths: Sequence[str]) -> str:
     for path in paths:
         other = seen.setdefault(path.casefold(), path)
         if other is not path:
-            same = "twice" if other == path else f"together with {other!r}: only capitals differ"
-            return f"{path!r} is present {same}"
+            if other == path:
+                return f"{path!r} is present twice"
+            return f"{path!r} and {other!r} differ only in case"
     return _folder_fault(seen)
 
 
@@ -96,7 +97,7 @@ def _folder_fault(seen: dict[str, str]) -> str:
         for folder in _folders(path):
             other = folders.setdefault(folder.casefold(), folder)
             if other != folder:
-                return f"{folder!r} is present together with {other!r}: only capitals differ"
+                return f"{folder!r} and {other!r} differ only in case"
             if folder.casefold() in seen:
                 return f"{folder!r} is a file and a folder"
     return ""

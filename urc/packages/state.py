@@ -23,7 +23,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
     package does not delete its key. Otherwise, a reinstallation would bypass the key check.
     """
     before: dict[str, Lock] = {}
-    """Lock before the last update, for one undo step, by digest of the installed lock."""
+    """Previous lock for undoing the last update, by digest of the installed lock."""
 
     def with_installed(self, plan: InstallPlan) -> "StoreState":
         """Return the state after installing a plan.

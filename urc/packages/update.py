@@ -122,7 +122,7 @@ def plan_update(
         old: lock of the installed package.
         sources: package sources, as for `newer`.
         store: its store.
-        complain: receives warnings for people.
+        complain: receives warnings for the user.
         wanted: version range; the newest version in this range is installed.
 
     Raises:

@@ -263,7 +263,10 @@ class EmulatedConnection:
         return self._flawed(self._receive(data, now_s, limit, self._answer_or_lose), now_s)
 
     def request(self, data: Payload, now_s: float) -> list[Payload]:
-        """Return the replies without injected faults. The server must delay and drop them."""
+        """Return the replies without injected faults.
+
+        The server must delay and drop replies itself.
+        """
         return self._receive(data, now_s, None, self._answer)
 
     def _receive(

@@ -24,7 +24,7 @@ _ONE_OF = re.compile(
     ('[^'\\]*'|"[^"\\]*"|0x[0-9A-Fa-f]+|-?\d+(?:\.\d+)?)\s*[,\])]""",
     re.VERBOSE | re.ASCII,
 )
-"""A name and its first possible constant."""
+"""Pattern for a name and the first constant of its list."""
 
 
 _MATCH = re.compile(

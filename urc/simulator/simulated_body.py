@@ -19,7 +19,7 @@ __all__ = ["SimulatedBody", "failsafe_of"]
 
 log = logging.getLogger("urc.simulator.emulated_robot")
 _KEPT = ("flies", "cut")
-"""Inputs that are no motion: a drone without commands stays in the air."""
+"""Inputs that do not move the body. For example, a drone without commands stays in the air."""
 
 _LOOKS = re.compile(r"_item\(ns\['world'\], '(laser|picture|panorama)'\)")
 """Sensors that need numpy."""

@@ -74,11 +74,11 @@ HOSTILE: dict[str, tuple[Callable[[], bytes], str]] = {
     "pipe": (lambda: zipped((special("a.txt", 0o010666), b"")), "'a.txt' is a pipe; only"),
     "case": (
         lambda: zipped(("a.txt", b""), ("A.txt", b"")),
-        "'A.txt' is present together with 'a.txt'",
+        "'A.txt' and 'a.txt' differ only in case",
     ),
     "case of folder": (
         lambda: zipped(("a/x.txt", b""), ("A/y.txt", b"")),
-        "'A' is present together with 'a': only capitals differ",
+        "'A' and 'a' differ only in case",
     ),
     "file and folder": (
         lambda: zipped(("a.txt/b.txt", b""), ("a.txt", b"")),

@@ -1,6 +1,6 @@
 """The terminal of a simulated shell, with input echo and normalization of line ends.
 
-A terminal program sends CR, while a driver may send LF. Real terminals accept both.
+A terminal program sends CR, while a driver may send LF. Real terminals accept both CR and LF.
 """
 
 from typing import Final

@@ -54,8 +54,8 @@ ROOM: Final = PlanSpec(
     ),
     holes=(Box(5.2, -0.6, 1.0, 1.0),),
 )
-"""The default room, 10 by 7 m. It has two halves with a door between them, boxes, four coloured
-posts and stairs down."""
+"""The default room, 10 by 7 m. The room has two halves with a door between them, boxes, four
+coloured posts and stairs down."""
 
 
 class WorldMap:
