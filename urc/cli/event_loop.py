@@ -27,8 +27,8 @@ def run_loop(
         work: returns an exit code; its cleanup after cancellation must take bounded time.
         code_when_ended: exit code after a signal; the default is 128 plus the signal number, as in
             a shell.
-        is_fast: whether to use the fastest installed event loop. Loading it delays the start
-            slightly.
+        is_fast: whether to use the fastest installed event loop. Loading the fastest loop delays
+            the start slightly.
     """
     handler = logging.StreamHandler()
     handler.setFormatter(_OneLine())

@@ -182,6 +182,6 @@ def _no_key(file: Path) -> str:
 def _statement(package: PackageId, version: str, sha256: str, by: str) -> bytes:
     """Return the statement to sign.
 
-    Its parts contain no line ends, so different statements have different bytes.
+    The statement's parts contain no line ends, so different statements have different bytes.
     """
     return _STATEMENT.format(package=package, version=version, sha256=sha256, by=by).encode()
