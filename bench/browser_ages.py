@@ -97,5 +97,5 @@ async def ages(one: Opened, seconds: float, rate_hz: float) -> list[float]:
 
 
 def _age_ms(now_ms: float, told_ms: float) -> float:
-    """Return the difference between a time and a time modulo the clock's period."""
+    """Return the age of a value that states its time only modulo the clock's period."""
     return (now_ms - told_ms + MODULUS_MS / 2) % MODULUS_MS - MODULUS_MS / 2

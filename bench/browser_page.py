@@ -110,7 +110,9 @@ async def opened(browser: Browser, address: str, *, script: str = "") -> AsyncIt
 
 
 async def cost_of(one: Opened, seconds: float, *, slowed: int = 1) -> Cost:
-    """Measure a running page. Other programs have little effect on its processor time.
+    """Measure the frame rate and processor time of a running page.
+
+    Other programs have little effect on the measured processor time.
 
     Args:
         one: page that already shows values.

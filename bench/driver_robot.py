@@ -30,7 +30,7 @@ def robot(*, is_beside: bool) -> Iterator[int]:
     Args:
         is_beside: whether the robot shares the driver's processor, if the system supports this. On
             another processor, a reply sometimes arrives before and sometimes after the driver
-            sleeps. The result would then measure the cost of waking up instead of the driver's
+            sleeps. The benchmark would then measure the cost of waking up instead of the driver's
             work.
     """
     allowed = (

@@ -1,7 +1,7 @@
 """Processor time of a binary frame (24 bytes, 8 fields, CRC), compared with hand-written code.
 
 URC and the hand-written code convert a frame from bytes to a mapping of named, scaled values, and
-back. URC uses a normal declaration of a profile. The hand-written code is typical for a careful
+back. URC uses a declaration as in a normal profile. The hand-written code is typical for a careful
 author without URC. The hand-written code uses one precompiled `struct.Struct` and the standard
 library's CRC, which is written in C.
 """

@@ -1,7 +1,7 @@
 """Frame counters of held motion over UDP, shared with polls, a keepalive and another control.
 
 Gestures of 5 to 60 s run in parallel. The receiving socket checks that counters increase without
-gaps, and that the last frame is a stop. An interrupted run can continue.
+gaps, and that the last frame is a stop. An interrupted run of the benchmark can be continued.
 """
 
 import asyncio
