@@ -1,7 +1,7 @@
 """The copy of the source tree for mutmut, and the invalidation of stored results.
 
 The sources are copied with one change: each property becomes a plain method, with a generated
-property under the old name. The reason is that mutmut skips decorated functions, but many
+property under the old name. Properties are split because mutmut skips decorated functions, and many
 properties of URC decide whether a robot stops.
 """
 

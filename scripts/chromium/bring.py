@@ -1,8 +1,8 @@
 """The installation of Chromium from npm, for Linux x64 machines without a browser and without root.
 
-The npm package is intended for cloud functions. It contains brotli archives of the browser, its
-libraries, fonts and a software renderer. The archives are unpacked once into the user's cache,
-together with a launcher that sets the paths of libraries and fonts.
+The npm package is intended for cloud functions. The package contains brotli archives of the
+browser, its libraries, fonts and a software renderer. The archives are unpacked once into the
+user's cache, together with a launcher that sets the paths of libraries and fonts.
 """
 
 import hashlib
