@@ -2,7 +2,7 @@
 
 ``python -m bench.stalled PORT PATH HEALTHY STOPPED BYTES_PER_S`` prints ``ready``. When standard
 input closes, the program prints a JSON object. The object contains the number of frames with values
-for each healthy page. It also contains the times and ages of the slow page's frames, in
+for each healthy page. The object also contains the times and ages of the slow page's frames, in
 milliseconds of the monotonic clock.
 """
 

@@ -4,8 +4,8 @@
     python -m scripts.compare_reports COMMIT --list     every difference, not the first of each kind
 
 The commit's own code reads the documents of the commit. This tree's code reads the same documents
-after migration. So later changes of a document, such as new comments, make no difference. The
-script compares:
+after migration. Later changes of a document, such as new comments, therefore make no difference.
+The script compares:
 
 - reports: file, line, column, severity and code of every problem of the broken documents. A renamed
   key shifts the columns after the key, but no lines;

@@ -2,8 +2,8 @@
 
 Each robot is a socket that stores received frames in order and answers polls. A session with a
 guard drives the robots. Each gesture uses a separate connection. A control is held for some
-seconds, sometimes together with a second control. Then all held controls are released, or the
-leases expire.
+seconds, sometimes together with a second control. A gesture ends when all held controls are
+released, or when the leases expire.
 """
 
 import asyncio
