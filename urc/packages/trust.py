@@ -78,9 +78,8 @@ class PinnedKey:
             )
         if head.left_s(self._now()) <= 0:
             raise PackageError(
-                f"{self._url}: the index expired at {head.expires}; nothing is"
-                " installed from it until its maintainer renews it; check this machine's clock too;"
-                " installed packages stay"
+                f"{self._url}: the index expired at {head.expires}; ask its maintainer to"
+                " renew the index, and check the clock of this machine; installed packages remain"
             )
 
     def pin(self, head: IndexHead, work: Path) -> None:

@@ -1,7 +1,7 @@
 """The body of an emulated robot. The robot's state drives the body, and the body provides signals.
 
-Pure: no sockets and no clock. The fail-safe works with and without a connection. It is declared in
-the document (`failsafe`) or derived from held commands (`watchdog`).
+Pure: no sockets and no clock. The fail-safe works with and without a connection. The fail-safe is
+declared in the document (`failsafe`) or derived from held commands (`watchdog`).
 """
 
 import logging
