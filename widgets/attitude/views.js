@@ -40,6 +40,8 @@ class Horizon {
    */
   constructor(el, isVehicle) {
     this.isVehicle = isVehicle;
+    // It has a drawing of its own to be turned: turned within one, all its texts are laid out again.
+    this.sphere = drawing(el, ".attitude-sphere");
     this.world = drawing(el, ".attitude-world");
     this.symbol = drawing(el, ".attitude-symbol");
     this.pointer = drawing(el, ".attitude-pointer");
@@ -64,16 +66,10 @@ class Horizon {
 
   /** @param {Lean} lean */
   show({ bank, nose }) {
-    const down = `translateY(${((nose ?? 0) * PER_DEGREE).toFixed(2)}px)`;
-    const side = (bank ?? 0).toFixed(2);
-    if (this.isVehicle) {
-      style(this.world, "transform", down);
-      style(this.symbol, "transform", `rotate(${side}deg)`);
-      style(this.pointer, "transform", `rotate(${side}deg)`);
-    } else {
-      style(this.world, "transform", `rotate(${-side}deg) ${down}`);
-      style(this.pointer, "transform", `rotate(${-side}deg)`);
-    }
+    const side = (this.isVehicle ? (bank ?? 0) : -(bank ?? 0)).toFixed(2);
+    style(this.world, "transform", `translateY(${((nose ?? 0) * PER_DEGREE).toFixed(2)}px)`);
+    style(this.isVehicle ? this.symbol : this.sphere, "transform", `rotate(${side}deg)`);
+    style(this.pointer, "transform", `rotate(${side}deg)`);
   }
 }
 

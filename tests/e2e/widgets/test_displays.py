@@ -133,7 +133,8 @@ async def test_needles_bars_and_tapes_stand_where_the_value_is(new_page: PageMak
         await until_text(page, ".compass-text", "090")
         assert await corners(page, ".compass-needle polygon") == [[52, 0], [-36, 24]]
         await until_text(page, ".attitude-words", "right side down 20°")
-        assert await transform(page, ".attitude-world") == "rotate(-20deg) translateY(0px)"
+        assert await transform(page, ".attitude-sphere") == "rotate(-20deg)"
+        assert await transform(page, ".attitude-world") == "translateY(0px)"
         await until_text(page, ".state-shape", "▲")
         await until_text(page, ".battery-note", "◆ Cells differ by 0.40 V")
         figures = await page.locator(".battery-figure").all_text_contents()
