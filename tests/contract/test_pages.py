@@ -278,7 +278,7 @@ def test_two_different_widgets_of_one_name_are_refused(tmp_path: Path) -> None:
     }
     with pytest.raises(UrcError) as caught:
         build_app(robots)
-    assert "two robots bring different widgets named 'battery'" in str(caught.value)
+    assert "two robots use different widgets named 'battery'" in str(caught.value)
 
 
 def test_a_dashboard_without_robots_says_what_to_do() -> None:
