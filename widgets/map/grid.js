@@ -2,7 +2,7 @@
 /** A grid in metres under the map: without tiles, it shows motion and distances. */
 /** @typedef {import("leaflet").Map} LeafletMap */
 /** @typedef {import("./geo.js").Place} Place */
-import { board, colours, write } from "urc/kit";
+import { colours, write } from "urc/kit";
 import { wholes } from "urc/axis_ticks";
 import { distance, distanceText, gridStep, perMetre } from "./geo.js";
 
@@ -24,6 +24,7 @@ export class Grid {
     this.canvas = document.createElement("canvas");
     this.canvas.className = "map-grid";
     this.canvas.setAttribute("aria-hidden", "true");
+    this.pen = this.canvas.getContext("2d");
     map.getContainer().prepend(this.canvas);
     this.isAsked = false;
     this.theme();
@@ -56,7 +57,8 @@ export class Grid {
     const { map, isLocal } = this;
     const { x: width, y: height } = map.getSize();
     if (width === 0 || height === 0) return;
-    const pen = board(this.canvas, { width, height });
+    const pen = this.clear(width, height);
+    if (!pen) return;
     const [one, other] = [map.containerPointToLatLng([0, height / 2]), map.containerPointToLatLng([100, height / 2])];
     const metres = distance([one.lat, one.lng], [other.lat, other.lng], isLocal) / 100;
     const step = gridStep(metres);
@@ -76,6 +78,23 @@ export class Grid {
       pen.moveTo(0, y);
       pen.lineTo(width, y);
     });
+  }
+
+  /**
+   * Return the cleared drawing context. The grid moves in each frame of a moving robot, and drawing off
+   * screen pays only for canvases that change less often, so `board` is not used.
+   *
+   * @param {number} width in CSS pixels
+   * @param {number} height
+   */
+  clear(width, height) {
+    const { canvas, pen } = this;
+    const density = Math.min(3, devicePixelRatio || 1);
+    const size = [Math.round(width * density), Math.round(height * density)];
+    if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width = 1, canvas.height = 1] = size;
+    pen?.setTransform(density, 0, 0, density, 0, 0);
+    pen?.clearRect(0, 0, width, height);
+    return pen;
   }
 
   /**
