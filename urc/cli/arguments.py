@@ -74,13 +74,13 @@ def parse(verb: str, summary: str, module: Any, words: list[str]) -> argparse.Na
 
 
 def add_profile(parser: argparse.ArgumentParser) -> None:
-    """Add PROFILE and the options for its settings."""
+    """Declare the argument PROFILE and the options for the profile's settings."""
     parser.add_argument("profile", metavar="PROFILE", help="robot file or robot name")
     add_settings(parser)
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
-    """Add `--set` and `--settings`."""
+    """Declare the options `--set` and `--settings`."""
     parser.add_argument(
         "--set",
         dest="settings",
@@ -99,7 +99,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
 
 
 def add_host(parser: argparse.ArgumentParser) -> None:
-    """Add `--host`, the address to listen on."""
+    """Declare the option `--host`, the address to listen on."""
     parser.add_argument(
         "--host",
         metavar="ADDRESS",
@@ -110,7 +110,7 @@ def add_host(parser: argparse.ArgumentParser) -> None:
 
 
 def add_dev(parser: argparse.ArgumentParser) -> None:
-    """Add `--dev` for the developer pages."""
+    """Declare the option `--dev` for developer pages."""
     parser.add_argument(
         "--dev",
         action="store_true",
@@ -127,7 +127,7 @@ def is_loopback(host: str) -> bool:
 
 
 def add_port(parser: argparse.ArgumentParser) -> None:
-    """Add `--port`, the port of the dashboard."""
+    """Declare the option `--port`, the port of the dashboard."""
     parser.add_argument(
         "--port",
         type=port,

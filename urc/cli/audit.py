@@ -13,7 +13,7 @@ MOST = 1_000_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the number of entries, the robot, and the data folder."""
+    """Declare the command-line arguments: number of entries, robot and data folder."""
     parser.add_argument(
         "--last",
         type=_count,

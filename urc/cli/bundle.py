@@ -13,7 +13,7 @@ EXAMPLE = "urc bundle drivers/puppet --to puppet.urcof"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the package, the signing key and the output file."""
+    """Declare the command-line arguments: package, signing key and output file."""
     parser.add_argument(
         "package",
         metavar="PACKAGE",

@@ -33,7 +33,7 @@ __all__ = ["DashboardAddress", "SettingsOf", "run_dashboard", "workshop_of"]
 SettingsOf = Callable[[Profile], Mapping[str, Value]]
 """Return the command-line settings of a profile; raise `UrcError` for invalid settings."""
 _LOOK = (320, 240)
-"""Columns and rows of the preview on a card."""
+"""Columns and rows of the preview on a robot's card."""
 
 
 def _nothing(_: Profile) -> Mapping[str, Value]:
@@ -77,11 +77,11 @@ def run_dashboard(
     """Serve the dashboard until a signal arrives, then return 0.
 
     Args:
-        profiles: initial robots.
+        profiles: profiles of the initial robots.
         place: address, folders and options of the dashboard.
         is_simulated: whether emulated robots replace the real robots.
-        on_ready: called once with the start addresses.
-        given: returns the command-line settings of a profile.
+        on_ready: callback that receives the start addresses once.
+        given: function that returns the command-line settings of a profile.
         is_dev: whether to serve developer pages and reload changed documents.
         faults: faults of emulated robots, such as ``loss=5%`` or ``tello:loss=5%``.
 
@@ -164,7 +164,7 @@ async def _listening(faulty: FaultInjector) -> AsyncIterator[None]:
 def workshop_of(
     place: DashboardAddress, given: SettingsOf = _nothing, faulty: FaultInjector | None = None
 ) -> RobotOptions:
-    """Return the robot factory of a dashboard. With `faulty`, all robots are emulated."""
+    """Return the robot factory of a dashboard. If `faulty` is given, all robots are emulated."""
     return RobotOptions(
         own_folder(place.data),
         make=partial(_robot, place, faulty),
@@ -179,7 +179,7 @@ def _motion(place: DashboardAddress) -> Motion:
 
 
 def _first(factory: RobotFactory, profile: Profile) -> Robot:
-    """Return an initial robot with its stored settings, if they are valid."""
+    """Return a robot of the command line, with its stored settings if they are valid."""
     try:
         return factory.robot(profile.name, profile)
     except UrcError as error:

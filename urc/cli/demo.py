@@ -21,7 +21,7 @@ USUAL_PORT = 8080
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the address, the faults, and the browser option."""
+    """Declare the command-line arguments: address, faults and browser option."""
     add_host(parser)
     add_port(parser)
     parser.set_defaults(port=None)

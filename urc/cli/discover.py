@@ -21,7 +21,7 @@ Row = Mapping[str, object]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the profile, the duration, and the output format."""
+    """Declare the command-line arguments: profile, duration and output format."""
     parser.add_argument(
         "profile",
         metavar="PROFILE",
@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _known_robots() -> list["Profile"]:
-    """Return the shipped robots without invalid profiles."""
+    """Return the shipped robots with valid profiles."""
     from urc.shipped import shipped
 
     found = []
@@ -135,7 +135,7 @@ async def _nearby(
 ) -> tuple[list[Row], str]:
     """Return the open ports of shipped robots on this machine, or at the given hosts.
 
-    Settings have their defaults.
+    All settings have their default values.
 
     For each rosbridge that replies, the result includes its topics.
     """

@@ -53,7 +53,7 @@ class _Finding:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the port to check."""
+    """Declare the command-line arguments: port to check."""
     add_port(parser)
 
 

@@ -24,7 +24,7 @@ def run_loop(
     A second signal terminates the process immediately.
 
     Args:
-        work: returns an exit code; its cleanup after cancellation must take bounded time.
+        work: coroutine that returns the exit code; its cleanup after cancellation must be short.
         code_when_ended: exit code after a signal; the default is 128 plus the signal number, as in
             a shell.
         is_fast: whether to use the fastest installed event loop. Loading the fastest loop delays

@@ -11,7 +11,7 @@ EXAMPLE = "urc explain unknown-key"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the code."""
+    """Declare the command-line arguments: problem code."""
     parser.add_argument(
         "code",
         metavar="CODE",

@@ -90,7 +90,7 @@ def _is_ours(handle: int) -> bool:
 
 
 def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
-    """Add the option for initial faults; `has_names` permits the form ROBOT:FAULT."""
+    """Declare the option for initial faults; `has_names` permits the form ROBOT:FAULT."""
     which = (
         " fault of emulated robots: FAULT affects all robots, ROBOT:FAULT a single robot;"
         if has_names
@@ -120,7 +120,7 @@ class FaultInjector:
         """Start without robots.
 
         Args:
-            now: returns the current time in seconds since the epoch.
+            now: function that returns the current time in seconds since the epoch.
         """
         self._now = now
         self._emulated_robots: dict[str, list[EmulatedRobot]] = {}

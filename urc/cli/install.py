@@ -20,7 +20,7 @@ EXAMPLE = "urc install drivers/puppet@^1.0"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the package and the confirmation options."""
+    """Declare the command-line arguments: package and confirmation options."""
     parser.add_argument(
         "package",
         metavar="PACKAGE",

@@ -6,7 +6,7 @@ EXAMPLE = "urc list --json"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the selection and the output format."""
+    """Declare the command-line arguments: selection and output format."""
     parser.add_argument(
         "--updates", action="store_true", help="list only packages with a newer version"
     )

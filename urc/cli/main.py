@@ -1,7 +1,7 @@
 """The `urc` program: imports only the requested subcommand and reports every failure in one line.
 
-Layer 6. Fast start: this module must not import large modules, not even `typing`. `urc --version`
-loads no subcommand, and each subcommand loads only its own imports.
+Layer 6. For a fast start, this module must not import large modules, not even `typing`. `urc
+--version` loads no subcommand, and each subcommand loads only its own imports.
 """
 
 import os

@@ -11,7 +11,7 @@ EXAMPLE = "urc migrate robot.yaml drivers/arm.yaml"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the documents and the check option."""
+    """Declare the command-line arguments: documents and check option."""
     parser.add_argument(
         "files",
         metavar="FILE",

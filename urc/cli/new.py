@@ -16,7 +16,7 @@ _TYPES = Path(__file__).resolve().parents[1] / "web" / "static" / "core/types.js
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the kind and the name."""
+    """Declare the command-line arguments: kind and name of the package."""
     parser.add_argument(
         "kind", metavar="KIND", choices=("widget",), help="kind of package to create: widget"
     )

@@ -131,7 +131,7 @@ RISKS_FLAG: Final = "--let-it-use-my-keys-files-and-fixed-hosts"
 
 
 def add_risks(parser: argparse.ArgumentParser) -> None:
-    """Add the option that accepts packages with predefined files, keys, programs or hosts."""
+    """Declare the option that accepts packages with predefined files, keys, programs or hosts."""
     parser.add_argument(
         RISKS_FLAG,
         dest="takes_risks",
@@ -156,7 +156,7 @@ def is_agreed_to(
     arguments: argparse.Namespace,
     question: str,
 ) -> bool:
-    """Ask the user, or use `--yes`. New permissions require an additional option.
+    """Ask the user, unless `--yes` is given. New permissions require an additional option.
 
     Args:
         difference: changes from the installed version; None without an installed version.
@@ -191,9 +191,9 @@ def _is_yes_enough(gains: bool, has_risks: bool, arguments: argparse.Namespace) 
 
 
 def used_lock(store: "Store", key: "PackageId") -> "Lock | None":
-    """Return the version of a package in use.
+    """Return the version in use of a robot, a driver or another package.
 
-    For a robot or driver, the version in use may have another key.
+    If a robot and a driver have the same name, the result may be of the other kind.
     """
     from urc.runtime.settings_store import DRIVEN, in_use
 
@@ -205,7 +205,7 @@ def used_lock(store: "Store", key: "PackageId") -> "Lock | None":
 
 
 def keep_in_use(lock: "Lock") -> None:
-    """Select the version for dashboards, independently of other installed versions."""
+    """Make dashboards use this version, even if other versions are installed."""
     from urc.runtime.settings_store import DRIVEN, pin
 
     if lock.key.kind in DRIVEN:
@@ -236,7 +236,7 @@ def signer(file: Path | None = None) -> "Signer | None":
 
 
 def search_repositories(words: Sequence[str], kind: str = "", *, is_json: bool = False) -> int:
-    """Print the newest version of each package with all words; return 1 without a result."""
+    """Print the newest version of each package that matches all words; return 1 without a match."""
     from urc.cli.output import json_text
     from urc.packages.index import search
     from urc.packages.sources import merged

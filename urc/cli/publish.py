@@ -14,7 +14,7 @@ EXAMPLE = "urc publish lab/drivers/puppet --to https://robots.example/ --token-f
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the packages and the repository."""
+    """Declare the command-line arguments: packages and repository."""
     parser.add_argument(
         "packages",
         metavar="DIR|PACKAGE",
@@ -105,7 +105,7 @@ def _provenance(arguments: argparse.Namespace) -> "Provenance | None":
 
 
 def _look(source: "FileSource", document: Path, arguments: argparse.Namespace) -> None:
-    """Reject a package folder with problems. The repository checks packed archives.
+    """Reject a package folder with problems; the repository itself checks packed archives.
 
     Raises:
         PackageError: the document has errors, or warnings that are not permitted.

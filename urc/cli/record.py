@@ -21,7 +21,7 @@ _SOON_S, _LOOK_S = 0.02, 0.5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the profile, the duration, and the file."""
+    """Declare the command-line arguments: profile, duration and output file."""
     add_profile(parser)
     parser.add_argument(
         "-o",

@@ -6,7 +6,7 @@ EXAMPLE = "urc remove drivers/puppet"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the package to remove."""
+    """Declare the command-line arguments: package to remove."""
     parser.add_argument(
         "package", metavar="PACKAGE", help="NAME or drivers/NAME; @VERSION for one version only"
     )

@@ -20,7 +20,7 @@ EXAMPLE = "urc replay puppet.mcap --speed 2"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the recording, the playback options, and the address."""
+    """Declare the command-line arguments: recording, playback options and address."""
     parser.add_argument("recording", metavar="FILE", type=Path, help="a recording of URC")
     parser.add_argument(
         "--profile",

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def token(arguments: argparse.Namespace) -> int:
-    """Add, list or remove upload tokens of a repository."""
+    """Add, list or remove the upload tokens of a repository."""
     from urc.packages.tokens import UploadTokens
     from urc.problems import printable
 
@@ -80,7 +80,7 @@ _RENEW_S = 3600.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the action and its options."""
+    """Declare the command-line arguments: action and its options."""
     parser.add_argument(
         "action",
         metavar="ACTION",

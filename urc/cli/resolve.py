@@ -9,7 +9,7 @@ EXAMPLE = "urc resolve puppet"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the profile."""
+    """Declare the command-line arguments: profile."""
     parser.add_argument("profile", metavar="PROFILE", help="robot file, driver file or robot name")
 
 

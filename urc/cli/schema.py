@@ -17,7 +17,7 @@ _OTHER = re.compile(r'"\$ref": *"([a-z-]+\.schema\.json)')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the kind."""
+    """Declare the command-line arguments: kind of document."""
     parser.add_argument(
         "kind", metavar="KIND", nargs="?", choices=KINDS, help=f"one of {', '.join(KINDS)}"
     )

@@ -6,7 +6,7 @@ EXAMPLE = "urc search battery --kind widget"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the words and the output format."""
+    """Declare the command-line arguments: search words and output format."""
     parser.add_argument(
         "words", metavar="WORD", nargs="*", help="words that a package must contain"
     )

@@ -142,7 +142,7 @@ _WRONG_USE = ("bad-argument", "unknown-command")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the profile, the command and its arguments."""
+    """Declare the command-line arguments: profile, command and the command's arguments."""
     add_profile(parser)
     parser.add_argument("command", metavar="COMMAND", help="a command of the robot's driver")
     parser.add_argument("words", metavar="ARG=VALUE", nargs="*", default=[], help="its arguments")
@@ -233,7 +233,7 @@ def _elements(argument: "Argument", text: str) -> tuple["Value", ...]:
 
 
 def _value(argument: "Argument", text: str) -> "Value":
-    """Return the typed value. The engine checks ranges and choices."""
+    """Return a text in the type of its argument. The engine checks ranges and choices."""
     try:
         if argument.type == "integer":
             return int(text, 0)

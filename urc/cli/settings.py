@@ -30,7 +30,7 @@ def settings_given(
 
     Raises:
         Misuse: no profile declares the name, or the text is not a value of the setting's type.
-        ProblemsError: the settings file contains such a name or value.
+        ProblemsError: the settings file contains an unknown name or an invalid value.
     """
     given: dict[str, str] = dict(arguments.settings)
     _warn_of_secrets(profiles, arguments)

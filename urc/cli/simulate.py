@@ -31,7 +31,7 @@ dropped."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the profile and the address."""
+    """Declare the command-line arguments: profile and address."""
     add_profile(parser)
     add_host(parser)
     add_faults(parser, has_names=False)
@@ -87,8 +87,8 @@ class UnansweredLog(logging.Handler):
     """A reporter of frames without a reply. Each frame has one line with a count.
 
     Args:
-        tell: prints one line.
-        clock: returns a monotonic time in seconds.
+        tell: function that prints one line.
+        clock: function that returns a monotonic time in seconds.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""The start addresses of a dashboard, with the keys in them."""
+"""The start addresses of a dashboard, including their keys."""
 
 import os
 import secrets

@@ -21,7 +21,7 @@ _NOT_ASKED_FOR = "-"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the profile, the transport, and the fingerprint."""
+    """Declare the command-line arguments: profile, transport and fingerprint."""
     add_profile(parser)
     parser.add_argument(
         "transport",

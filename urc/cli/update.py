@@ -17,7 +17,7 @@ EXAMPLE = "urc update drivers/puppet"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the packages and the confirmation options."""
+    """Declare the command-line arguments: packages and confirmation options."""
     parser.add_argument(
         "packages",
         metavar="NAME",
@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _installed(store: "Store", word: str) -> "tuple[Lock, str]":
-    """Return the installed package of a name, and the requested range."""
+    """Return the installed package with this name, and the requested version range."""
     from urc.packages.names import PackageError, parse_requirement
 
     required = parse_requirement(word)
@@ -83,7 +83,7 @@ def _all(store: "Store") -> "list[tuple[Lock, str]]":
 def _update(
     old: "Lock", plan: "InstallPlan", store: "Store", arguments: argparse.Namespace
 ) -> bool:
-    """Show the changes, ask for confirmation, and update; return whether it was installed."""
+    """Show the changes, ask for confirmation, and update; return whether the user agreed."""
     from urc.cli.packages import is_agreed_to
     from urc.packages.install import origin_lines
     from urc.packages.update import staged_difference

@@ -49,7 +49,7 @@ class _Report:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the documents, the format and the checks."""
+    """Declare the command-line arguments: documents, format and checks."""
     parser.add_argument(
         "paths", metavar="PATH", nargs="+", help="documents of any kind, or robot names"
     )
@@ -156,7 +156,8 @@ def _examine_own_widgets(profile: "Profile", report: _Report) -> None:
 def _document_in(path: str) -> str:
     """Return the document for a path or a robot name.
 
-    The folder of a widget stands for its manifest. A missing file is reported like other problems.
+    For the folder of a widget, the document is the manifest. A missing file is reported like other
+    problems.
     """
     manifest = os.path.join(path, "widget.yaml")
     if os.path.isfile(manifest):

@@ -30,7 +30,7 @@ _LOSSES_S = 5.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the profile, the signals, the duration, and the raw traffic."""
+    """Declare the command-line arguments: profile, signals, duration and raw traffic."""
     add_profile(parser)
     parser.add_argument(
         "signals", metavar="SIGNAL", nargs="*", default=[], help="only these signals"
@@ -99,7 +99,7 @@ async def _follow(tap: "EventTap", printer: "_Printer", seconds: float | None) -
 
 
 def _reasons(hub: "Hub") -> str:
-    """Return the state of the links as a reason."""
+    """Return the states of the links as the end of an error message, or ""."""
     details = dict.fromkeys(link.detail for link in hub.links.values() if link.detail)
     return f": {'; '.join(details)}" if details else ""
 

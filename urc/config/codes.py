@@ -1,6 +1,6 @@
 """Reader of ``codes.md``, the explanations of problem codes for `urc explain` and SARIF.
 
-Every page has the same four parts. An example is a fenced block of YAML, or words.
+Every page has the same four parts. An example is a fenced block of YAML, or text.
 """
 
 from pathlib import Path
@@ -21,7 +21,7 @@ class CodePage(NamedTuple):
     why: str
     """Effect or cause of the problem."""
     example: str
-    """Document, or part of a document, with the problem; words if YAML cannot show the problem."""
+    """All or part of a document with the problem; a description if YAML cannot show the problem."""
     instead: str
     """The example without the problem, or instructions in words."""
 
@@ -52,7 +52,7 @@ def _page(text: str) -> CodePage:
 
 
 def _unfenced(text: str) -> str:
-    """Return the code of a fenced block, or a text as one line."""
+    """Return the code in a fenced block, or other text joined into one line."""
     _, fence, code = text.partition("```yaml\n")
     return code.partition("```")[0] if fence else " ".join(text.split())
 

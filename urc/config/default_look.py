@@ -44,10 +44,10 @@ _GROUPS: Final[tuple[tuple[str, Mapping[str, tuple[str, ...]], frozenset[str]], 
     ("compass", {"heading": ("heading", "bearing", "course")}, frozenset(("heading",))),
     ("compass", {"yaw": ("yaw",)}, frozenset(("yaw",))),
 )
-"""Widget, its inputs with the last words of suitable signal names, and its required inputs."""
+"""Widgets for several signals, with the endings of signal names by input, and required inputs."""
 
 _COLUMNS: Final = {"landscape": 4, "phone_portrait": 2, "phone_landscape": 7}
-"""Screen → maximum number of columns in a default grid."""
+"""Maximum number of columns in a default grid, by screen."""
 _LOW_ROWS: Final = 2
 """Number of visible rows on a phone in landscape."""
 _BIG: Final = frozenset(
@@ -58,7 +58,7 @@ _BIG: Final = frozenset(
 )
 """Widgets that span two rows and two columns."""
 _STEERED: Final = 2
-"""Rank of steering controls."""
+"""Position of steering controls in the order of widgets; see `_rank`."""
 
 
 def automatic_slots(driver: Driver, registry: WidgetFolder) -> dict[str, WidgetUse]:
@@ -180,7 +180,7 @@ def _table(signals: list[Signal], registry: WidgetFolder) -> WidgetUse | None:
 
 
 def _given(command: Command, driver: Driver, registry: WidgetFolder) -> WidgetUse | None:
-    """Return the control of a command; None when no widget has enough values."""
+    """Return the control of a command; None if no widget gives all required arguments."""
     if command.hold is not None:
         held = _held(command, registry)
         return held if held is not None and _is_complete(held, command) else None
@@ -254,7 +254,7 @@ def _output(widget: Widget | None, command: Command, names: Mapping[str, str]) -
 def _with_state(
     use: WidgetUse, argument: Argument, driver: Driver, registry: WidgetFolder
 ) -> WidgetUse:
-    """Bind a signal with the same name as the argument or command, if any."""
+    """Bind the signal with the name of the argument or command to the widget, if it exists."""
     widget = registry.get(use.widget)
     port = widget.inputs.get("state") if widget is not None else None
     command = next(iter(use.outputs.values()))

@@ -1,4 +1,4 @@
-"""Table of frame forms: key in a document → module of its parser."""
+"""Tables of the parser modules of frame forms, by key in a document."""
 
 from collections.abc import Mapping
 from typing import Final

@@ -1,7 +1,7 @@
 """The first passes over a document and its references: compose, expand and shape.
 
 The compose pass merges a document with its base and its includes. The expand pass replaces `params`
-and `each`. The shape pass compares the result with the schema. Each pass is a function of one
+and `each`. The shape pass checks the result against the schema. Each pass is a function of one
 document.
 
 URC reads the robot before the driver and the interfaces, because the robot refers to both.
@@ -31,7 +31,7 @@ class LoadedSources(NamedTuple):
     problems: list[Problem]
     kind: str
     files: tuple[str, ...]
-    """Every requested file, even if missing."""
+    """Paths of all requested files, including missing files."""
 
 
 def gather(path: str) -> LoadedSources:
@@ -147,7 +147,7 @@ def _driver(part: Node, sources: Sources, library: Library) -> Node:
 
 
 def _follow(reference: Node, kind: str, library: Library, given: Node | None = None) -> Node | None:
-    """Return the document that `reference` names after its first passes, or None."""
+    """Return the document that `reference` names, after the first passes; None on error."""
     document = library.follow(reference, (kind,))
     if document is None:
         return None

@@ -24,9 +24,9 @@ class InterfaceFit(NamedTuple):
     interface: Interface | None
     """The linked interface; None when the interface does not fit."""
     widgets: Mapping[str, Widget] = NOTHING
-    """Name → widget, for all widgets of the interface."""
+    """All widgets of the interface, by name."""
     fault: str = ""
-    """The reason why the interface does not fit, in one line; otherwise empty."""
+    """Reason why the interface does not fit, in one line; "" if it fits."""
 
 
 class _Known(WidgetFolder):

@@ -42,7 +42,7 @@ class CheckResult(NamedTuple):
     kind: str
     """``robot``, ``driver``, ``interface`` or ``widget``; "" after an error in the first passes."""
     files: tuple[str, ...] = ()
-    """Every requested file, even if missing; the checked document is the first."""
+    """Paths of all requested files, including missing files; the checked document is first."""
     pages: tuple[str, ...] = ()
     """URLs of web pages in the widgets, as written in the document."""
     widget: Widget | None = None

@@ -41,7 +41,7 @@ class KeyRename(NamedTuple):
     old: str
     new: str
     types: tuple[str, ...] = ()
-    """Values of `type` in mappings with this rename; empty for all.
+    """Values of `type` in the mappings that this rename applies to; empty for all mappings.
 
     Mappings without `type` always match.
     """
@@ -118,7 +118,7 @@ CODES: Final = {
     "unnoticed-freeze": "no-liveness-check",
     "unnoticed-loss": "no-loss-detection",
 }
-"""Old problem code → new problem code."""
+"""New problem codes, by old code."""
 
 
 def renamed_hint(path: tuple[str | int, ...], key: str, known: Mapping[str, Any]) -> str:

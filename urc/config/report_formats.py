@@ -47,7 +47,7 @@ def to_sarif(
     Args:
         problems: all problems.
         version: of URC.
-        summaries: problem code → summary in one sentence.
+        summaries: one-sentence summaries, by problem code.
     """
     codes = list(dict.fromkeys(problem.code for problem in problems))
     return {

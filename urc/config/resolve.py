@@ -98,7 +98,7 @@ def _layout(part: Node) -> Mapping[str, Node]:
 
 
 def _slot(parts: list[Node], registry: WidgetFolder) -> Node:
-    """Return the widget of a slot; later parts override earlier parts."""
+    """Return the merged declaration of a slot's widget; later parts override earlier parts."""
     tree = _tree(parts[0])
     for part in parts[1:]:
         over = _tree(part)

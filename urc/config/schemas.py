@@ -46,8 +46,8 @@ def shipped_check() -> "QuickCheck":
 def fits(reference: str, value: object) -> bool:
     """Return whether a value certainly matches the schema at ``file#/pointer``.
 
-    Passes before the shape pass call this function before they use a key. These passes ignore a
-    value that does not match, and the shape pass reports an error.
+    The passes before the shape pass call this function before they use a key. Each pass ignores a
+    value that does not match, and the shape pass reports the error.
     """
     return shipped_check().is_valid_at(reference, value)
 

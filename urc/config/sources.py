@@ -27,7 +27,7 @@ class Sources:
         """Mapping with transports, signals, messages, commands and polls."""
         self.settings: dict[str, Node] = {}
         self.slots: dict[str, list[Node]] = {}
-        """Slot → declarations of its widget; later declarations change earlier ones."""
+        """Declarations of the widget in each slot; later declarations override earlier ones."""
         self.interfaces: dict[str, Node] = {}
         self.tests: list[Node] = []
         self.simulator: dict[str, Node] = {}

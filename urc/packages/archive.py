@@ -59,7 +59,7 @@ _BARE: Final = frozenset(("LICENSE", "LICENCE", "NOTICE", "README", "AUTHORS"))
 
 
 def name_fault(path: str) -> str:
-    """Return the fault of a path in a package; "" for a valid path."""
+    """Return an error message for an invalid path in a package; "" for a valid path."""
     if path.startswith(("/", "\\")) or re.match(r"[A-Za-z]:", path):
         return f"{path!r} is an absolute path"
     parts = path.split("/")
@@ -80,7 +80,7 @@ def name_fault(path: str) -> str:
 
 
 def names_fault(paths: Sequence[str]) -> str:
-    """Return the fault of two indistinguishable paths, or "". Some systems ignore case in paths."""
+    """Return an error message for paths that some systems cannot distinguish, or ""."""
     seen: dict[str, str] = {}
     for path in paths:
         other = seen.setdefault(path.casefold(), path)

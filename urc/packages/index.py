@@ -89,7 +89,7 @@ class Index(msgspec.Struct, frozen=True):
     """Number that increases with every change of the repository; 0 in unnumbered indexes."""
 
     def to_bytes(self) -> bytes:
-        """Return the content of the file. The same packages always produce the same bytes."""
+        """Return the content of the index file. The same packages always produce the same bytes."""
         return msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n"
 
 

@@ -6,7 +6,7 @@
     DIR/archives/drivers/puppet/1.0.0.json its origin, and whether it is withdrawn
     DIR/index.json                        all versions, with a number that grows with each change
     DIR/index/head.json                   its number and digest, signed by the maintainer
-    DIR/drivers/puppet/urcpm.json         the same in the thesis's form
+    DIR/drivers/puppet/urcpm.json         the package's description in the form of the URC thesis
 
 Only files in the index are served.
 """
@@ -75,7 +75,7 @@ def make_index(
     Args:
         folder: folder of the repository.
         name: name of the repository.
-        examine: returns the errors of a package's document, one per line.
+        examine: function that returns the errors of a package's document, one per line.
         index_signer: maintainer's signer for the index and for new source packages.
 
     Raises:
@@ -196,7 +196,7 @@ def _listed(index: Index, key: PackageId, version: str) -> IndexEntry:
 
 
 def _checked(notes: Notes) -> Notes:
-    """Return the notes if they can be read back; raise `PackageError`."""
+    """Return the notes if they can be encoded and decoded again; otherwise raise `PackageError`."""
     try:
         return msgspec.json.decode(msgspec.json.encode(notes), type=Notes)
     except msgspec.DecodeError as error:
@@ -365,7 +365,7 @@ def read_signature(archive: Path) -> Signature | None:
 
 
 def urcpm(said: Manifest, files: Mapping[str, bytes]) -> bytes:
-    """Return the description of a package in the format of the thesis's figure B.2."""
+    """Return the description of a package in the format of figure B.2 of the URC thesis."""
     needed = [key for key in map(parse_key, said.needs) if key.kind in _THESIS]
     styles = sorted(path for path in files if path.endswith(".css"))
     found: dict[str, object] = {

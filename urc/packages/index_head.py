@@ -77,7 +77,7 @@ class IndexHead(msgspec.Struct, frozen=True, omit_defaults=True):
         return signature is None or signature.verifies(_statement(self, signature.by))
 
     def to_bytes(self) -> bytes:
-        """Return the content of the file."""
+        """Return the content of the head's file."""
         return msgspec.json.encode(self) + b"\n"
 
 

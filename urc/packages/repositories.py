@@ -32,7 +32,7 @@ class _Known(msgspec.Struct, frozen=True):
 
 class _Tags(msgspec.Struct, frozen=True):
     sha256: str
-    """Digest of the index that these tags belong to."""
+    """Digest of the index that the stored ETags belong to."""
     index: str = ""
     """ETag of the index."""
     head: str = ""
@@ -108,7 +108,7 @@ class Repository:
         )
 
     def _asked(self) -> Index | None:
-        """Make one attempt; return None if the index does not match its signed head."""
+        """Request head and index once; return None if the index does not match its signed head."""
         kept = self._kept()
         said = kept[1].said if kept is not None else None
         etag = kept[1].head if kept is not None and said is not None else ""
@@ -168,7 +168,7 @@ class Repository:
         self._trust.forget()
 
     def _store(self, tags: _Tags, data: bytes | None = None) -> None:
-        """Store the tags, and the index if `data` is given."""
+        """Store the ETags, and the index if `data` is given."""
         work = self._folder / "work"
         if tags.said is not None:
             self._trust.pin(tags.said, work)
@@ -177,9 +177,9 @@ class Repository:
         atomic_files.put_file(self._tags, msgspec.json.encode(tags), work)
 
     def _kept(self) -> tuple[Index, _Tags] | None:
-        """Return the stored index with its tags, or None without a valid index.
+        """Return the stored index with its ETags, or None without a valid index.
 
-        Mismatched tags are empty.
+        If the stored ETags belong to another index, the returned ETags are empty.
         """
         data = _content(self._index, INDEX_BYTES)
         if data is None:

@@ -1,4 +1,4 @@
-"""A repository over HTTP: its listed files, and the lists of the thesis's figure B.3.
+"""HTTP server of a repository: its listed files, and the lists in figure B.3 of the URC thesis.
 
 Only files in the index are served. The server reads the index again after each change, so new
 packages need no restart.
@@ -203,7 +203,7 @@ def repository_app(
     Args:
         folder: folder of the repository.
         tokens: upload tokens; None to refuse uploads.
-        examine: checks uploads, as in `urc.packages.submission.take`.
+        examine: function that checks uploads, as in `urc.packages.submission.take`.
         index_signer: maintainer's signer, for the index after uploads.
     """
     shop = _Shop(folder)
@@ -298,7 +298,7 @@ def _stamp(status: os.stat_result) -> tuple[int, ...]:
 
 
 def _lists(name: str, newest: Mapping[str, IndexEntry]) -> dict[str, bytes]:
-    """Return the responses for the paths of the thesis's figure B.3."""
+    """Return the responses for the paths in figure B.3 of the URC thesis."""
     paths = {
         folder: [f"/{key}/" for key, entry in sorted(newest.items()) if entry.kind == kind]
         for folder, kind in FOLDERS.items()

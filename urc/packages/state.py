@@ -74,8 +74,8 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
     def check(self, plan: InstallPlan) -> None:
         """Raise `PackageError` for a plan that contradicts the state.
 
-        Rejected are different bytes of a known version, invalid signatures, and keys that differ
-        from the pinned key. A missing signature is rejected if a key is pinned.
+        The state rejects different bytes of a known version, invalid signatures, and keys that
+        differ from the pinned key. A missing signature is rejected if a key is pinned.
         """
         for name, pin in plan.lock.packages.items():
             self._check_known(name, pin)

@@ -233,7 +233,7 @@ class StoreTransaction:
         self._store.write_state(self._store.state().with_installed(plan))
 
     def replace(self, old: Lock, plan: InstallPlan) -> None:
-        """Replace `old` by a staged plan. `back` can restore `old`."""
+        """Replace the lock `old` by a staged plan. The method `back` can restore `old`."""
         self._store.write_state(self._store.state().with_update(old, plan))
 
     def back(self, lock: Lock) -> Lock:
@@ -265,7 +265,7 @@ class StoreTransaction:
     def forget_key(self, key: PackageId) -> None:
         """Delete the pinned key of a package; raise `PackageError`.
 
-        Any signature is then accepted.
+        The next installation accepts any valid signature of the package.
         """
         self._store.write_state(self._store.state().without_key(key))
 

@@ -54,7 +54,7 @@ def take(
         entry_file: path of the upload, such as ``archives/drivers/puppet/1.0.0.zip``.
         data: the archive.
         signature: signature of the package; None for an unsigned package.
-        examine: returns the errors of a document in a folder of packages.
+        examine: function that returns the errors of a document in a folder of packages.
         provenance: declared origin of the package, if any.
         index_signer: maintainer's signer, for the index.
 

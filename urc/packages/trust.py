@@ -19,7 +19,7 @@ class _Pin(msgspec.Struct, frozen=True):
     key: Annotated[str, msgspec.Meta(pattern=r"\A[A-Za-z0-9+/]{43}=\Z")]
     by: str
     number: int
-    """Highest number of an index signed with this key."""
+    """Highest index number signed with the pinned key."""
 
 
 class PinnedKey:
@@ -31,7 +31,7 @@ class PinnedKey:
         Args:
             url: URL of the repository, for messages.
             file: file that stores the pinned key.
-            now: returns the current time in seconds since the epoch.
+            now: function that returns the current time in seconds since the epoch.
         """
         self._url = url
         self._file = file
@@ -45,7 +45,7 @@ class PinnedKey:
 
     @property
     def number(self) -> int:
-        """Highest signed number. Valid indexes have at least this number."""
+        """Highest signed index number; an index with a lower number is rejected."""
         pin = self._pin()
         return pin.number if pin is not None else 0
 

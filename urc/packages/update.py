@@ -60,8 +60,7 @@ class PackageSummary(Protocol):
 
 
 Look = Callable[[Path, Path, Sequence[str]], PackageSummary]
-"""Returns a preview for a document, the folder with all its files, and the names of included
-widgets."""
+"""Function from a document's path, its package's folder and its widgets to a preview."""
 
 
 class UpdateDiff(NamedTuple):
@@ -146,7 +145,7 @@ def staged_difference(
         plan: install plan of the update.
         store: store with both versions.
         staged: result of `StoreTransaction.stage` for the plan.
-        look: returns the preview of documents.
+        look: function that returns the preview of a package's documents.
 
     Raises:
         UrcError: the new document has errors, or refers to a file outside its package.

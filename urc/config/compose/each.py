@@ -39,7 +39,7 @@ class _Copy(NamedTuple):
 
 
 class Expander:
-    """An expander for the `each` of all items of one document."""
+    """An expander of all `each` keys in one document."""
 
     def __init__(self, document: Document, problems: Problems, budget: ExpansionBudget) -> None:
         self.document = document

@@ -1,8 +1,8 @@
 """Replacement of names in single braces, such as ``{i}`` of an `each`, or ``{params.id}``.
 
-URC replaces names in single braces in all keys and texts while it loads a document. Templates have
-double braces and stay unchanged. A text that consists of one name becomes the value itself, so the
-result of ``"{i}"`` may be a number.
+URC replaces names in single braces in all keys and texts while it loads a document. Templates,
+which have double braces, stay unchanged. A text that consists of one name becomes the value itself,
+so the result of ``"{i}"`` may be a number.
 """
 
 import re
@@ -24,11 +24,11 @@ __all__ = [
 ]
 
 Names = Mapping[str, object]
-"""Name → scalar, or mapping of scalars."""
+"""Values by name; each value is a scalar or a mapping of scalars."""
 
 
 class PlaceholderReporter(Protocol):
-    """A receiver of names that have no value."""
+    """An interface for reporting names without a value."""
 
     def unknown(self, path: Path, name: str, word: str, offset: int) -> None:
         """Report an unknown word after the dot of a known `name`."""
@@ -177,7 +177,7 @@ def _item(tree: Tree, key: str | int, item: object) -> Tree:
 def fill(
     tree: Tree, path: Path, names: Names, budget: ExpansionBudget, listener: PlaceholderReporter
 ) -> Tree:
-    """Return `tree` after the replacement of every name; parts without names are shared."""
+    """Return `tree` after the replacement of every name; parts without names are not copied."""
     return _Filler(names, budget, listener).tree(tree, path)
 
 

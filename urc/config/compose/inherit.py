@@ -32,7 +32,7 @@ _INCLUDED: Final = {
     "driver": ("driver",),
     "interface": ("interface",),
 }
-"""Kind of a document → kinds of its possible includes."""
+"""Kinds of documents that a document may include, by the document's own kind."""
 
 
 class Composed(NamedTuple):
@@ -73,7 +73,7 @@ class _Composer:
 
     def __init__(self, library: Library) -> None:
         self.sources: dict[str, Document] = {}
-        """File → merged document."""
+        """Merged documents by file."""
         self._library = library
         self._problems = library.problems
         self._whole: dict[str, Document | None] = {}

@@ -23,7 +23,7 @@ _FILE_CODES: Final = (
 )  # fmt: skip
 _NAME: Final = re.compile("[a-z][a-z0-9-]*")
 _SHIPPED: Final = {"robot": ".", "driver": "drivers", "interface": "interfaces"}
-"""Kind of a document → folder of the shipped documents, below `robots`."""
+"""Folders of the shipped documents, below `robots`, by kind of document."""
 _ARTICLES: Final = {"interface": "an interface"}
 
 
@@ -32,7 +32,7 @@ class Library:
 
     def __init__(self) -> None:
         self.files: dict[str, None] = {}
-        """Every requested file, even if missing."""
+        """Paths of all requested files, including missing files."""
         self.problems = Problems()
         self._documents: dict[str, Document | None] = {}
 

@@ -1,4 +1,4 @@
-"""Merge of two trees of data and their marks. The upper tree changes the lower tree.
+"""Merge of two data trees with source positions; the upper tree overrides the lower tree.
 
 Mappings are merged by key, and lists of named items by name. The upper tree replaces all other
 values. Rules of a simulator are merged by name, and rules without a name are kept. The value
@@ -43,7 +43,7 @@ def _pinned(tree: Tree) -> Mark:
 
 
 def mark_inside(inner: Tree, around: Tree) -> Mark:
-    """Return the mark of `inner`, and add its document if `around` has another one."""
+    """Return the mark of `inner`, with its document if `around` is in another document."""
     return _pinned(inner) if inner.home is not around.home else inner.mark
 
 

@@ -29,9 +29,9 @@ def fill_params(
 ) -> Document:
     """Return a driver's document after the replacement of its parameters.
 
-    `given` contains the robot's values, and `use` is the robot's reference to the driver. A driver
-    without a robot needs neither argument. Its parameters without a default get sample values of
-    their types.
+    `given` contains the robot's values, and `use` is the robot's reference to the driver. Pass
+    None for both to check a driver without a robot. In this case, each parameter without a default
+    gets a sample value of its type.
     """
     data = document.data
     if not isinstance(data, dict):

@@ -66,7 +66,7 @@ def check_option(
 
 
 class NameUses:
-    """The used names of a driver; rules report the unused names."""
+    """The names that a driver uses; rules report declared names without a use."""
 
     def __init__(self) -> None:
         self.settings: set[str] = set()

@@ -25,7 +25,7 @@ _T = TypeVar("_T")
 def link_slots(
     sources: Sources, driver: Driver, registry: WidgetFolder, problems: Problems
 ) -> dict[str, WidgetUse]:
-    """Return the widget of each slot, without the changes of an interface."""
+    """Return the widget of each slot, before an interface changes the slots."""
     slots: dict[str, WidgetUse] = {}
     for slot, parts in sources.slots.items():
         use: WidgetUse | None = None

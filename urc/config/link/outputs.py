@@ -21,7 +21,7 @@ _GIVERS: Final = {
     "boolean": "switch",
     "string": "text",
 }
-"""Type of an argument → names of the shipped widgets that give a value of this type."""
+"""Names of the shipped widgets that give a value of an argument's type, by type."""
 
 
 def link_output(

@@ -213,7 +213,7 @@ def _link_reaction(
 
 
 def _check_told(linker: Linker, part: Node, told: frozenset[str]) -> None:
-    """Report values for signals that the world sets."""
+    """Report each signal that a rule sets although the emulated robot's world sets it."""
     for name, inner in part.named("set").items():
         if name in told:
             text = f"the world sets the signal {name!r}"

@@ -49,7 +49,7 @@ def link_signals(part: Node, driver: Driver, check: _Check, problems: Problems) 
 
 
 def _set_by_frames(driver: Driver) -> dict[str, str]:
-    """Return signal → description of the frame that sets the signal."""
+    """Return descriptions of the frames that set signals, by signal name."""
     found: dict[str, str] = {}
     for message in driver.messages.values():
         found |= dict.fromkeys(message.read.fields, f"message {message.name!r}")

@@ -190,7 +190,7 @@ class _Walk:
 
 
 def _loops(start: str, driver: Driver) -> str:
-    """Return the first of `start` and its called sequences that has a loop, or ""."""
+    """Return the first sequence with a loop, among `start` and its called sequences, or ""."""
     waiting, seen = [start], {start}
     while waiting:
         name = waiting.pop(0)

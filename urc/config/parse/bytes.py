@@ -16,7 +16,7 @@ CONTROL_NAMES: Final = {name: bytes((place,)) for place, name in enumerate(_NAME
     "DEL": b"\x7f",
     "CRLF": b"\r\n",
 }
-"""Name of a control character → its byte."""
+"""Bytes of the control characters, by name."""
 _HEX = re.compile(r"0x((?:[0-9A-Fa-f]{2})+)")
 _TEMPLATE = re.compile(r"\{\{.*?\}\}")
 _BACKSLASH = re.compile(r"\\(?:x[0-9A-Fa-f]{2}|[abefnrtv0])")

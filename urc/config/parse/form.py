@@ -43,9 +43,9 @@ class FormContext(NamedTuple):
     signals: frozenset[str] = frozenset()
     """Names of all signals of the driver."""
     types: Mapping[str, tuple[Item, ...]] = NOTHING
-    """Name → items, for the reusable structs under ``types``."""
+    """Items of the reusable structs under ``types``, by name."""
     enums: Mapping[str, tuple[tuple[int, str], ...]] = NOTHING
-    """Name → numbers and words, for the driver's enums."""
+    """Numbers and words of the driver's enums, by name."""
     catalog: Registries | None = None
     """Available framings, for a frame that declares its own framing."""
     framing: FramingSpec | None = None

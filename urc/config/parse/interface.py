@@ -77,7 +77,7 @@ def _check_beside_tabs(part: Node, problems: Problems) -> None:
 
 
 def _tab(part: Node, problems: Problems, around: Node | None = None) -> Tab:
-    """Return one page; for a tab, the key ``mirror`` of `around` is the default."""
+    """Return one page; a tab inherits ``mirror`` from the interface `around`."""
     is_mirrored = around.flag("mirror", default=True) if around is not None else True
     left = part.get("left_handed")
     return Tab(

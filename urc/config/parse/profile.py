@@ -15,7 +15,7 @@ _VALUE_TYPES: Final = {
     "boolean": "boolean",
     "port": "integer",
 }
-"""Type of a setting → type of its value; other settings contain text."""
+"""Types of values by type of setting; other settings contain text."""
 
 
 def parse_setting(part: Node, problems: Problems) -> Setting:

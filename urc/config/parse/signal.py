@@ -57,7 +57,7 @@ def parse_signal(part: Node, title: str, problems: Problems) -> Signal:
 
 
 def with_ages(signals: Mapping[str, Signal], polls: tuple[Poll, ...]) -> dict[str, Signal]:
-    """Return the signals with the age in seconds at which each signal is stale.
+    """Return the signals with the age in seconds at which each signal becomes stale.
 
     The default age is three periods of the signal's fastest poll, at least 1 s, or 5 s without a
     poll. A computed signal has the smallest age of its inputs.

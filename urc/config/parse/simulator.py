@@ -41,9 +41,9 @@ _DEGREES: Final = {
     "laser": ("first", "last"),
     "camera": ("fov", "tilt"),
 }
-"""Part of a world → fields that documents give in degrees."""
+"""Fields that documents give in degrees, by part of the world."""
 _KEYS: Final = {"first": "from", "last": "to"}
-"""Field of a laser → key in the document."""
+"""Keys of a laser in documents, by field of the model."""
 _LONGEST_S: Final = 3600.0
 
 Spec = TypeVar("Spec", bound=Any)

@@ -24,7 +24,7 @@ _BESIDE: Final = {
     "if": ("then", "else"),
     "fail": (),
 }
-"""Verb of a step → additional keys of the step."""
+"""Additional keys of a step, by its verb."""
 VERBS: Final = tuple(_BESIDE)
 _OF_REQUESTS: Final = ("match", "stages", "resend", "extend")
 _NEVER: Final = compile_template("")

@@ -199,7 +199,7 @@ def _covers(first: tuple[Item, ...], second: tuple[Item, ...]) -> bool:
 
 
 def _asked(items: tuple[Item, ...]) -> dict[tuple[int, int], object] | None:
-    """Return (offset, size) → constant, or None if a match depends on other conditions."""
+    """Return the constants by offset and size; None if a match depends on other conditions."""
     found: dict[tuple[int, int], object] = {}
     offset = 0
     for item in items:

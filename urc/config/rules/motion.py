@@ -1,8 +1,8 @@
 """Rules about held commands: watchdog, lease, repetition and load of the transport.
 
-If the URC server loses power, only the robot's own watchdog can stop the robot. A driver must
-therefore declare the watchdog. A contradiction with the watchdog is an error, because the motion
-would stutter or outlast the lease. All other problems are warnings.
+If the URC server loses power, only the robot's own watchdog can stop the robot. Drivers must
+therefore declare the watchdog. A contradiction with the declared watchdog is an error, because the
+motion would stutter or outlast the lease. All other problems of held commands are warnings.
 """
 
 import math

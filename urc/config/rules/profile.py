@@ -143,7 +143,7 @@ def _drawn(part: Node, slot: str) -> tuple[Node, int] | None:
 def _check_pace(part: Node, poll: Poll, driver: Node, problems: Problems) -> None:
     """Warn of a poll with a reply timeout longer than its period.
 
-    A declared timeout up to the default causes no warning, because the default causes none.
+    A declared timeout that is not above the default causes no warning.
     """
     if poll.reply is None:
         return

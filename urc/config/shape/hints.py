@@ -33,7 +33,7 @@ _OTHER_WORDS: Final = {
     "message": ("text",),
     "license": ("licence",),
 }
-"""Key of another tool → key of URC."""
+"""Keys of URC, by the corresponding key of another tool."""
 _SAME_TYPES: Final = {
     "float": "number",
     "double": "number",
@@ -48,7 +48,7 @@ _SAME_TYPES: Final = {
     "picture": "image",
     "bytes": "blob",
 }
-"""Type name of another tool → type name of URC."""
+"""Type names of URC, by the corresponding type name of another tool."""
 _URL: Final = re.compile(r"[a-z]+://(?P<host>[^/:?#]+)(?::(?P<port>[0-9]+))?(?P<path>/[^?#]+)?")
 _FRAMING: Final = "framing: { type: delimiter, tx: LF, rx: LF }"
 _ELSEWHERE: Final = {
@@ -56,7 +56,7 @@ _ELSEWHERE: Final = {
     ("signal", "command"): "bind an input to the name of a signal, such as level: battery;"
     " only an output takes 'command'",
 }
-"""(Misplaced key, another valid key of the same mapping) → hint."""
+"""Hints, by misplaced key and another valid key of the same mapping."""
 
 
 def key_hint(key: str, known: Mapping[str, Any], value: object = None, path: Path = ()) -> str:
@@ -112,7 +112,7 @@ def example_of(schema: Mapping[str, Any], key: str) -> str:
 
 
 def mapping_hint(document: Document, path: Path, value: object, schema: Mapping[str, Any]) -> str:
-    """Return the schema's first example of a mapping; a delimiter in it is replaced by `value`."""
+    """Return the schema's first example of a mapping, with `value` in place of its delimiter."""
     if _is_filled_in(document, path):
         return ""
     example = next((one for one in schema.get("examples", ()) if isinstance(one, dict)), None)

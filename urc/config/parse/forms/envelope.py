@@ -32,7 +32,7 @@ _STAMPED: Final = {
     "Vector3": "vector",
     "Wrench": "wrench",
 }
-"""Type of geometry_msgs → field name of its value in the stamped type (common_interfaces)."""
+"""Name of the value field in stamped geometry_msgs types, by plain type (ROS common_interfaces)."""
 
 
 def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSpec | None:

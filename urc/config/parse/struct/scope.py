@@ -16,7 +16,7 @@ class Scope:
 
     def __init__(self, problems: Problems, purpose: Literal["read", "send", "type"]) -> None:
         self.known: dict[str, Item | None] = {}
-        """Name → item; None for a name without an item in this struct."""
+        """Items by name; None for a name without an item in this struct."""
         self.uses: list[tuple[Node, Template]] = []
         """Expressions that use arguments or settings, with their nodes."""
         self._problems = problems
