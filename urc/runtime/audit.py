@@ -34,8 +34,7 @@ MOST_WAITING: Final = 4096
 """Maximum number of queued entries."""
 _BATCH: Final = 512
 _GATHER_S: Final = 0.05
-"""Time for which entries are gathered into a batch, in seconds, so that one commit writes many
-entries."""
+"""Time for collecting the entries of one batch, in seconds; one commit writes the whole batch."""
 _RETRY_S: Final = 5.0
 """Delay before the next attempt after a write error, in seconds."""
 _LOCKED_S: Final = 1.0
@@ -43,7 +42,7 @@ _LOCKED_S: Final = 1.0
 _CLOSE_S: Final = 2.0
 _LONGEST_TEXT: Final = 1000
 _SHARE: Final = 10
-"""When the file is full, one in this many rows is deleted."""
+"""Divisor for the number of rows that a full file loses: 10 deletes a tenth of the rows."""
 _PAGE: Final = 4096
 
 log = logging.getLogger(__name__)
@@ -62,7 +61,7 @@ class AuditEntry(NamedTuple):
     """Name of the person or page that caused the event."""
     role: str = ""
     client: str = ""
-    """Identifier of the connection between page and server."""
+    """Identifier of the connection between the page and the server."""
     epoch: int = 0
     """Epoch of the lease at the time of the event."""
     command: str = ""
@@ -291,8 +290,8 @@ def read(file: Path, *, robot: str = "", since: float = 0.0, last: int = 200) ->
 
     Args:
         file: path of the file of an `AuditLog`, which may still be writing.
-        robot: name of a robot, to select its entries and the entries without a robot; "" for all
-            entries.
+        robot: name of the robot whose entries to return, with all entries that name no robot; ""
+            for all entries.
         since: start of the period, as UTC time in seconds since 1970.
         last: maximum number of entries.
 
@@ -337,7 +336,7 @@ def _link(before: str, entry: AuditEntry) -> str:
 
 
 def _cut(entry: AuditEntry) -> AuditEntry:
-    """Return an entry with shortened texts, and without lone surrogates, invalid in UTF-8."""
+    """Return an entry with shortened texts, without characters that UTF-8 cannot encode."""
     return AuditEntry._make(_text(one) if isinstance(one, str) else one for one in entry)
 
 

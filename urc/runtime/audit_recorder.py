@@ -1,10 +1,10 @@
 """Audit entries of one robot: two entries per motion, instead of one per tick.
 
-This module is on layer 4 and synchronous; callers pass the time. Functions of this module never
-block or raise an exception, because motion code calls the functions. Each motion has a start entry
-and an end entry, with the first and last values of the motion. Repeated refusals are combined into
-one entry per second, with a count. The audit log therefore shows the cause of each motion, but does
-not grow with every tick.
+Layer 4. The module is synchronous: callers pass the current time. The functions never block and
+never raise an exception, because motion code calls them. Each motion has a start entry and an end
+entry, with the first and last values of the motion. Repeated refusals are combined into one entry
+per second, with a count. The audit log therefore shows the cause of each motion, but does not grow
+with every tick.
 """
 
 import json
@@ -41,7 +41,10 @@ _P = ParamSpec("_P")
 def _harmless(
     take: "Callable[Concatenate[AuditRecorder, _P], None]",
 ) -> "Callable[Concatenate[AuditRecorder, _P], None]":
-    """Catch every exception, because an audit bug must not stop motion; log only the first one."""
+    """Catch every exception, so that a bug in the audit code cannot stop motion.
+
+    Log only the first exception.
+    """
 
     @wraps(take)
     def taken(self: "AuditRecorder", /, *args: _P.args, **named: _P.kwargs) -> None:
@@ -108,7 +111,10 @@ class AuditRecorder:
         """Number of refusal entries in the current second."""
 
     def attend(self, hub: Hub | None, now: Callable[[], float]) -> None:
-        """Also report entries to the taps of a session's hub. None as the hub ends the reports."""
+        """Also report entries to the taps of a session's hub.
+
+        Passing None as the hub ends the reports.
+        """
         self._hub, self._now = hub, now
 
     def hide(self, secrets: Iterable[str]) -> None:
@@ -148,7 +154,7 @@ class AuditRecorder:
 
     @_harmless
     def stopped(self, command: str, reason: str, now: float) -> None:
-        """Record the stop of a control, and the reason of the stop."""
+        """Record the stop of a control, with the reason for the stop."""
         motion = self._motions.pop(command, None)
         if motion is None:
             return
@@ -182,7 +188,7 @@ class AuditRecorder:
 
     @_harmless
     def leased(self, state: LeaseState, now: float) -> None:
-        """Record a change of the lease: the holder, or the latch of STOP."""
+        """Record a change of the lease: a new holder, a latched STOP or a reset."""
         before, self._lease = self._lease, state
         if state.latched_by and not before.latched_by:
             self._record("STOP", _NOBODY, epoch=state.epoch, outcome=f"by {state.latched_by}")
@@ -207,7 +213,7 @@ class AuditRecorder:
         data: Payload = b"",
         answer: Mapping[str, Reading] = NOTHING,
     ) -> None:
-        """Record a command without hold, and its outcome: ``done`` or the reason of the failure."""
+        """Record a command without `hold`, with its outcome: ``done`` or a failure reason."""
         if answer:
             outcome = f"{outcome}: {_json(answer)}"
         self._record(

@@ -1,4 +1,4 @@
-"""Time as an injected dependency: the real clock; `urc.testing` has a fake clock."""
+"""The clock of the event loop, and timers. `urc.testing` has a fake clock for tests."""
 
 import asyncio
 import time
@@ -13,7 +13,7 @@ class Timer(Protocol):
     """A scheduled call that can be cancelled."""
 
     def cancel(self) -> None:
-        """Cancel the call; does nothing after the call was made."""
+        """Cancel the call; do nothing if the call was already made."""
 
 
 class Clock(Protocol):
@@ -46,7 +46,10 @@ class LoopClock:
 
 
 class PeriodicTimer:
-    """A timer with an action that returns the delay until the next call in seconds; None: end."""
+    """A timer that repeats an action.
+
+    The action returns the delay until its next call in seconds, or None to end the timer.
+    """
 
     def __init__(self, clock: Clock, delay_s: float, action: Callable[[], float | None]) -> None:
         self._clock = clock

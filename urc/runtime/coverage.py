@@ -1,4 +1,4 @@
-"""Test coverage of a document: its commands, polls and messages that the tests use.
+"""Test coverage of a document: the commands, polls and messages that its tests use.
 
 Layer 4, pure. An untested command is not reported as a problem, because the author decides which
 tests are needed.

@@ -1,4 +1,4 @@
-"""A short digest of a robot's destinations, used to bind secrets to these destinations.
+"""A short digest of a robot's network destinations, used to bind secrets to these destinations.
 
 Secrets are sent to the hosts named in the transport options. Each secret is therefore stored with
 its destination, and is never used for a different destination.
@@ -39,7 +39,7 @@ def destination_of(profile: Profile, package: str, values: Mapping[str, Value]) 
     Args:
         profile: profile with the transports.
         package: package name, such as ``drivers/puppet``; "" for a document given by path.
-        values: setting → value.
+        values: value of each setting, by name of the setting.
     """
     empty = {name: one.empty for name, one in profile.settings.items() if not one.is_required}
     lines = [_line(spec, empty | dict(values)) for spec in profile.driver.transports.values()]

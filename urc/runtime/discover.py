@@ -40,7 +40,7 @@ class RosTopic(NamedTuple):
 
 
 async def ros_topics(transport: Transport, timeout_s: float) -> list[RosTopic]:
-    """Query all topics from rosapi; the function opens and closes the rosbridge transport.
+    """Query all topics from rosapi; this function opens and closes the rosbridge transport.
 
     Raises:
         TransportError: the bridge or rosapi does not respond.

@@ -43,17 +43,17 @@ class PendingCommands:
     """The futures of pending commands."""
 
     def __init__(self, clock: Clock, limit_s: Callable[[str], float]) -> None:
-        """Begin without pending commands.
+        """Create an empty table of pending commands.
 
         Args:
             clock: source of time.
-            limit_s: command → maximum wait, in seconds.
+            limit_s: function that returns the maximum wait for a command, in seconds.
         """
         self._clock = clock
         self._limit_s = limit_s
         self._limits_s: dict[str, float] = {}
         self._all: dict[int, tuple[asyncio.Future[Answer], float, str]] = {}
-        """Request number → future, deadline and command."""
+        """Future, deadline and command of each pending request, by request number."""
         self._alarm: Timer | None = None
         self._alarm_s = 0.0
 
@@ -123,11 +123,11 @@ class EngineLike(Protocol):
 
     @property
     def deadline(self) -> float | None:
-        """Time of the next `tick`, or None without one."""
+        """Time at which `tick` must be called next; None if no call is needed."""
 
     @property
     def calm_s(self) -> float:
-        """Minimum delay of deadlines that `receive` and `command` may create, in seconds."""
+        """Minimum delay of the deadlines that `receive` and `command` create, in seconds."""
 
     def start(self, transport: str, now: float) -> Sequence[Event]:
         """Handle an opened transport."""
@@ -142,7 +142,7 @@ class EngineLike(Protocol):
         """Start a command."""
 
     def latch(self, reason: str, now: float) -> Sequence[Event]:
-        """End every sequence and refuse autonomous motion, until a call with ""."""
+        """End every sequence and refuse autonomous motion, until a call with an empty reason."""
 
     def finish(self, now: float) -> list[Event]:
         """Start an orderly close of every connection."""
@@ -162,10 +162,10 @@ class LinkPort(Protocol):
         """Whether the output queue is too long for new commands."""
 
     def want_open(self) -> None:
-        """Connect, because a request is waiting."""
+        """Open the connection for a waiting request."""
 
     def want_close(self, reason: str) -> None:
-        """Write the queued output, then close; with a reason, close immediately."""
+        """Close the connection: with a reason, immediately; otherwise, after all output."""
 
     def send(self, sent: Send) -> None:
         """Write bytes or a message; secret data is hidden from the traffic view."""
@@ -199,15 +199,16 @@ class Dispatcher:
         sequence_control: Mapping[str, SequenceControl] = NOTHING,
         motion: Callable[[MotionEvent], None] | None = None,
     ) -> None:
-        """Take over an engine.
+        """Create the dispatcher of an engine.
 
         Args:
             engine: the engine, which other code must not call from now on.
             hub: destination of readings and log entries.
             clock: source of time.
             commands: the driver's commands.
-            limit_s: command → maximum wait in seconds, even if the engine is still busy.
-            sequence_control: control of each sequence, by name.
+            limit_s: function that returns the maximum wait for a command in seconds, even if the
+                engine is still busy.
+            sequence_control: state and controls of each sequence, by name of the sequence.
             motion: handler of held-command events; None ignores the events.
         """
         self._engine = engine
@@ -284,7 +285,7 @@ class Dispatcher:
             self._run(self._engine.tick)
 
     def latch(self, reason: str) -> None:
-        """End every sequence and refuse autonomous motion; "" permits autonomous motion again."""
+        """End every sequence and refuse autonomous motion; an empty reason permits motion again."""
         self._run(lambda now: self._engine.latch(reason, now))
 
     def forget(self, request_id: int) -> None:
@@ -313,7 +314,10 @@ class Dispatcher:
         self._waiting.close(reason)
 
     def _refusal(self, request: Request) -> Failed:
-        """Return the reason to refuse a request before the engine is called, or None."""
+        """Return the reason to refuse a request without calling the engine.
+
+        None to accept the request.
+        """
         if self._is_stopped:
             return Failed(request.id, request.command, "disconnected", "the session is closed")
         if self._waiting.is_full:
@@ -367,7 +371,7 @@ class Dispatcher:
                 port.publish()
 
     def _change(self, event: Event) -> None:
-        """Pass an event to the link that changes state."""
+        """Pass an event to the link of the event's transport, which changes its state."""
         match event:
             case Violation(transport):
                 self._ports[transport].count(event)

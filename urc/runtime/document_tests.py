@@ -1,11 +1,11 @@
 """The runner of a document's tests, which uses the same engine as a real robot.
 
-This module is on layer 4, without I/O and asyncio: `urc validate` needs no robot, network or
+Layer 4. The module uses neither I/O nor asyncio, so `urc validate` needs no robot, network or
 secret.
 
-A test runs either in one instant or step by step on a simulated clock. In a test of one instant,
-the driver sends nothing automatically. In a test with steps, the whole driver runs, except for
-polls that the test does not name.
+A test runs either in one instant or step by step on a simulated clock. In a one-instant test, the
+driver sends nothing automatically. In a test with steps, the whole driver runs, except for polls
+that the test does not name.
 """
 
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ __all__ = ["TestReport", "exercise", "sample_settings"]
 
 _SAMPLE: Final[Mapping[str, Value]] = {"host": "127.0.0.1", "port": 1, "integer": 0, "number": 0.0}
 _ROUNDS: Final = 16
-"""Maximum number of deadlines during the wait for a declared failure."""
+"""Maximum number of deadlines to handle while waiting for a declared failure."""
 
 
 class TestReport(NamedTuple):

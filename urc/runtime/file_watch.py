@@ -36,7 +36,9 @@ class FileWatcher:
 
 
 def wait_for_change(watched: FileWatcher, sleep: Callable[[float], None] = time.sleep) -> list[str]:
-    """Return the changed files after at least one has changed and all are stable for one period.
+    """Wait until at least one file has changed and all files are stable for one period.
+
+    Return the changed files.
 
     The stable period ensures that files written in several steps are complete.
     """

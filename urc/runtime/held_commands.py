@@ -31,7 +31,7 @@ class MotionFrames(Protocol):
         """Return whether the stop frame of a held command is constant."""
 
     def has_stops(self, command: str) -> bool:
-        """Return whether the last rendered stop frames are still sufficient."""
+        """Return whether the rendered stop frames of a held command are still valid."""
 
     def is_ready(self, command: str) -> bool:
         """Return whether the command's transport is connected, with all connection steps done."""
@@ -49,7 +49,7 @@ class MotionBackend(Protocol):
     """The interface to the writer of motion frames: a guard process or a guard in this process."""
 
     def arm(self, command: str, terms: HoldTerms) -> None:
-        """Accept ticks of `command` from now on, under `terms`."""
+        """Accept ticks of `command` from now on, with the stop frame and time limits in `terms`."""
 
     def tick(self, command: str, data: Payload | CountedFrame) -> None:
         """Renew the lease of `command`, with `data` as its newest frame."""
@@ -70,7 +70,7 @@ class MotionBackend(Protocol):
         """Stop all motion immediately; `stops` maps each held command to its stop frame."""
 
     async def stops(self) -> Sequence[tuple[str, Reason]]:
-        """Wait for written stop frames; return the command and the reason of each.
+        """Wait for written stop frames; return the command and the stop reason of each frame.
 
         The returned list is in order and never empty. Cancelling the wait loses no stop. A control
         stopped by `stop` is reported as ``stopped`` even without motion, after the transport has
@@ -95,7 +95,7 @@ class MotionSession(Protocol):
 
 @dataclass(slots=True)
 class HeldControl:
-    """The state of one held command, as known to its page."""
+    """The motion controller's state of one held command."""
 
     line: str
     hold: Hold
@@ -110,9 +110,10 @@ class HeldControl:
     is_lasting: bool = False
     """Whether the stop frame stays the same while the command is armed."""
     motion_state: Literal["rest", "moving", "ending"] = "rest"
-    """``ending`` means: released, but the stop is not yet reported as written."""
+    """``ending`` means that the control was released, but the stop is not yet reported as
+    written."""
     stop: Payload | FrameVariants | None = None
-    """Stop frame of the command, as known to the motion backend."""
+    """Stop frame of the command that was last passed to the motion backend."""
     is_owed_again: bool = False
     """Whether the stop was sent before the transport was ready, and must be repeated."""
     needs_release: bool = False
@@ -122,7 +123,7 @@ class HeldControl:
     """Epoch of the lease in which the command was stopped; motion requires a later epoch."""
 
     def rest(self) -> None:
-        """Reset the control to the state of rest."""
+        """Set the control to rest."""
         if self.slew is not None:
             self.slew.reset()
 
@@ -147,7 +148,7 @@ class HeldControl:
 
 
 def control_of(driver: Driver, command: Command) -> HeldControl:
-    """Return a held command of `driver`, at rest."""
+    """Return the initial state of a held command of `driver`: at rest."""
     hold = command.hold
     assert hold is not None  # noqa: S101 - callers pass only held commands
     slew, defaults = None, {}

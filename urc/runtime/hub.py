@@ -49,7 +49,7 @@ class SampleHistory:
     def __init__(self) -> None:
         self._kept: dict[str, deque[tuple[int, Sample]]] = {}
         self._counts: dict[str, int] = {}
-        """Signal → total number of readings."""
+        """Total number of readings of each signal, by signal name."""
 
     def __bool__(self) -> bool:
         return bool(self._kept)
@@ -152,7 +152,7 @@ class HubSubscription:
             await self._event.wait()
 
     def wake(self) -> None:
-        """Wake the waiting `changed` call to check again."""
+        """Make the waiting `changed` call check its condition again."""
         self._event.set()
 
     def changes(self) -> list[Sample]:
@@ -172,7 +172,7 @@ class SequenceProgress:
     of: int
     state: Literal["idle", "running", "paused"]
     reason: str = ""
-    """Reason of the sequence's failure, or ""."""
+    """Reason for the failure of the sequence, or ""."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +186,7 @@ class MotionRecord:
 
 @dataclass(frozen=True, slots=True)
 class AuditRecord:
-    """An audit log entry in the form for taps."""
+    """An audit log entry, as reported to taps."""
 
     time_s: float
     """Monotonic time of the entry, in seconds, unaffected by adjustments of the time of day."""
@@ -242,7 +242,7 @@ class Hub:
         Args:
             signals: the driver's signals.
             redactor: removes secrets from all incoming data; None for a robot without secrets.
-            streams: names of transports with traffic that may split a message into several pieces.
+            streams: names of the transports that may split one message into several pieces.
         """
         self.signals = signals
         self._redactor = redactor if redactor is not None and redactor.is_needed else None
@@ -255,7 +255,7 @@ class Hub:
         self.links_count = 0
         """Number of link state changes so far."""
         self.progress: dict[str, SequenceProgress] = {}
-        """Sequence → its progress; sequences that have never run are missing."""
+        """Progress of each sequence, by name; sequences that have never run are missing."""
         self.progress_count = 0
         """Number of sequence progress changes so far."""
         self.notes: deque[LogEntry] = deque(maxlen=NOTES_KEPT)
@@ -264,7 +264,7 @@ class Hub:
         self.traffic: deque[Traffic] = deque(maxlen=TRAFFIC_KEPT)
         self.traffic_count = 0
         self.traffic_watchers = 0
-        """Number of readers of traffic; while above 0, traffic is recorded."""
+        """Number of readers of the traffic; traffic is recorded only if this number is above 0."""
         self.streams = SampleHistory()
         """Signals for which every reading is kept; empty by default."""
         self._latest: dict[str, Sample] = {}

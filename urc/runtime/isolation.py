@@ -19,7 +19,7 @@ from urc.runtime.package_preview import PackagePreview, look
 __all__ = ["PreviewWorker", "bound_this_process", "look_apart"]
 
 TOTAL_S: Final = 60.0
-"""Maximum time for a preview, in seconds, chosen for small and busy machines."""
+"""Maximum time for a preview, in seconds; long enough for small and busy machines."""
 PROCESSOR_S: Final = 30
 MEMORY_BYTES: Final = 1 << 30
 COMMAND: Final = ("-P", "-m", "urc.runtime.isolation")
@@ -35,7 +35,7 @@ def look_apart(
     Args:
         document: the document of the package.
         folder: folder that contains all files of the package and its dependencies.
-        widgets: names of the included widgets.
+        widgets: names of the widgets in the package.
         total_s: maximum time for the preview, in seconds.
 
     Raises:

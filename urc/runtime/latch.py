@@ -1,4 +1,4 @@
-"""The part of a lease that survives a restart, in a small file: latch, epoch, pending stop.
+"""A small file for the part of a lease that survives a restart: latch, epoch and pending stop.
 
 Writing can be slow, or fail on a full disk; a stop must not wait for either. A thread therefore
 writes the newest state, and failures are reported without an exception.
@@ -43,7 +43,7 @@ class LatchStore:
     """
 
     def __init__(self, folder: Path, robot: str) -> None:
-        """Select the file, without reading or writing."""
+        """Set the path of the file, without reading or writing the file."""
         self._file = folder / f"{robot}.latch.json"
         self._newest: Latch | None = None
         self._writing: asyncio.Task[None] | None = None
@@ -56,8 +56,8 @@ class LatchStore:
     def load(self) -> Latch:
         """Return the stored state.
 
-        An unreadable or invalid file counts as latched, because the true state is unknown. If the
-        file is unreadable, the stop is sent again, unless the file confirms an earlier delivery.
+        An unreadable or invalid file counts as latched with a pending stop, because the true state
+        is unknown. In a valid file, a missing entry ``owed`` means that a latched stop is pending.
         Page numbers restart at one in each run, so page names from an earlier run are marked.
         """
         try:

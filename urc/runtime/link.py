@@ -1,4 +1,4 @@
-"""The link to a robot: one transport, and its share of the driver's engine.
+"""The link to a robot: one transport that exchanges data with the driver's engine.
 
 Theory of operation. `run` is a loop with three waits. First, the loop waits for a reason to
 connect. A persistent link always has a reason; other links need an `Open` event or a request. Then
@@ -9,10 +9,10 @@ connection. Every end goes through `_end`, and only `_serve` stops the reader an
 A connection counts as good after its first valid frame; only a good connection resets the backoff.
 URC therefore does not flood a robot that closes every accepted connection again. With
 ``on_connect`` steps, frames do not count until the steps are done, because a robot may send a
-greeting and then refuse the login. Pages show the `LinkState`; while attempts fail, only the count
-of attempts changes.
+greeting and then refuse the login. Pages show the `LinkState`. During failed attempts, only its
+number of attempts changes.
 
-The link uses only the five transport members, so a transport may run in another process. A
+The link uses only the five members of `Transport`, so a transport may run in another process. A
 transport that implements `Prompt` saves task switches. Bytes that arrive while the reader waits are
 passed directly to the engine. The engine's bytes are passed directly to the kernel. The reader and
 writer tasks handle bytes that must wait, large amounts of data, and errors.
@@ -42,7 +42,8 @@ SLICE_S = 0.001
 fewer bytes."""
 _LEAST_SLICE_BYTES = 512
 _CHUNK_COST = 32
-"""Fixed cost of a received chunk, in bytes, because many tiny chunks would also block the loop."""
+"""Fixed cost of a received chunk, counted as bytes, because many tiny chunks would also block the
+loop."""
 SETTLE_S = 1.0
 """Age after which a connection counts as accepted by the robot, in seconds."""
 _GRACE_S = 1.0
@@ -55,7 +56,7 @@ log = logging.getLogger(__name__)
 
 
 class Link:
-    """A transport that is reopened after every loss, and its traffic with the engine."""
+    """A transport that is reopened after every loss and exchanges data with the engine."""
 
     def __init__(
         self,
@@ -116,7 +117,8 @@ class Link:
     def _forget_connection(self) -> None:
         """Reset the state of one connection."""
         self._close_reason: str | None = None
-        """The engine's reason for closing the connection, after which further data is dropped."""
+        """The engine's reason for closing the connection; data received after the close is
+        dropped."""
         self._heard_s = self._clock.now()
         self._is_reader_waiting = False
         self._is_ready = not self._spec.on_connect
@@ -289,7 +291,7 @@ class Link:
         self._conclude(reason)
 
     def _greet(self) -> None:
-        """Publish the state of a connection without any frame."""
+        """Publish the state of a connection that has not received a valid frame yet."""
         if self._report.attempts or self._report.state == "silent":
             return  # the state changes after `SETTLE_S`, see `_settled`
         if not self._is_ready and self._is_persistent:
@@ -378,7 +380,7 @@ class Link:
                     size = min(size * 2, SLICE_BYTES)
 
     def _take_now(self, data: bytes) -> bool:
-        """Handle received bytes immediately, unless there are many or earlier ones are waiting."""
+        """Handle received bytes now, unless they are too many or earlier bytes are waiting."""
         if len(data) > _LEAST_SLICE_BYTES or not self._is_reader_waiting:
             return False
         ended = self._ended

@@ -16,7 +16,7 @@ BURST = 4
 REFILL_S = 10.0
 """Minimum interval of further log entries of one kind, in seconds."""
 HELD_S = 0.3
-"""Time for which a possible beginning of a secret is held back, in seconds."""
+"""Maximum time to hold back data that may be the beginning of a secret, in seconds."""
 KINDS = 64
 """Maximum number of kinds of log entries; further kinds of a third-party engine share one rate
 limit."""

@@ -18,7 +18,7 @@ LATE_S: Final = 0.1
 TOO_LATE_S: Final = 0.5
 """Delay that stops motion regardless of the lease, in seconds."""
 QUIET_S: Final = 10.0
-"""Interval in which several delays are reported only once, in seconds."""
+"""Length of the interval in which several delays are reported as one, in seconds."""
 
 log = logging.getLogger(__name__)
 

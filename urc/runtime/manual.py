@@ -1,7 +1,7 @@
 """The manual page of a profile in Markdown: the robot, its signals and its commands.
 
-This module is on layer 4 and is pure: the same profile always produces the same page. The page is
-written for operators and quotes the descriptions of the document.
+Layer 4, pure. The same profile always produces the same page. The page is written for operators and
+quotes the descriptions of the document.
 """
 
 import math

@@ -63,7 +63,7 @@ class MotionController:
     def __init__(
         self, driver: Driver, *, kept: LeaseState | None = None, is_owed: bool = False
     ) -> None:
-        """Begin without an operator and without a connected robot.
+        """Create a controller without an operator and without a session.
 
         Args:
             driver: the driver; commands with ``hold`` become controls.
@@ -117,7 +117,7 @@ class MotionController:
         return command in self._holds
 
     def rests(self, command: str) -> bool:
-        """Return whether a held command is at rest, and its last stop was reported as written."""
+        """Return whether a held command is at rest and its last stop was reported as written."""
         return self._controls[command].motion_state == "rest"
 
     @property
@@ -165,7 +165,7 @@ class MotionController:
         self._settle(self.lease.leave(client))
 
     def heartbeat(self, client: str, now: float) -> int:
-        """Return the number of a new beat, which the page echoes in its inputs."""
+        """Return the number of a new heartbeat, which the page echoes in its inputs."""
         return self._screens[client].freshness.issue(now)
 
     # -- the lease
@@ -205,7 +205,7 @@ class MotionController:
         Controls that the backend has already stopped receive no second stop.
 
         Returns:
-            The commands that may have moved.
+            The commands that may have moved the robot.
         """
         halted = self._moving()
         for name in halted:
@@ -339,7 +339,7 @@ class MotionController:
         return not (backend.is_open(command) and frames.is_ready(command))
 
     def _repeat_stops(self, line: str) -> None:
-        """Repeat stops that were sent before the steps of connection `line` were done."""
+        """Repeat stops that were sent before the connection steps of transport `line` were done."""
         owed = [
             name
             for name, control in self._controls.items()
@@ -351,7 +351,7 @@ class MotionController:
             self._backend.stop(self._stop_frames(owed))
 
     def _renew_stops(self, line: str) -> None:
-        """Render the stop frames of `line` again, with counters after the last sent frame."""
+        """Render the stop frames of transport `line` again, with the next counter values."""
         frames, backend = self._frames, self._backend
         if frames is None or backend is None:
             return

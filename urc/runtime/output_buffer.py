@@ -1,4 +1,4 @@
-"""The output buffer of one transport: joins and bounds data, and reports traffic once written.
+"""The output buffer of one transport: a bounded queue that reports written data as traffic.
 
 With an empty buffer, a `Prompt` transport passes bytes directly to the kernel. Other bytes wait for
 the writer's task, which may block.
@@ -32,8 +32,8 @@ class _Waiting(NamedTuple):
     shown: Payload
     """Payload to report as traffic."""
     counted: CountedFrame | None = None
-    """Frame with counters, or None; never joined with other data, because sending uses the counter
-    values up.
+    """Frame with counters, or None. The frame is never joined with other data, because sending may
+    change the counters.
     """
 
 
@@ -42,13 +42,13 @@ class _Shared(Protocol):
     """A transport that can also send frames with counters through the guard."""
 
     def offer_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> bool:
-        """Send a counted frame without waiting; return whether the frame was accepted.
+        """Send a frame with counters without waiting; return whether the frame was accepted.
 
         `left` receives the frame that was sent.
         """
 
     async def send_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> None:
-        """Send a counted frame; wait until the frame is sent.
+        """Send a frame with counters; wait until the frame is sent.
 
         `left` receives the frame that was sent.
         """

@@ -53,7 +53,7 @@ def secret_texts(profile: Profile, settings: Mapping[str, Value]) -> list[str]:
 
 
 class Redactor:
-    """A redactor of secrets in frames, texts and streams."""
+    """A filter that replaces secrets in frames, texts and streams."""
 
     def __init__(self, secrets: Iterable[str], encodings: Iterable[str] = ("utf-8",)) -> None:
         """Prepare the redaction of `secrets` in the given encodings; empty secrets are ignored."""

@@ -1,6 +1,7 @@
 """The built-in tables of transport types and framing types.
 
-The module does not import any transport or framing; each is imported at its first use.
+This module imports no transport and no framing. Each transport and framing is imported at its first
+use.
 """
 
 from urc.registry import Registries

@@ -1,4 +1,4 @@
-"""Timed execution of a held command by a script, under the normal rules of motion.
+"""Execution of a held command by a script for a limited time, under the normal rules of motion.
 
 The script samples no input, but renews the lease with regular ticks. If the script hangs, is killed
 or loses its connection, the lease expires, and the guard writes the stop.

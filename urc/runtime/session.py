@@ -63,8 +63,8 @@ class FifoEvent:
 
 
 Motion = Literal["none", "here", "guarded"]
-"""Writer of motion frames: none, a guard in this process, or a guard process. Only a guard process
-stops the robot if URC fails."""
+"""Kind of the writer of motion frames: none, a guard in this process, or a guard process. Only a
+guard process stops the robot if URC fails."""
 
 _LOOK_S = 0.02
 new = tuple.__new__

@@ -27,7 +27,7 @@ _WAITED_FOR: Final = {
     "xml": "for the end of the XML element",
     "regex": "for bytes that match the pattern",
 }
-"""Framing type → the missing part of an incomplete frame."""
+"""Missing part of an incomplete frame, by framing type."""
 
 
 class _Asked(NamedTuple):

@@ -1,6 +1,7 @@
 """Comparison of expected and actual results in a document's tests.
 
-Layer 4, pure. Each mismatch message is part of a line and contains both values.
+Layer 4, pure. Each mismatch message contains the expected and the actual value; callers insert the
+message into a line of text.
 """
 
 import math
@@ -26,7 +27,8 @@ _SHOWN: Final = 3
 """Maximum number of reported failures per test."""
 _SHOWN_BYTES: Final = 48
 _BEFORE_BYTES: Final = 16
-"""Number of shown bytes of a long frame, in total and before the first difference."""
+"""Number of displayed bytes of a long frame before the first difference; `_SHOWN_BYTES` is the
+total number."""
 
 
 def first(failures: list[str]) -> list[str]:

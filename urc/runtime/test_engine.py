@@ -1,6 +1,7 @@
 """A test bench for an engine, with a simulated clock and transports that always connect.
 
-Layer 4, without I/O and asyncio. All output of the engine is collected for the test.
+Layer 4. The module uses neither I/O nor asyncio. All output of the engine is collected for the
+test.
 """
 
 import json
@@ -43,7 +44,7 @@ _TWO_PEOPLE: Final = ("author of the test", "operator")
 _BRINGS_OBJECTS: Final = frozenset(("ros",))
 """Transport types with objects as messages; all other types carry bytes."""
 _MOST_TICKS: Final = 20_000
-"""Maximum number of deadlines during one wait of a test."""
+"""Maximum number of deadlines to handle during one wait of a test."""
 
 
 class _Watched(Engine):
@@ -101,9 +102,9 @@ class TestEngine:
         self.fresh: set[str] = set()
         """Signals set since the last call of `forget`, with their samples."""
         self.fed: dict[str, bytes] = {}
-        """Transport → all bytes received from the robot since the connection opened."""
+        """All bytes received from the robot since the connection opened, by transport."""
         self.sent: dict[str, list[Payload]] = {}
-        """Transport → sent payloads that no check has read yet."""
+        """Sent payloads that no check has read yet, by transport."""
         self.failures: list[str] = []
         self.ended: list[Replied | Failed] = []
         """Finished commands that no check has read yet."""
@@ -111,7 +112,7 @@ class TestEngine:
         """Transports closed by the engine that no check has read yet."""
         self._requests = 0
         self._numbers: dict[str, list[object]] = {}
-        """Transport → numbers of the unanswered requests."""
+        """Numbers of the unanswered requests, by transport."""
 
     @property
     def used(self) -> set[Exercised]:
@@ -182,7 +183,10 @@ class TestEngine:
         self.perform(self.engine.receive(transport, data, self.now))
 
     def _envelope(self, transport: str, piece: Envelope) -> Envelope:
-        """Return the message as delivered by a transport: a response has its request's number."""
+        """Return the message as a transport delivers it.
+
+        A response carries the number of its request.
+        """
         body = piece.body
         if body is not None and self.driver.transports[transport].type not in _BRINGS_OBJECTS:
             body = body if isinstance(body, bytes) else json.dumps(body).encode()
@@ -204,7 +208,7 @@ class TestEngine:
                 self.perform(self.engine.tick(self.now))
 
     def wait(self, seconds: float) -> None:
-        """Let simulated time pass, and handle all deadlines in it."""
+        """Advance the simulated time, and handle all deadlines that fall due."""
         end = self.now + seconds
         for _ in range(_MOST_TICKS):
             if not self.pass_to_deadline(end):

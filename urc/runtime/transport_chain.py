@@ -26,7 +26,7 @@ class BuiltTransport(NamedTuple):
 def make_lines(
     driver: Driver, settings: Mapping[str, Value], table: Table
 ) -> dict[str, BuiltTransport]:
-    """Return name → closed transport; each tunnel precedes the transports inside the tunnel.
+    """Return the closed transports by name; each tunnel precedes the transports inside the tunnel.
 
     Args:
         driver: the loaded driver; tunnels must not be circular.
@@ -62,5 +62,5 @@ def make_lines(
 def make_transports(
     driver: Driver, settings: Mapping[str, Value], table: Table
 ) -> dict[str, Transport]:
-    """Return name → closed transport; for details, see `make_lines`."""
+    """Return the closed transports by name, in the order of `make_lines`."""
     return {name: made.transport for name, made in make_lines(driver, settings, table).items()}

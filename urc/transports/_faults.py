@@ -26,7 +26,7 @@ def one_line(said: str, most: int = _SHOWN) -> str:
 
 
 def place_of(host: str, port: int) -> str:
-    """Return a host and port in the usual notation."""
+    """Return a host and port as ``HOST:PORT``, with brackets around an IPv6 address."""
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 

@@ -1,4 +1,4 @@
-"""Address lookups that block neither the event loop nor the exit of the program."""
+"""Lookups of network addresses that block neither the event loop nor the exit of the program."""
 
 import asyncio
 import errno

@@ -1,4 +1,4 @@
-"""Readers of transport options; each invalid option raises a one-line error."""
+"""Functions that read and check transport options. An invalid option raises a one-line error."""
 
 from collections.abc import Mapping
 
@@ -62,7 +62,7 @@ def flag(kind: str, options: Mapping[str, object], key: str, *, default: bool) -
 def choice(
     kind: str, options: Mapping[str, object], key: str, among: tuple[str, ...], default: str
 ) -> str:
-    """Return an option with one of the words in `among`, or `default` for a missing option.
+    """Return an option that must be one of the words in `among`; `default` for a missing option.
 
     Raises:
         TransportError: the value is not one of the words.

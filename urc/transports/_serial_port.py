@@ -22,7 +22,8 @@ from urc.transports.base import PeerClosed
 __all__ = ["FAULTS", "SerialStream", "open_port"]
 
 FAULTS: tuple[type[Exception], ...] = (OSError, SerialException, ValueError, LookupError)
-"""Exceptions raised by the library; `LookupError` indicates a server with invalid RFC 2217 data."""
+"""Exceptions that the library raises; a `LookupError` means that a server sent invalid RFC 2217
+data."""
 UNTAKEN_BYTES = 1_048_576
 """Maximum number of unsent bytes of option replies to a server."""
 if sys.platform != "win32":
@@ -30,10 +31,12 @@ if sys.platform != "win32":
 
     FAULTS = (*FAULTS, termios.error)
 _KEPT_OPTIONS, _AT_ONCE = 64, 4096
-"""Maximum number of pending unsolicited options, and maximum number of bytes processed in one step.
+"""Maximum number of pending unsolicited options. `_AT_ONCE` is the maximum number of bytes to
+process in one step.
 """
 _DRAIN_S, _LOOK_S = 0.3, 0.01
-"""Maximum wait for unsent bytes when closing, and the interval between checks, in seconds."""
+"""Maximum wait for unsent bytes before a port closes, in seconds. `_LOOK_S` is the interval between
+checks."""
 
 
 async def open_port(
@@ -69,8 +72,8 @@ async def open_port(
 class _Rfc2217(RFC2217SerialTransport):
     """An RFC 2217 connection that skips the confirmation of unused notifications.
 
-    The library would wait for a confirmation until its timeout, but the common server ser2net never
-    sends one.
+    The library would wait for a confirmation until its timeout, because the common server ser2net
+    never sends a confirmation.
     """
 
     def _data_received(self, data: bytes) -> None:
@@ -123,7 +126,7 @@ class SerialStream(asyncio.Protocol):
     # -- called by the library
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Take over the open port."""
+        """Store the transport of the opened port."""
         assert isinstance(transport, BaseSerialTransport)  # noqa: S101 - guaranteed by the library
         self._transport = transport
         transport.set_write_buffer_limits(high=0)
@@ -192,7 +195,7 @@ class SerialStream(asyncio.Protocol):
         await self._close()
 
     def unsent(self) -> int:
-        """Return the number of bytes that are not transmitted yet."""
+        """Return the number of bytes that have not been transmitted yet."""
         waiting = self._transport.get_write_buffer_size()
         if self.socket is not None:
             return waiting + (unsent_in(self.socket) if self.socket.fileno() >= 0 else 0)

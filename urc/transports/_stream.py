@@ -1,8 +1,8 @@
 """An open TCP connection as a stream, and a base class for transports over a stream.
 
-Each connection receives data into one fixed buffer. While the buffer is full, the socket is not
-read, so a flooding robot fills only its own send queue. `write` returns after the kernel has
-accepted every byte, so the connection may be closed directly after the last write.
+Each connection stores received data in one buffer of fixed size. While the buffer is full, the
+socket is not read, so a flooding robot fills only its own send queue. `write` returns after the
+kernel has accepted every byte, so the connection may be closed directly after the last write.
 """
 
 import asyncio
@@ -79,13 +79,13 @@ class TcpStream(asyncio.BufferedProtocol):
         self._number = -1
         """File descriptor of the socket; -1 after the end of the connection."""
         self.sink: Callable[[bytes], bool] | None = None
-        """Callback that receives data while the buffer is empty, and returns whether the data was
-        accepted."""
+        """Callback that receives data while the buffer is empty. The callback returns whether the
+        data was accepted."""
 
     # -- called by asyncio
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Take over the open connection."""
+        """Store the transport of the opened connection."""
         # No isinstance check: the transports of uvloop have another base class.
         self._transport = cast("asyncio.Transport", transport)
         self._transport.set_write_buffer_limits(high=0)
@@ -106,7 +106,7 @@ class TcpStream(asyncio.BufferedProtocol):
         self._arrived.set()
 
     def eof_received(self) -> bool:
-        """Record the end of the stream, and let the connection close."""
+        """Record the end of the stream; the event loop then closes the connection."""
         self.end(HUNG_UP)
         return False
 
@@ -260,7 +260,7 @@ async def adopt(line: socket.socket, read_ahead_bytes: int = READ_AHEAD_BYTES) -
 
 
 def tune(line: socket.socket) -> None:
-    """Disable delays, limit unsent data, and detect lost peers, as far as the system permits."""
+    """Set socket options that disable delays, limit unsent data, and detect a lost peer."""
     line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     line.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for name, value in (
@@ -288,7 +288,7 @@ def as_bytes(payload: Payload) -> bytes:
 
 
 def forget_unsent(line: socket.socket) -> None:
-    """Configure `line` so that closing resets the connection and discards unsent data."""
+    """Make the next close of the socket `line` reset the connection and discard unsent data."""
     with suppress(OSError):  # already closed
         line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _LINGER_NOT)
 
@@ -296,8 +296,8 @@ def forget_unsent(line: socket.socket) -> None:
 def unsent_in(line: socket.socket) -> int:
     """Return the number of bytes in the kernel that the other side has not acknowledged.
 
-    The result is 0 if the number is unknown. The result is 1 for a closed socket, because the fate
-    of its data is unknown.
+    The result is 0 if the number is unknown. The result is 1 for a closed socket, because the
+    delivery of its data is unknown.
     """
     if sys.platform != "linux":
         return 0

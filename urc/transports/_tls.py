@@ -42,7 +42,7 @@ class Tls:
     def __init__(
         self, context: ssl.SSLContext, server_name: str = "", *, is_server: bool = False
     ) -> None:
-        """Store the settings; certificates must match `server_name` or, if empty, the host."""
+        """Store the settings; the peer's certificate must match `server_name`, or else the host."""
         self._context = context
         self._server_name = server_name
         self._is_server = is_server
@@ -54,8 +54,8 @@ class Tls:
         Args:
             kind: type of the transport, for error messages.
             option: ``true``, ``false``, None, or a mapping with ``ca``, ``cert``, ``key``,
-                ``server_name`` and ``verify``. ``ca``, ``cert`` and ``key`` are file names or PEM
-                texts.
+                ``server_name`` and ``verify``. The values of ``ca``, ``cert`` and ``key`` are file
+                names or PEM texts.
             is_server: whether the robot connects to URC, so that URC presents its certificate.
 
         Raises:

@@ -3,7 +3,7 @@
 A transport carries payloads without interpretation: bytes for streams and datagrams, envelopes for
 messages. A transport converts every exception of a library into one of the errors in this module.
 
-Only `urc.runtime.link` uses transports, without knowledge of the process in which a transport runs.
+Only `urc.runtime.link` uses transports, and works equally if a transport runs in another process.
 """
 
 from collections.abc import Callable, Mapping
@@ -39,9 +39,9 @@ __all__ = [
 
 
 NOTICE: Final = "notice"
-"""Verb of messages that a transport itself creates. The body of a notice is a one-line text about
-an error that the robot does not report. Notices go to the robot's log and do not prove that the
-robot is alive.
+"""Verb of notices, the messages that a transport itself creates. The body of a notice is a one-line
+text about an error that the robot does not report. Notices go to the robot's log and do not prove
+that the robot is alive.
 """
 
 
@@ -116,7 +116,7 @@ class Tunnel(Protocol):
 
 
 class TopicSubscription(NamedTuple):
-    """A topic that a driver's messages need, on a transport that carries messages."""
+    """A topic that a driver's messages need on a transport such as MQTT or ROS."""
 
     topic: str
     attributes: Mapping[str, Value] = NOTHING
@@ -214,8 +214,7 @@ class Prompt(SupportsOffer, Protocol):
     def divert(self, sink: Callable[[bytes], bool]) -> None:
         """Pass received data to `sink` until the connection is closed.
 
-        The sink returns whether the data was accepted; `receive` returns data that the sink
-        refused.
+        The sink returns whether it accepted the data; `receive` returns refused data.
         """
 
 

@@ -1,8 +1,8 @@
-"""Fast connections to a robot that may become reachable at any moment.
+"""Overlapping connection attempts to a robot that may become reachable at any moment.
 
 The operating system repeats a failed connection attempt only after a second, and later at longer
-intervals. If `HURRY` is set, new attempts start at short intervals while earlier attempts continue,
-because a distant robot may need the time.
+intervals. If `HURRY` is set, new attempts start at short intervals. Earlier attempts continue,
+because a distant robot may reply late.
 """
 
 import asyncio
@@ -24,11 +24,12 @@ class ConnectRace:
     def __init__(self, every_s: float) -> None:
         self.every_s = every_s
         self.is_used = False
-        """Whether overlapping attempts were used; some transports connect in other ways."""
+        """Whether overlapping attempts were used; some transports ignore the setting."""
 
 
 HURRY: ContextVar[ConnectRace | None] = ContextVar("HURRY", default=None)
-"""Interval settings, set by a caller that needs a fast connection; None for a single attempt."""
+"""Interval between overlapping attempts, set by a caller that needs a fast connection; None for a
+single attempt."""
 
 
 async def connected(family: int, address: object) -> socket.socket:

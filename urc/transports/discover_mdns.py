@@ -36,7 +36,7 @@ async def announced(
     Args:
         types: service types, such as ``_rosbridge._tcp``; at least one.
         seconds: duration of the search.
-        interfaces: addresses of this machine to listen on; () for all interfaces.
+        interfaces: addresses of this machine on which to listen; () for all interfaces.
 
     Raises:
         TransportError: the library is missing, or no network is available.

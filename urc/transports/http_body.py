@@ -13,7 +13,7 @@ __all__ = ["body_of", "complaint", "fault_of", "read_body"]
 
 _COMPLAINT_BYTES: Final = 65536
 _FORMATS: Final = {"gzip": 31, "x-gzip": 31, "deflate": 47}
-"""Content-Encoding → zlib window bits, for gzip or for automatic detection."""
+"""Window bits for zlib by Content-Encoding; the values select gzip or automatic detection."""
 
 
 async def read_body(response: httpx2.Response, max_bytes: int) -> bytes:
@@ -63,7 +63,7 @@ async def body_of(response: httpx2.Response, max_bytes: int) -> bytes:
 
 
 async def fault_of(response: httpx2.Response) -> str:
-    """Return the error of a stream request, or "" on success; a successful body is not read."""
+    """Return the error of a stream request, or "" on success; the body of a success is not read."""
     if response.status_code < HTTPStatus.MULTIPLE_CHOICES:
         return ""
     return complaint(response, await body_of(response, _COMPLAINT_BYTES))

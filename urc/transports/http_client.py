@@ -61,7 +61,7 @@ class HttpClient:
         headers: Mapping[str, str],
         connections: int,
     ) -> None:
-        """Initialise without connecting. At most `connections` are open at a time."""
+        """Initialise without connecting. At most `connections` connections are open at a time."""
         self._place = place
         self._credentials = credentials
         self._backend = _Backend(dialer)
@@ -218,7 +218,7 @@ class HttpClient:
 
 
 def leads_up(path: str) -> bool:
-    """Return whether a path contains the segment "." or ".." in any encoding."""
+    """Return whether a path contains the segment "." or "..", even if percent-encoded."""
     plain = path.partition("?")[0].partition("#")[0]
     for _ in range(_UNPACKED):  # some servers decode twice
         plain = unquote(plain)
@@ -234,7 +234,8 @@ _FAULTS = (
     NotImplementedError,  # Digest with auth-int only
 )
 _NO_TLS = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-"""An empty TLS context for the pool, which would otherwise load the certificates of the system."""
+"""An empty TLS context for the connection pool, so that the pool does not load the system's
+certificates."""
 
 
 def _short(fault: Exception) -> str:
@@ -388,7 +389,8 @@ class _Connection(httpcore2.AsyncNetworkStream):
     def is_readable(self) -> bool:
         """Return whether `read` would return immediately; an idle connection is then closed.
 
-        The only test of a stream is a call of `read`, which is cancelled if no data is available.
+        A stream can only be tested by calling `read`; the call is cancelled if no data is
+        available.
         """
         if self._early:
             return True
@@ -405,7 +407,7 @@ class _Connection(httpcore2.AsyncNetworkStream):
 
 
 class _Wire(httpx2.AsyncBaseTransport):
-    """A library transport that uses URC's connection pool and raises errors unchanged."""
+    """A transport for the library that uses URC's connection pool and raises errors unchanged."""
 
     def __init__(self, pool: httpcore2.AsyncConnectionPool) -> None:
         self._pool = pool

@@ -1,4 +1,6 @@
-"""Parsers for ``text/event-stream`` and plain lines. The parsers are pure: bytes in, messages out.
+"""Parsers for ``text/event-stream`` and plain lines.
+
+The parsers do no I/O: the input is bytes, and the output is messages.
 
 Server-sent events follow the HTML standard (section 9.2.6, "Interpreting an event stream"), except
 that data is not decoded to text. Sizes are limited: an event or line that is too long is skipped
@@ -31,7 +33,7 @@ class LineSplitter:
     """An incremental splitter of a response body into lines without line ends (CR LF, LF or CR)."""
 
     def __init__(self, max_bytes: int, instead: bytes | None = None) -> None:
-        """Skip lines longer than `max_bytes`, or replace such lines by `instead`."""
+        """Create a splitter that skips, or replaces by `instead`, all lines above `max_bytes`."""
         self._most = max_bytes
         self._instead = instead
         self._buffer = bytearray()
@@ -91,7 +93,7 @@ class EventStreamParser:
     """An incremental parser of an event stream."""
 
     def __init__(self, max_bytes: int, last_id: str = "") -> None:
-        """Skip events longer than `max_bytes`; `last_id` is the previous connection's last id."""
+        """Skip events longer than `max_bytes`; `last_id` is the last id of the old connection."""
         self._most = max_bytes
         self._lines = LineSplitter(max_bytes + _MAX_NAME, _TOO_LONG)
         self._is_start = True

@@ -1,6 +1,6 @@
 """A parser of ``multipart/x-mixed-replace`` bodies (MJPEG).
 
-The parser is pure: bytes in, parts out.
+The parser does no I/O: the input is bytes, and the output is parts.
 
 Many cameras violate the multipart format (RFC 2046, section 5.1). The parser accepts quoted
 boundaries, plain boundaries, and headers that include the body's two dashes. Parts without
@@ -58,7 +58,8 @@ class MultipartParser:
         self._loose = re.compile(rb"(?:\A|\r?\n)-*" + re.escape(boundary))
         self._strict = re.compile(rb"\r?\n-+" + re.escape(boundary))
         self._keep = len(boundary) + 80
-        """Number of trailing bytes to search again, because a delimiter may be incomplete."""
+        """Number of bytes at the end of the buffer to search again, because they may contain an
+        incomplete delimiter."""
         self._most = max_part_bytes
         self._buffer = bytearray()
         self._state: Literal["seek", "rest", "head", "counted", "open", "ended"] = "seek"
@@ -133,7 +134,7 @@ class MultipartParser:
         return True
 
     def _open(self, parts: list[bytes]) -> bool:
-        """Extract a part that ends at the next delimiter."""
+        """Extract a part of unknown length, up to the next delimiter."""
         found = self._strict.search(self._buffer, self._from)
         end = found.start() if found else len(self._buffer) - self._keep
         if end > self._most:

@@ -14,14 +14,15 @@ EVENTS = 64
 
 
 class HttpReceiveQueue:
-    """A bounded queue in order of arrival.
+    """A bounded queue of responses, images and events, in order of arrival.
 
     A newer image replaces the queued image of the same topic.
     """
 
     def __init__(self) -> None:
         self._waiting: dict[object, Envelope] = {}
-        """Key → envelope; the key is the topic of an image, or a number for other envelopes."""
+        """Queued envelopes by key; the key is the topic of an image, or a number for other
+        envelopes."""
         self._number = 0
         self._events = 0
         self._events_bytes = 0

@@ -1,8 +1,8 @@
 """Streams from a robot over HTTP: images, events and lines. Each stream runs as a task.
 
-A failed stream is requested again after growing delays, as long as the transport is open. Only the
+While the transport is open, a failed stream is requested again after increasing delays. Only the
 first failure and the recovery are logged. The transport ends only if the robot refuses connections
-and has been silent on all streams for a while.
+and no stream has received data for `_GONE_S` seconds.
 """
 
 import asyncio
@@ -36,7 +36,8 @@ SHORTEST_RETRY_S: Final = 0.2
 _LONGEST_RETRY_S: Final = 60.0
 _NO_MORE: Final = 204
 _GONE_S: Final = 2.0
-"""Silence after which a refused connection means that the robot is unreachable, in seconds."""
+"""Minimum silence of all streams before a refused connection means that the robot is unreachable,
+in seconds."""
 
 log = logging.getLogger(__name__)
 
@@ -48,8 +49,8 @@ class StreamSpec(NamedTuple):
     path: str
     every_s: float
     topics: frozenset[str]
-    """All topics of the stream's path; for events, a topic with ``#NAME`` receives only events of
-    that name."""
+    """All topics of the stream's path; a topic ``PATH#NAME`` receives only the events called
+    ``NAME``."""
 
 
 def streams_of(subscriptions: Sequence[TopicSubscription]) -> list[StreamSpec]:
@@ -232,7 +233,7 @@ class HttpStream:
         return f"http {self._client.where} {self._spec.path}"
 
     def _pause_s(self) -> float:
-        """Return the delay before the next attempt, which grows and has random jitter."""
+        """Return the delay before the next attempt, in seconds: growing, with random jitter."""
         if self._retry_s is not None and not self._failures:
             return self._retry_s
         wait_s, self._wait_s = self._wait_s, min(2 * self._wait_s, _LONGEST_WAIT_S)
@@ -256,7 +257,7 @@ class HttpStream:
 
 
 class _Bound:
-    """A timeout that can be extended, and raises `HttpFault`."""
+    """An extendable timeout that raises `HttpFault`."""
 
     def __init__(self, limit_s: float, lack: str) -> None:
         self._limit_s = limit_s

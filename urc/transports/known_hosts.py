@@ -1,7 +1,7 @@
 """Trusted SSH host keys from URC's own file and from the transport options.
 
-URC's file has the format of OpenSSH's ``known_hosts``. Only `remember` adds keys, after
-confirmation by a person with ``urc trust``.
+URC's file has the format of OpenSSH's ``known_hosts``. Only `remember` adds keys to this file,
+after a person has confirmed the key with ``urc trust``.
 """
 
 from pathlib import Path
@@ -52,7 +52,7 @@ class HostKeys:
 
     @property
     def is_pinned(self) -> bool:
-        """Whether the document itself contains the trusted fingerprint."""
+        """Whether the document contains the trusted fingerprint."""
         return bool(self._pinned)
 
     def known(self, host: str, port: int) -> HostKeyStatus:

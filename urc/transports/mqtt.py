@@ -1,6 +1,6 @@
 """The factory of the MQTT transport, for robots behind an MQTT broker.
 
-This module does not import the MQTT library, so a missing library can be reported.
+This module does not import the MQTT library itself, so that it can report a missing library.
 """
 
 from importlib.util import find_spec

@@ -5,8 +5,8 @@ Each `open` connects a socket and creates a paho client for this connection only
 earlier connection can therefore be sent late. A reused paho client would store unacknowledged
 messages and send the messages again. The transport starts no thread.
 
-Every MQTT session starts clean. The broker publishes the last will after every end of the
-connection, even if URC closes the connection. An extra stop is harmless.
+Every connection starts a clean MQTT session. The broker publishes the last will after every end of
+the connection, even if URC closes the connection. A will that repeats a stop is harmless.
 """
 
 import asyncio
@@ -31,7 +31,7 @@ from urc.transports.web_dial import Dialer
 __all__ = ["MqttTransport"]
 
 KEEPALIVE_S = 5
-"""Keepalive interval in seconds; the broker counts as lost after twice this time without data."""
+"""Keepalive interval, in seconds. After twice this time without data, the broker counts as lost."""
 MAX_BYTES = 16 * 1024 * 1024
 """Maximum size of a received message, in bytes."""
 MAX_UNACKNOWLEDGED = 256
@@ -238,7 +238,7 @@ class _Session:
             raise PeerClosed(self.queue.ended)
 
     def _forget(self, line: Any) -> None:
-        """Stop watching a socket that will be closed next."""
+        """Stop watching a socket that is about to be closed."""
         if line.fileno() >= 0:
             self._loop.remove_reader(line)
             self._loop.remove_writer(line)
@@ -328,7 +328,7 @@ class _Session:
 
 
 class _Client(Client):
-    """A paho client that uses a given socket."""
+    """A paho client that uses an existing socket."""
 
     def __init__(self, options: MqttOptions, line: socket.socket) -> None:
         version = MQTTProtocolVersion.MQTTv5 if options.is_v5 else MQTTProtocolVersion.MQTTv311
@@ -365,7 +365,7 @@ class _Client(Client):
         self._given.close()
 
     def excess(self) -> str:
-        """Return a message about an exceeded limit, or ""; paho itself enforces no limits."""
+        """Return a message about an exceeded limit, or "". The library paho enforces no limits."""
         if self._in_packet["remaining_length"] > MAX_BYTES:
             return f"the broker sent a message of more than {MAX_BYTES} bytes"
         if len(self._out_packet) > MAX_UNTAKEN:

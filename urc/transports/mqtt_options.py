@@ -53,7 +53,7 @@ class MqttOptions(NamedTuple):
 
     @property
     def where(self) -> str:
-        """Host and port in their usual notation."""
+        """Host and port as ``HOST:PORT``, with brackets around an IPv6 address."""
         return place_of(self.host, self.port)
 
 

@@ -1,8 +1,8 @@
-"""The listening addresses of URC's own dashboard, which are forbidden for transports.
+"""The listening addresses of URC's own dashboard, to which no transport may connect.
 
 A document that connects to the dashboard would have the rights of a local program. The address of
-each new connection is checked, so host names, redirects and address notations make no difference.
-Connections forwarded by a router, a proxy or another machine are not detected.
+each open connection is checked, so a host name, a redirect or an unusual notation cannot hide the
+address. Connections forwarded by a router, a proxy or another machine are not detected.
 """
 
 import ipaddress
@@ -41,7 +41,7 @@ class OwnListeners:
             self._doors.remove(door)
 
     def words(self) -> list[str]:
-        """Return the addresses as words, for `learn` in a related process."""
+        """Return the addresses as words, to pass to `learn` in a related process."""
         return [f"{address}#{port}" for address, port in self._doors]
 
     def learn(self, words: Iterable[str]) -> None:
@@ -62,8 +62,8 @@ class OwnListeners:
         Args:
             address: target address.
             port: target port.
-            is_near: whether the connection starts on this machine; if not, a loopback address means
-                another machine.
+            is_near: whether the connection starts on this machine. If false, a loopback address
+                means another machine.
         """
         wanted = unmapped(address)
         if not is_near and (wanted.is_loopback or wanted.is_unspecified):

@@ -1,4 +1,4 @@
-"""A serial port of this machine, or of a server (``socket://``, ``rfc2217://``).
+"""The serial transport, for a port of this machine or of a server (``socket://``, ``rfc2217://``).
 
 The transport uses the library serialx from the extra ``serial``. A ``socket://`` address is a plain
 TCP connection to a server that has already configured the port.
@@ -37,7 +37,7 @@ class SerialSettings(NamedTuple):
     stop_bits: float = 1
     flow_control: str = "none"
     rts: bool | None = None
-    """Initial level of the RTS pin; None for the default level, high."""
+    """Initial level of the RTS pin; None for the default, which is high."""
     dtr: bool | None = None
     is_exclusive: bool = True
     """Whether to lock other programs out of the port."""
@@ -122,7 +122,7 @@ def explain(port: str, shown: str, fault: BaseException) -> str:
 
 
 def _remedy(port: str) -> str:
-    """Return a hint about the port's user group, on systems with groups."""
+    """Return a hint about the user group that may open the port, on systems with groups."""
     if sys.platform == "win32":
         return ""
     import grp

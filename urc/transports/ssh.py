@@ -1,8 +1,8 @@
 """The SSH transport: a shell, a program, or only a tunnel for other transports.
 
-The users of one shared connection are the transport's own channel and the transports that name this
-transport in ``tunnel``. The first user opens the connection, the last user closes the connection,
-and a lost connection ends all users.
+The users of one shared SSH connection are the transport's own channel and all transports that name
+this transport in ``tunnel``. The first user opens the connection, the last user closes the
+connection, and a lost connection ends all users.
 """
 
 import asyncio
@@ -140,7 +140,8 @@ def _environment(value: object) -> tuple[tuple[str, str], ...]:
 
 
 _COLUMNS, _ROWS = 240, 24
-"""Size of the pseudo-terminal, wide enough to prevent shells from wrapping long lines."""
+"""Columns and rows of the pseudo-terminal, which is wide enough to prevent shells from wrapping
+long lines."""
 
 
 class SshTransport:
@@ -149,7 +150,7 @@ class SshTransport:
     def __init__(
         self, target: SshTarget, program: RemoteProgram, outer: "SshTransport | None" = None
     ) -> None:
-        """Store the server and the program; `outer` is the SSH transport of the tunnel, or None."""
+        """Store the server and the program; `outer` is the tunnelling SSH transport, or None."""
         self.target = target
         self._program = program
         self._outer = outer
@@ -249,7 +250,7 @@ class SshTransport:
                 await self._outer.leave()
 
     async def join(self, timeout_s: float) -> asyncssh.SSHClientConnection:
-        """Return the asyncssh connection for a tunnelled connection; call `leave` afterwards."""
+        """Return the asyncssh connection for a tunnelled connection; afterwards, call `leave`."""
         return (await self._shared.join(timeout_s)).ssh
 
     async def leave(self) -> None:

@@ -19,12 +19,12 @@ __all__ = ["MAX_PACKET", "WINDOW", "SshChannel"]
 READ_AHEAD_BYTES = 65536
 """Size of the receive buffer, in bytes."""
 WINDOW = 262_144
-"""SSH window size of the channel in bytes, in addition to the receive buffer."""
+"""SSH window size of the channel, in bytes; the receive buffer adds to this size."""
 MAX_PACKET = 32768
 _CLOSES_WITHIN_S = 1.0
 """Maximum wait for the exit of a program that has closed its output, in seconds."""
 _LAST_WORDS = 200
-"""Maximum amount of standard error output quoted in the message about a program's end, in bytes."""
+"""Maximum size of the standard error output in the message about a program's end, in bytes."""
 
 
 class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]):
@@ -56,7 +56,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
     # -- called by asyncssh
 
     def connection_made(self, chan: object) -> None:
-        """Take over the open channel."""
+        """Store the asyncssh channel when it opens."""
         self._channel = chan  # type: ignore[assignment] # of either base
         self._channel.set_write_buffer_limits(high=0)
 
@@ -141,7 +141,7 @@ class SshChannel(asyncssh.SSHClientSession[bytes], asyncssh.SSHTCPSession[bytes]
     def unsent(self) -> int:
         """Return the number of bytes that the server has not acknowledged.
 
-        The number includes all unacknowledged bytes of the SSH connection, also of other channels.
+        The number includes the unacknowledged bytes of all channels of the SSH connection.
         """
         return self._channel.get_write_buffer_size() + self._wire.unsent()
 

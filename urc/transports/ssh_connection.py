@@ -84,9 +84,9 @@ class SshConnection:
     async def _checked(self, host: str, port: int) -> str:
         """Return the target address for `host`; raise `OwnAddressError` for URC's own dashboard.
 
-        An SSH server on this machine could reach the dashboard. For an SSH server on this machine,
-        a host name is looked up once in this method, so the server cannot resolve the name
-        differently.
+        An SSH server on this machine could reach the dashboard at a loopback address. For such a
+        server, this method looks up a host name and returns an address, so that the server cannot
+        resolve the name differently.
         """
         is_near = self._is_on_this_machine()
         addresses = [host]

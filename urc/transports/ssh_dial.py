@@ -1,4 +1,4 @@
-"""Opening of SSH connections: socket, host key, login, and error messages."""
+"""Functions that open an SSH connection: socket, host key check, login and error messages."""
 
 from typing import Any, NamedTuple
 
@@ -92,7 +92,7 @@ async def dial(
 async def look_at_key(
     target: SshTarget, outer: asyncssh.SSHClientConnection | None, timeout_s: float
 ) -> OfferedHostKey:
-    """Return the host key of the server without logging in; for the parameters, see `dial`."""
+    """Return the host key of the server without logging in; `dial` describes the parameters."""
     client = _Client(target, _known(target), only_looks=True)
     try:
         connection = await _connect(target, client, outer, timeout_s, {"client_keys": None})

@@ -46,7 +46,7 @@ class Login(NamedTuple):
     """Whether to accept legacy algorithms that are no longer secure."""
 
     def __repr__(self) -> str:
-        """Return only the user name, so that no secret enters a log."""
+        """Return a text with only the user name, so that no secret enters a log."""
         return f"Login({self.username!r})"
 
 
@@ -62,7 +62,7 @@ def algorithms(login: Login) -> dict[str, Any]:
 def host_key_algorithms(
     known: Sequence[asyncssh.SSHKey], *, has_authorities: bool, legacy: bool
 ) -> list[str]:
-    """Return the accepted types of host keys; known types first, as servers have several keys."""
+    """Return the accepted types of host keys, with the types of known keys before other types."""
     familiar = [
         name.decode("ascii")
         for key in known

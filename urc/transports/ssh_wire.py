@@ -20,9 +20,9 @@ _READ_BYTES = 65536
 UNTAKEN_BYTES = 8_388_608
 """Maximum number of unsent bytes of replies to a server; larger than the window of a channel."""
 _LAST_TURNS = 10
-"""Number of event loop turns between the last bytes and the end of the stream, because asyncssh
-reads some packets in tasks. Servers often close directly after a refusal; the delay lets asyncssh
-read the reason."""
+"""Number of event loop turns between the last bytes and the end of the stream; the delay exists
+because asyncssh reads some packets in tasks. Servers often close directly after a refusal; the
+delay lets asyncssh read the reason."""
 
 
 def why_lost(exc: Exception | None) -> str:
@@ -71,7 +71,7 @@ class SshSocket(asyncio.BufferedProtocol):
         await self._gone.wait()
 
     def end(self, reason: str) -> None:
-        """Record the reason of the connection's end; keep the first reason."""
+        """Record why the connection ended; keep the first reason."""
         self.fault = self.fault or reason
         self._room.set()
 
@@ -129,7 +129,7 @@ class SshSocket(asyncio.BufferedProtocol):
     # -- the end
 
     def _at_last(self, act: Callable[..., None], *words: Any, turns: int = _LAST_TURNS) -> None:
-        """Call `act` after some turns of the event loop, in the order of calls."""
+        """Call `act` after `turns` turns of the event loop; several calls keep their order."""
         loop = asyncio.get_running_loop()
         if turns:
             loop.call_soon(lambda: self._at_last(act, *words, turns=turns - 1))
@@ -151,7 +151,7 @@ class TunnelAdapter:
     """An asyncssh tunnel that provides the connection below the SSH connection."""
 
     def __init__(self, line: socket.socket | asyncssh.SSHClientConnection) -> None:
-        """Use a connected socket, or another SSH connection that forwards data."""
+        """Create a tunnel over a connected socket, or over another forwarding SSH connection."""
         self._line = line
         self._is_used = False
         self.wire: SshSocket

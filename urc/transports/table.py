@@ -18,5 +18,6 @@ TRANSPORTS = Table(
         "mqtt": "urc.transports.mqtt:from_setup",
     },
 )
-"""Transport type → factory that returns a `Transport` for a `urc.transports.base.TransportSetup`.
+"""Factories by transport type; each factory returns a `Transport` for a
+`urc.transports.base.TransportSetup`.
 """

@@ -26,8 +26,8 @@ __all__ = ["READ_AHEAD_BYTES", "TcpListener", "TcpTransport", "from_setup"]
 
 
 HANDOVER_S = 6.0
-"""Lifetime of a connection that replaced an older one, in seconds, until the next `open`. The
-lifetime is slightly longer than the backoff between connection attempts."""
+"""Time for which a newer connection waits for the next `open`, in seconds. This time is slightly
+longer than the backoff between connection attempts."""
 _WAITING = 8
 _AGAIN_S = 0.1
 """Delay after a failed accept call, in seconds."""
@@ -37,11 +37,12 @@ _Caller = tuple[socket.socket, str]
 
 
 class TcpListener(StreamTransport):
-    """A transport that listens for one robot at a time; a newer connection replaces the older one.
+    """A transport that listens for one robot; a newer connection replaces the present connection.
 
     After a failed `open`, the port keeps listening, so that a robot is not refused between two
-    attempts. After a replacement, the first `close` also keeps listening: the next `open` receives
-    the newer connection, within `HANDOVER_S`. Any other `close` stops listening on the port.
+    attempts. After a replacement, the first `close` also keeps the port listening: within
+    `HANDOVER_S`, the next `open` receives the newer connection. Any other `close` stops listening
+    on the port.
     """
 
     def __init__(self, bind: str, port: int, *, only: str = "", tls: Tls | None = None) -> None:
@@ -76,7 +77,7 @@ class TcpListener(StreamTransport):
 
     @property
     def port(self) -> int:
-        """Local port number, known while listening."""
+        """Local port number; available only while the transport is listening."""
         return self._port if self._listener is None else int(self._listener.getsockname()[1])
 
     @property
@@ -162,7 +163,7 @@ class TcpListener(StreamTransport):
             asyncio.get_running_loop().add_reader(self._listener, self._knock, self._listener)
 
     def _knock(self, listener: socket.socket) -> None:
-        """Accept a connection when the event loop reports one.
+        """Accept a connection that the event loop has reported.
 
         The event loop's own accept function may lose a new connection when cancelled.
         """
@@ -192,7 +193,7 @@ class TcpListener(StreamTransport):
             self._meet(line, address)
 
     def _meet(self, line: socket.socket, address: tuple[str, int]) -> None:
-        """Keep the newest connection for `open`, and end the present connection."""
+        """Store the newest connection for the next `open`, and end the present connection."""
         allowed = self._allowed_now[0] if self._allowed_now is not None else None
         if allowed is not None and _plain(address[0]) not in allowed:
             line.close()
@@ -291,7 +292,7 @@ class TcpTransport(StreamTransport):
 
     @property
     def is_clogged(self) -> bool:
-        """Whether accepted data still waits for the kernel; `send` waits until all is accepted."""
+        """Whether accepted data still waits for the kernel; `send` waits for that data."""
         stream = self._stream
         return type(stream) is TcpStream and not stream.is_writable
 

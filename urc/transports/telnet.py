@@ -1,6 +1,6 @@
 """The Telnet transport: a byte stream with option negotiation.
 
-The underlying connection is a TCP connection of this machine, or a tunnelled connection.
+The underlying connection is either a TCP connection of this machine or a tunnelled connection.
 """
 
 import asyncio
@@ -30,11 +30,11 @@ __all__ = ["TelnetTransport", "TelnetOptions", "from_setup"]
 DEFAULT_PORT: Final = 23
 _QUICKACK: Final = getattr(socket, "TCP_QUICKACK", None)
 _COLUMNS: Final = 240
-"""Width of the terminal that URC reports, in characters, large enough to prevent shells from
-wrapping long lines."""
+"""Width of the terminal that URC reports, in characters; the width prevents shells from wrapping
+long lines."""
 _LONGEST_NAME: Final = 40
 _SMALL_BYTES: Final = 1024
-"""Maximum size of received data that is acknowledged immediately, in bytes."""
+"""Maximum size of a received segment that URC acknowledges immediately, in bytes."""
 
 
 class TelnetOptions(NamedTuple):

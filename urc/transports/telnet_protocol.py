@@ -1,9 +1,9 @@
-"""The Telnet protocol without a socket: separates text from negotiation, and creates replies.
+"""The Telnet protocol without a socket: separation of text from negotiation, and replies.
 
 Pure. Options are negotiated with the Q method (RFC 1143), which prevents loops: replies are sent
 only for changes. URC never withdraws an agreed option, so the six states of the Q method reduce to
-the three of `_Side`. Options outside the tables are refused at every request, because servers
-negotiate in several rounds and wait for the last reply.
+the three of `_Side`. Every request for an unknown option is refused, because servers negotiate in
+several rounds and wait for the last reply.
 """
 
 import re
@@ -13,9 +13,9 @@ from typing import Final
 __all__ = ["BINARY", "ECHO", "NAWS", "SGA", "TTYPE", "TelnetNegotiation"]
 
 BINARY: Final = 0
-"""Transmission of all byte values unchanged, including NUL and CR (RFC 856)."""
+"""Unchanged transmission of all byte values, including NUL and CR (RFC 856)."""
 ECHO: Final = 1
-"""Echo by the side that offers the option (RFC 857)."""
+"""Echo of received characters by the side that offers the option (RFC 857)."""
 SGA: Final = 3
 """Suppress Go Ahead, which enables full-duplex operation (RFC 858)."""
 TTYPE: Final = 24
@@ -84,7 +84,7 @@ class TelnetNegotiation:
         columns: int = 80,
         rows: int = 24,
     ) -> None:
-        """Begin without any agreed option.
+        """Create the protocol state, without any agreed option.
 
         Args:
             ours: local options that URC enables on request.

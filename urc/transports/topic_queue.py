@@ -16,7 +16,8 @@ __all__ = ["TopicReceiveQueue"]
 TOPIC_MESSAGES = 256
 """Maximum number of queued messages per topic."""
 TOPIC_BYTES = 524_288
-"""Maximum number of queued bytes per topic; one larger message, such as an image, is queued alone.
+"""Maximum number of queued bytes per topic. A larger message, such as an image, is queued without
+other messages of its topic.
 """
 MESSAGES = 4096
 """Maximum number of queued messages of all topics, because a wildcard may match any number of
@@ -34,14 +35,14 @@ class TopicReceiveQueue:
 
     def __init__(self) -> None:
         self._waiting: dict[int, Envelope] = {}
-        """Sequence number → envelope, in order of arrival."""
+        """Queued envelopes by sequence number, in order of arrival."""
         self._topics: dict[str, deque[tuple[int, int]]] = {}
-        """Topic → sequence number and size of each queued message."""
+        """Sequence number and size of each queued message, by topic."""
         self._sizes: dict[str, int] = {}
         self._bytes = 0
         self._messages = 0
         self._answers: dict[int, int] = {}
-        """Sequence number → size of each queued response."""
+        """Size of each queued response, by sequence number."""
         self._answers_bytes = 0
         self._number = 0
         self._arrived = asyncio.Event()

@@ -2,8 +2,8 @@
 
 UDP has no connections, so opening sends nothing, and a lost robot is noticed only by its silence.
 The transport reports errors that UDP can detect: a closed port of the robot, and a missing route.
-If the options contain no address, the first sender becomes the robot, and opening waits for this
-sender.
+If the options contain no address, opening waits for the first datagram, and its sender becomes the
+robot.
 
 If the receive queue is full, the oldest datagrams are dropped and counted in `dropped`.
 """
@@ -36,7 +36,7 @@ _RECVERR = {socket.AF_INET: (socket.IPPROTO_IP, 11), socket.AF_INET6: (socket.IP
 """Linux socket option IP_RECVERR, which Python does not define. IP_RECVERR also reports refusals on
 unconnected sockets."""
 _LOST_HERE = (errno.ENOBUFS, errno.EAGAIN, errno.ENOMEM)
-"""Errors that mean the local loss of a datagram, which UDP permits."""
+"""Errors that mean that this machine lost a datagram, which UDP permits."""
 _NO_WAY = (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENETDOWN, errno.EADDRNOTAVAIL)
 
 _Address = tuple[str | int, ...]
@@ -59,7 +59,7 @@ class UdpTransport:
 
         Args:
             host: name or address of the robot; "" to accept the first sender.
-            port: port of the robot, 1 to 65535; 0 for the source port of its datagrams.
+            port: port of the robot, 1 to 65535; 0 to use the source port of the robot's datagrams.
             listen: local port; 0 lets the system choose.
             bind: local address; "" for all addresses of this machine.
             accepts_any: whether to accept datagrams from any sender, instead of only from `host`.
@@ -241,7 +241,7 @@ class UdpTransport:
             self._take_fault(fault, 0)
 
     def _take_fault(self, fault: OSError, length: int) -> None:
-        """End the connection because of an error, and raise the error.
+        """End the connection because of an error, and raise this error.
 
         Raises:
             TransportError: always.

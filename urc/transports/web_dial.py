@@ -64,7 +64,7 @@ class Dialer:
             raise ConnectFailed(self._address.explain(fault)) from fault
 
     def unsent(self, line: socket.socket) -> int:
-        """Return the number of unacknowledged bytes of `line`, a socket returned by `plug`."""
+        """Return the number of unacknowledged bytes of `line`, a socket that `plug` returned."""
         return unsent_in(line) + (unsent_of(self._carried) if self._bridges else 0)
 
     async def reset(self, line: socket.socket) -> None:

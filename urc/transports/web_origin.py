@@ -37,7 +37,7 @@ class WebOrigin(NamedTuple):
 
 
 class OptionReader:
-    """A reader of the options of one transport; each invalid option raises a one-line error."""
+    """A reader of one transport's options; an invalid option raises a one-line error."""
 
     def __init__(self, kind: str, options: Mapping[str, object]) -> None:
         """Read the `options` of a transport of type `kind`."""
@@ -113,7 +113,7 @@ class OptionReader:
         return seconds
 
     def place(self, plain: str) -> WebOrigin:
-        """Return the target of the option `url`; with TLS, its scheme is `plain` + ``s``."""
+        """Return the target in the option `url`; for TLS, its scheme is `plain` + ``s``."""
         url = self.text("url")
         wanted = f"{self.kind} needs a url such as {plain}://192.168.4.1/, not {url!r}"
         try:
@@ -133,7 +133,7 @@ class OptionReader:
         return WebOrigin(is_secure, host, port or (443 if is_secure else 80), path)
 
     def headers(self) -> dict[str, str]:
-        """Return the option `headers` as a mapping of name → value."""
+        """Return the option `headers` as a mapping from names to values."""
         found: dict[str, str] = {}
         for name, value in self.part("headers").entries():
             text = str(value).strip()
@@ -166,7 +166,7 @@ class OptionReader:
         return Credentials(kind, user, auth.text("password"))
 
     def tls(self, place: WebOrigin) -> Tls | None:
-        """Return the TLS settings for `place`, or None if its scheme has no TLS."""
+        """Return the TLS settings for `place`, or None if the scheme of `place` has no TLS."""
         option = self._options.get("tls")
         if place.is_secure:
             return Tls.of(self.kind, option or True)

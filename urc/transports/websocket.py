@@ -2,8 +2,8 @@
 
 Each WebSocket message is one payload. Only a few messages are read ahead, and further messages stay
 in the kernel's queue, so a flooding robot must wait. `send` returns after the kernel has accepted
-every byte. A lost robot is detected by missing replies to pings. Unsent data is never kept after
-the end of a connection.
+every byte. A lost robot is detected by missing replies to pings. Unsent data is discarded at the
+end of a connection.
 """
 
 import asyncio
@@ -70,7 +70,7 @@ class WebSocketTransport:
         return f"websocket ws{'s' * place.is_secure}://{place.authority}{place.path}"
 
     async def open(self, timeout_s: float) -> None:
-        """Connect and shake hands, or raise `ConnectFailed` within `timeout_s` seconds."""
+        """Connect and do the handshake, or raise `ConnectFailed` within `timeout_s` seconds."""
         await self.close()
         where = self._place.authority
         try:
@@ -130,7 +130,7 @@ class WebSocketTransport:
             await self._dialer.close()
 
     async def probe(self) -> None:
-        """Send a ping; return after any data has arrived since the call."""
+        """Send a ping, and return as soon as any data has arrived."""
         connection = self._socket
         if not isinstance(connection, _Connection):
             raise PeerClosed(CLOSED)
@@ -225,7 +225,7 @@ class _Connection(ClientConnection):
 
 
 class _Connect(connect):
-    """A WebSocket connector without redirects, because a robot must not lead URC elsewhere."""
+    """A WebSocket connector that refuses redirects, because they could lead to another server."""
 
     def process_redirect(self, exc: Exception) -> Exception | str:
         return exc

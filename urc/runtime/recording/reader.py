@@ -45,7 +45,7 @@ class Recording(NamedTuple):
     """Time of the first message, in nanoseconds since 1970."""
     end_ns: int
     topics: Mapping[Any, str] = NOTHING
-    """Channel number → topic, from the summary at the end of the file."""
+    """Topic of each channel, by channel number, from the summary at the end of the file."""
     unread_bytes: int = 0
     """Number of unreadable bytes at the end; -1 for a readable file without a proper end."""
 

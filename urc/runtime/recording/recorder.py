@@ -89,7 +89,7 @@ class Recorder:
         self.is_begun = False
         """Whether the file has been created."""
         self.counts: Counter[str] = Counter()
-        """Topic → number of messages written so far."""
+        """Number of messages written so far, by topic."""
         self._is_folder = is_folder
         self._profile = profile
         self._document = document

@@ -217,7 +217,7 @@ class RecordingEncoder:
         return WIRE + traffic.transport, self._now(traffic.time_s), _json(told)
 
     def _now(self, time_s: float) -> int:
-        """Return `time_s`, or the last used time if later: playback follows the order of the file.
+        """Return `time_s` or the last used time, whichever is later; recorded times never decrease.
 
         The time of a reading is the arrival of its first byte; the time of traffic is its arrival.
         """

@@ -1,8 +1,8 @@
 """Checks of topics against the graph of a ROS system.
 
 A ROS connection reports no error for a topic that does not exist, has a different type, or has no
-subscribers. A connection with access to the graph, such as rosapi, passes its data to a
-`TopicGraph`, which reports each mistake once. No I/O.
+subscribers. A connection with access to the graph, such as rosapi, passes the topics to a
+`TopicGraph`. The `TopicGraph` reports each mistake once. No I/O.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -11,7 +11,7 @@ from typing import Final
 __all__ = ["TopicGraph", "version_of"]
 
 MAX_TOLD: Final = 256
-"""Maximum number of remembered reports; beyond this limit, further mistakes are not reported."""
+"""Maximum number of remembered reports; after this number, further mistakes are not reported."""
 
 
 class TopicGraph:
@@ -72,7 +72,7 @@ class TopicGraph:
 
 
 def version_of(types: Iterable[str]) -> int | None:
-    """Return the ROS version that matches the form of the type names; None if unknown."""
+    """Return the ROS version that uses this form of type names; None if unknown."""
     words = [len(name.split("/")) for name in types if name]
     if not words:
         return None

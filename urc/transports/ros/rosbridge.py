@@ -2,20 +2,20 @@
 
 Theory of operation. Each connection is one WebSocket of URC's WebSocket transport, with pings. The
 protocol over the WebSocket is implemented by roslibpy (`urc.transports.ros.rosbridge_client`). The
-state of roslibpy ends with the connection, so no data can be sent late. A task reads continuously,
-however slowly messages are consumed: one stalled reader would freeze the topic for every client of
-the bridge.
+objects of roslibpy are discarded with the connection, so no data can be sent late. A task reads
+continuously, even if messages are consumed slowly: one stalled reader would freeze the topic for
+every client of the bridge.
 
 A bridge delivers the first message of a topic only after its publisher has connected to the
-subscribers. If the client leaves earlier, the message is dropped. Clients therefore call `settle`
-before leaving: the method queries rosapi and waits for the subscribers. The reply of rosapi also
-shows that the bridge has processed all earlier data.
+subscribers. If the client disconnects earlier, the message is dropped. Clients therefore call
+`settle` before disconnecting: the method queries rosapi and waits for the subscribers. The reply of
+rosapi also shows that the bridge has processed all earlier data.
 
-The bridge reports no errors: a topic without a publisher, a wrong type and an access restriction
-all cause silence. The transport therefore asks rosapi for the list of topics at the start, and for
-a topic's subscribers at its first message. `urc.transports.ros.graph` reports mistakes. With
-``version: auto``, subscriptions wait for the list of topics, which determines the form of type
-names.
+The bridge reports no errors. A topic without a publisher, a wrong type and an access restriction
+all result in missing messages. The transport therefore asks rosapi for the list of topics at the
+start, and for a topic's subscribers at its first message. `urc.transports.ros.graph` reports
+mistakes. With ``version: auto``, subscriptions wait for the list of topics, which determines the
+form of type names.
 """
 
 import asyncio
@@ -49,7 +49,7 @@ _WEBSOCKET = ("auth", "headers")
 """Options that are passed to the WebSocket transport."""
 
 _ANSWER_S = 3.0
-"""Timeout of rosapi, in seconds; afterwards, rosapi counts as missing."""
+"""Maximum wait for a reply of rosapi, in seconds; without a reply, rosapi counts as missing."""
 _CONNECTS_S = 1.0
 """Time for which a bridge keeps a message for new subscribers, in seconds."""
 _LOOK_S = 0.2
@@ -116,7 +116,7 @@ class RosbridgeTransport:
         return await self._session.queue.pop()
 
     async def send(self, data: Payload) -> None:
-        """Publish, call a service, or start or cancel a goal; return once the kernel has the data.
+        """Publish, call a service, or start or cancel a goal; return when the kernel has the data.
 
         Raises:
             PeerClosed: the connection broke.
@@ -149,7 +149,7 @@ class RosbridgeTransport:
         return "" if self._session is None else await self._session.settle()
 
     async def probe(self) -> None:
-        """Probe the bridge; return after the bridge has sent any data since the call."""
+        """Probe the bridge, and return as soon as the bridge has sent any data."""
         await self._wire.probe()
 
     def unsent(self) -> int:
@@ -223,7 +223,7 @@ def _listening(topic: str, attributes: Mapping[str, Value]) -> RosSubscription:
 
 
 def _merged(wanted: list[RosSubscription]) -> tuple[RosSubscription, ...]:
-    """Return one subscription per topic, because a second one would cancel the first throttle."""
+    """Return one subscription per topic, because a second one cancels the first one's throttle."""
     found: dict[str, RosSubscription] = {}
     for one in wanted:
         other = found.setdefault(one.topic, one)
@@ -272,7 +272,7 @@ class _Session:
             await self._write(self._client.listen(one))
 
     async def perform(self, envelope: Envelope) -> None:
-        """Send the rosbridge operation that corresponds to an envelope."""
+        """Send an envelope as a rosbridge operation."""
         frames = self._client.perform(envelope)
         if envelope.verb == "publish":
             topic = str(envelope.attributes.get("topic"))
@@ -283,7 +283,7 @@ class _Session:
         await self._write(frames)
 
     def _look_at(self, topic: str, kind: str) -> list[bytes]:
-        """Return a query for the topic's subscribers, to send with the topic's first message."""
+        """Return the query for a topic's subscribers, sent with the topic's first message."""
         if not self._graph.publishes(topic, kind):
             return []
 

@@ -1,13 +1,13 @@
 """The roslibpy protocol of a rosbridge connection, without roslibpy's network connection.
 
 roslibpy implements the rosbridge operations, their ids, and pending requests. The network
-connections of roslibpy are not used. These connections would replay old messages after a
-reconnection, fail on binary frames, and never probe the other side. The measurements are in
-docs/decisions. In this module, roslibpy's protocol writes into a list, and the transport sends the
-list over URC's socket. The transport passes received data to the protocol. Each object serves only
-one connection, so no state is carried over to the next connection.
+connections of roslibpy are not used. After a reconnection, roslibpy would send old messages again;
+roslibpy also fails on binary frames, and never probes the other side. The measurements are in
+docs/decisions. In this module, roslibpy's protocol writes frames into a list, and the transport
+sends these frames over URC's socket. The transport passes received data to the protocol. Each
+object serves only one connection, so no state is carried over to the next connection.
 
-The client has no I/O, task or thread.
+The client does no I/O, and uses no task or thread.
 """
 
 from collections.abc import Callable, Mapping
@@ -48,7 +48,7 @@ class RosClient:
     """A converter between envelopes and rosbridge operations, for one connection."""
 
     def __init__(self, queue: TopicReceiveQueue, ros: int | None) -> None:
-        """Deliver to `queue`; `ros` (1, 2, or None: as written) selects the form of type names."""
+        """Deliver messages to `queue`; `ros` is the ROS version of type names, or None."""
         self._queue = queue
         self._ros_version = ros
         self._protocol = _Protocol()
@@ -57,7 +57,7 @@ class RosClient:
         self._topics: dict[str, Any] = {}
         self._services: dict[str, Any] = {}
         self._goals: dict[str, tuple[str, object]] = {}
-        """roslibpy's id of a running goal → name of the action, and id of the request."""
+        """Action name and request id of each running goal, by roslibpy's goal id."""
 
     @property
     def unanswered(self) -> int:
@@ -218,7 +218,7 @@ _ENDS = frozenset(_OUTCOMES.values())
 
 
 class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no types
-    """roslibpy's protocol class, which writes into a list."""
+    """A version of roslibpy's protocol class that writes into a list."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -255,23 +255,23 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
         self._frames.append(payload)
 
     def send_ros_message(self, message: Any) -> None:
-        """Write an operation; unlike in roslibpy, failures raise an error."""
+        """Write an operation; unlike roslibpy, raise an error on a failure."""
         self.send_message(encode_operation(dict(message)))
 
     def send_ros_service_request(self, message: Any, callback: Any, errback: Any) -> None:
-        """Call a service like roslibpy; support not-a-number, and limit pending requests."""
+        """Call a service like roslibpy, but permit NaN values and limit pending requests."""
         self.send_ros_message(message)
         _keep(self._pending_service_requests, message["id"], (callback, errback))
 
     def send_ros_action_goal(
         self, message: Any, resultback: Any, feedback: Any, errback: Any
     ) -> None:
-        """Send an action goal like roslibpy; support not-a-number, and limit pending goals."""
+        """Send an action goal like roslibpy, but permit NaN values and limit pending goals."""
         self.send_ros_message({**message, "feedback": self.wants_feedback})
         _keep(self._pending_action_requests, message["id"], (resultback, feedback, errback))
 
     def _handle_action_result(self, message: Any) -> None:
-        """Process a result like roslibpy, but accept any status number."""
+        """Process an action result like roslibpy, but accept any status number."""
         resultback, _, errback = self._pending_action_requests.pop(message["id"])
         values = message.get("values", {})
         status = message.get("status")
@@ -282,7 +282,7 @@ class _Protocol(RosBridgeProtocol):  # type: ignore[misc] # roslibpy ships no ty
 
 
 class _Factory(EventEmitterMixin):  # type: ignore[misc] # roslibpy ships no types
-    """roslibpy's connection factory, which always counts as connected."""
+    """A version of roslibpy's connection factory that always counts as connected."""
 
     is_connected = True
 
@@ -295,7 +295,7 @@ class _Factory(EventEmitterMixin):  # type: ignore[misc] # roslibpy ships no typ
 
 
 class _Ros(Ros):  # type: ignore[misc] # roslibpy ships no types
-    """roslibpy's client with a given protocol instead of a network connection."""
+    """A version of roslibpy's client that uses a given protocol instead of a network connection."""
 
     def __init__(self, protocol: _Protocol) -> None:
         self._id_counter = 0
@@ -310,7 +310,7 @@ class _Topic(Topic):  # type: ignore[misc] # roslibpy ships no types
 
 
 def _ignore(said: object) -> None:
-    """Ignore the status or the failure of an internal query, because the bridge logs failures."""
+    """Ignore the status or the failure of an internal query; the bridge logs failures."""
 
 
 def _keep(table: dict[str, object], name: str, waiting: object) -> None:

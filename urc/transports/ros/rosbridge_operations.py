@@ -1,8 +1,9 @@
 """Conversion between WebSocket frames and rosbridge operations, with size limits.
 
 Pure. A frame is JSON text, or CBOR for subscriptions that request CBOR. An operation may arrive in
-fragments, or as a PNG image with JSON text in its pixels. JSON has no not-a-number and no
-infinities, so the bridge writes null; CBOR values are converted in the same way.
+fragments, or as a PNG image with JSON text in its pixels. JSON has no NaN (not a number) and no
+infinities, so the bridge writes null. This module also converts the NaN and infinite values of CBOR
+data to null.
 """
 
 import base64
@@ -26,10 +27,10 @@ MAX_PNG_BYTES = 2 * 1024 * 1024
 """Maximum length of the text in an image, in bytes; decoding text of this length in Python takes
 one second."""
 MAX_VALUES = 2_000_000
-"""Maximum number of commas and brackets, because an empty list takes three bytes as text but fifty
-in memory."""
+"""Maximum number of commas and brackets; the limit exists because an empty list takes three bytes
+as text but fifty in memory."""
 _MANY_VALUES = 100_000
-"""Maximum number of values in CBOR data with shared references; processing this number takes a
+"""Maximum number of values in CBOR data with shared references; processing this many values takes a
 tenth of a second."""
 _CBOR_MAP = b"\xa0"
 """First byte of a CBOR map or of a higher CBOR type; JSON text never begins with these bytes."""
@@ -49,7 +50,7 @@ class BadOperation(ValueError):
 
 
 def encode_operation(operation: Mapping[str, object]) -> bytes:
-    """Encode an operation as JSON; bytes become base64, and not-a-number becomes null.
+    """Encode an operation as JSON; bytes become base64, and NaN values become null.
 
     Raises:
         BadOperation: a value cannot be written as JSON.
@@ -65,9 +66,10 @@ class OperationReader:
 
     def __init__(self) -> None:
         self._halves: dict[str, dict[int, str]] = {}
-        """Id of a fragmented operation → its fragments by number."""
+        """Fragments of each incomplete operation, by operation id and fragment number."""
         self._sizes: dict[str, int] = {}
-        """Id of a fragmented operation → total number of characters in its fragments."""
+        """Total number of characters in the fragments of each incomplete operation, by operation
+        id."""
 
     def read(self, frame: bytes) -> dict[str, Any] | None:
         """Return the operation of a frame, or None for an incomplete operation.
@@ -145,7 +147,7 @@ def _read_cbor(data: bytes) -> object:
 
 
 def _tagged(first: Any, second: Any) -> object:
-    """Return the numbers of a tagged array; cbor2 passes the tag first since version 6."""
+    """Return the numbers of a tagged array; cbor2 passes the tag first since its version 6."""
     tag = first if hasattr(first, "tag") else second
     code, data = _NUMBERS.get(tag.tag), tag.value
     if code is None or not isinstance(data, bytes) or len(data) % struct.calcsize(code):
@@ -154,19 +156,19 @@ def _tagged(first: Any, second: Any) -> object:
 
 
 class _Plain:
-    """A converter of CBOR values to JSON-like values, with a limit on their expansion.
+    """A converter of CBOR values to JSON-like values, with a limit on the size of the result.
 
-    CBOR values may refer to earlier values with further references, so a few bytes could expand
-    without limit.
+    References in CBOR data may be nested, so a few bytes could expand without limit.
     """
 
     def __init__(self, size: int) -> None:
-        """Prepare the conversion of a frame of `size` bytes; values take at least one byte each."""
+        """Prepare the conversion of a frame of `size` bytes; each value takes at least one byte."""
         self._room = MAX_BYTES
-        """Remaining bytes of the result; every value counts as at least one byte."""
+        """Remaining size of the result, in bytes; every value counts as at least one byte."""
         self._values = max(size, _MANY_VALUES)
         self._left = self._values
-        """Remaining number of values, limited because even small values take time."""
+        """Remaining number of values that may be converted; the number is limited because even
+        small values take time."""
 
     def of(self, value: Any) -> Any:
         """Return `value` with null in place of numbers that JSON cannot express."""
@@ -205,7 +207,7 @@ def _png_text(operation: Mapping[str, Any]) -> bytes:
 
 
 def _pixels(image: bytes) -> bytes:
-    """Return the pixel bytes of a non-interlaced 8-bit RGB image, the format of the bridge."""
+    """Return the pixel bytes of a non-interlaced 8-bit RGB image, the bridge's only format."""
     if not image.startswith(_PNG_MAGIC):
         raise BadOperation("the png data is not a PNG image")
     width = height = 0

@@ -9,7 +9,7 @@ def spelled(name: str, kind: str, ros: int | None) -> str:
     Args:
         name: ``pkg/Type`` or ``pkg/msg/Type``; an empty name stays empty.
         kind: middle part of the name: ``msg``, ``srv`` or ``action``.
-        ros: ROS version 1 or 2; None: return the name as written.
+        ros: ROS version 1 or 2; None to return the name as written.
     """
     words = name.split("/")
     if ros is None or not all(words) or len(words) not in (2, 3):
