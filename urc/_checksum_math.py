@@ -1,7 +1,7 @@
 """Checksum algorithms: parameters, and functions that compute checksums of bytes.
 
-CRCs are computed by `anycrc`, except for two CRCs in `zlib` and `binascii`. Each sum or fold is one
-call of a C function.
+CRCs are computed by `anycrc`, except for two CRCs in `zlib` and `binascii`. A sum checksum or fold
+checksum takes a single call of a C function.
 """
 
 import binascii
@@ -55,7 +55,8 @@ class FoldSpec(NamedTuple):
     ored: int = 0
     """Mask of the bits to set in the result as the last step."""
     is_odd_xored: bool = False
-    """Whether an odd last byte is combined by XOR; only for 16-bit numbers."""
+    """Whether the last byte of an odd number of bytes is combined by XOR; only for 16-bit
+    numbers."""
 
 
 FOLDED: Final = {
@@ -65,7 +66,7 @@ FOLDED: Final = {
     "xor8": FoldSpec("xor"),
     "lrc": FoldSpec("sum", complement="twos"),
 }
-"""Parameters of common folds, by name."""
+"""Parameters of common fold checksums, by name."""
 PLAIN_CHECKSUMS: Final = {
     "adler32": 32,
     "fletcher8": 8,
@@ -74,7 +75,7 @@ PLAIN_CHECKSUMS: Final = {
     "fletcher32": 32,
     "internet": 16,
 }
-"""Result widths in bits of the algorithms without parameters, by name."""
+"""Width of the result, in bits, of each algorithm without parameters, by name."""
 
 
 def algorithm_of(name: str) -> CrcSpec | FoldSpec | str | None:
@@ -169,7 +170,7 @@ def _numbers(data: bytes, size: int, order: str) -> list[int]:
 
 
 def _fletcher(modulus: int, bits: int, size: int = 1) -> Compute:
-    """Return Fletcher's checksum of little-endian numbers of `size` bytes."""
+    """Return the Fletcher checksum of little-endian numbers of `size` bytes each."""
 
     def compute(data: bytes) -> int:
         numbers = data if size == 1 else _numbers(data, size, "little")

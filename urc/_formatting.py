@@ -1,7 +1,7 @@
 """Text forms of values in templates, joined lists, paths, topics and messages.
 
-Private to expressions. Equal numbers have the same text, whether received as 20 or 20.0. The text
-has the minimum number of digits that identify the number. Numbers have no exponents, because few
+Private to expressions. Equal numbers have the same text, whether received as 20 or 20.0. A number
+is written with the fewest digits that identify the number. Numbers have no exponents, because few
 robots can parse exponents.
 """
 
@@ -34,7 +34,7 @@ def spelt(value: object) -> str:
 def quoted(value: object, most: int = 40) -> str:
     """Return the text of a value for messages to people: quoted text, or bytes as hex digits.
 
-    Control characters are escaped exactly once, to protect terminals.
+    Control characters are escaped exactly once, so a value cannot control the terminal.
 
     Args:
         value: any value from a robot, a page or a document.

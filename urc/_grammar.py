@@ -1,9 +1,9 @@
 """Translation of expressions into Python source, for the supported subset of Jinja.
 
 Private to `urc.expressions`. Grammar and precedence follow Jinja ("Expressions" in the template
-designer documentation of Jinja). A custom parser can report the column of every error, and avoids
-40 ms for importing a template engine. `tests/unit/test_expressions.py` compares this parser with
-Jinja.
+designer documentation of Jinja). A custom parser can report the column of every error, and saves
+the 40 ms for the import of a template engine. `tests/unit/test_expressions.py` compares this parser
+with Jinja.
 
 WARNING: the generated Python source is passed to eval. The source may contain only the `repr()` of
 constants, results of `resolve`, and names of `urc.filters.table.SCOPE`.
@@ -42,9 +42,9 @@ _TESTS = (
 )  # fmt: skip
 _PATTERNS = ("match", "search")
 COUNTERS: Final = "seq()"
-"""Root name for the counters in a namespace; documents cannot use this name."""
+"""Name of the counters in the namespace of an expression; documents cannot use this name."""
 NONCE: Final = "nonce()"
-"""Root name for the nonce in a namespace; documents cannot use this name."""
+"""Name of the nonce in the namespace of an expression; documents cannot use this name."""
 _MOST_NONCE: Final = 64
 _NONCE_ALONE = re.compile(r"\(\d+\)")
 _COUNTER = re.compile(r"[a-z][a-z0-9_]{0,63}")
@@ -128,7 +128,7 @@ class _Parser:
         return token
 
     def _accept(self, text: str) -> bool:
-        """Skip the next token if equal to `text`, unless the token is a string literal."""
+        """Skip the next token if it equals `text` outside quotes; return whether it was skipped."""
         if self._next.text == text and self._next.kind in ("operator", "name"):
             self._place += 1
             return True

@@ -45,7 +45,7 @@ class Mark:
 
 
 class UnfilledText(NamedTuple):
-    """A text before the substitution of names."""
+    """The original of a text in which names were substituted."""
 
     text: str
     edits: tuple[tuple[int, int, int], ...]

@@ -59,7 +59,8 @@ def plain_reader(number: Number) -> Callable[[bytes, int], Any]:
 def plain_writer(number: Number) -> Callable[[Any], bytes]:
     """Return a function that encodes a raw number within the range of the type.
 
-    The function raises `OverflowError` or `struct.error` if a float is too large for 16 or 32 bits.
+    The returned function raises `OverflowError` or `struct.error` if a float is too large for 16 or
+    32 bits.
     """
     code = format_of(number)
     if not code:
@@ -73,7 +74,7 @@ def reader_of(
 ) -> Callable[[bytes, int, int], tuple[Any, int]]:
     """Return a function that reads a number from data between two offsets.
 
-    The function raises `fault` for an invalid number.
+    The returned function raises `fault` for an invalid number.
     """
     if number.is_variable:
         return _varint_reader(fault, is_zigzag=number.kind == "zigzag")

@@ -1,14 +1,14 @@
 r"""Regular expressions of documents, with matching in linear time.
 
-Private to `urc.patterns` and `urc.filters.lists`. The dialect of all patterns is RE2, without
-look-around and back-references. In this dialect, ``$`` matches only the end of the text, and ``\d``
+Only `urc.patterns` and `urc.filters.lists` use this module. The dialect of all patterns is RE2,
+without look-around and back-references. In RE2, ``$`` matches only the end of the text, and ``\d``
 only ASCII digits. Patterns that `_is_linear` proves linear run on `re`, which is ten times faster
 for short lines. Other patterns run on RE2, or are refused if RE2 is not installed.
 
 Theory of operation: backtracking takes more than linear time only if two parts of a pattern can
 match the same characters in many ways. A proven pattern must therefore have a start anchor, and
-alternatives with different first characters. Every repeat must be over one set of characters,
-disjoint from the possible next characters.
+alternatives with different first characters. Every repeat must match a single set of characters,
+without any character that may follow the repeat.
 
 The run time of RE2 is proportional to the size of the text and to the size of the program, with
 expanded ``{n}``. The size of an unproven pattern is therefore limited. This module computes the
@@ -47,7 +47,8 @@ _RE2_BYTES: Final = 4 << 20
 """Memory limit of RE2 for one pattern. With only 1 MiB, RE2 is a hundred times slower for repeats
 of optional parts."""
 _BEYOND_ASCII: Final = 6
-"""Number of RE2 instructions for all non-ASCII characters, which RE2 matches byte by byte."""
+"""Number of RE2 instructions for the set of all non-ASCII characters, which RE2 matches byte by
+byte."""
 
 _OTHER = 128
 """Code that represents all non-ASCII characters."""
@@ -180,9 +181,9 @@ def example(pattern: Pattern, groups: Mapping[str, str], variant: int = 0) -> st
     Args:
         pattern: pattern to match.
         groups: texts of the named groups, by name.
-        variant: number of the text variant. Variant 0 omits optional parts without given groups,
-            and contains the first alternatives and the first printable characters. Other variants
-            contain other alternatives, characters and repeats.
+        variant: number of the text variant. Variant 0 omits every optional part without one of
+            `groups`, and uses the first alternatives and the first printable characters. Other
+            variants use other alternatives, characters and numbers of repeats.
     """
     tree = _parser.parse(pattern.source, re.ASCII)
     names = {number: name for name, number in tree.state.groupdict.items()}

@@ -1,7 +1,7 @@
 """Translatable texts for people.
 
 A phrase stores the English text and the values, for later translation by `urc.web.words`.
-`scripts.translations` finds the texts as arguments of `phrase`.
+`scripts.translations` collects the texts to translate from the calls of `phrase`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -18,7 +18,7 @@ class Phrase(str):
     """English text with a placeholder ``{name}`` for each of `names`."""
     names: Mapping[str, str]
     pieces: tuple[str, ...]
-    """Parts of a joined phrase, for which `text` is empty."""
+    """Parts of a joined phrase; `text` is then empty."""
     between: str
 
 

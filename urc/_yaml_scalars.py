@@ -12,7 +12,7 @@ __all__ = ["DIGITS_MAX", "resolve_plain"]
 
 DIGITS_MAX: Final = 40
 """Maximum number of characters in a number. Python converts long numbers in quadratic time, and
-refuses thousands of digits."""
+refuses numbers with thousands of digits."""
 _SCALAR = re.compile(
     r"""(?P<null>~|null|Null|NULL|)
     |(?P<true>true|True|TRUE)|(?P<false>false|False|FALSE)

@@ -37,7 +37,7 @@ class DocumentLimits(NamedTuple):
 
 
 class StoppedError(Exception):
-    """Reading has stopped at an error; the last problem of the reader has the reason."""
+    """Reading has stopped at an error; the last problem of the reader states the reason."""
 
 
 class _Built(NamedTuple):
@@ -290,7 +290,7 @@ class TreeReader:
         return not self._line(end.line)[end.column :].lstrip().startswith(":")
 
     def _report_comma(self, event: Any, before: Any) -> None:
-        """Report a key without a colon as the rest of the text `before`."""
+        """Report a key without a colon: the key is the rest of the text `before`, after a comma."""
         self._report(
             event,
             "unquoted",

@@ -1,10 +1,10 @@
 """Templates and expressions in documents: a subset of Jinja, compiled to Python functions.
 
 `urc._grammar` defines the supported subset. Expressions are a sandbox: no attributes of Python
-objects, no loops, and no operator that expands a short text. Filters of `urc.filters.table` are the
-only functions. Literal text is preserved exactly, whereas Jinja converts CR to LF and drops a final
-newline. URC raises errors that Jinja hides (``'abc' | int`` is 0), because a wrong reading must not
-become zero.
+objects, no loops, and no operator that turns a short text into a very long text. Filters of
+`urc.filters.table` are the only functions. Literal text is preserved exactly, whereas Jinja
+converts CR to LF and drops a final newline. URC raises errors that Jinja hides (in Jinja, ``'abc' |
+int`` is 0), because a wrong reading must not become zero.
 
 The result of a template with only one ``{{ expression }}`` keeps the type of the expression.
 """
@@ -39,10 +39,10 @@ __all__ = [
 ]
 
 NOW: Final = "now"
-"""Root name for the current Unix time, in seconds."""
+"""Name of the current Unix time in expressions, in seconds."""
 _HASHES: Final = frozenset(f"_filter_{name}" for name in ("md5", "sha1", "sha256", "hmac_sha256"))
 _SUMMARIES: Final = frozenset(("_filter_length", "_is_defined", "_is_none", "_match", "_search"))
-"""Functions with results that reveal almost nothing about the operands."""
+"""Functions that reveal almost nothing about the operands, such as a length."""
 _NONCE: Final = re.compile(rf"ns\['{re.escape(NONCE)}'\]\(\d+\)")
 MAX_SOURCE: Final = 4096
 """Maximum length of a template, in characters."""
@@ -70,7 +70,7 @@ class ExpressionError(UrcError):
 
 
 class Template:
-    """A compiled template. Immutable templates with equal source are equal."""
+    """A compiled template. Templates are immutable, and templates with equal source are equal."""
 
     __slots__ = ("_function", "is_constant", "names", "python", "settings", "source")
 
@@ -78,7 +78,7 @@ class Template:
         self.source = source
         """Source of the template, as in the document."""
         self.python = python
-        """Source of the Python expression, over a mapping `ns`."""
+        """Python source of the expression, which reads all names from a mapping `ns`."""
         self.names = names
         """Root names in the expression, such as ``settings``, arguments and signals."""
         self.settings = settings
@@ -269,7 +269,7 @@ def _gather(node: ast.AST, needed: set[str], spare: set[str], *, has_default: bo
 
 
 def digested_settings(template: Template) -> frozenset[str]:
-    """Return the settings that appear only in tests, and in hashes with a nonce or time.
+    """Return the settings that an expression uses only in tests, or in hashes with a nonce or time.
 
     A hash with a nonce or time does not reveal a setting, and cannot be replayed.
     """

@@ -11,7 +11,8 @@ from typing import Final
 __all__ = ["MAX_PIXELS", "media_type", "picture_size", "pixels"]
 
 MAX_PIXELS: Final = 16_000_000
-"""Maximum number of pixels of an image. An image of this size takes 64 MB in a browser."""
+"""Maximum number of pixels of an image. An image with this number of pixels takes 64 MB of memory
+in a browser."""
 
 _OTHER: Final = "application/octet-stream"
 _SIGNS: Final = (
@@ -39,10 +40,10 @@ def media_type(data: bytes) -> str:
 
 
 def picture_size(data: bytes) -> tuple[int, int] | None:
-    """Return the width and height of an image in pixels; None if the first bytes lack the size.
+    """Return the width and height of an image in pixels; None if `data` ends before the size.
 
-    The result for AVIF is always None: the size is in nested boxes, and browsers limit the size
-    themselves.
+    The result for AVIF is always None: the size is in nested boxes, and browsers limit the size of
+    AVIF images themselves.
     """
     read = _READERS.get(media_type(data))
     try:
@@ -52,7 +53,7 @@ def picture_size(data: bytes) -> tuple[int, int] | None:
 
 
 def pixels(data: bytes) -> int:
-    """Return the number of pixels of an image; 0 if the first bytes lack the size."""
+    """Return the number of pixels of an image; 0 if `data` ends before the size."""
     width, height = picture_size(data) or (0, 0)
     return width * height
 

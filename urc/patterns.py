@@ -1,6 +1,6 @@
 """Regular expressions in documents, limited to patterns with linear run time.
 
-The implementation is in `urc._patterns`, for patterns and for expressions.
+`urc._patterns` contains the implementation, which expressions also use.
 """
 
 from urc._patterns import (

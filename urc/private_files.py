@@ -1,4 +1,4 @@
-"""Atomic writing of private files that survives a power failure.
+"""Atomic writing of private files: after a power failure, a file has its old or its new content.
 
 The files contain persistent data: settings, a latched STOP, host keys.
 """

@@ -55,7 +55,7 @@ class Problem(NamedTuple):
     code: str
     """Code of the problem, such as ``unknown-key``."""
     message: str
-    """One-line message with the found and the expected content."""
+    """One-line message that states the found and the expected content."""
     file: str
     line: int = 1
     """1-based."""
@@ -86,7 +86,7 @@ def printable(text: str) -> str:
 
 
 def printable_json(text: str) -> str:
-    """Return equivalent JSON with control and bidirectional characters as JSON escapes."""
+    """Return the JSON text with control and bidirectional characters as JSON escapes."""
     return text.translate(_IN_JSON)
 
 

@@ -1,9 +1,10 @@
 """Tables that map words in documents to implementations.
 
-Each row contains the import path of a factory. Factories are imported on first use, so a robot on
-TCP never loads SSH. The top layer passes all tables as one `Registries` to lower layers. Passing
-the tables down avoids imports between modules of one layer. Third-party packages add rows through
-the entry-point groups ``urc.transports`` and ``urc.framings``.
+Each row contains the import path of a factory. Factories are imported on first use: a robot with
+only a TCP transport never loads the SSH code. The top layer passes all tables as one `Registries`
+to lower layers. Because the tables are passed down, modules of one layer need not import each
+other. Third-party packages add rows through the entry-point groups ``urc.transports`` and
+``urc.framings``.
 """
 
 from collections.abc import Iterator, Mapping

@@ -86,7 +86,7 @@ class Document:
         return [0, *(end.end() for end in ends.finditer(self.text))]
 
     def source_of(self, path: Path) -> "Document":
-        """Return the document whose text contains the value at `path`, or its nearest parent."""
+        """Return the document with the text of the value at `path`, or of its nearest parent."""
         return self._nearest(path)[0]
 
     def problem(
@@ -151,7 +151,7 @@ class Document:
         return value if isinstance(value, str) else None
 
     def inside(self, mark: Mark, text: str | None, offset: int, length: int) -> Span | None:
-        """Return the position of some characters in a text of this document; None if unknown."""
+        """Return the position of characters of a value in the document's text; None if unknown."""
         written = mark.written
         if written is not None:
             end = written.offset(offset + length)
@@ -334,8 +334,8 @@ def _inside_lines(
 ) -> Span | None:
     """Return the position of a character in a multi-line scalar.
 
-    The function searches for each source line in the value. Block scalars, plain text, and quoted
-    text without escapes are supported.
+    To find the position, the function searches for each source line in the value. Block scalars,
+    plain text, and quoted text without escapes are supported.
     """
     position = 0
     last = min(span.end_line, len(lines))

@@ -35,7 +35,7 @@ FRAME_NAMES: Final = frozenset(("_size", "_left"))
 """Names that expressions of a struct can use in addition to its items. `_size` is the size of the
 whole frame in bytes. `_left` is the number of bytes from the start of the item to the end."""
 OUTER_NAMES: Final = frozenset(("settings", COUNTERS))
-"""Outer names that items of a named type may also use."""
+"""Names that expressions inside a named type may use in addition to the items of the type."""
 WORDS_OF_TYPES: Final = ("bytes", "text")
 
 
@@ -65,8 +65,8 @@ class Item(NamedTuple):
     size: Extent | None = None
     """Size of bytes, text, padding or a struct's window; None: unlimited."""
     times: Extent | None = None
-    """Length of an array. The name ``count`` is unavailable, because tuples have a ``count``
-    method."""
+    """Number of elements of an array. The name ``count`` is unavailable, because tuples have a
+    ``count`` method."""
     condition: Template | None = None
     """Condition under which the item is present; None: always present."""
     const: int | float | bool | bytes | None = None
@@ -88,9 +88,10 @@ class Item(NamedTuple):
     until: bytes = b""
     """Terminator of bytes or text without a declared size."""
     trim: int | None = None
-    """Padding byte that may be missing at the end of a struct's window, any number of times."""
+    """Padding byte of a trimmed struct: any number of these bytes may be missing at the end of the
+    struct."""
     is_lsb_first: bool = False
-    """Whether the first item of ``bits`` is the least significant."""
+    """Whether the first item of ``bits`` has the least significant bits."""
     items: tuple["Item", ...] = ()
     """Items of a ``struct``, or the parts of ``bits``."""
     switch: "Switch | None" = None

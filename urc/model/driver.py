@@ -65,7 +65,7 @@ class Backoff(NamedTuple):
 
 
 class TransportSpec(NamedTuple):
-    """A transport of a driver; `type` is a row of the transports table."""
+    """A transport of a driver; `type` is a transport type, such as ``tcp``."""
 
     name: str
     type: str
@@ -98,7 +98,7 @@ class TransportSpec(NamedTuple):
     errors: tuple[Pattern, ...] = ()
     """Patterns of error replies to any request."""
     faults: tuple[ErrorReply, ...] = ()
-    """Error replies to any request, decoded with any form."""
+    """Further error replies to any request; each declares a form for decoding."""
 
 
 class Reply(NamedTuple):
@@ -109,12 +109,13 @@ class Reply(NamedTuple):
     timeout_s: float | None = None
     """Reply timeout, in seconds; None: ``timeouts.reply`` of the transport."""
     match: Template | None = None
-    """Correlation condition over the fields, the arguments of the command, and the counters in the
-    request (``seq.NAME``). Without a correlation, replies arrive in the order of the requests."""
+    """Condition that identifies the reply to a request, over the reply's fields, the command's
+    arguments, and the request's counters (``seq.NAME``). Without a condition, replies must arrive
+    in the order of the requests."""
     stages: tuple[Stage, ...] = ()
     """Further replies that complete the request."""
     faults: tuple[ErrorReply, ...] = ()
-    """Error replies in addition to `errors`, decoded with any form."""
+    """Error replies in addition to `errors`; each declares a form for decoding."""
     framing: FramingSpec | None = None
     """Framing of the reply; None: the framing of the connection."""
     asides: ProvisionalReplies = ProvisionalReplies()
@@ -192,11 +193,11 @@ class Command(NamedTuple):
     description: str = ""
     priority: Priority = "normal"
     is_latest_only: bool = False
-    """Whether a newer call replaces a queued call of the same command."""
+    """Whether a new call of the command replaces a queued call."""
     rate_per_s: float | None = None
     """Average rate limit in calls per second, with bursts of two calls; None: unlimited."""
     is_idempotent: bool = False
-    """Whether repeated execution has the same effect as a single execution."""
+    """Whether repeating the command has the same effect as sending the command once."""
     retries: int = 0
     """Maximum number of retries after a timeout of an idempotent command, or at the robot's
     request. The value 0 means `RESENDS` if the robot may request retransmissions."""
@@ -210,7 +211,7 @@ class Command(NamedTuple):
     """Condition over the arguments for autonomous motion; None: every call moves if `moves` is
     true."""
     stops: bool = False
-    """Whether STOP sends this command; each STOP sends it once."""
+    """Whether STOP sends this command; each STOP sends the command once."""
     confirm: Confirm | None = None
     requires: tuple[Requirement, ...] = ()
     verify: Verify | None = None
@@ -233,7 +234,7 @@ class Poll(NamedTuple):
     """A request that is repeated while the robot is connected."""
 
     name: str
-    """Value of ``name:``, or a generated name such as ``polls.0``."""
+    """Name of the poll: the value of ``name``, or a generated name such as ``polls.0``."""
     transport: str
     every_s: float
     send: WriteSpec
@@ -245,7 +246,8 @@ class Poll(NamedTuple):
     arguments: Mapping[str, Reading] = NOTHING
     """Arguments of the command in `run`, including defaults."""
     when: Template | None = None
-    """Condition over fresh signals and settings for sending the request; None: always."""
+    """Condition for sending the request, over fresh signals and settings; None: the poll always
+    sends."""
     priority: Priority = "low"
     offline: Offline | None = None
 
@@ -269,7 +271,7 @@ class Driver(NamedTuple):
     messages: Mapping[str, Message] = NOTHING
     polls: tuple[Poll, ...] = ()
     discovery: tuple[str, ...] = ()
-    """DNS-SD service types of these robots, such as ``_rosbridge._tcp``."""
+    """DNS-SD service types of the robots, such as ``_rosbridge._tcp``."""
 
     def learnt(self, transport: str) -> frozenset[str]:
         """Return the names of the fields that a login reads, such as ``_nonce``.

@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 RESENDS = 3
-"""Default number of retransmissions at the robot's request, without ``retries``."""
+"""Default number of retransmissions at the robot's request, for commands without ``retries``."""
 
 Priority = Literal["realtime", "high", "normal", "low"]
 """Priority of a request. ``realtime`` requests ignore the queue, the minimum gap and pending
@@ -63,7 +63,7 @@ class Keepalive(NamedTuple):
 
 
 class ErrorReply(NamedTuple):
-    """A reply that reports a failure, decoded with any form."""
+    """A declared reply that reports a failure."""
 
     read: ReadSpec
     text: Template | None = None
@@ -78,7 +78,7 @@ class ProvisionalReplies(NamedTuple):
     extend: ReadSpec | None = None
     """Frame that reports a busy robot and extends the timeout; None: not supported."""
     extend_s: float = 600.0
-    """Maximum total extension of the timeout, in seconds, 0.001 to 3600."""
+    """Maximum total extension of the timeout by `extend` frames, in seconds, 0.001 to 3600."""
 
 
 class Stage(NamedTuple):

@@ -45,11 +45,11 @@ class Salt(NamedTuple):
 
     constant: bytes = b""
     offset: int = 0
-    """Offset of the number that selects from `table`."""
+    """Offset in the frame of the number that selects an entry of `table`."""
     size: int = 1
     is_big: bool = False
     table: Mapping[Any, bytes] = NOTHING
-    """Secret bytes, by the selecting number in the frame."""
+    """Secret bytes, by the number in the frame that selects the secret bytes."""
     otherwise: Literal["fault", "skip", "pass"] = "fault"
     """Handling of a frame with an unknown number: report and drop (``fault``), drop silently
     (``skip``), or accept unchecked (``pass``)."""
@@ -113,10 +113,11 @@ class LengthSpec(NamedTuple):
     adjust: int = 0
     unit: int = 1
     bits: int = 64
-    """Number of low bits that contain the length; the remaining bits belong to the payload."""
+    """Number of low bits of the length field that contain the length; the remaining bits belong to
+    the payload."""
     spelling: Spelling = "raw"
     is_counted: bool = False
-    """Whether the first `size` digits are the number of length digits that follow."""
+    """Whether the first `size` digits state the number of digits in the length."""
     until: bytes = b""
     """Terminator of a length field with at most `size` digits; b"": no terminator."""
     flag_at: int = -1
@@ -124,7 +125,7 @@ class LengthSpec(NamedTuple):
     valid."""
     flag_mask: int = 0
     """Mask of the flag byte. The length field is valid if any masked bit of the flag byte is set.
-    Without such a bit, the frame has `adjust` bytes."""
+    If the length field is invalid, the frame has `adjust` bytes."""
 
     @property
     def is_loose(self) -> bool:
@@ -141,7 +142,7 @@ class EscapeSpec(NamedTuple):
     """Replacements that follow the escape byte, by stuffed byte."""
     xor: int | None = None
     """XOR mask for decoding any stuffed byte, because a robot may stuff bytes outside `table`.
-    Without a mask, only bytes of `table` may be stuffed."""
+    Without an XOR mask, only bytes of `table` may be stuffed."""
     after: bytes = b""
     """Sequence after which `insert` is stuffed; `byte` and `table` are then unused."""
     insert: int = 0

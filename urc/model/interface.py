@@ -18,7 +18,8 @@ class OutputBinding(NamedTuple):
     """The mapping of a widget output's values to command arguments."""
 
     names: Mapping[str, str] = NOTHING
-    """Arguments of the output, by command argument; only for pairs with different names."""
+    """Name of the output's value, by argument of the command; only for pairs with different
+    names."""
     fixed: Mapping[str, Value] = NOTHING
     """Constant values for command arguments, by argument."""
 

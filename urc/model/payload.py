@@ -42,8 +42,8 @@ class Envelope(NamedTuple):
     ``request``. The transport delivers ``message``, ``response``, ``feedback`` and ``notice``."""
     attributes: Mapping[str, object] = NOTHING
     """Address and options: topic, type, method, path, headers, quality of service and so on. A
-    request and its response have the same ``id``. A response has ``ok``, and a failure also has a
-    ``reason``."""
+    request and its response have the same ``id``. Every response has the attribute ``ok``; a
+    response that reports a failure also has ``reason``."""
     body: object = None
     """Content of the envelope: JSON-like data, or bytes."""
 
@@ -56,7 +56,7 @@ Payload = bytes | Envelope
 
 
 class Count(NamedTuple):
-    """The effect of a frame on the counters of its connection."""
+    """The counters of a connection before and after a frame."""
 
     before: dict[str, int]
     """Last number of each used counter before the frame, by counter."""
@@ -86,7 +86,7 @@ class CountedFrame(NamedTuple):
 
 
 class FramingSpec(NamedTuple):
-    """Rules for cutting a byte stream into frames; `type` is a row of the framings table."""
+    """Rules for cutting a byte stream into frames; `type` is a framing, such as ``delimiter``."""
 
     type: str = "delimiter"
     options: Mapping[str, object] = NOTHING
@@ -152,8 +152,8 @@ class ReadSpec(NamedTuple):
     """Condition over the converted fields; if false, the frame does not match. Without a condition,
     every frame with the fields matches."""
     lines: int | Pattern | None = None
-    """Number of frames in the reply, or a pattern for the last frame. The reader receives the
-    frames of a reply joined by LF."""
+    """Number of frames in the reply, or a pattern that only the last frame matches. The reader
+    receives the frames of a reply as one text, joined by LF."""
     topic: Template | None = None
     """Template over settings for the source topic, on transports for messages; None: any topic."""
     collects: Mapping[str, Collect] = NOTHING
@@ -172,9 +172,9 @@ class WriteSpec(NamedTuple):
     specifications."""
     options: Mapping[str, object] = NOTHING
     names: frozenset[str] = frozenset()
-    """Root names in the templates."""
+    """Root names that the templates use."""
     settings: frozenset[str] = frozenset()
-    """Names of the settings in the templates, from ``settings.NAME``."""
+    """Names of the settings that the templates use as ``settings.NAME``."""
 
 
 def each_of(send: WriteSpec) -> tuple[WriteSpec, ...]:

@@ -27,7 +27,7 @@ __all__ = [
 
 
 class Setting(NamedTuple):
-    """A value that the operator fills in or sets with ``--set``."""
+    """A value of a robot that the operator fills in on a page or sets with ``--set``."""
 
     name: str
     type: Literal["string", "host", "port", "integer", "number", "boolean", "choice", "path"]
@@ -103,10 +103,10 @@ class DialogueStep(NamedTuple):
     leaves: bool = False
     """Whether the operator disconnects: all connections close in an orderly way."""
     sent: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
-    """Expected output since the previous check, by transport; (): no output."""
+    """Expected output of URC since the previous check, by transport; (): no output."""
     expect: Mapping[str, Expected] = NOTHING
     reply: Mapping[str, Value | tuple[Value, ...]] | None = None
-    """Expected reply values of the first completed command that no step has checked."""
+    """Expected reply values of the oldest completed command that no step has checked."""
     of: str = ""
     """Name of the command that `reply` or `fails` refers to; "": any command."""
     fails: str = ""
@@ -154,7 +154,7 @@ class Reaction(NamedTuple):
     """One reaction of the emulated robot; the actions run in the order of the attributes."""
 
     after_s: float = 0.0
-    """Time since the previous reaction, in seconds."""
+    """Delay after the previous reaction, in seconds."""
     sets: Mapping[str, Template | Reading] = NOTHING
     """New values, or templates for new values, by signal or state variable."""
     answers: bool = False
@@ -174,16 +174,17 @@ class SimulatorRule(NamedTuple):
 
     transport: str
     match: Pattern | ReadSpec | None = None
-    """Matching frames: a text pattern, or a form for decoding."""
+    """Text pattern or form for the received frames; None: the rule does not match frames by
+    content."""
     request: str = ""
-    """Name of the command or poll with the matching frames."""
+    """Name of a command or poll; the rule matches the requests of the command or poll."""
     every_s: float | None = None
     """Period of a timed rule, in seconds; None: the rule is not timed."""
     when: Template | None = None
     """Condition for the rule; the rule is inactive while the condition is false."""
     reactions: tuple[Reaction, ...] = (Reaction(),)
     name: str = ""
-    """Name for overriding the rule in other documents; "": no name."""
+    """Name by which other documents can override the rule; "": no name."""
 
 
 class Profile(NamedTuple):

@@ -1,6 +1,6 @@
 """Steps of a sequence: one class for each kind of step, and the union type `Step`.
 
-Modules that handle every kind of step import this module as `sequence`.
+Other modules import this module as `sequence` if they handle every kind of step.
 """
 
 from collections.abc import Iterator, Mapping
@@ -36,7 +36,7 @@ MAX_STEPS = 200
 MAX_STEPS_DONE = 10_000
 """Maximum number of steps in one run, counting every round of every ``repeat``."""
 MAX_STEP_S = 600.0
-"""Maximum wait in one step, in seconds."""
+"""Maximum duration of the wait in one step, in seconds."""
 
 
 class SendStep(NamedTuple):
@@ -62,7 +62,7 @@ class ExpectStep(NamedTuple):
     text: str = ""
     """Error message after a timeout; "": a generated message."""
     framing: FramingSpec | None = None
-    """Framing of the connection during the wait; None: the usual framing."""
+    """Framing of the connection during the wait; None: the framing that the transport declares."""
 
 
 class PromptStep(NamedTuple):

@@ -11,7 +11,7 @@ class PatternField(NamedTuple):
     """A field in a pattern, with the preceding literal text."""
 
     before: str
-    """Literal text before the field; consecutive blanks count as one blank."""
+    """Literal text before the field; consecutive blanks match like a single blank."""
     name: str
     """Name of the field; "" for a skipped field."""
     kind: FieldKind

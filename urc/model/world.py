@@ -53,7 +53,7 @@ BODY_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "climb": ("quadrotor",),
     "hover": ("quadrotor",),
 }
-"""Body types that support a key, by key; a missing key applies to all body types."""
+"""Body types that support a key, by key; a key that is not listed applies to all body types."""
 
 
 def _words(text: str) -> frozenset[str]:
@@ -78,7 +78,8 @@ READINGS: Final[Mapping[str, frozenset[str]]] = {
         " cliff_front_right drop"
     ),
 }
-"""Names of sensor values (``world.NAME``), with the names of parts (``world.NAME.PART``)."""
+"""Names of sensor values (``world.NAME``), each with the names of its parts
+(``world.NAME.PART``)."""
 
 
 class Wall(NamedTuple):
@@ -130,9 +131,9 @@ class BodySpec(NamedTuple):
     turn_acceleration: float = 6.0
     """Maximum angular acceleration, in rad/s²; for `ackermann`, the steering rate in rad/s."""
     track: float | None = None
-    """Distance between the left and right wheels; None: 1.6 times the radius."""
+    """Distance between the left and right wheels, in metres; None: 1.6 times the radius."""
     slip: float = 0.15
-    """Fraction of a turn that tracks lose to slip."""
+    """Fraction of a turn that the robot loses because its tracks slip."""
     roughness: float = 0.01
     """Amplitude of the tilt on rough ground, in rad."""
     wheelbase: float = 0.4

@@ -17,8 +17,8 @@ connection, without calling `closed`.
 
 Theory of operation. Conversations, polls, commands and sequences do not call each other. A
 conversation also returns internal events: `ExchangeEnded` for a finished request, `Matched` for an
-expected frame, and `ConnectionClosing`. `_settle` removes the internal events, informs the owners,
-and advances the sequences, until only external events remain.
+expected frame, and `ConnectionClosing`. `_settle` handles internal events and advances the
+sequences until only external events remain.
 """
 
 from collections.abc import Mapping, Sequence
@@ -87,7 +87,8 @@ class Engine:
         settings: values of all settings in the profile, by name.
         fresh: sources of time and randomness for sent frames; fixed sources for tests.
         is_compiled: whether to generate a function for each message and command. Generated
-            functions save time in live sessions, but not in short document tests.
+            functions save time in live sessions, but cost more time than they save in short
+            document tests.
 
     Raises:
         BadArgument: a constant frame contains its own delimiter, or cannot be encoded.
@@ -136,13 +137,13 @@ class Engine:
         self._is_begun = False
         self._is_timed = self._schedule.keeps_alive or self.readings.is_timed
         self._is_watched = needs_readings(driver)
-        """Whether any condition or formula needs the newest samples."""
+        """Whether any condition or formula of the driver depends on the newest samples."""
 
     # -- methods
 
     @property
     def deadline(self) -> float | None:
-        """Time for the next `tick`; minus infinity before the first `tick`, None for never."""
+        """Time of the next `tick`; minus infinity before the first `tick`; None: no deadline."""
         if not self._is_begun:
             return float("-inf")
         first: float | None = None
@@ -162,7 +163,7 @@ class Engine:
 
     @property
     def calm_s(self) -> float:
-        """Minimum delay until any new deadline after received data or a command, in seconds."""
+        """Minimum delay between received data or a command and any new deadline, in seconds."""
         return self._calm_s
 
     def start(self, transport: str, now: float) -> list[Event]:

@@ -50,12 +50,12 @@ class Send(NamedTuple):
     is_secret: bool = False
     """Whether `data` contains a secret, and must not be shown or logged."""
     counted: CountedFrame | None = None
-    """The frame with its counter numbers, for a connection that the guard also uses; otherwise
+    """The frame with its counter numbers if the guard also sends on the connection; otherwise
     None."""
 
 
 class Close(NamedTuple):
-    """Close this transport; the engine has already discarded the connection."""
+    """Request to close this transport; the engine has already discarded the connection."""
 
     transport: str
     reason: str = ""
@@ -69,7 +69,7 @@ class Ready(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """Samples of frames that were received together, in order and including computed signals."""
+    """Samples of frames that arrived together, in order and including computed signals."""
 
     transport: str
     """Name of the transport; "" for an alarm that began without a frame."""
@@ -107,7 +107,7 @@ class Violation(NamedTuple):
 
 
 class NumbersUsed(NamedTuple):
-    """The counters of this connection advanced, so rendered stop frames may have outdated numbers.
+    """The counters of this connection have advanced, so rendered stops may be outdated.
 
     `NumbersUsed` occurs only on connections that share counters with motion
     (`MotionEncoder.share`).

@@ -26,17 +26,17 @@ from urc.protocol.sequences.commands import is_guarded, why_refused
 __all__ = ["MotionEncoder", "MotionUnavailable"]
 
 _SPARE_STOPS: Final = 24
-"""Spare counter numbers for other frames, before the stops must be rendered again."""
+"""Number of spare counter numbers for other frames, before the stops must be rendered again."""
 
 Check = Callable[[Mapping[str, object]], dict[str, Reading]]
 
 
 class MotionUnavailable(UrcError):
-    """Motion is currently not possible; the message is the reason."""
+    """Motion is currently not possible; the message states the reason."""
 
 
 class _Way:
-    """The prepared encoder of one held command, because setpoints are frequent."""
+    """The encoder of one held command, prepared in advance because setpoints are frequent."""
 
     __slots__ = ("ask", "check", "command", "is_guarded", "line")
 
@@ -119,8 +119,8 @@ class MotionEncoder:
     def has_stops(self, command: str) -> bool:
         """Return whether the rendered stops of `command` are still valid.
 
-        Stops are valid while at least half of the spare numbers are left. Rendered stops that
-        depend on other values are never still valid.
+        Stops are valid while at least half of the spare numbers are left. Rendered stops are always
+        outdated if they depend on values other than arguments and counters.
         """
         made, line = self._made.get(command), self._found(command).transport
         if made is None or not self._asks[command].is_local or line not in self._lengths:
@@ -136,8 +136,8 @@ class MotionEncoder:
         """Return the stop of `command`: bytes including framing, an envelope, or frame variants.
 
         Rendering a stop needs no connection. A stop with a counter is a series with one frame for
-        each possible next number. A series of stops has enough frames for all stops of the
-        connection. The stop is empty for a robot that ends each motion step itself.
+        each possible next number. The series is long enough for the stops of all held commands of
+        the connection. The stop is empty for a robot that ends each motion step itself.
 
         Raises:
             BadArgument: the command is not held, or the stop cannot be written.
@@ -166,11 +166,11 @@ class MotionEncoder:
     ) -> Payload | CountedFrame:
         """Return the frame of `command` with `arguments`, ready for sending.
 
-        In half duplex, the frame is empty while a reply is pending, and only the next setpoint is
-        sent.
+        In half duplex, the result is empty while a reply is pending: this setpoint is skipped, and
+        the next setpoint is sent instead.
 
-        On a shared connection, the counter numbers are only proposed; `set_counters` confirms the
-        numbers after the transmission.
+        On a shared connection, the frame's counter numbers are provisional until `set_counters`
+        confirms them after the transmission.
 
         Args:
             command: name of a held command.

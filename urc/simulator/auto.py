@@ -1,8 +1,8 @@
 """Automatic replies of an emulated robot to every request that the driver declares.
 
-Pure: no sockets and no clock. Each received frame is matched against all requests that the driver
-can send on its transport. Each reply is encoded from plausible values, by the declaration that
-decodes the reply. A command argument with the name of a signal sets that signal.
+The module uses no sockets and no clock. Each received frame is matched against all requests that
+the driver can send on its transport. Each reply is encoded from plausible values, with the driver's
+declaration for decoding the reply. A command argument with the name of a signal sets that signal.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -102,7 +102,7 @@ class ReceivedRequest(NamedTuple):
 
 
 class DefaultResponder:
-    """Values and settings that all connections of an emulated robot share."""
+    """The values and settings of an emulated robot, shared by all connections."""
 
     def __init__(self, driver: Driver, settings: Mapping[str, Value], values: Values) -> None:
         self.driver = driver
@@ -126,7 +126,7 @@ class DefaultResponder:
         return self._raw[name](self.values.of(name, now_s))
 
     def fields(self, spec: ReadSpec, known: Mapping[str, object], now_s: float) -> Fields:
-        """Return raw fields for a frame: the set values, or plausible values."""
+        """Return raw fields for a frame: values that were set, otherwise plausible values."""
         numbers: dict[str, object] = {}
         others: dict[str, object] = {}
         for name in spec.fields:
@@ -265,10 +265,10 @@ class DefaultConnection:
         return best if best is not None and label in ("", best.request.label) else None
 
     def asked_too(self, frame: Frame, label: str) -> ReceivedRequest | None:
-        """Return the frame as a request of the command `label`, unless the first match has a reply.
+        """Return `frame` as a request of the command `label`; None if the best match has a reply.
 
-        Two declarations often send the same stop frame. Examples are the release of a held command,
-        a close message and a command without reply.
+        Two declarations of a driver often have the same stop frame. Examples are the release of a
+        held command, a close message and a command without reply.
         """
         best = self.asked(frame)
         if best is None or best.request.names or best.request.answers:
@@ -279,7 +279,7 @@ class DefaultConnection:
         return None
 
     def labels(self, frame: Frame) -> set[str]:
-        """Return the commands, polls and sequences with exactly this frame, or the nearest one."""
+        """Return the labels of all requests that encode to this frame, or of the first match."""
         found = list(self._readings(frame))
         exact = {one.request.label for one in found if self._gives(one)}
         return exact or {one.request.label for one in found[:1]}
@@ -368,7 +368,7 @@ class DefaultConnection:
     def _script(
         self, label: str, steps: Iterable[Step]
     ) -> tuple[list[SimulatedReply], list[_Request]]:
-        """Return the frames expected before the first send, and the requests with their replies."""
+        """Return the frames expected before the first request, and all requests with replies."""
         opening: list[SimulatedReply] = []
         requests: list[tuple[WriteSpec, list[SimulatedReply]]] = []
         for step in _main_way(steps):

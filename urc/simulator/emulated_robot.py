@@ -90,13 +90,13 @@ class EmulatedRobot:
         return EmulatedConnection(spec, framing, ruled, auto, self._setters, self._values)
 
     def picture(self, transport: str, topics: Iterable[str], now_s: float) -> bytes | None:
-        """Return the world's current image for one of `topics`, or None without an image.
+        """Return the world's current image for one of `topics`; None if no topic has an image.
 
-        The image is b"" while the sensor has a dropout fault.
+        The image is b"" while a dropout fault affects the camera.
 
         Args:
             transport: name of the transport with the subscription.
-            topics: alternative names of the image's topic.
+            topics: topic names to try, because a topic may have several names.
             now_s: current time, in seconds since the epoch.
         """
         body = self._values.body
@@ -186,7 +186,7 @@ def _pictures(
 
 
 def _speaks(rule: SimulatorRule) -> bool:
-    """Return whether a rule sends messages instead of the declared messages."""
+    """Return whether a rule replaces the automatic messages of the robot."""
     if rule.request:
         return False
     says = any(one.send or one.message for one in rule.reactions)
@@ -198,7 +198,7 @@ class _Periodic:
     what: ReadyRule | DefaultMessage
     every_s: float
     left_s: float
-    """Time until the next action, in seconds."""
+    """Time until the rule or message is due, in seconds."""
 
 
 class EmulatedConnection:
@@ -234,7 +234,7 @@ class EmulatedConnection:
         self.is_over = False
         """Whether the robot closes the connection after the client has received all data."""
         self.faults = 0
-        """Number of invalid frames, unmatched frames and failed replies."""
+        """Total number of invalid frames, unmatched frames and failed replies."""
         self.last_fault = ""
         """Text of the latest fault, in one line."""
 
@@ -265,7 +265,7 @@ class EmulatedConnection:
     def request(self, data: Payload, now_s: float) -> list[Payload]:
         """Return the replies without injected faults.
 
-        The server must delay and drop replies itself.
+        The caller must delay and drop the replies according to the injected faults.
         """
         return self._receive(data, now_s, None, self._answer)
 
@@ -292,13 +292,13 @@ class EmulatedConnection:
     def advance(self, dt_s: float, now_s: float) -> list[Payload]:
         """Advance the time by `dt_s` seconds and return the robot's unsolicited frames.
 
-        A periodic rule sends at most once per call, so a pause causes no burst.
+        A periodic rule sends at most once per call, so a late call causes no burst of frames.
         """
         said = self._flawed(self._due(dt_s, now_s), now_s)
         return self._late.pop_due(now_s) + said if self.has_late else said
 
     def _flawed(self, said: list[Payload], now_s: float) -> list[Payload]:
-        """Return the frames to send now. Injected faults delay or drop the other frames."""
+        """Return the frames to send now. Injected faults delay or drop the remaining frames."""
         if not self._flaws.active:
             return said
         said = self._flaws.apply(said)

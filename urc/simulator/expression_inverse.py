@@ -1,8 +1,8 @@
 """Inversion of expressions: find the field value for which an expression has the wanted value.
 
 Pure. An expression of one field with a chain of filters is inverted from the last filter to the
-first. Parts of the same bytes (``unpack`` at several offsets) are merged. Expressions without an
-inverse return None.
+first. If several expressions ``unpack`` parts of the same bytes, the parts are merged. Expressions
+without an inverse have the result None.
 """
 
 import ast

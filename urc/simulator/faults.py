@@ -1,6 +1,6 @@
 """Fault injection for an emulated robot: delay, loss, noise and failed sensors.
 
-Pure. For the same traffic, the same faults drop the same frames.
+Pure. With the same traffic and the same faults, the same frames are dropped in every run.
 """
 
 import math
@@ -115,7 +115,7 @@ class Faults:
         return "silent" in self.active
 
     def add(self, fault: Fault) -> None:
-        """Add a fault; it replaces a fault of the same name and signal."""
+        """Add a fault, and remove any previous fault of the same name and signal."""
         key = f"{fault.name} {fault.signal}".strip()
         self.active[key] = fault
 
@@ -134,7 +134,7 @@ class Faults:
         return uniform(1, self._frames, "loss") < fault.amount
 
     def apply(self, frames: Iterable[Payload]) -> list[Payload]:
-        """Return the frames that reach the client."""
+        """Return the frames that the active faults do not drop."""
         return [] if self.is_silent else [one for one in frames if not self.loses()]
 
     def drops(self, names: Iterable[str]) -> bool:

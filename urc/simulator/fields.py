@@ -10,7 +10,7 @@ __all__ = ["Fields"]
 
 
 class Fields(NamedTuple):
-    """The known fields for one frame."""
+    """The field values for one frame, as far as known."""
 
     numbers: dict[str, object]
     others: dict[str, object]

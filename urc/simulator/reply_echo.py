@@ -24,17 +24,17 @@ _ONE_OF = re.compile(
     ('[^'\\]*'|"[^"\\]*"|0x[0-9A-Fa-f]+|-?\d+(?:\.\d+)?)\s*[,\])]""",
     re.VERBOSE | re.ASCII,
 )
-"""Pattern for a name and the first constant of its list."""
+"""Pattern of ``name in [constant, …]``, with groups for the name and the first constant."""
 
 
 _MATCH = re.compile(
     r"(?<![\w.])(_?[A-Za-z]\w*)\s+is\s+(?:match|search)\(\s*'([^']*)'\s*\)", re.ASCII
 )
-"""A name and the pattern of its value."""
+"""Pattern of ``name is match('…')``, with groups for the name and the regular expression."""
 
 
 _HEMISPHERE = re.compile(r"\|\s*ddmm\(\s*(_?[A-Za-z]\w*)\s*\)", re.ASCII)
-"""Name of the hemisphere field of a value in degrees and minutes."""
+"""Pattern of the filter ``ddmm``, with a group for the name of the hemisphere field."""
 
 
 def rule_for(driver: Driver, transport: str, label: str) -> str:
@@ -126,7 +126,7 @@ def guesses(
 ) -> Iterator[dict[str, object]]:
     """Yield the arguments with each possible value of a missing argument, such as true and false.
 
-    Arguments are guessed only if a single argument is missing and its values are few.
+    An argument is guessed only if all other arguments are known and the argument has few values.
     """
     left = [one for name, one in arguments.items() if name not in found]
     if len(left) == 1:

@@ -71,7 +71,7 @@ class RunningRule:
         self.ready_reactions = ready_reactions
         """Pending reactions."""
         self.names = names
-        """Names and values from the frame."""
+        """Values from the frame, by name."""
         self.asked = asked
         """The declared request that triggered the rule; None for other frames."""
         self.frame = frame
@@ -214,7 +214,7 @@ class RuleSet:
         return what.send is not None and self._values.faults.drops(what.send.names)
 
     def _wants_dropped(self, what: Reaction) -> bool:
-        """Return whether a failed sensor may explain the failure of a reaction."""
+        """Return whether a failed sensor may be the cause of a reaction's failure."""
         body = self._values.body
         names = {
             name for one in what.sets.values() if isinstance(one, Template) for name in one.names

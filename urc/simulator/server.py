@@ -1,4 +1,4 @@
-"""Serves an emulated robot over real connections, for operators, tests and ``urc demo``.
+"""Servers for an emulated robot on real connections, for operators, tests and ``urc demo``.
 
 The package `urc.simulator.servers` has one server for each type of transport.
 """
@@ -30,7 +30,7 @@ __all__ = ["serve"]
 
 _LOOPBACK = "127.0.0.1"
 _PORTS = {"ssh": 22, "telnet": 23, "ros": 9090}
-"""Default ports of transports for which the option `port` may be omitted."""
+"""Default ports of the transport types with an optional `port`."""
 
 
 @asynccontextmanager
@@ -49,7 +49,8 @@ async def serve(
         profile: profile with `simulator` rules.
         settings: values for ports and templates; for a port of 0, the system chooses a port.
         host: local address to listen on; the default accepts only local clients.
-        now: returns the current time in seconds since the epoch, available to templates as ``now``.
+        now: function that returns the current time, in seconds since the epoch; templates read the
+            time as ``now``.
         is_anywhere: whether to listen on free ports instead of the profile's ports and paths.
         emulated_robot: emulated robot to serve; None: create one from the profile.
 
@@ -126,7 +127,7 @@ def _put_inside(
 
 
 def _known_as(context: ServerContext) -> tuple[object, object, str]:
-    """Return the host and port of a transport in the driver, and its URL if it has no TLS."""
+    """Return the driver's host and port of a transport, and its URL without TLS, or ""."""
     url = context.options.get("url")
     if not isinstance(url, str):
         host, port = context.options.get("host"), context.options.get("port")

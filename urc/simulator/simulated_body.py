@@ -1,7 +1,7 @@
 """The body of an emulated robot. The robot's state drives the body, and the body provides signals.
 
-Pure: no sockets and no clock. The fail-safe works with and without a connection. The fail-safe is
-declared in the document (`failsafe`) or derived from held commands (`watchdog`).
+The module uses no sockets and no clock. The fail-safe works with and without a connection. The
+fail-safe is declared in the document (`failsafe`) or derived from held commands (`watchdog`).
 """
 
 import logging
@@ -19,13 +19,14 @@ __all__ = ["SimulatedBody", "failsafe_of"]
 
 log = logging.getLogger("urc.simulator.emulated_robot")
 _KEPT = ("flies", "cut")
-"""Inputs that do not move the body. For example, a drone without commands stays in the air."""
+"""Inputs that stay active when the fail-safe stops the body, because these inputs cause no motion.
+For example, a drone without commands stays in the air."""
 
 _LOOKS = re.compile(r"_item\(ns\['world'\], '(laser|picture|panorama)'\)")
 """Sensors that need numpy."""
 
 Evaluate = Callable[[Template, float], object]
-"""Evaluates a template over the robot's signals and state, at the given time."""
+"""Function that evaluates a template over the robot's signals and state at a given time."""
 
 
 class SimulatedBody:
@@ -34,8 +35,8 @@ class SimulatedBody:
     Args:
         spec: declaration of the world.
         driver: driver of the robot.
-        evaluate: returns the value of a template.
-        put: sets a value in the robot's state.
+        evaluate: function that returns the value of a template.
+        put: function that sets a value in the robot's state.
     """
 
     def __init__(
@@ -77,7 +78,7 @@ class SimulatedBody:
         return self._evaluate(self.spec.senses[name], now_s)
 
     def picture(self, name: str, now_s: float) -> bytes | None:
-        """Return the image value of a signal; None for other values."""
+        """Return the image of a signal; None if the value of the signal is not an image."""
         value = self.sense(name, now_s)
         return value if isinstance(value, bytes) else None
 
@@ -121,7 +122,10 @@ class SimulatedBody:
 
 
 def failsafe_of(driver: Driver) -> Failsafe | None:
-    """Return the fail-safe derived from `watchdog` or `step` of held commands; None without one."""
+    """Return a fail-safe from the `watchdog` or `step` of the held commands, or None.
+
+    Return None without held commands, or if any held command has no finite time.
+    """
     held = {name: one.hold for name, one in driver.commands.items() if one.hold is not None}
     times = [hold.step_s or hold.watchdog_s for hold in held.values()]
     if not times or any(one is None or not math.isfinite(one) for one in times):

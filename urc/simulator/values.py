@@ -86,7 +86,8 @@ def _quaternion(now_s: float) -> dict[str, Value]:
 
 
 _DIGITS: Final = 7
-"""Decimal places of world values: a centimetre in degrees of latitude."""
+"""Number of decimal places of world values; in degrees of latitude, the last place is a
+centimetre."""
 _DEEPEST: Final = 16
 """Maximum depth of chained computed signals."""
 
@@ -105,7 +106,7 @@ class Values:
         initial: Mapping[str, Reading] = NOTHING,
         world: WorldSpec | None = None,
     ) -> None:
-        """Start with `initial` values of signals and state variables, optionally with a world."""
+        """Initialise the robot with `initial` signals and state variables, and a world if given."""
         self.driver = driver
         self.settings: Mapping[str, Value] = dict(settings)
         self.state: dict[str, Reading] = {}
@@ -127,7 +128,7 @@ class Values:
             )
 
     def remember(self, arguments: Mapping[str, object]) -> None:
-        """Store all command arguments with the name of a signal."""
+        """Store the value of each command argument that has the name of a signal."""
         for name, value in arguments.items():
             signal = self.driver.signals.get(name)
             if signal is None or name in self.senses:

@@ -1,7 +1,8 @@
 """The form of envelopes: publish, call, goal and request.
 
-Pure. An envelope has an address (attributes) and a body. The body has another form, such as JSON.
-JSON bodies are not encoded as text, because each transport for messages has its own encoding.
+Pure. An envelope has an address (attributes) and a body. The body of an envelope is in another
+form, such as JSON. JSON bodies are not encoded as text, because each transport for messages has its
+own encoding.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,14 +27,15 @@ _UP: Final = (".", "..")
 class _Piece(NamedTuple):
     template: Template
     is_value: bool
-    """Whether the piece contains an argument, and not only text or settings."""
+    """Whether the piece contains an argument of the command, and not only text or settings."""
 
 
 class PathTemplate:
     """A writer for addresses: paths of requests, and names of topics, services and actions.
 
-    A value is one segment of the address, so a value cannot redirect the request. A value for the
-    whole address may have several segments. Settings are as trusted as the document.
+    An argument value fills exactly one segment of the address, so the value cannot redirect the
+    request. An argument value that is the whole address may have several segments. Settings are as
+    trusted as the document.
     """
 
     def __init__(self, pieces: tuple[_Piece, ...], written: Callable[[str, bool], str]) -> None:

@@ -1,6 +1,6 @@
 """Status and headers of an HTTP response as fields.
 
-Pure. The reader for the head wraps the reader of the body, for reading and writing.
+Pure. The reader for status and headers wraps the reader of the body, for reading and writing.
 """
 
 from collections.abc import Mapping
@@ -37,7 +37,7 @@ class HeadReader:
         self._head = dict(spec.head)
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the fields, or None for another kind of frame."""
+        """Return the fields; None for a frame that does not match."""
         found = self._reader.read(frame)
         if found is None:
             return None

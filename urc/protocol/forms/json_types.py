@@ -47,7 +47,7 @@ class _Shape:
 
 
 class PathNode:
-    """A node in the tree of paths, with the fields at the path and the nodes of longer paths."""
+    """A node in the tree of paths, with the fields at its path and the nodes of longer paths."""
 
     def __init__(self, shape: _Shape) -> None:
         self.shape = shape
@@ -74,8 +74,8 @@ class ExtractionPlan(NamedTuple):
 
         Args:
             variable: name of the variable with the decoded value.
-            begin: function that returns the source text before the value of a field; "" skips the
-                field.
+            begin: function that returns the beginning of the source line of a field, before the
+                value; "": the field is skipped.
         """
         yield from self._picking(self.want, variable, "    ", begin)
 
@@ -124,7 +124,7 @@ def plan_of(paths: Mapping[str, JsonPath]) -> ExtractionPlan | None:
 def build_pick(plan: ExtractionPlan) -> Callable[[bytes], dict[str, object] | None]:
     """Return a function that extracts the fields found in a document.
 
-    The function raises `msgspec.DecodeError` for a document of another structure.
+    The returned function raises `msgspec.DecodeError` for a document of another structure.
     """
     lines = ["    v = decode(data)", "    found = {}"]
     lines += plan.picking("v", "found[{!r}] = ".format)

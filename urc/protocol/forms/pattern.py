@@ -1,7 +1,7 @@
 """The form ``pattern``: literal text with typed fields.
 
-A pattern becomes a regular expression with linear run time. Every repeat is possessive, over
-characters that cannot follow the repeat.
+A pattern becomes a regular expression with linear run time. Every repeat is possessive, and matches
+only characters that cannot follow the repeat.
 """
 
 import re
@@ -51,8 +51,8 @@ class PatternReader:
         self._start = _start(self._holes, self._tail)
         """First literal word of the pattern; "": the pattern begins with a field."""
         self._match: Callable[[str], re.Match[str] | None] | None = None
-        """Regular expression of the pattern. Patterns are compiled on first use, because a test
-        uses only few patterns of a driver."""
+        """Regular expression of the pattern. Patterns are compiled on first use, because a document
+        test uses only a few patterns of a driver."""
         self._casts = [
             (place, hole.name, _cast_of(hole))
             for place, hole in enumerate(self._holes, 1)
@@ -176,7 +176,7 @@ def _field(kind: FieldKind, after: str) -> str:
 
 
 def _cast_of(hole: PatternField) -> Callable[[str], object]:
-    """Return a function that converts text to a value, and the text of an empty column to None."""
+    """Return a function that converts text to a value; the text of an empty column becomes None."""
     cast_to = CASTS[hole.kind]
     if not hole.width:
         return cast_to

@@ -12,7 +12,7 @@ __all__ = ["KeyvalueReader", "SplitReader"]
 
 
 class SplitReader:
-    """A reader for values by position. An empty part between separators means "not available"."""
+    """A reader for values by position. An empty part is a value that is not available."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         options = spec.options
@@ -71,7 +71,7 @@ class SplitReader:
 
 
 class KeyvalueReader:
-    """A reader for values by key. An empty value of a key means "not available"."""
+    """A reader for values by key. A key without text is a value that is not available."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         options = spec.options

@@ -1,4 +1,4 @@
-"""The form ``text``: a template, as under ``send:``."""
+"""The form ``text``: text from a template, as in the key ``send``."""
 
 import re
 from collections.abc import Mapping
@@ -36,9 +36,10 @@ class TextWriter:
             raise NotWritable(f"{quoted(wrong)} cannot be written in {self._encoding}") from None
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the text at the positions of plain names, by name; None for an unexpected text.
+        """Return the text at the positions of plain names, by name; None for another frame.
 
-        The number of a counter has the key ``seq.NAME``. A field extends to the first possible end.
+        The number of a counter has the key ``seq.NAME``. A field ends at the next occurrence of its
+        following literal text. The last field ends before the literal text at the end of the frame.
         """
         try:
             text = frame.text

@@ -97,7 +97,8 @@ def listened(
 ) -> dict[str, Mapping[str, Value]]:
     """Return the subscription options of a driver on a transport, by topic.
 
-    For repeated topics, the first options take precedence, and later options add missing keys.
+    If several declarations have the same topic, the first options take precedence, and later
+    options add missing keys.
     """
     topics: dict[str, dict[str, Value]] = {}
     for read in _reads(driver, transport):

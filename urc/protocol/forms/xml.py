@@ -22,7 +22,7 @@ _MAX_DEPTH = 100
 
 
 class XmlReader:
-    """A reader for element texts and attributes, which also writes documents with such values."""
+    """A reader for the texts and attributes of XML elements, which also writes XML documents."""
 
     def __init__(self, spec: ReadSpec, context: CodecContext) -> None:
         self._paths = dict(cast("Mapping[str, XmlPath]", spec.options["paths"]))

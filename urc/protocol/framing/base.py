@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 SKIPPED: Final = ""
-"""Code of a frame that is dropped silently, for use by a `switch`."""
+"""Violation code of a frame that a `switch` drops silently."""
 Open = Callable[[bytes], bytes]
 
 
@@ -41,13 +41,13 @@ class FramingError(UrcError):
 
 
 class FrameFault(NamedTuple):
-    """A violation by received bytes that are not a valid frame."""
+    """A violation of the framing: received bytes that are not a valid frame."""
 
     code: str
     """Code of the violation: ``frame-too-long``, ``bad-checksum``, ``no-frame`` and others."""
     message: str
     closes: bool = False
-    """Whether the connection must be closed because of the violation."""
+    """Whether the violation requires closing the connection."""
 
 
 class Decoder(Protocol):
@@ -62,7 +62,7 @@ class Decoder(Protocol):
 
     @property
     def deadline(self) -> float | None:
-        """Time at which `tick` may complete a frame; None if only received bytes can."""
+        """Time at which `tick` may complete a frame; None if completion requires more bytes."""
 
     def feed(self, data: bytes, now: float = 0.0) -> list[bytes | FrameFault]:
         """Append received bytes; return the completed frames and violations in order."""
@@ -99,7 +99,7 @@ class StreamDecoder:
         self._is_lost = False
         """Whether the bytes since the last frame are invalid; invalid bytes are reported once."""
         self._is_case = False
-        """Whether the decoder is a case of a `switch`."""
+        """Whether the decoder belongs to a case of a `switch`."""
 
     @property
     def pending(self) -> int:

@@ -1,7 +1,7 @@
 """Checksums after a text of variable length.
 
 Pure. A `ChecksumTrailer` adds the checksum to the content between a frame's markers, or removes the
-checksum. The content without the checksum has fixed positions.
+checksum. Without the checksum, all parts of the content have fixed positions.
 """
 
 from urc.model.framing import TrailerSpec

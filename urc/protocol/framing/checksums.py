@@ -20,7 +20,7 @@ class BadFrame(UrcError):
         super().__init__(message)
         self.code = code
         self.closes = closes
-        """Whether the connection must be closed."""
+        """Whether the invalid frame requires closing the connection."""
 
 
 class Checksum:

@@ -53,7 +53,7 @@ class DelimiterFraming(NamedTuple):
 
 
 class DelimiterDecoder(StreamDecoder):
-    """A decoder for frames with a delimiter, in linear time even for slow frames.
+    """A decoder for frames with a delimiter, in linear time even if a frame arrives byte by byte.
 
     A frame over the size limit is dropped and reported once. After a dropped frame, decoding
     continues at the next delimiter.
@@ -113,8 +113,8 @@ class DelimiterDecoder(StreamDecoder):
     def ahead(self) -> list[bytes]:
         """Return all complete frames if several are buffered, without removing any frame.
 
-        The list of frames is empty if any frame needs a check. `skip` removes processed frames from
-        the stream.
+        The returned list is empty if any frame requires a check. `skip` removes processed frames
+        from the stream.
         """
         stream, delimiter = self._stream, self._delimiter
         if self._open or self._credit or self._is_skipping or self._skips_empty:

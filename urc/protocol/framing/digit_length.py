@@ -17,7 +17,8 @@ class DigitLength:
         self._spec = spec
         self._base = 10 if spec.spelling == "dec" else 16
         self.end = spec.offset + (spec.size + 1 if spec.is_counted else 1 + len(spec.until))
-        """Minimum number of frame bytes for reading the length field."""
+        """Minimum number of frame bytes that must be received before the length field can be
+        read."""
 
     def total(self, data: bytes | bytearray, at: int) -> int | None:
         """Return the frame size at `at` in bytes; negative if invalid, None if incomplete."""

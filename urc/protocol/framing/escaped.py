@@ -2,9 +2,9 @@
 
 Theory of operation. Markers (start, end, delimiter) are sent unchanged. The content between the
 markers is stuffed last, so length field and checksum refer to the original bytes. If every marker
-byte in the content is escaped, an ordinary search finds the markers. If a doubled escape byte may
-begin a marker, the decoder processes all escapes in order. A frame with a length field is decoded
-byte by byte up to its length.
+byte in the content is escaped, an ordinary search finds the markers. If a marker begins with the
+escape byte, and the content contains doubled escape bytes, the decoder processes all escapes in
+order. A frame with a length field is decoded byte by byte up to its length.
 """
 
 from functools import partial
@@ -147,7 +147,7 @@ class _DoubledDecoder(StreamDecoder):
         return self._skip(place - stream.at) if place > stream.at else None
 
     def _to_end(self) -> bytes | FrameFault | None:
-        """Return the complete frame or None; if `_searched` is -1, the search must continue."""
+        """Return the frame or a violation, or None; `_searched` -1 requires another search."""
         stream, data, end = self._stream, self._stream.data, self._end
         while True:
             place = data.find(self._escape, stream.at + self._searched)
@@ -249,7 +249,7 @@ class _LengthDecoder(StreamDecoder):
                 return "bad-stuffing", "a frame has invalid byte stuffing; skipped"
 
     def _ending(self) -> tuple[str, ...] | None:
-        """Check the end bytes, with the same results as `_read`."""
+        """Check the end bytes; the possible results are the results of `_read`."""
         at = self._stream.at + self._taken
         there = bytes(self._stream.data[at : at + len(self._end)])
         if there == self._end:

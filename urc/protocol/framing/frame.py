@@ -114,7 +114,7 @@ class FrameCodec:
     def close(self, payload: bytes) -> bytes:
         """Return the frame of `payload`; raise `BadFrame` if the payload does not fit.
 
-        Bytes outside the payload and the declared fields are zeros.
+        All bytes outside of the payload and of the declared parts of the frame are zeros.
         """
         layout = self.layout
         if self._stuffing is not None:
@@ -191,7 +191,7 @@ class LengthField:
     def __init__(self, spec: LengthSpec) -> None:
         self._spec = spec
         self.end = max(spec.offset + spec.size, spec.flag_at + 1)
-        """Number of frame bytes for reading the length field."""
+        """Number of frame bytes that must be received before the length field can be read."""
         self._mask = (1 << min(spec.bits, 8 * spec.size)) - 1
 
     def total(self, data: bytes | bytearray, at: int) -> int:

@@ -42,7 +42,7 @@ class IdleFraming(NamedTuple):
 
 
 class DatagramFraming(NamedTuple):
-    """Frames that arrive whole, one for each receive."""
+    """Frames that arrive whole: each receive is one frame."""
 
     codec: FrameCodec | None
     max_bytes: int
@@ -92,7 +92,7 @@ class _WholeDecoder(StreamDecoder):
 class _IdleDecoder(_WholeDecoder):
     """A decoder for frames that end with silence.
 
-    The parameter `now` of `push` is the time of receipt. Without time, only `tick` ends frames.
+    The parameter `now` of `push` is the time of receipt. Without `now`, only `tick` ends frames.
     """
 
     def __init__(self, stream: ReceiveBuffer | None, framing: IdleFraming) -> None:

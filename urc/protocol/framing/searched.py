@@ -28,9 +28,11 @@ Search = Callable[[bytes | bytearray, int], Any]
 _SMALL: Final = 256
 """Maximum buffer size for a new search after every receive, in bytes."""
 _GROWTH: Final = 8
-"""Growth of a larger buffer before a new search, as a divisor of the buffer size."""
+"""Divisor for larger buffers: the buffer is searched again after growing by its size /
+`_GROWTH`."""
 _QUIET_S: Final = 0.005
-"""Duration of silence after which a larger buffer is always searched, in seconds."""
+"""Duration of silence after which a larger buffer is searched regardless of its growth, in
+seconds."""
 
 
 class RegexFraming(NamedTuple):
@@ -158,7 +160,7 @@ class _RegexDecoder(StreamDecoder):
         return None
 
     def _wait(self) -> FrameFault | None:
-        """Keep the newest bytes, which may contain the start of a frame."""
+        """Keep only the newest bytes, which may contain the start of a frame."""
         fault = None
         surplus = len(self._stream) - self._max_bytes
         if surplus > 0:
@@ -254,7 +256,7 @@ class BracketsDecoder(StreamDecoder):
         return self._skip(gone) if gone else None
 
     def _overflow(self) -> FrameFault | None:
-        """Continue at the newest opening marker; earlier frames already exceed the size limit."""
+        """Continue at the newest opening marker; an earlier frame exceeds the size limit."""
         stream = self._stream
         fault = self._too_long()
         last = stream.data.rfind(self._open, stream.at + len(self._open))

@@ -31,7 +31,7 @@ class SwitchFraming(NamedTuple):
     otherwise: Framing | None = None
     """Framing of frames that match no case; None: frames that match no case are invalid."""
     is_robot: bool = False
-    """Whether the framing is for an emulated robot, at the robot's end of the connection."""
+    """Whether the framing is for the robot's end of the connection, in an emulated robot."""
 
     @classmethod
     def from_spec(cls, spec: FramingSpec) -> "SwitchFraming":

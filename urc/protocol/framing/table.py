@@ -1,6 +1,6 @@
 """Framings: conversion between byte streams and frames.
 
-Pure. This module contains the table of framings, and builds a framing from its declaration. Each
+Pure. This module contains the table of framings, and builds framings from their declarations. Each
 family of framings is imported on first use. The interfaces are in `urc.protocol.framing.base`.
 """
 

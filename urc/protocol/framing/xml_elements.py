@@ -1,9 +1,10 @@
 """The framing ``xml``: consecutive XML elements.
 
-Theory of operation. A stream of elements has no root, so each top-level element is a frame. Tags,
-comments, declarations and CDATA determine the end of an element. Quoted attribute values may
-contain markup characters. The scan jumps from marker to marker, and reads every byte once. Blanks,
-comments and declarations may separate frames. Data up to a mismatched closing tag is dropped.
+Theory of operation. A stream of XML elements has no root element, so each top-level element is a
+frame. Tags, comments, declarations and CDATA determine the end of an element. Quoted attribute
+values may contain markup characters. The scan jumps from marker to marker, and reads every byte
+once. Blanks, comments and declarations may separate frames. Data up to a mismatched closing tag is
+dropped.
 """
 
 import re
@@ -18,7 +19,7 @@ __all__ = ["XmlFraming"]
 _NESTING_MOST: Final = 100
 _BETWEEN: Final = b" \t\r\n"
 _SPECIAL: Final = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>"}
-"""Terminators of sections without tags, by their first characters."""
+"""Terminators of sections without tags, by the first characters of the section."""
 _IN_TAG: Final = re.compile(rb"[\"'<>]")
 _NAME: Final = re.compile(rb"</?([^\s/<>\"'=]+)")
 _WAIT, _BAD = 0, -1
@@ -108,7 +109,7 @@ class _XmlDecoder(StreamDecoder):
         return self._skip(start - stream.at) if start > stream.at else None
 
     def _to_end(self) -> int:
-        """Return the end of the element or of a preceding section; otherwise `_WAIT` or `_BAD`."""
+        """Return the end offset of the element or of a preceding section, or `_WAIT` or `_BAD`."""
         while True:
             if self._until:
                 step = self._through_special()

@@ -1,8 +1,9 @@
 """Alarm states of signals over time.
 
-Pure: callers pass the time. A value equal to the limit counts as an alarm. The alarm ends when the
-value is inside the limit by ``hysteresis``. With ``for``, the alarm begins after this time beyond
-the limit, even without another sample, at `AlarmMonitor.deadline`.
+Callers pass the time, because the module reads no clock. A value equal to the limit causes an
+alarm. The alarm ends when the value is inside the limit by ``hysteresis``. The key ``for`` delays
+the alarm until the value has been beyond the limit for this time. A delayed alarm begins at
+`AlarmMonitor.deadline`, even without another sample.
 """
 
 from urc.model.values import Alarm, AlarmLimits, Reading

@@ -55,8 +55,8 @@ def build_fast_read(
 def _head_check(prefix: str, encoding: str) -> list[str]:
     """Return source lines that reject most frames without `prefix`.
 
-    Frames with leading blanks or non-ASCII bytes are not rejected, because decoding may skip blanks
-    or fail.
+    Frames with leading blanks or non-ASCII bytes pass this check, because the decoder may skip
+    blanks, or may report undecodable bytes.
     """
     if not prefix or encoding not in _KEEPS_ASCII:
         return []
@@ -144,7 +144,7 @@ def _of_pattern(
 
 
 def _words(holes: tuple[PatternField, ...], tail: str) -> list[str | PatternField] | None:
-    """Return the words of a pattern; None if a field is only part of a word."""
+    """Return the words of a pattern; None if any field is only a part of a word."""
     words: list[str | PatternField] = []
     for place, hole in enumerate(holes):
         before = hole.before.lstrip() if place == 0 else hole.before
@@ -159,5 +159,5 @@ def _words(holes: tuple[PatternField, ...], tail: str) -> list[str | PatternFiel
 
 
 def _skipped(kind: FieldKind, raw: str) -> str:
-    """Return the check of a skipped field, which rejects frames that do not match."""
+    """Return the source text that checks a skipped field, and rejects frames that do not match."""
     return {"integer": f"int({raw})", "number": f"float({raw})"}.get(kind, f"{raw}[0]")

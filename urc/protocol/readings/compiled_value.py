@@ -17,8 +17,8 @@ __all__ = ["Compiled", "Taken", "Value", "finish", "of_json_type", "value_of"]
 
 Taken = tuple[list[Sample], Sequence[str]]
 Compiled = Callable[[Frame, float], "Taken | None"]
-"""Function from a frame and the time to samples and refused values; None for a frame that does not
-match."""
+"""Function that returns the samples and the refused values for a frame and the time; None if the
+frame does not match."""
 
 _BEGIN: Final = (
     "    payload = frame.payload",

@@ -10,7 +10,7 @@ __all__ = ["DataChangeFilter"]
 
 
 class DataChangeFilter:
-    """A change filter with the last reported and the pending sample of one signal."""
+    """A change filter for one signal, with the last reported sample and the pending sample."""
 
     __slots__ = ("_band", "_pending", "_settle_s", "_since", "_told")
 
@@ -42,7 +42,7 @@ class DataChangeFilter:
         return self.tick(now)
 
     def tick(self, now: float) -> Sample | None:
-        """Return the pending sample if its value has lasted long enough at `now`, else None."""
+        """Return the pending sample if the value is stable long enough at `now`, else None."""
         due = self.deadline
         if self._pending is None or due is None or now < due:
             return None

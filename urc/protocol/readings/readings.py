@@ -17,8 +17,8 @@ from urc.protocol.values.decode import Convert, build_converter
 __all__ = ["Decode", "Readings"]
 
 Decode = Callable[[Mapping[str, object], float], tuple[list[Sample], list[str]]]
-"""Function from the fields of a frame and the time to samples, and one message for each refused
-value."""
+"""Function that returns, for the fields of a frame and the time, the samples and a message for each
+refused value."""
 
 
 class _Computed(NamedTuple):
@@ -96,7 +96,7 @@ class Readings:
     def set_values(
         self, values: Mapping[str, object], now: float
     ) -> tuple[list[Sample], list[str]]:
-        """Convert values that do not originate from a frame, in the same way as fields."""
+        """Convert values from another source than a frame, in the same way as fields."""
         return self.decoder(values)(values, now)
 
     def alarm(self, name: str, value: Reading, now: float) -> Alarm:
@@ -114,7 +114,7 @@ class Readings:
 
     @property
     def is_timed(self) -> bool:
-        """Whether a sample can change without new data, only with time."""
+        """Whether the passage of time can change samples, without new data."""
         return bool(self._timed or self._change_filter)
 
     @property
@@ -127,7 +127,7 @@ class Readings:
         return min((time for time in times if time is not None), default=None)
 
     def tick(self, now: float) -> list[Sample]:
-        """Return samples that changed only with time until `now`, with their original times.
+        """Return samples that changed by the passage of time until `now`, with their arrival times.
 
         The result contains the newest samples of signals with a new alarm, and debounced samples.
         """

@@ -29,7 +29,7 @@ GOOD_BYE_S: Final = 2.0
 
 
 def queue_limit_s(spec: TransportSpec, reply_s: float | None) -> float:
-    """Return the maximum time of a request in the queue, in seconds.
+    """Return the maximum time that a request waits in the queue, in seconds.
 
     Args:
         spec: transport of the request.
@@ -49,10 +49,10 @@ def longest_s(driver: Driver, name: str) -> float:
 
 
 def calm_s(driver: Driver) -> float:
-    """Return the minimum delay between a frame or command and the next deadline; 0 if unknown.
+    """Return the minimum delay in seconds from any frame or command to a new deadline, or 0.
 
     Deadlines come from replies, polls and stale connections. Deadlines of sequences and framing
-    timeouts are not considered.
+    timeouts are not considered. The result is 0 if the minimum is unknown.
     """
     if any(one.verify or one.rate_per_s for one in driver.commands.values()):
         return 0.0

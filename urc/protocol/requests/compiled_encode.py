@@ -1,9 +1,9 @@
 """Generated encoders: one function per command, which encodes arguments to bytes.
 
 A generated encoder handles only the common case, in which every argument is a number of the
-declared type. The closures of `urc.protocol.requests.encode` handle all other cases. The tests
-compare the function with the closures. Generated encoders support only sums, products and ``fixed``
-over numbers.
+declared type. The closures of `urc.protocol.requests.encode` handle all other cases. Tests compare
+the generated encoders with the closures. Templates of generated encoders may contain only sums,
+products and the filter ``fixed`` over numbers.
 """
 
 import ast
@@ -29,7 +29,7 @@ _OPERATORS: Final[Mapping[str, ast.operator]] = {
     "_div": ast.Div(),
 }
 _IN_NUMBERS: Final = frozenset(b"0123456789+-.einfa")
-"""Bytes that may occur in a written number."""
+"""Bytes that may occur in the text of a number."""
 _MOST_DIGITS: Final = 20
 _LARGEST: Final = 1e308
 """Maximum finite value, as in `urc.protocol.requests.encode`."""
@@ -120,7 +120,7 @@ def build_fast_check(
 
 
 def _range(variable: str, argument: Argument) -> str:
-    """Return source text that checks that a variable is a valid value of the argument."""
+    """Return source text that checks whether a variable contains a valid value of the argument."""
     low = -_LARGEST if argument.min is None else argument.min
     high = _LARGEST if argument.max is None else argument.max
     whole = f"type({variable}) is int"

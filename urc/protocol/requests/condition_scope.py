@@ -21,11 +21,11 @@ class SignalState:
         self.latched = ""
         """Reason for refusing autonomous motion; "" if motion is allowed."""
         self.stops = 0
-        """Number of stops. A motion request from before a stop is not sent."""
+        """Number of stops. A motion request that is older than the last stop is not sent."""
         self._last: dict[str, Sample] = {}
 
     def latch(self, reason: str) -> None:
-        """Record a stop with its reason, or the reset of the stop with ""."""
+        """Record a stop with its reason; "" records the reset of the stop."""
         self.latched = reason
         self.stops += reason != ""
 

@@ -45,7 +45,7 @@ class Connection:
         """Labels of requests that reset the robot's watchdog; None: all requests."""
         self.counters = Counters()
         self.learnt: dict[str, object] = {}
-        """Values of private fields that the login has read, by name."""
+        """Values of private fields that the login has received, by name."""
         self.has_motion = False
         """Whether the connection has held commands, which bypass the queue."""
         self._pending_replies = PendingReplies()

@@ -9,9 +9,9 @@ the connection afterwards (`Close`). The module is pure: callers pass the time.
 Requests in flight are kept in the order of sending. A received frame is offered to all requests in
 flight, oldest first. A request with a correlation accepts only its own reply. Of the requests
 without a correlation, only the oldest accepts the frame, because replies arrive in order. Real-time
-requests have a separate order of replies. After a timeout, a request stays in flight as *late* for
-another reply timeout. A late reply is dropped, because the next request must not accept a late
-reply. Until the late reply arrives or times out, requests with similar replies wait. After
+requests have a separate order of replies. After its timeout, a request is *late*, and stays in
+flight for another reply timeout. A late reply is dropped, because the next request must not accept
+a late reply. Until the late reply arrives or times out, requests with similar replies wait. After
 `MISSES_UNTIL_CLOSED` consecutive missing replies, the connection is closed and reopened.
 """
 
@@ -236,7 +236,7 @@ class Conversation(Connection):
     # -- receiving
 
     def listen(self, expectation: Expectation, now: float) -> list[LineEvent]:
-        """Add an expectation for frames other than replies, which may have a different framing.
+        """Add an expectation, which may have a separate framing, for frames other than replies.
 
         Remaining bytes of the connection may be complete frames in the framing of the expectation.
         """
@@ -292,8 +292,8 @@ class Conversation(Connection):
     def _ahead(self, now: float) -> list[LineEvent]:
         """Process messages at the front of the stream, and report their samples together.
 
-        Processing short frames one by one takes almost twice as long (decision 27). A batch of
-        messages ends after the expected reply or a refused value, or before another kind of frame.
+        Processing short frames one by one takes almost twice as long as in batches (decision 27). A
+        batch ends after the expected reply or a refused value, or before another kind of frame.
         """
         receiver, decoder, pending = (
             self.receiver,
@@ -387,7 +387,7 @@ class Conversation(Connection):
         return self.receiver.publish(frame, now) if of_motion is None else of_motion
 
     def _plain(self, pending: PendingReply, frame: Frame, now: float) -> list[LineEvent]:
-        """Process a frame if the only pending reply contains only samples.
+        """Process a frame for a pending reply that contains only samples.
 
         Most replies contain only samples. `_answer` processes all other replies.
         """
@@ -440,7 +440,7 @@ class Conversation(Connection):
     def _motion_response(
         self, frame: Frame, attributes: Mapping[str, object], now: float
     ) -> list[LineEvent]:
-        """Return the events of the response to a frame of motion."""
+        """Return the events of a response envelope to a frame of motion."""
         if attributes.get("ok", True):
             return self._of_motion(frame, now) or []
         reason = str(attributes.get("reason") or "the robot refused")
@@ -488,8 +488,8 @@ class Conversation(Connection):
     ) -> list[LineEvent]:
         """Return the events of a frame with the match result `offer` for a request.
 
-        A provisional reply may also be a message. If `frame` is missing, the message has already
-        been reported.
+        A provisional reply may also be a message. Without `frame`, the message has already been
+        reported.
         """
         exchange = pending.exchange
         events: list[LineEvent] = self.receiver.dropped(offer) if offer.dropped else []

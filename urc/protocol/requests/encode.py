@@ -1,4 +1,4 @@
-"""Check of command arguments, and encoding into the bytes of a frame.
+"""Check of command arguments, and their encoding as a frame.
 
 Pure. This module checks the arguments from browsers, scripts and tests.
 """

@@ -50,7 +50,7 @@ new = tuple.__new__
 
 
 def untold(error: Exception) -> str:
-    """Return the reason why a secret frame is not sent, without revealing the secret."""
+    """Return the error message for a secret frame that cannot be sent; omit the secret."""
     text = str(error)
     if _MISSING.fullmatch(text):
         return text  # only the name of a missing value, and no secret
@@ -83,7 +83,7 @@ class CompiledRequest(NamedTuple):
     """Whether the request moves the robot. Motion requests fail immediately if the connection is
     not ready."""
     learnt: frozenset[str] = frozenset()
-    """Names in the request's templates that the login reads."""
+    """Names in the request's templates for values that the login has received."""
     is_fresh: bool = False
     """Whether the request contains the time or a nonce."""
     is_local: bool = False
@@ -91,10 +91,10 @@ class CompiledRequest(NamedTuple):
     queue_s: float = 0.0
     """Maximum time in the queue, in seconds."""
     plain: Matcher | None = None
-    """Reader of the reply, for a request with a single reply that contains only samples; otherwise
+    """Reader of the reply if the request has a single reply that contains only samples; otherwise
     None."""
     is_miss_harmless: bool = False
-    """Whether only the poll counts missing replies, so a missing reply does not indicate a lost
+    """Whether only the poll counts missing replies; a missing reply then does not indicate a lost
     connection."""
     is_numbered: bool = False
     """Whether the request is an envelope with a number that the reply repeats."""
@@ -139,9 +139,11 @@ class Exchange:
     is_secret = False
     """Whether the payload is secret, and must not appear in any message."""
     condition: Callable[[float], str] | None = None
-    """Check before sending: function that returns why the request is not allowed, or ""."""
+    """Function that returns why the request is not allowed, evaluated before sending; "":
+    allowed."""
     unless: Callable[[], str] | None = None
-    """Check before sending: function that returns why the request is obsolete, or ""."""
+    """Function that returns why the request is obsolete, evaluated before sending; "": not
+    obsolete."""
     waits_until = float("-inf")
     """Earliest time of a retry, in seconds."""
     on_sent: Callable[[Payload], None] | None = None
@@ -160,8 +162,8 @@ class Exchange:
         self.namespace = namespace
         """Values for the templates by name, without counters."""
         self.data = data
-        """Rendered payload; None if rendered at the time of sending, see
-        `CompiledRequest.render`."""
+        """Rendered payload; None: the payload is rendered at the time of sending
+        (`CompiledRequest.render`)."""
         self.gives_up_at = gives_up_at
         """Time at which a queued request fails, in seconds."""
         self.tries_left = ask.retries
@@ -223,7 +225,7 @@ LineEvent = Event | ExchangeEnded | Matched | ConnectionClosing
 
 
 class ReplySink:
-    """A sink that returns the outcome of a request as an event, and owns a plain exchange."""
+    """A sink that returns the outcome of a request as an event, and may own an exchange."""
 
     __slots__ = ("_request",)
 
@@ -248,5 +250,5 @@ class ReplySink:
 
 
 def expires_at(ask: CompiledRequest, now: float) -> float:
-    """Return the time at which a new request fails if still queued."""
+    """Return the time at which a new request fails if the request is still queued."""
     return now + ask.queue_s

@@ -35,8 +35,8 @@ __all__ = ["FrameReceiver"]
 _HIDDEN: Final = "•••"
 _MOST_SECRETS: Final = 8
 _SHORTEST: Final = 3
-"""Minimum length of a secret for partial redaction. A shorter secret occurs in many words, so the
-whole message is hidden."""
+"""Minimum length of a secret for partial redaction. A shorter secret may occur in ordinary words,
+so the whole message is hidden."""
 
 
 class SentSecrets:
@@ -82,7 +82,7 @@ class FrameReceiver:
         self.replies = Acknowledgements()
         """Acknowledgements to send."""
         self.collectors: list[Collector] = []
-        """Collectors of values from several messages, cleared with the connection."""
+        """Collectors of values from several messages, cleared when the connection is lost."""
         self._expectations: list[Expectation] = []
         self._prompt: tuple[Pattern, Expectation] | None = None
         self.is_listening = False
@@ -133,11 +133,11 @@ class FrameReceiver:
         return told or [] if heard is None else heard + (told or [])
 
     def came_since(self, since: float, instead: str) -> str:
-        """Return a text about an unexpected frame during a wait; "" if no frame arrived.
+        """Return a message part about an unexpected frame during a wait; "" if no frame arrived.
 
         Args:
             since: start time of the wait, in seconds.
-            instead: description of the unexpected frame, such as "no answer to home".
+            instead: explanation why the frame is unexpected, such as "no answer to home".
         """
         time_s, text = self._stray
         if time_s < since:
@@ -220,7 +220,7 @@ class FrameReceiver:
         return events
 
     def answered(self, asker: object, frame: Frame, refusal: str, now: float) -> list[LineEvent]:
-        """Return the events of a reply to a request of `asker`, for the expecting step.
+        """Return the events of a reply, for the step of `asker` that expects the reply.
 
         Args:
             asker: the sequence that made the request; only this sequence receives the reply.
@@ -263,14 +263,15 @@ class FrameReceiver:
     def samples(
         self, matcher: Matcher, found: Fields, now: float
     ) -> tuple[list[LineEvent], list[Sample]]:
-        """Return the events for the fields of a frame, and their samples."""
+        """Return the events for the fields of a frame, and the samples from the fields."""
         samples, refused = matcher.decode(found, now)
         return self.events_of(samples, refused), samples
 
     def events_of(self, samples: list[Sample], refused: Sequence[str]) -> list[LineEvent]:
         """Return the events for samples and refused values.
 
-        A valid frame without values also causes an event, as a sign that the robot is alive.
+        A valid frame without values also causes an event, because the frame shows that the robot is
+        alive.
         """
         if not refused and not self.replies:
             return [new(Samples, (self._name, tuple(samples)))]

@@ -6,8 +6,8 @@ motion. An unsolicited refusal also ends the motion, such as a refusal because o
 guard.
 
 In half duplex, frames of motion wait for a pending reply, and queued requests wait for replies to
-motion. Waits for replies to motion are short, because a lost reply must not prevent motion. A stop
-never waits for replies.
+motion. The wait for a reply to motion is short, because a lost reply must not prevent motion. A
+stop never waits for replies.
 
 A held command expects replies from its first frame until the reply timeout of the newest frame.
 """
@@ -131,7 +131,7 @@ class HoldReplies:
         return self.refusals(frame, now) or plain
 
     def accepted(self, frame: Frame, now: float) -> tuple[CompiledReply, MatchResult] | None:
-        """Return the match result of an acknowledgement; None for other frames."""
+        """Return the match result of an acknowledgement of motion; None for other frames."""
         for _, one in self._listening(now):
             offer = one.expectation.offer(frame, one.is_mine)
             if offer is not None:

@@ -1,4 +1,4 @@
-"""Additional effects of messages: values from several frames, and acknowledgements.
+"""Additional effects of messages: collecting values from several frames, and acknowledgements.
 
 Pure. Both effects of a message occur during the conversion from fields to samples, exactly once per
 message. Incomplete collected values are discarded when the connection is lost. Acknowledgements

@@ -21,7 +21,7 @@ class Messages:
     def decode(self, frame: Frame, now: float) -> Taken | None:
         """Return the samples and refused values of a frame; None if no message matches.
 
-        `Frame.fault` is set if a message matches the frame but rejects a value.
+        If a message matches the frame but rejects a value, the reason is stored in `Frame.fault`.
         """
         for one in self.declared:
             taken = one.take(frame, now)

@@ -45,7 +45,7 @@ class PendingReply:
         self.since = now
         """Start time of the wait for the current reply, in seconds."""
         self.is_extended = False
-        """Whether the robot has extended the reply timeout."""
+        """Whether the robot has requested more time for the reply."""
         self.is_late = False
         """Whether the reply has timed out. A late reply may still arrive, and must not match
         another request."""
@@ -201,7 +201,7 @@ class PendingReplies(list[PendingReply]):
         return None
 
     def collects_lines(self) -> bool:
-        """Return whether any frame may be part of a pending multi-frame reply."""
+        """Return whether any received frame could be part of a pending multi-frame reply."""
         return any(pending.expectation.answer.lines is not None for pending in self)
 
     def plain(self) -> PendingReply | None:
@@ -217,7 +217,7 @@ class PendingReplies(list[PendingReply]):
     def offer(
         self, frame: Frame, *, is_message: bool = False
     ) -> tuple[PendingReply, MatchResult] | None:
-        """Return the transmission that the frame answers, and the match result; or None."""
+        """Return the transmission that the frame answers and the match result, or None."""
         if len(self) == 1:
             only = self[0].offer(frame, is_message=is_message)
             return None if only is None else (self[0], only)
@@ -247,7 +247,7 @@ class PendingReplies(list[PendingReply]):
 
 
 def _plain(raw: object) -> Reading:
-    """Return a raw field as a plain reply value."""
+    """Return the plain reply value of a raw field."""
     if isinstance(raw, (list, tuple)):
         return tuple(map(_plain, raw))
     if raw is None or isinstance(raw, (bool, int, float, str, bytes, Mapping)):

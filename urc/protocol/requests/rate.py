@@ -20,8 +20,9 @@ REALTIME: Final = 0
 class GcraLimiter:
     """A rate limiter: the generic cell rate algorithm, with one period of tolerance.
 
-    After a pause, two calls may pass immediately; the average rate stays constant. A minimum gap
-    instead would reduce the average rate, because calls that are slightly early would be delayed.
+    After a pause, two calls may pass immediately; the average rate stays constant. With a minimum
+    gap between calls, every slightly early call would be delayed, which would reduce the average
+    rate.
     """
 
     __slots__ = ("_next_s", "_period_s")
@@ -121,12 +122,12 @@ class Counters:
     def series(
         self, encode: Callable[[FrameCounters], Payload], length: int, made: Made
     ) -> FrameVariants:
-        """Render a frame for each of the next numbers, and for a new connection's first numbers.
+        """Render frames for the next numbers, and for the first numbers of a new connection.
 
         Args:
             encode: function that renders a frame with the given numbers.
             length: number of frames to render.
-            made: cache of rendered frames, which receives the frames of this series.
+            made: cache of rendered frames; the frames of this series are added to the cache.
         """
         frames: dict[Stand, Numbered] = {}
         for begin, most in ((self._known, length + self.ahead), ({}, length)):
@@ -183,7 +184,7 @@ class PriorityQueue(list[Item]):
         self._depth = depth
 
     def push(self, item: Item) -> Item | None:
-        """Add `item`; return the displaced item, which may be `item`, or None."""
+        """Add `item`; return the displaced item (possibly `item` itself), or None."""
         if item.latest_key:
             for place, other in enumerate(self):
                 if other.latest_key == item.latest_key:

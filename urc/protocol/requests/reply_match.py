@@ -93,7 +93,8 @@ class CompiledReply(NamedTuple):
     is_silence: bool = False
     """Whether silence until the reply timeout counts as success."""
     takes_redirects: bool = False
-    """Whether the reply reads the target of a redirect; a redirect is then not a failure."""
+    """Whether the reply declares the target of a redirect as a field, so a redirect is not a
+    failure."""
 
 
 class MatchResult(NamedTuple):
@@ -104,7 +105,7 @@ class MatchResult(NamedTuple):
     refusal: str = ""
     """The robot's refusal, as a message for people; "": no refusal."""
     told: tuple[Matcher, Fields] | None = None
-    """Matcher and fields of a provisional or error reply, for updating signals."""
+    """Matcher and fields of a provisional or error reply, to update signals."""
     aside: Aside | None = None
     """Kind of the provisional reply; None for other frames."""
     dropped: str = ""
@@ -142,7 +143,7 @@ class Expectation:
     def beside(self, frame: Frame, is_mine: IsMine | None = None) -> MatchResult | None:
         """Return the match result of a provisional or error reply; None for other frames.
 
-        A frame without a correlation belongs to the oldest pending request.
+        If the request has no correlation, the frame belongs to the oldest pending request.
         """
         for kind, matcher in self.answer.asides:
             fields = matcher.read(frame)

@@ -33,7 +33,7 @@ class RequestCompiler:
 
     Raises:
         BadArgument: a constant frame contains its own delimiter, or cannot be encoded. Every method
-            may raise this error.
+            may raise `BadArgument`.
     """
 
     def __init__(

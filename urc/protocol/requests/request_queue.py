@@ -38,7 +38,7 @@ class RequestQueue(PriorityQueue[Exchange]):
         """End time of the minimum gap after the last request, in seconds."""
 
     def submit(self, exchange: Exchange) -> tuple[Exchange, ExchangeOutcome] | None:
-        """Queue a request; return a displaced request with the outcome, or None."""
+        """Queue a request; return a displaced request with its outcome, or None."""
         gone = self.push(exchange)
         if gone is None:
             return None
@@ -98,7 +98,8 @@ class RequestQueue(PriorityQueue[Exchange]):
             return None
         first: float | None = None
         barred_from = float("inf")
-        """Time from which a due request without room in the buffer blocks later requests."""
+        """From this time, a request that does not fit into the robot's buffer blocks later
+        requests."""
         for exchange in self:
             if not (is_ready or exchange.is_privileged) or self._pending_replies.may_confuse(
                 exchange
@@ -127,7 +128,8 @@ def written(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]
         learnt: values that the login has read, by name.
 
     Raises:
-        BadArgument: the frame cannot be encoded; its counter numbers remain used.
+        BadArgument: the frame cannot be encoded; the counter numbers of the frame are not used
+            again.
     """
     draw = counters.draw()
     count = Count({}, {})
@@ -149,7 +151,7 @@ def render_retry(exchange: Exchange, counters: Counters, learnt: Mapping[str, ob
 
 
 def rendered_size(exchange: Exchange, counters: Counters, learnt: Mapping[str, object]) -> int:
-    """Return the size of a request in bytes, without using counter numbers."""
+    """Return the size of a request in bytes, without consuming counter numbers."""
     if exchange.data is not None:
         return size_of(exchange.data)
     try:

@@ -70,7 +70,8 @@ def questions(command: Command, values: Mapping[str, object]) -> tuple[Confirm, 
 
     Args:
         command: the declared command.
-        values: arguments including defaults, by name; each element of an array counts.
+        values: arguments including defaults, by name; each element of an array may cause a
+            question.
     """
     asked = [] if command.confirm is None else [command.confirm]
     for name, argument in command.arguments.items():
@@ -127,7 +128,8 @@ def exchange_of(
         sink: function that receives the outcome.
         now: current time, in seconds.
         known: state of the robot, for conditions.
-        verifications: receives the run of a command with verification.
+        verifications: runs that wait for verification; receives the run of a command with
+            verification.
 
     Raises:
         BadArgument: the frame cannot be encoded with these arguments.

@@ -23,7 +23,7 @@ __all__ = ["Action", "SequenceHost", "CompiledSequence", "SequenceRunner", "Sink
 Sink = Callable[[ExchangeOutcome, float], list[LineEvent]]
 """Function that receives an outcome and the time, and returns the resulting events."""
 Unless = Callable[[], str]
-"""Function that returns why a request is obsolete; "" for a valid request."""
+"""Function that returns why a request is obsolete; "": the request is still valid."""
 
 
 class SequenceHost(Protocol):
@@ -155,7 +155,7 @@ class SequenceRunner:
         return events
 
     def wait_for_logins(self, now: float) -> None:
-        """Wait for the logins of all open connections, up to the queue limit of a command."""
+        """Wait for the logins of all open connections, at most for the queue limit of a command."""
         lines = (self.host.lines[name] for name in self.program.transports)
         self._logins = [
             line
@@ -210,7 +210,7 @@ class SequenceRunner:
             self._outcome = ExchangeOutcome(code, reason)
 
     def why_over(self) -> str:
-        """Return the reason why further frames of the run are obsolete, or ""."""
+        """Return the reason why further frames of the run are obsolete; "": the run continues."""
         return self._outcome.message if self._outcome is not None else ""
 
     # -- called by the engine

@@ -38,7 +38,7 @@ class OtherFrame(Exception):
 
 
 def note(out: Out, name: str, meaning: Callable[[Any], Any], raw: Any) -> None:
-    """Store the decoded value of `raw` in `out`, or the first error."""
+    """Store the decoded value of `raw` in `out`; on failure, store the first error."""
     try:
         out[name] = meaning(raw)
     except BadItem as error:
@@ -48,7 +48,7 @@ def note(out: Out, name: str, meaning: Callable[[Any], Any], raw: Any) -> None:
 def coded_reader(number: Number) -> Callable[[bytes, int, int], tuple[Any, int]]:
     """Return a function that reads a raw number from data between two offsets.
 
-    The function raises `OtherFrame` for an invalid number.
+    The returned function raises `OtherFrame` for an invalid number.
     """
     return reader_of(number, OtherFrame)
 

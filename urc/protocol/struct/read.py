@@ -130,7 +130,7 @@ def _number_step(item: Item, encoding: str) -> Step:
 
 
 def const_of(item: Item) -> Any:
-    """Return the constant after reading back, because 0.1 in 32 bits is not exactly 0.1."""
+    """Return the constant as read back from a frame, because 0.1 in 32 bits is not exactly 0.1."""
     if item.const is None or item.kind != "number":
         return item.const
     return plain_reader(item.number)(number_writer(item.number, item.id)(item.const), 0)

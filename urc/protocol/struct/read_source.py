@@ -24,7 +24,7 @@ Read = Callable[[Frame], Mapping[str, object] | None]
 def generate_read(items: tuple[Item, ...], encoding: str) -> Read:
     """Return a function that reads the fields of a frame, or returns None for no match.
 
-    The function raises `BadItem` if a matching frame contains an invalid value.
+    The returned function raises `BadItem` if a matching frame contains an invalid value.
     """
     source = SourceBuilder()
     source.scope |= {"FAULT": FAULT, "not_valid": not_valid, "BadItem": BadItem}
@@ -61,8 +61,8 @@ def add_fixed(
         data: name of the variable that contains the frame.
 
     Returns:
-        The source lines for decoding, and an expression for the value of each field after these
-        lines.
+        The source lines for decoding, and for each field an expression that is valid after the
+        source lines.
     """
     has_open_end = bool(items) and _is_open_end(items[-1])
     parts = list(runs_of(items[:-1] if has_open_end else items))
@@ -225,7 +225,7 @@ def _add_mixed(
 
 
 def _add_noted(source: SourceBuilder, lines: list[str], fields: list[str]) -> None:
-    """Add source for the value of one item; errors wait until the whole frame has matched."""
+    """Add source for the value of one item; errors are raised after the whole frame is read."""
     if not fields:
         return
     depth = 1

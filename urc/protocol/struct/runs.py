@@ -1,6 +1,7 @@
 """Runs of fixed struct items, each unpacked by one `struct.Struct`.
 
-Pure. The generators `urc.protocol.struct.read_source` and `.write_source` use the runs.
+Pure. The generators `urc.protocol.struct.read_source` and `urc.protocol.struct.write_source` use
+the runs.
 """
 
 from collections.abc import Iterator
@@ -26,7 +27,7 @@ class FixedField(NamedTuple):
     outer: str
     """Joined name of the outer structs."""
     code: str
-    """Format characters for `struct`; "x" has no value."""
+    """Format characters for `struct`; "x": the item has no value."""
     endian: Literal["", "big", "little"] = ""
     values: int = 1
 

@@ -29,7 +29,7 @@ __all__ = [
 
 
 def meaning_of(item: Item) -> Callable[[Any], Any]:
-    """Return a function that converts raw form to value, or raises `BadItem` if invalid."""
+    """Return a function from raw form to value; the function raises `BadItem` if invalid."""
     words, scale, offset, valid = dict(item.enum), item.scale, item.offset, item.valid
     divisor = divisor_of(scale)
 
@@ -54,7 +54,7 @@ def not_valid(name: str, value: object, valid: tuple[float, float]) -> BadItem:
 
 
 def raw_of(item: Item) -> Callable[[Any], Any]:
-    """Return a function that converts value to raw form, or raises `NotWritable`.
+    """Return a function that converts the value to the raw form, or raises `NotWritable`.
 
     Numbers are rounded to the nearest whole number, and halves to the even number.
     """
@@ -119,7 +119,7 @@ def _wanted(item: Item) -> str:
 
 
 def checked_raw(item: Item) -> Callable[[Any], tuple[Any, Any]]:
-    """Return a function that converts a value to the raw number, and reads the number back."""
+    """Return a function from a value to the raw number and the value of the raw number."""
     raw_from, meaning = raw_of(item), meaning_of(item)
 
     def checked(value: Any) -> tuple[Any, Any]:

@@ -1,7 +1,7 @@
 """Conversion of raw values to values, and the inverse conversion for emulated robots.
 
 Pure. A conversion is a chain of small functions, built once for each engine. Each function converts
-the result of the previous function; None means "not available" and ends the chain.
+the result of the previous function. The result None means "not available", and ends the chain.
 """
 
 import math
@@ -52,7 +52,7 @@ class Unusable:
 def build_conversion(conversion: Conversion) -> Step | None:
     """Return a function that converts raw values; None without a conversion.
 
-    The function raises `BadValue` for an invalid raw value.
+    The returned function raises `BadValue` for an invalid raw value.
     """
     steps: list[Step] = []
     if conversion.base:
@@ -71,7 +71,7 @@ def build_conversion(conversion: Conversion) -> Step | None:
 def build_inverse(conversion: Conversion) -> Step | None:
     """Return a function that converts values back to raw values; None without a conversion.
 
-    The function raises `BadValue` for a value without a corresponding raw value.
+    The returned function raises `BadValue` for a value without a corresponding raw value.
     """
     steps: list[Step] = []
     if conversion.states:

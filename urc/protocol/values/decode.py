@@ -1,8 +1,8 @@
 """Decoding of raw fields into typed values.
 
-Pure. Each engine builds the converters once per signal. A value of the wrong type or range is a
-counted violation and never a sample. A wrong number on the screen would be worse than an old
-number.
+Pure. Each engine builds the converters once per signal. A value of the wrong type or range is
+counted as a violation, and never becomes a sample. On a screen, a wrong number would be worse than
+an old number.
 """
 
 import math
@@ -43,9 +43,9 @@ def build_converter(signal: Signal) -> Convert:
 
 
 def build_raw(signal: Signal) -> Callable[[object], object]:
-    """Return a function from a value of `signal` to a raw field, for the emulated robot.
+    """Return a function that converts a value of `signal` to a raw field, for the emulated robot.
 
-    The function raises `BadValue` for a value without a raw counterpart.
+    The returned function raises `BadValue` for a value without a raw counterpart.
     """
     conversion = signal.conversion._replace(states=signal.states or signal.conversion.states)
     back = build_inverse(conversion)

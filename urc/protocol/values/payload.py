@@ -25,7 +25,7 @@ __all__ = [
 
 
 class BadText(ValueError):
-    """The frame is not valid text in the connection's encoding; the message has the position."""
+    """The frame is not valid text in the connection's encoding; the message states the position."""
 
 
 class BadItem(BadText):
@@ -42,7 +42,7 @@ class Frame:
     __slots__ = ("_text", "attributes", "encoding", "fault", "payload", "topic", "was_text_wanted")
 
     fault: str
-    """Reason why a reader rejected a matching frame; unset if no reader rejected the frame."""
+    """Reason why a reader rejected a value of the frame; unset if no reader rejected a value."""
     was_text_wanted: bool
     """Whether a reader needed the text of an undecodable frame; unset if no reader did."""
 
@@ -106,4 +106,4 @@ class PayloadWriter(Protocol):
         """Return the frame; raise `NotWritable` or `ExpressionError`."""
 
     def read(self, frame: Frame) -> Mapping[str, object] | None:
-        """Return the values of the root names that result in this frame; None if impossible."""
+        """Return values of the root names for which `write` returns this frame, or None."""

@@ -35,8 +35,8 @@ class Endpoint(NamedTuple):
     text: str
     """Text for people, such as ``tcp 127.0.0.1:6789`` or ``serial /dev/pts/3``."""
     options: Mapping[str, object] = NOTHING
-    """Options for connecting the driver's transport to this server. These options override the
-    options in the driver.
+    """Options for connecting the driver's transport to this server. Options in this mapping
+    override the options in the driver.
     """
     path: str = ""
     """Path of the device file of a serial port."""
@@ -61,17 +61,20 @@ class ServerContext(NamedTuple):
     host: str
     """Local address to listen on."""
     line: Callable[[], EmulatedConnection]
-    """Creates the robot's side of a new connection."""
+    """Function that creates the robot's side of a new connection."""
     now: Callable[[], float]
-    """Returns the current time in seconds since the epoch, available to templates as ``now``."""
+    """Function that returns the current time, in seconds since the epoch; templates read the time
+    as ``now``."""
     topics: Mapping[str, Mapping[str, Value]] = NOTHING
     """Options of the driver's subscriptions by topic, on a message transport."""
     is_anywhere: bool = False
     """Whether to listen on any free port instead of the configured port."""
     picture: Callable[[Sequence[str]], bytes | None] = lambda _: None
-    """Returns the current world image for the given topic names; None without an image."""
+    """Function that returns the current world image for the given topic names; None without an
+    image."""
     last_peer: LastPeer | None = None
-    """Last peer, shared by all servers of the robot; None: not recorded."""
+    """Host that last sent data, shared by all servers of the robot; None: the host is not
+    recorded."""
     carried: Mapping[tuple[str, int], Endpoint] = MappingProxyType({})
     """Targets that clients can reach through this server. The keys are hosts and ports in the
     driver, and the values are endpoints of the emulated robot."""

@@ -32,7 +32,7 @@ class ClientConnection:
     def __init__(self, line: EmulatedConnection, abort: Callable[[], None]) -> None:
         self.line = line
         self.abort = abort
-        """Disconnects the client immediately; further calls do nothing."""
+        """Function that disconnects the client immediately; further calls have no effect."""
         self.active_s = asyncio.get_running_loop().time()
         """Time of the client's last data, on the event loop's clock."""
 
@@ -55,7 +55,7 @@ class Clients:
         talk: Callable[[ClientConnection], Coroutine[Any, Any, None]],
         abort: Callable[[], None],
     ) -> None:
-        """Run `talk` for a new client. Call `abort` to disconnect the client, and at the end.
+        """Run `talk` for a new client. When the client is replaced or `talk` ends, call `abort`.
 
         `talk` may raise OSError or TimeoutError for a lost client.
         """
@@ -106,9 +106,9 @@ async def converse(
     Args:
         context: context of the server.
         client: client with the robot's side of its connection.
-        take: returns the client's next payload; None or b"" at the end of input. Calls of `take`
-            may be cancelled and repeated without data loss.
-        put: sends payloads of the robot; waits while the client's buffer is full.
+        take: function that returns the client's next payload; None or b"" at the end of input.
+            Calls of `take` may be cancelled and repeated without data loss.
+        put: function that sends payloads of the robot, and waits while the client's buffer is full.
 
     Raises:
         TimeoutError: the client does not read its data.

@@ -44,7 +44,7 @@ def picture(now_s: float) -> bytes:
 
 
 def _mean(difference: int) -> str:
-    """Return the code of a difference from the previous mean: length (four bits) and number."""
+    """Return the JPEG code of a difference of means: number of bits (four bits) and value."""
     if difference == 0:
         return "0000"
     length = abs(difference).bit_length()
@@ -235,7 +235,7 @@ class _Talk:
         return str(kinds[0]) if kinds else ""
 
     def _picture(self, asked: HttpRequest) -> bytes:
-        """Return the camera image of the robot's world, or an image of one changing colour."""
+        """Return the camera image of the robot's world; without a world, an image of one colour."""
         context, target = self._context, asked.target.removeprefix(self._base)
         seen = context.picture((asked.path, target))
         return picture(context.now()) if seen is None else seen
@@ -332,7 +332,7 @@ def _bytes(body: object) -> bytes:
 
 
 def _piece(kind: str, event: str, body: bytes) -> bytes:
-    """Return a message as a server-sent event or as a line."""
+    """Return a message as a server-sent event, or as a line of text."""
     if kind == "lines":
         return body.replace(b"\n", b" ") + b"\n"
     name = [b"event: " + event.encode()] if event else []

@@ -14,7 +14,7 @@ _FIELD = re.compile(r'(\w+)=(?:"([^"]*)"|([^\s,]*))')
 
 
 class HttpAuth:
-    """Checks requests against the driver's option `auth`."""
+    """A check of requests against the driver's option `auth`."""
 
     def __init__(self, auth: object) -> None:
         """Read the option `auth`. Without the option, every request is accepted."""

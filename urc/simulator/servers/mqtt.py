@@ -1,7 +1,7 @@
 """The emulated robot as a client of a real MQTT broker.
 
 A broker must run at the configured address, as for the real robot. The emulated robot publishes the
-driver's subscribed topics. It receives the messages of all other topics.
+driver's subscribed topics. The emulated robot receives the messages of all other topics.
 """
 
 import asyncio
@@ -23,8 +23,8 @@ OPEN_S = 5.0
 AGAIN_S = 1.0
 """Delay before reconnecting to the broker, in seconds."""
 _NOT_OURS = ("client_id", "will")
-"""Options that are valid only for the driver. A shared client identifier would make each client
-disconnect the other."""
+"""Options that are valid only for the driver. With a shared client identifier, the emulated robot
+and the driver would disconnect each other."""
 
 log = logging.getLogger(__name__)
 

@@ -41,7 +41,7 @@ class Bridge:
     """The state that all clients of one bridge share."""
 
     def __init__(self, declared: Mapping[str, str]) -> None:
-        """Start with the types of the robot's topics, by name; "" for an unknown type."""
+        """Initialise the bridge with the types of the robot's topics, by name; "": unknown type."""
         self.types = dict(declared)
         self.clients: list[BridgeClient] = []
         self.servers: dict[str, BridgeClient] = {}
@@ -364,7 +364,7 @@ def _fields(body: object) -> object:
 
 
 def _png(data: bytes) -> str:
-    """Return `data` as base64 pixels of a square 8-bit RGB image, padded with newlines."""
+    """Return `data`, padded with newlines, as the base64 pixels of a square 8-bit RGB image."""
     side = max(1, round((len(data) / 3) ** 0.5))
     height = -(-len(data) // (side * 3))
     padded = data.ljust(side * height * 3, b"\n")

@@ -1,8 +1,8 @@
 """An emulated robot behind a pseudo-terminal, which programs can open like a serial port.
 
-The system chooses the name of the pseudo-terminal. If the profile's port is a missing path outside
-``/dev``, the server creates a symbolic link at this path. The profile then works unchanged. For
-``socket://HOST:PORT``, the server listens on a TCP port.
+The system chooses the name of the pseudo-terminal. If the profile's port is a path outside ``/dev``
+that does not exist, the server creates a symbolic link at this path. With the symbolic link, the
+profile works without changes. For ``socket://HOST:PORT``, the server listens on a TCP port.
 """
 
 import asyncio
@@ -22,8 +22,8 @@ from urc.simulator.servers.tcp import TcpServer
 __all__ = ["SerialServer"]
 
 _LOOK_S = 0.02
-"""Polling interval for a closed pseudo-terminal, in seconds. The system does not report its
-opening."""
+"""Polling interval for a closed pseudo-terminal, in seconds. The system does not report when a
+program opens the pseudo-terminal."""
 
 
 class SerialServer:

@@ -13,7 +13,7 @@ _LINE_ENDS: Final = (b"\r", b"\n", b"\r\n")
 
 
 class TerminalInput:
-    """Input of one client, converted to the line ends of the driver."""
+    """The input of one client, converted to the line ends of the driver."""
 
     def __init__(self, spec: TransportSpec) -> None:
         """Use the line ends in the framing of `spec`. For other framings, bytes stay unchanged."""

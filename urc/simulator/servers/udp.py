@@ -23,7 +23,7 @@ from urc.simulator.servers.clients import ClientConnection, Clients, converse
 __all__ = ["UdpServer"]
 
 FORGOTTEN_S = 300.0
-"""Timeout in seconds for silent clients. The timeout does not apply to the driver's port."""
+"""Timeout in seconds for silent clients, except for the port on which the driver listens."""
 _WAITING = 256
 """Maximum number of queued datagrams per client; further datagrams are dropped."""
 

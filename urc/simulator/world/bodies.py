@@ -17,7 +17,7 @@ GRAVITY: Final = 9.80665
 _LANDS_AT: Final = 0.4
 """Descent speed of a landing quadrotor, in m/s."""
 _LEAN: Final = 0.02
-"""Lean of a sprung body, in radians per m/s²."""
+"""Lean of a sprung body per acceleration, in radians per m/s²."""
 
 Inputs = Mapping[str, float]
 
@@ -56,11 +56,11 @@ class Motion:
     rates: list[float] = field(default_factory=lambda: [0.0, 0.0])
     """Roll rate and pitch rate, in rad/s."""
     told_forward: float = 0.0
-    """Speed of the wheels or tracks in m/s, even against an obstacle. `told_turn` is their turn
-    rate in rad/s."""
+    """Speed of the wheels or tracks, in m/s; the wheels turn even if an obstacle stops the body.
+    `told_turn` is the turn rate of the wheels or tracks, in rad/s."""
     told_turn: float = 0.0
     effort: float = 0.0
-    """Used share of the maximum power, 0 to 1."""
+    """Power in use, as a fraction of the maximum power, 0 to 1."""
 
 
 def move(body: BodySpec, motion: Motion, inputs: Inputs, dt_s: float) -> None:
@@ -93,7 +93,7 @@ def legs_of(body: BodySpec, motion: Motion) -> tuple[float, ...]:
 
 
 def _lean(body: BodySpec, motion: Motion) -> None:
-    """Lean against accelerations, and rock on rough ground."""
+    """Set roll and pitch: the body leans against accelerations, and rocks on rough ground."""
     along, across, _ = motion.accelerations
     motion.pitch += (-_LEAN * along - motion.pitch) * 0.2
     motion.roll += (_LEAN * across - motion.roll) * 0.2

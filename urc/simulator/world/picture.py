@@ -1,7 +1,7 @@
 """The camera image of the emulated robot as JPEG, rendered by ray casting: walls, ground and sky.
 
 Pure. The module imports numpy and Pillow, so it is loaded on first use. Each image column is one
-direction on the ground. Its obstacles are drawn from the farthest to the nearest.
+direction on the ground. The obstacles in this direction are drawn from the farthest to the nearest.
 """
 
 import io
@@ -22,7 +22,8 @@ Array = NDArray[np.float32]
 _BINS: Final = 1440
 """Number of directions around the camera."""
 _LAYERS: Final = 4
-"""Maximum number of edges drawn per direction. A low box hides only the foot of a wall."""
+"""Maximum number of edges drawn per direction. Several edges may be visible in one direction,
+because a low box hides only the foot of a wall."""
 _SKY: Final = ((150, 184, 222), (226, 233, 240))
 """Colours of the sky, at the top and at the horizon."""
 _GROUNDS: Final = {
@@ -31,7 +32,7 @@ _GROUNDS: Final = {
     "water": ((70, 122, 150), (62, 112, 142)),
 }
 _FAR_M: Final = 25.0
-"""Distance in metres at which colours are blended halfway with the horizon."""
+"""Distance in metres at which a colour is an equal blend of its own colour and the horizon."""
 _QUALITY: Final = 80
 
 
@@ -70,7 +71,7 @@ def camera_picture(
 def panorama_picture(
     plan: WorldMap, faces: EdgeArrays, pose: CameraPose, size: tuple[int, int]
 ) -> NDArray[np.uint8]:
-    """Return the panorama. Columns are directions, and rows are heights."""
+    """Return the panorama image: each column is a direction, and each row is a height."""
     columns, rows = size
     azimuth = np.linspace(math.pi, -math.pi, columns, endpoint=False, dtype=np.float32)
     height = np.linspace(math.pi / 2 - 0.01, -math.pi / 2 + 0.01, rows, dtype=np.float32)
@@ -121,7 +122,8 @@ def _seen(
 ) -> NDArray[np.uint8]:
     """Return the colours in the given directions.
 
-    `azimuth` is relative to ahead, positive to the left. `slope` is positive upwards.
+    `azimuth` is the angle from the forward direction, positive to the left. `slope` is the rise
+    over the horizontal distance, positive upwards.
     """
     direction = azimuth + np.float32(pose.yaw)
     picture = _open_country(plan, pose, direction, slope)

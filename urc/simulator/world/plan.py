@@ -14,7 +14,7 @@ __all__ = ["ROOM", "Edge", "WorldMap", "Contact"]
 
 
 class Edge(NamedTuple):
-    """A vertical face that starts at the ground."""
+    """A vertical face of an obstacle, from the ground up."""
 
     x1: float
     y1: float
@@ -54,8 +54,8 @@ ROOM: Final = PlanSpec(
     ),
     holes=(Box(5.2, -0.6, 1.0, 1.0),),
 )
-"""The default room, 10 by 7 m. The room has two halves with a door between them, boxes, four
-coloured posts and stairs down."""
+"""The default room, 10 by 7 m. The room contains boxes, four coloured posts and stairs down; a wall
+with a door divides the room into two halves."""
 
 
 class WorldMap:

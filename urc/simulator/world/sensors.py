@@ -63,7 +63,7 @@ class Odometry:
     """Wheel odometry: a pose with a constant systematic error."""
 
     def __init__(self, spec: WorldSpec) -> None:
-        """Begin at the start pose of the world."""
+        """Initialise the odometry with the start pose of the world."""
         self.x, self.y, self.yaw = spec.start
         scale = spec.odometry.scale
         self._stride = 1 + scale * (2 * uniform(spec.seed, 0, "stride") - 1)
@@ -221,10 +221,10 @@ def _is_cliff(moment: SensorInput, body: BodySpec, angle: float) -> bool:
 
 
 class Battery:
-    """The battery. Its level is at least 0. An empty battery is replaced after a standstill."""
+    """The battery, with a level of at least 0. An empty battery is replaced after a standstill."""
 
     def __init__(self, spec: WorldSpec) -> None:
-        """Begin with the declared level."""
+        """Initialise the battery with the declared level."""
         self._spec = spec.battery
         self.charge = spec.battery.capacity * spec.battery.level / 100
         """Charge, in A·h."""
@@ -248,7 +248,7 @@ class Battery:
             self.charge = self._spec.capacity * max(self._spec.level, 2 * _EMPTY) / 100
 
     def drain(self, level: float) -> None:
-        """Limit the charge to `level` per cent."""
+        """Reduce the charge to at most `level` per cent."""
         self.charge = min(self.charge, self._spec.capacity * level / 100)
 
     def readings(self) -> Mapping[str, object]:

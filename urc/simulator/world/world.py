@@ -1,7 +1,8 @@
 """The world of an emulated robot: a body with inputs, and sensors.
 
-Pure: no clock and no sockets. Time is an argument, and the world advances in steps of `STEP_S`.
-Identical commands at identical times produce the same world, regardless of observations.
+The module uses no clock and no sockets. Time is an argument, and the world advances in steps of
+`STEP_S`. Identical commands at identical times produce the same world, however often the world is
+observed.
 """
 
 import math
@@ -32,10 +33,10 @@ __all__ = ["FARTHEST_S", "STEP_S", "SensorView", "World"]
 STEP_S: Final = 0.02
 """Length of a simulation step, in seconds."""
 FARTHEST_S: Final = 60.0
-"""Maximum simulated time between two observations, in seconds. The rest of a longer gap is
-skipped."""
+"""Maximum simulated time between two observations, in seconds. The remainder of a longer gap is not
+simulated."""
 _ASKED_EVERY_S: Final = 0.1
-"""Interval for reading time-dependent inputs during a long gap, in seconds."""
+"""Interval at which time-dependent inputs are evaluated during a long gap, in seconds."""
 _TRAIL_EVERY_M: Final = 0.05
 _TRAIL_MOST: Final = 400
 _LOW: Final = 12.0
@@ -44,7 +45,7 @@ _PANORAMA: Final = (512, 256)
 """Columns and rows of a panorama image."""
 
 Inputs = Callable[[float], Mapping[str, float]]
-"""Returns the inputs of the body at a given time."""
+"""Function that returns the inputs of the body at a given time."""
 
 
 class World:
@@ -52,9 +53,10 @@ class World:
 
     Args:
         spec: the declaration.
-        inputs: returns the inputs of the body at a given time. The function may observe the world
-            at the current step.
-        holds: evaluates a condition of the camera, if a document has a template for the condition.
+        inputs: function that returns the inputs of the body at a given time. The function may
+            observe the world at the current step.
+        holds: function that evaluates a condition of the camera, which a document may give as a
+            template.
     """
 
     def __init__(
@@ -143,7 +145,7 @@ class World:
     def panorama(self) -> bytes:
         """Return a panorama as JPEG, with the forward direction in the middle.
 
-        Image rows are heights.
+        Each column of the image is a direction, and each row is a height.
         """
 
         def draw() -> bytes:
@@ -200,7 +202,7 @@ class World:
             self._trail.append((motion.x, motion.y))
 
     def _collide(self) -> None:
-        """Move an overlapping body back to the edge of the obstacle."""
+        """Move a body that overlaps an obstacle back to the edge of the obstacle."""
         motion, self.touch = self.motion, None
         for _ in range(3):  # a corner has two edges
             touch = self.plan.touch(motion.x, motion.y, motion.z, self.spec.body.radius)
