@@ -39,7 +39,7 @@ _SECONDS = {"ms": 0.001, "s": 1.0, "m": 60.0, "h": 3600.0, None: 1.0}
 
 
 class _Exit(Exception):
-    """Raised after help text or an error message was printed."""
+    """An exception that ends parsing after help text or an error message was printed."""
 
 
 class _Parser(argparse.ArgumentParser):

@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _planned(word: str, store: "Store") -> "InstallPlan":
-    """Return the packages. Installed versions have priority, because they are tested."""
+    """Return the packages, preferably in their installed versions, which are tested."""
     from urc.cli.packages import is_path, planned
     from urc.packages.install_plan import InstallPlan
     from urc.packages.names import parse_requirement

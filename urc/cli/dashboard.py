@@ -152,7 +152,7 @@ async def _serve(
 
 @asynccontextmanager
 async def _listening(faulty: FaultInjector) -> AsyncIterator[None]:
-    """Read and execute fault commands from standard input during the context."""
+    """Execute fault commands from standard input while the context is active."""
     task = asyncio.create_task(faulty.listen())
     try:
         yield

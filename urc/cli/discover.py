@@ -167,7 +167,7 @@ async def _nearby(
 def _places(
     profile: "Profile", settings: Mapping[str, "Value"]
 ) -> Iterator[tuple[str, tuple[str, int]]]:
-    """Yield type, host and port of each transport with complete settings."""
+    """Yield the type, host and port of each transport with complete settings."""
     from urc.runtime.settings import options_of
     from urc.transports.ros.rosbridge import DEFAULT_PORT
 

@@ -88,7 +88,7 @@ class LineWriter:
         threading.Thread(target=self._work, name="writer", daemon=True).start()
 
     async def write(self, stream: TextIO, text: str) -> None:
-        """Write all of `text`, and return afterwards.
+        """Write all of `text` before returning.
 
         Raises:
             OSError: writing failed; `BrokenPipeError` if the reader has closed the stream.

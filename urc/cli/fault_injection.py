@@ -129,7 +129,7 @@ class FaultInjector:
 
     @contextmanager
     def watch(self, name: str, emulated_robot: "EmulatedRobot") -> Iterator[None]:
-        """Inject the stored faults of a robot during the context."""
+        """Inject the stored faults of a robot while the context is active."""
         emulated_robots = self._emulated_robots.setdefault(name, [])
         for text in self._wrong.get(name, {}).values():
             with suppress(UrcError):  # another version may lack that signal
@@ -220,6 +220,6 @@ class FaultInjector:
             print(self, flush=True)
 
     async def listen(self) -> None:
-        """Execute the commands from standard input until it ends."""
+        """Execute the commands from standard input until the input ends."""
         async for line in typed_lines(sys.stdin):
             self.obey(line)

@@ -124,8 +124,8 @@ def _unknown(verb: str) -> int:
 def _mend_streams() -> None:
     """Open missing standard streams, and let all streams accept any text.
 
-    WARNING: missing streams must be opened first. Otherwise the next file or socket would receive
-        the number of a standard stream, and printed text could reach a robot.
+    WARNING: missing streams must be opened first. If a standard stream is missing, the next file or
+        socket receives its number, and printed text could reach a robot.
     """
     for number in range(3):
         try:
@@ -158,7 +158,7 @@ def _flush(code: int) -> int:
 def _discard_output() -> None:
     """Discard pending output.
 
-    Otherwise, Python would retry the failed write and print an error at exit.
+    Without this step, Python would retry the failed write and print an error at exit.
     """
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

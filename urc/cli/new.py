@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Create the folder; never change an existing folder."""
+    """Create the folder of the widget; raise `UrcError` if the folder exists."""
     from urc.problems import UrcError
 
     name: str = arguments.name

@@ -40,7 +40,7 @@ __all__ = [
 
 
 def open_store() -> "Store":
-    """Return this user's store."""
+    """Return the package store of this user."""
     from urc.packages.store import Store
 
     return Store(own_folder() / "packages")

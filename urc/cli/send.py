@@ -303,7 +303,7 @@ async def _given(
 async def _heeding(
     session: "Session", command: "Command", arguments: argparse.Namespace
 ) -> AsyncIterator["MotionInterlock | None"]:
-    """Apply the interlocks during the context, unless the arguments override them."""
+    """Apply the interlocks while the context is active, unless an argument overrides them."""
     may_move = command.moves or command.hold is not None
     if arguments.despite_stop or not may_move:
         yield None

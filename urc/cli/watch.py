@@ -80,7 +80,7 @@ async def _watch(
 
 
 async def _follow(tap: "EventTap", printer: "_Printer", seconds: float | None) -> None:
-    """Print the events of the tap until the duration has elapsed."""
+    """Print the robot's events until the duration has elapsed."""
     now = asyncio.get_running_loop().time
     ends = math.inf if seconds is None else now() + seconds
     is_over = False

@@ -21,7 +21,7 @@ def parse_moves(part: Node, problems: Problems) -> tuple[bool, Template | None]:
 
 
 def link_moves(problems: Problems, part: Node, command: Command) -> None:
-    """Report each name in the condition under ``moves`` that is not an argument."""
+    """Report each name under ``moves`` that is not an argument of the command."""
     condition = command.moves_if
     if condition is None:
         return
@@ -42,7 +42,7 @@ def runs_what_moves(command: Command, arguments: Mapping[str, Template | Reading
 
 
 def with_moving_steps(commands: Mapping[str, Command]) -> dict[str, Command]:
-    """Return all commands, and mark each sequence that runs a moving or held command."""
+    """Return all commands; set `moves` of each sequence that runs a moving or held command."""
     found = dict(commands)
 
     def does(step: object) -> bool:

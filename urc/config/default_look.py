@@ -44,7 +44,7 @@ _GROUPS: Final[tuple[tuple[str, Mapping[str, tuple[str, ...]], frozenset[str]], 
     ("compass", {"heading": ("heading", "bearing", "course")}, frozenset(("heading",))),
     ("compass", {"yaw": ("yaw",)}, frozenset(("yaw",))),
 )
-"""Widgets for several signals, with the endings of signal names by input, and required inputs."""
+"""Widgets for several signals: name, endings of signal names by input, and required inputs."""
 
 _COLUMNS: Final = {"landscape": 4, "phone_portrait": 2, "phone_landscape": 7}
 """Maximum number of columns in a default grid, by screen."""
@@ -149,7 +149,7 @@ def _candidates(signal: Signal) -> tuple[str, ...]:
 
 
 def _one_input(widget: Widget | None, signal: Signal) -> WidgetUse | None:
-    """Bind the signal to the widget's first suitable input; None if more inputs are required."""
+    """Return the widget, bound to the signal by one input; None if one input does not suffice."""
     if widget is None:
         return None
     fitting = [
@@ -239,7 +239,7 @@ def _says(name: str, words: tuple[str, ...]) -> bool:
 
 
 def _output(widget: Widget | None, command: Command, names: Mapping[str, str]) -> WidgetUse | None:
-    """Bind the command to the widget's first output with the values in `names`."""
+    """Return the widget, bound to the command by its first output with the values in `names`."""
     if widget is None or any(port.is_required for port in widget.inputs.values()):
         return None
     is_held = command.hold is not None
@@ -254,7 +254,7 @@ def _output(widget: Widget | None, command: Command, names: Mapping[str, str]) -
 def _with_state(
     use: WidgetUse, argument: Argument, driver: Driver, registry: WidgetFolder
 ) -> WidgetUse:
-    """Bind the signal with the name of the argument or command to the widget, if it exists."""
+    """Return the widget, also bound to a signal with the name of the argument or command."""
     widget = registry.get(use.widget)
     port = widget.inputs.get("state") if widget is not None else None
     command = next(iter(use.outputs.values()))
@@ -315,7 +315,7 @@ def _grid(slots: Mapping[str, WidgetUse], screen: str) -> Layout:
 
 
 def _rank(use: WidgetUse) -> int:
-    """Return the rank of a widget: large displays, small displays, steering controls, others."""
+    """Return the rank of a widget: large display, small display, steering control, or other."""
     if use.widget in _BIG:
         return _STEERED if use.outputs and not use.inputs else 0
     return 3 if use.outputs else 1
@@ -324,7 +324,7 @@ def _rank(use: WidgetUse) -> int:
 def _free(
     taken: set[tuple[int, int]], columns: int, size: int, first: int, *, is_from_right: bool
 ) -> tuple[int, int]:
-    """Return row and column of the first free square at or below the row `first`."""
+    """Return the row and the column of the first free square at or below the row `first`."""
     places = range(columns - size + 1)
     row = first
     while True:

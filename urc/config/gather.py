@@ -1,8 +1,8 @@
 """The first passes over a document and its references: compose, expand and shape.
 
-The compose pass merges a document with its base and its includes. The expand pass replaces `params`
-and `each`. The shape pass checks the result against the schema. Each pass is a function of one
-document.
+The compose pass merges a document with the documents under `extends` and `include`. The expand pass
+replaces `params` and `each`. The shape pass checks the result against the schema. Each pass is a
+function of one document.
 
 URC reads the robot before the driver and the interfaces, because the robot refers to both.
 """
@@ -90,7 +90,7 @@ def _prepared(
 
 
 def _place(problem: Problem) -> tuple[str, str, int, int]:
-    """Return code, file, line and column, which identify a problem across passes."""
+    """Return the code, file, line and column, which identify a problem across passes."""
     return problem.code, problem.file, problem.line, problem.column
 
 

@@ -40,13 +40,13 @@ class CheckResult(NamedTuple):
     """The profile of a robot or driver without errors; a driver gets the default interface."""
     problems: tuple[Problem, ...]
     kind: str
-    """``robot``, ``driver``, ``interface`` or ``widget``; "" after an error in the first passes."""
+    """Document kind: ``robot``, ``driver``, ``interface``, ``widget``, or "" after early errors."""
     files: tuple[str, ...] = ()
     """Paths of all requested files, including missing files; the checked document is first."""
     pages: tuple[str, ...] = ()
     """URLs of web pages in the widgets, as written in the document."""
     widget: Widget | None = None
-    """The widget, for a manifest without errors."""
+    """The widget of a valid manifest; None for other documents and invalid manifests."""
     is_cut_short: bool = False
     """Whether an error prevented later passes, which may find more problems."""
 

@@ -1,4 +1,4 @@
-"""Migration of documents: replaces old keys and values without any other change."""
+"""Migration of documents: replacement of old keys and values, without any other change."""
 
 import re
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ class Migrated(NamedTuple):
 
 
 def migrate(path: str) -> Migrated:
-    """Return the content of a file with new names, without a change of the file.
+    """Return the content of a file with new names; the file itself is not changed.
 
     Raises:
         ProblemsError: the file cannot be read, is not a document, or has a key under both names.
@@ -74,7 +74,7 @@ def _replaced(written: str, new: str) -> str:
 
 
 def _parts(document: Document) -> Iterator[tuple[Content, Path]]:
-    """Yield content type and path of each part of a document."""
+    """Yield the content type and the path of each part of a document."""
     kind = kind_of(document)
     data = document.data
     if kind == "robot" and isinstance(data, dict):
@@ -103,7 +103,7 @@ def _parts(document: Document) -> Iterator[tuple[Content, Path]]:
 def _renames(
     document: Document, content: Content, root: Path
 ) -> Iterator[tuple[Span, tuple[str, str]]]:
-    """Yield the position of each old name in one part, with its old and new name."""
+    """Yield the position of each old name in one part, with the old and the new name."""
     keys = [one for one in KEYS if one.content == content]
     values = [one for one in VALUES if one.content == content]
     for path, mapping in _mappings(_at(document.data, root)):
@@ -123,7 +123,7 @@ def _renames(
 
 
 def _mappings(data: object, path: Path = ()) -> Iterator[tuple[Path, dict[str, object]]]:
-    """Yield path and value of `data` and every nested mapping."""
+    """Yield the path and the value of `data` and of every nested mapping."""
     if isinstance(data, dict):
         yield path, data
         for key, inner in data.items():

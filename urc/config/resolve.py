@@ -135,7 +135,7 @@ def written(key: str, value: object) -> str:
 
 
 def _entry(key: str, node: object, depth: int) -> Iterator[str]:
-    """Yield the lines of one key."""
+    """Yield the lines of one key and its value."""
     yield from _value(f"{'  ' * depth}{_text(key)}:", node, depth, _place(node))
 
 

@@ -99,7 +99,9 @@ def clear(work: Path) -> None:
 
 @contextmanager
 def exclusive(file: Path) -> Iterator[None]:
-    """Lock out other processes during the context. A crash of this process releases the lock.
+    """Lock out other processes while the context is active.
+
+    A crash of this process releases the lock.
 
     Raises:
         PackageError: another process holds the lock for more than ten seconds.

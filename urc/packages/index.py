@@ -118,7 +118,7 @@ def entry_of(
 def read_index(data: bytes, where: str) -> Index:
     """Return an index from an untrusted source; raise `PackageError`.
 
-    Versions and ranges are validated, so later code need not check them.
+    Versions and ranges are validated, so later code can rely on valid values.
     """
     if len(data) > INDEX_BYTES:
         raise PackageError(f"{where}: the index is larger than {INDEX_BYTES >> 20} MiB")

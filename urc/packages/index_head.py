@@ -1,7 +1,8 @@
 """The head of an index: number, digest, signature and expiry time.
 
-A maintainer with a key signs the head, and therefore the digest of the whole index. Signatures
-expire after some days. An attacker cannot hide newer versions from clients after the expiry.
+A maintainer with a key signs the head, and therefore the digest of the whole index. The signature
+of a head expires after some days. An attacker cannot hide newer versions from clients after the
+expiry.
 """
 
 import time

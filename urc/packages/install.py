@@ -43,7 +43,7 @@ def plan_requirement(
         required: the requirement.
         sources: package sources, in the order of requests.
         store: store with archives that need no download.
-        complain: receives warnings for the user.
+        complain: callback for warnings to the user.
         pinned: lock with the only accepted versions and digests, even if a version was withdrawn
             later.
         takes_withdrawn: whether withdrawn versions are accepted.

@@ -24,7 +24,7 @@ class Published(msgspec.Struct, frozen=True):
     """Listed version, such as ``drivers/puppet 1.0.0``."""
     sha256: str
     is_new: bool = True
-    """False if the repository already listed this version."""
+    """Whether the version is new; False if the repository already listed the version."""
 
 
 class _Fault(msgspec.Struct, frozen=True):

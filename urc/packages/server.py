@@ -204,7 +204,7 @@ def repository_app(
         folder: folder of the repository.
         tokens: upload tokens; None to refuse uploads.
         examine: function that checks uploads, as in `urc.packages.submission.take`.
-        index_signer: maintainer's signer, for the index after uploads.
+        index_signer: signer of the index after uploads, with the maintainer's key.
     """
     shop = _Shop(folder)
     routes = [Route("/{path:path}", shop.answer, methods=["GET", "HEAD"])]

@@ -167,12 +167,12 @@ def merged(
 ) -> dict[PackageId, list[tuple[IndexEntry, Source]]]:
     """Return every version of every package with its source, including withdrawn versions.
 
-    All versions of a package are from the first source that contains the package. Therefore a
-    source that is added later cannot offer a newer version of a known package.
+    All versions of a package are from the first source that contains the package. A source that is
+    added later therefore cannot offer a newer version of a known package.
 
     Args:
         sources: package sources, in the order of requests.
-        complain: receives an error message for each unreachable source.
+        complain: callback for an error message about each unreachable source.
     """
     found: dict[PackageId, list[tuple[IndexEntry, Source]]] = {}
     for source in sources:

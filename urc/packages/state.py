@@ -20,7 +20,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
     installed: tuple[Lock, ...]
     keys: dict[str, str] = {}
     """Public key of the first installation, by package, such as ``drivers/puppet``. Removing a
-    package does not delete its key. Otherwise, a reinstallation would bypass the key check.
+    package does not delete its key, because a reinstallation would then bypass the key check.
     """
     before: dict[str, Lock] = {}
     """Previous lock for undoing the last update, by digest of the installed lock."""
@@ -35,7 +35,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
         return self._next((*others, lock), self.before, plan)
 
     def with_update(self, old: Lock, plan: InstallPlan) -> "StoreState":
-        """Return the state after replacing `old`. One undo step can restore `old`."""
+        """Return the state after replacing the lock `old`, with an undo step for `old`."""
         gone = (old, plan.lock)
         others = [one for one in self.installed if not any(_same(one, lock) for lock in gone)]
         return self._next((*others, plan.lock), {**self.before, plan.lock.digest: old}, plan)
@@ -53,7 +53,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
         return self._next((*others, old), {**self.before, old.digest: lock}, None)
 
     def without(self, gone: Iterable[Lock]) -> "StoreState":
-        """Return the state without these locks."""
+        """Return the state without the removed locks `gone`."""
         digests = {lock.digest for lock in gone}
         kept = tuple(lock for lock in self.installed if lock.digest not in digests)
         return self._next(kept, self.before, None)

@@ -8,8 +8,7 @@
       work/                   incomplete files, and files to delete
 
 Only `state.json` defines the installed packages, and it changes atomically. Each change also
-deletes all files that `state.json` does not refer to. Therefore the store is consistent at all
-times.
+deletes all files that `state.json` does not refer to. The store is therefore always consistent.
 """
 
 import os
@@ -37,7 +36,7 @@ _STATE_BYTES: Final = 16 << 20
 
 
 class Store:
-    """The store in one folder. The first installation creates the folder."""
+    """The store in one folder. The first installation creates the store's folder."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -78,7 +77,7 @@ class Store:
         return max(found, key=lambda lock: lock.number, default=None)
 
     def document(self, lock: Lock) -> Path:
-        """Return the document of an installed package. Its files are compared with their archives.
+        """Return the document of an installed package, after comparing its files with the archives.
 
         Raises:
             PackageError: both the files and the archives are damaged.
@@ -171,7 +170,7 @@ class Store:
         return files
 
     def _collect(self) -> None:
-        """Delete files without a lock. Files in use are deleted by a later change."""
+        """Delete the files of removed locks. A later change deletes files that are still in use."""
         locks = self.state().kept
         digests = {pin.sha256 for lock in locks for pin in lock.packages.values()}
         for folder, wanted in (
@@ -188,7 +187,7 @@ class Store:
 
 
 class StoreTransaction:
-    """A change of the store while the store is locked."""
+    """A transaction that changes the store while other processes are locked out."""
 
     def __init__(self, store: Store) -> None:
         self._store = store

@@ -47,7 +47,7 @@ def take(
     provenance: Provenance | None = None,
     index_signer: IndexSigner | None = None,
 ) -> SubmissionResult:
-    """Check and list an untrusted package.
+    """Check an untrusted package, and list it in the repository's index.
 
     Args:
         folder: folder of the repository.
@@ -56,11 +56,12 @@ def take(
         signature: signature of the package; None for an unsigned package.
         examine: function that returns the errors of a document in a folder of packages.
         provenance: declared origin of the package, if any.
-        index_signer: maintainer's signer, for the index.
+        index_signer: signer of the index, with the maintainer's key.
 
     Raises:
         SubmissionRefused: the upload is rejected.
-        OSError: writing failed, for example because the disk is full. The index is unchanged.
+        OSError: writing failed, for example because the disk is full. The repository's index is
+            then unchanged.
     """
     package, entry = _opened(entry_file, data, signature)
     with changing(folder) as work:
@@ -91,7 +92,7 @@ def take(
 
 
 def _noted(notes: Notes, provenance: Provenance | None, entry: IndexEntry) -> Notes:
-    """Return the notes about a version with its origin. The first declared origin remains valid."""
+    """Return the notes with the declared origin; refuse an origin that differs from the notes."""
     if None not in (notes.provenance, provenance) and notes.provenance != provenance:
         raise SubmissionRefused(409, f"{entry} is already listed, {notes.provenance}")
     return msgspec.structs.replace(notes, provenance=notes.provenance or provenance)

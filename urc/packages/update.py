@@ -81,14 +81,14 @@ class UpdateDiff(NamedTuple):
 def newer(
     store: Store, sources: Sequence[Source], complain: Callable[[str], None]
 ) -> list[AvailableUpdate]:
-    """Return the available updates. Only indexes are downloaded.
+    """Return the available updates; download only the indexes of the repositories.
 
     If several versions of a package are installed, only the newest is compared.
 
     Args:
         store: store with the installed packages.
         sources: repositories, in the order of requests.
-        complain: receives a message for each unreachable repository and each dependency conflict.
+        complain: callback for a message about each unreachable repository and dependency conflict.
 
     Raises:
         PackageError: the store cannot be read.

@@ -72,8 +72,8 @@ class Range:
     def allows(self, version: Version) -> bool:
         """Return whether a version is in the range.
 
-        A pre-release matches only if the range names a pre-release of the same x.y.z. Therefore
-        users receive pre-releases only on request.
+        A pre-release matches only if the range names a pre-release of the same x.y.z. Users
+        therefore receive pre-releases only on request.
         """
         if version.prerelease and _core(version) not in self._unfinished:
             return False

@@ -3,8 +3,8 @@
     signals:
       "joint_{i}": { each: { i: [1, 2, 3] }, unit: rad }
 
-Items declared by name change the copies: ``joint_2: { unit: deg }`` changes one copy, and
-``joint_2: null`` removes it.
+An item with the name of a copy changes this copy: ``joint_2: { unit: deg }`` sets its unit, and
+``joint_2: null`` removes the copy.
 """
 
 import re
@@ -295,7 +295,7 @@ def expand(document: Document, problems: Problems) -> Document:
 
 
 def _without_removals(document: Document, places: list[Path], problems: Problems) -> Document:
-    """Drop the removals of missing items, and report each of these removals."""
+    """Drop and report each removal of an item that does not exist."""
     tree = Tree(document.data, document.mark, document)
     for path in places:
         items = _at(document.data, path)

@@ -132,7 +132,7 @@ class _Filler:
         return Tree([item.value for item in items], tree.mark.copy(marks), tree.home)
 
     def text(self, text: str, path: Path) -> tuple[object, UnfilledText | None]:
-        """Return the text after the replacement of its names, and its edits for error positions."""
+        """Return the text after the replacement of names, and the original text if it changed."""
         if "{" not in text:
             return text, None
         edits: list[tuple[int, int, int]] = []

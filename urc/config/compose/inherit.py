@@ -4,8 +4,8 @@
     extends: generic-ros1               # the same, with a document that ships with URC
     include: [parts/battery.yaml]       # parts of documents, below the keys of this document
 
-The keys of a document override the keys of its includes. The keys of the includes override the keys
-of the base.
+The keys of a document override the keys of included documents. The keys of included documents
+override the keys of the extended document.
 """
 
 import os
@@ -122,7 +122,7 @@ class _Composer:
     def _sources(
         self, root: Node, chain: tuple[str, ...]
     ) -> tuple[list[Tree | None], list[Tree | None]]:
-        """Return the base, if any, and the includes, with None for each invalid document."""
+        """Return the extended and the included documents, with None for each invalid document."""
         kind = kind_of(root.document)
         base = root.get("extends")
         return (
@@ -165,7 +165,7 @@ class _Composer:
         return _without(Tree(found.data, found.mark, found), without)
 
     def _merged_includes(self, parts: list[Tree], settled: object) -> list[Tree]:
-        """Merge the includes into at most one tree; report contradictory values."""
+        """Merge the included documents, if any, into one tree; report contradictory values."""
         if not parts:
             return []
         clashes = _Clashes(settled)

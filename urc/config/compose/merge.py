@@ -82,7 +82,7 @@ def count_nodes(value: object) -> int:
 
 
 def merge(base: Tree, over: Tree, path: Path = (), clash: _Clash | None = None) -> Tree:
-    """Return `base` with the changes of `over`.
+    """Return `base`, overridden by the values of `over`.
 
     The base is not modified. `path` is the position of both trees in their documents. The callback
     `clash` receives each replaced value and its replacement.

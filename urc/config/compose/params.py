@@ -29,8 +29,8 @@ def fill_params(
 ) -> Document:
     """Return a driver's document after the replacement of its parameters.
 
-    `given` contains the robot's values, and `use` is the robot's reference to the driver. Pass
-    None for both to check a driver without a robot. In this case, each parameter without a default
+    `given` contains the robot's values, and `use` is the robot's reference to the driver. To check
+    a driver without a robot, pass None for `given` and `use`. Each parameter without a default then
     gets a sample value of its type.
     """
     data = document.data

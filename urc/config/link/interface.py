@@ -44,7 +44,7 @@ def link_interface(
     registry: WidgetFolder,
     problems: Problems,
 ) -> Interface:
-    """Return the interface with its changes to the slots.
+    """Return the interface with the widgets that it declares for its slots.
 
     `slots` contains the slots of the driver. Without a driver, the check covers only the interface.
     """

@@ -83,7 +83,7 @@ def _check_instead(
 ) -> None:
     """Warn of a binding or option in this document that another binding of the slot replaces.
 
-    A driver gets no warning, because its interfaces may override its bindings.
+    Bindings in a driver cause no warning, because an interface may override the bindings.
     """
     said = (*part.named("bind").items(), *part.named("options").items())
     for port in widget.inputs.values():
@@ -148,7 +148,7 @@ def _arguments(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[Arg
 
 
 def _check_order(part: Node, use: WidgetUse, widget: Widget, problems: Problems) -> None:
-    """Report an option that is not smaller than the option with its limit."""
+    """Report an option that is not smaller than the option that limits its value."""
     own = part.named("options")
     for name, schema in widget.options.items():
         above = schema.get("less_than") if isinstance(schema, Mapping) else None

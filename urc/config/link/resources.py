@@ -43,7 +43,7 @@ _LAST_PORT: Final = 65535
 def link_files(options: Node, widget: Widget, problems: Problems) -> dict[str, str]:
     """Return a mapping from the file names in the options to their paths.
 
-    The options of the slot fit their schema. The widget's manifest marks the options that name
+    The options must already fit their schema. The widget's manifest marks the options that name
     files.
     """
     found = {}
@@ -68,7 +68,7 @@ def link_files(options: Node, widget: Widget, problems: Problems) -> dict[str, s
 def named_texts(
     options: Node, schemas: Mapping[str, object], keyword: str
 ) -> Iterator[tuple[str, Node]]:
-    """Yield name and text of each option with `keyword: true` in its schema."""
+    """Yield the name and the text of each option with `keyword: true` in its schema."""
     for name, part in options.entries().items():
         schema = schemas.get(name)
         if not isinstance(schema, Mapping):
@@ -96,7 +96,7 @@ def _is_below(place: FilePath, folder: FilePath) -> bool:
 def link_pages(options: Node, widget: Widget, problems: Problems) -> dict[str, tuple[str, ...]]:
     """Return a mapping from each option for web pages to its URLs.
 
-    The options of the slot fit their schema. The widget's manifest marks the options that name
+    The options must already fit their schema. The widget's manifest marks the options that name
     pages. An empty text is valid, and means no page.
     """
     found: dict[str, tuple[str, ...]] = {}

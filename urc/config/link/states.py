@@ -39,7 +39,7 @@ def check_words(
 
 
 def _compared(python: str) -> Iterable[tuple[str, str]]:
-    """Yield name and text of each comparison between a name and one or more texts."""
+    """Yield the name and the text of each comparison between a name and one or more texts."""
     for node in ast.walk(ast.parse(python, mode="eval")):
         if not isinstance(node, ast.Compare):
             continue

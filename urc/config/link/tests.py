@@ -21,7 +21,7 @@ def link_test(
     settings: Mapping[str, Setting],
     problems: Problems,
 ) -> DocumentTest:
-    """Return the test with typed values and a poll index; report mistakes."""
+    """Return the test with converted values and with the index of its poll; report mistakes."""
     if test.steps:
         _check_polls(part, driver, problems)
         steps = _link_steps(part, test.steps, driver, problems)

@@ -57,7 +57,7 @@ class DeclaredChecksum(NamedTuple):
     closes: bool
     before: bytes
     trailer: "DeclaredTrailer | None" = None
-    """Position after a text, or None; a checksum with a trailer has no `at`."""
+    """Position after a text; None for a fixed position."""
 
     @property
     def size(self) -> int:

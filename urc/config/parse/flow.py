@@ -157,7 +157,7 @@ def command_with_flow(command: Command, part: Node, problems: Problems) -> Comma
 
 
 def _refuse_asides(reply: Node | None, problems: Problems) -> None:
-    """Report `resend` and `extend` of a held command, because its next value follows anyway."""
+    """Report `resend` and `extend` of a held command, which sends its next value anyway."""
     for inner in [reply, *reply.listed("stages")] if reply is not None else ():
         why = "has no effect with 'hold', because the next value follows anyway"
         refuse(inner, ("resend", "extend"), why, problems)

@@ -15,7 +15,7 @@ _VALUE_TYPES: Final = {
     "boolean": "boolean",
     "port": "integer",
 }
-"""Types of values by type of setting; other settings contain text."""
+"""Value types of the settings that do not contain text, by type of setting."""
 
 
 def parse_setting(part: Node, problems: Problems) -> Setting:

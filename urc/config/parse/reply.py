@@ -20,7 +20,7 @@ __all__ = [
 ]
 
 _OF_THE_WHOLE = ("match", "stages", "framing")
-"""Keys of the whole reply that a stage may not have."""
+"""Keys that are allowed for a whole reply, but not for one of its stages."""
 _BESIDE_SILENCE = (
     "fields", "head", "set", "when", "lines", "match", "timeout", "framing", "resend", "extend",
 )  # fmt: skip
@@ -67,7 +67,7 @@ def parse_reply(part: Node | None, problems: Problems, context: FormContext) -> 
 def implied_reply(send: WriteSpec) -> Reply | None:
     """Return the implied reply of a request if its protocol always replies, or None.
 
-    With an implied reply, a refused request fails instead of counting as done after it is sent.
+    Without the implied reply, a refused request would count as done as soon as it is sent.
     """
     return Reply(ReadSpec("any")) if send.options.get("verb") in NUMBERED else None
 

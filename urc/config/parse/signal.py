@@ -60,7 +60,7 @@ def with_ages(signals: Mapping[str, Signal], polls: tuple[Poll, ...]) -> dict[st
     """Return the signals with the age in seconds at which each signal becomes stale.
 
     The default age is three periods of the signal's fastest poll, at least 1 s, or 5 s without a
-    poll. A computed signal has the smallest age of its inputs.
+    poll. The default age of a computed signal is the smallest age of its inputs.
     """
     aged = {name: _with_age(one, polls) for name, one in signals.items()}
     for name, one in signals.items():

@@ -100,7 +100,7 @@ def _step(part: Node, problems: Problems) -> DialogueStep:
 
 
 def _place(part: Node) -> tuple[int, int, str]:
-    """Return line, column and source line of `part`."""
+    """Return the line, the column and the source line of `part`."""
     mark, home = part.document.at(part.path), part.document.source_of(part.path)
     line, column = (mark.span.line, mark.span.column) if mark else (1, 1)
     return line, column, home.lines[line - 1]

@@ -102,7 +102,7 @@ def _stamped(kind: str, spec: WriteSpec) -> WriteSpec:
 
 
 def _unstamped(part: Node, spec: WriteSpec) -> WriteSpec:
-    """Return the body in the form of the document."""
+    """Return the body as the document declares it, before its conversion to the stamped type."""
     tree = spec.options.get("tree")
     if not part.data.get("stamped") or not isinstance(tree, dict):
         return spec

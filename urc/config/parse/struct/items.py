@@ -286,7 +286,7 @@ class ItemParser:
         return items
 
     def _check_case(self, part: Node, subject: Item | None) -> None:
-        """Report a case for a value that the subject can never have."""
+        """Report a case of a switch for a value that the switch's item can never have."""
         key = case_key(part.name)
         if subject is None or subject.kind not in ("number", "coded"):
             return
