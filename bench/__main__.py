@@ -44,7 +44,7 @@ PROGRAMS = {
     "browser_roslibjs": "chromium",
     "motion_input": "chromium",
 }
-"""Benchmark → name of its required program in `scripts.needs`, in addition to Python."""
+"""Required program of each benchmark in addition to Python, by its name in `scripts.needs`."""
 
 
 def main() -> int:

@@ -1,7 +1,7 @@
 """Processor time of a request and its reply over a socket, compared with a hand-written driver.
 
-Measured is the CPU time of this process; all drivers use the same robot in another process. Each
-round opens a new connection, and sends `TIMES` requests after a warm-up.
+The benchmark measures the CPU time of this process; all drivers use the same robot in another
+process. Each round opens a new connection, and sends `TIMES` requests after a warm-up.
 """
 
 import asyncio

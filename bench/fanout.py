@@ -1,8 +1,8 @@
 """Processor time of sending 200 values to 50 pages: URC compared with a plain loop of sends.
 
-Measured is the processor time of the server, including readings and encoding. Pages and robot run
-in other processes. The loop sends the same number of bytes to the same number of pages, but knows
-nothing of values or WebSockets.
+The benchmark measures the processor time of the server, including readings and encoding. Pages and
+robot run in other processes. The loop sends the same number of bytes to the same number of pages,
+but knows nothing of values or WebSockets.
 """
 
 import subprocess

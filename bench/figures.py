@@ -17,7 +17,7 @@ BARS = 40
 """Longest bar of a histogram, in characters."""
 
 _UNITS = {"ms": "ms", "us": "us", "mb": "MB", "hz": "Hz"}
-"""Suffix of a name → unit in the title of its column."""
+"""Unit in the title of a column, for each suffix of the column's name."""
 
 told: list[dict[str, object]] = []
 """Results of this run."""

@@ -26,7 +26,7 @@ GOAL = 0.02
 """Goal: largest share of a processor for each driven robot."""
 ROBOTS = 6
 FINGERS = {"at rest": 20, "moving": 60}
-"""State of the finger → ticks a second, the same rates as in ``static/control/input.js``."""
+"""Ticks a second for each state of the finger, as in ``static/control/input.js``."""
 LOOK_S, LOOK_IF_FULL_S = 4.0, 10.0
 ROUNDS, ROUNDS_IF_FULL = 3, 9
 SETTLE_S = 0.5
@@ -58,7 +58,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def _round(rate_hz: int, look_s: float) -> tuple[float, float]:
-    """Return the processor time of the server and of the guards, per robot and second."""
+    """Return the processor times of server and guards for one robot in one second."""
     with ExitStack() as stack, tempfile.TemporaryDirectory(prefix="urc-bench-") as folder:
         robots = stack.enter_context(Robots(["tcp:127.0.0.1:0"] * ROBOTS))
         files = [Path(folder, f"cost{number}.yaml") for number in range(ROBOTS)]
@@ -96,7 +96,7 @@ def _spent(
 
 
 def _drive(pages: Sequence[TimedPage], rate_hz: int, seconds: float) -> None:
-    """Send ticks from each page at the rate, at different times; with rate 0, only listen."""
+    """Send ticks from each page at a rate, at staggered times; with rate 0, only listen."""
     step_ns = int(1e9 / (rate_hz or FINGERS["at rest"]) / len(pages))
     next_ns = time.monotonic_ns()
     end_ns = next_ns + int(seconds * 1e9)

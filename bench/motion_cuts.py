@@ -53,7 +53,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def _spread(count: int, longest_s: float, dice: random.Random) -> list[tuple[float, float]]:
-    """Return the lengths of cuts, each with the share before the release, in random order."""
+    """Return cuts in random order: the length of each cut, and its share before the release."""
     ratio = longest_s / SHORTEST_S
     times = [SHORTEST_S * ratio ** (place / (count - 1)) for place in range(count)]
     dice.shuffle(times)

@@ -67,7 +67,7 @@ EVENTS = {
     "context menu": "contextmenu",
     "pad lost": "gamepaddisconnected",
 }
-"""Way to release → event that the page receives."""
+"""Event that the page receives, for each way to release."""
 # Before any script of the page: its own listeners run after these.
 STAMP = f"""
 window.stamps = {{}};

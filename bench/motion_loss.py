@@ -25,14 +25,14 @@ DELAY_MS = 50
 LOOK_S = 0.25
 CALM_S = 20.0
 LATE_MS, LATE_WITHIN_NS = 50.0, 600_000_000
-"""Smallest delay of the machine that can cause a stop, and longest time until this stop."""
+"""Smallest delay that can cause a stop, in ms; longest time until this stop, in nanoseconds."""
 MOST = {0: None, 1: 0.1, 3: 4.0}
-"""Loss in percent → largest allowed number of stops a minute.
+"""Largest allowed number of stops a minute, for each loss in percent.
 
 For a limit of None, only stops caused by the machine are allowed.
 """
 LASTS_S, LASTS_IF_FULL_S = {0: 10, 1: 15, 3: 10}, {0: 60, 1: 180, 3: 60}
-"""Loss in percent → duration of the run with all robots in parallel, in seconds."""
+"""Duration of the run with all robots in parallel, in seconds, for each loss in percent."""
 
 
 def run(*, full: bool) -> Sequence[Result]:
@@ -74,7 +74,7 @@ def _is_still(rig: Rig, index: int) -> bool:
 
 
 def _drive(rig: Rig, seconds: float, *, has_spare: bool) -> tuple[float, int, int]:
-    """Drive every robot; return the minutes of motion and three numbers of stops.
+    """Drive every robot; return the duration of motion, in minutes, and three numbers of stops.
 
     The third number counts the stops after a delay of the machine.
     """

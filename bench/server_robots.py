@@ -3,8 +3,8 @@
 Every robot sends 20 signals, 20 times a second, in lines of JSON over TCP. The robot's page
 receives each change. Robots and pages run in two other processes, which only send or count bytes.
 Additional rows show the growth with the number of robots, signals and pages, and the share of lines
-that reach no page. Robots that can be driven have guards in separate processes, which are measured
-separately.
+that reach no page. Robots that can be driven have guards in separate processes; the guards are
+measured separately.
 """
 
 import json
@@ -66,7 +66,7 @@ class Look(NamedTuple):
     frames: int
     """Number of frames received by all pages."""
     server: dict[int, float]
-    """Process id of the server → processor time in seconds."""
+    """Processor time of the server in seconds, by process id."""
     guards: dict[int, float]
 
 

@@ -97,7 +97,7 @@ async def speaking(ticks: int, rate_hz: float) -> AsyncIterator[Robot]:
     """Start a robot, which waits until it receives data.
 
     Like a real robot, the process wakes the server by a readable socket. A timer in the server's
-    process would cost several times as much, and would be included in the measurement.
+    process would take several times the processor time, and would be included in the measurement.
     """
     ours, theirs = socket.socketpair()
     with ours, theirs:

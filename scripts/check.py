@@ -59,9 +59,9 @@ PYTEST = (PYTHON, "-m", "pytest")
 
 
 def halves(tests: str, *half: str, timeout_s: float) -> tuple[Step, Step]:
-    """Return two steps: the tests in the folders `half` of `tests`, and all other tests.
+    """Return two test steps: one for the folders of `tests` in `half`, one for all other tests.
 
-    The processes of the two steps do not communicate. A third process to distribute thousands of
+    The processes of the two steps do not communicate. A third process that distributes thousands of
     small tests would take a fifth of the processor time.
     """
     name = f"tests {tests.rpartition('/')[2]}"

@@ -1,15 +1,15 @@
-"""A comparison of two commits' results for the same documents, apart from renamed words.
+"""A comparison of two commits' results for the same documents; renamed words count as equal.
 
     python -m scripts.compare_reports COMMIT            that commit and this tree
     python -m scripts.compare_reports COMMIT --list     every difference, not the first of each kind
 
-The commit's own code reads the documents of the commit. This tree's code reads the same documents
-after migration. Later changes of a document, such as new comments, therefore make no difference.
-The script compares:
+The old commit's code reads the old commit's documents. This tree's code reads the same documents
+after their migration. Later changes of a document, such as new comments, therefore make no
+difference. The script compares:
 
 - reports: file, line, column, severity and code of every problem of the broken documents. A renamed
   key shifts the columns after the key, but no lines;
-- resolved profiles: the output of `urc resolve` for each robot; the commit's output is migrated
+- resolved profiles: the output of `urc resolve` for each robot; the old commit's output is migrated
   first.
 
 The exit code is 1 if a difference is not explained by a rename.
@@ -75,7 +75,7 @@ for path in sorted(Path("robots").glob("*.yaml")):
     resolved[path.name] = resolve(path.as_posix(), shelf, profile).text
 print(json.dumps({"reports": reports, "resolved": resolved}))
 """
-"""Source of a program that runs in the commit's tree with the commit's code."""
+"""Source of a program that runs in the old commit's tree with the old commit's code."""
 
 Problem = tuple[str, int, int, str, str]
 """A problem: file, line, column, severity and code."""

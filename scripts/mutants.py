@@ -28,7 +28,7 @@ _STATUS = {
     152: "timeout",
     255: "timeout",
 }
-"""Exit code of mutmut → status; the status of any other code is `odd`."""
+"""Status of a mutant for each exit code of mutmut; the status for any other exit code is `odd`."""
 STATUSES = ("killed", "timeout", "survived", "no tests", "odd", "waiting")
 DEAD = ("killed", "timeout")
 """Statuses of detected mutants: a test failed or timed out."""
@@ -103,7 +103,7 @@ class Explained(NamedTuple):
     """Explanations of surviving mutants: reasons why no test needs to kill the mutant."""
 
     reasons: dict[tuple[str, Change], str]
-    """Function and change → reason."""
+    """Reason for each combination of function and change."""
     kinds: tuple[Kind, ...] = ()
 
     def covers(self, mutant: Mutant) -> bool:

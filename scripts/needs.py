@@ -37,12 +37,12 @@ class Need:
 
     name: str
     executables: tuple[str, ...]
-    """Alternative executables; one of them is sufficient."""
+    """Alternative executables; a single executable is sufficient."""
     package: str
     """Debian packages, separated by spaces; "" if npm installs the program."""
     purpose: str
     variable: str = ""
-    """Environment variable that overrides the path of the executable; "" if none."""
+    """Environment variable that overrides the executable's path; "" for no variable."""
     other: Callable[[], str | None] | None = None
     """Function that returns the path of a program outside the search path, or None."""
     is_of_root: bool = False

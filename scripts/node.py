@@ -22,7 +22,7 @@ def node_executable() -> str | None:
 
 
 def playwright_environment() -> dict[str, str]:
-    """Return the variable with Node's path for playwright, if playwright's own Node can't start."""
+    """Return the environment variable that playwright needs if its own Node can't start."""
     import playwright
 
     own = Path(playwright.__file__).parent / "driver" / ("node.exe" if os.name == "nt" else "node")

@@ -45,7 +45,7 @@ class Passage(NamedTuple):
     kind: str
     """`docs`, `docstring` or `string`."""
     text: str
-    """Text including line breaks, to compute the line of each sentence."""
+    """Text with its line breaks, which are needed to compute the line of each sentence."""
 
 
 class Sentence(NamedTuple):

@@ -42,7 +42,7 @@ RULES: Mapping[str, re.Pattern[str]] = {
     "who-subject": re.compile(r"^[(\"“*]*(?:Who|What|Whose|Of which|Of whom)\s(?!.*\?)"),
     "what-clause": re.compile(rf"(?<!^)\bwhat (?:{_VERBS})\b(?!.*\?)"),
 }
-"""Rule → pattern of a hit; the rules `long` and `glossary` have no pattern."""
+"""Pattern of a hit for each rule; the rules `long` and `glossary` have no pattern."""
 
 _CODE = re.compile(r"(`+).+?\1")
 _LETTER = re.compile(r"[A-Za-z0-9{]")
@@ -150,7 +150,7 @@ def counts(found: Iterable[Hit]) -> Counter[tuple[str, str]]:
 def counts_in(baseline: str) -> Counter[tuple[str, str]]:
     """Return the counts in a baseline.
 
-    If a merge left two rows for a file and rule, use the larger count.
+    If a merge left two rows for the same file and rule, use the larger count.
     """
     found: Counter[tuple[str, str]] = Counter()
     for path, rule, count in _ROW.findall(baseline):

@@ -77,7 +77,7 @@ async def pictures(names: list[str]) -> None:
 
 
 async def pictures_of(names: list[str], environment: Mapping[str, str]) -> None:
-    """Take the pictures from `urc demo`, started with an environment."""
+    """Take the pictures from `urc demo`, started with the given environment variables."""
     demo = UrcProcess(("demo", "--no-browser", "--port", "0"), environment)
     try:
         address = (await demo.wait_for_async(r"dashboard (http://\S+)", READY_MS / 1000))[1]

@@ -3,16 +3,16 @@
     python -m scripts.structure             this tree
     python -m scripts.structure ROOT        another tree, such as a worktree of an older commit
 
-Compare the metrics before and after a change; no metric is a goal by itself. `--names` lists the
-counted modules, classes and functions. Definitions of the metrics:
+Use the metrics to compare the code before and after a change; no metric is a goal by itself.
+`--names` lists the counted modules, classes and functions. Definitions of the metrics:
 
-- modules with one importer: modules of `urc` imported by exactly one other module, at any level, or
-  named by an entry `"urc.module:name"` of a table; packages and `__main__` do not count;
+- modules with one importer: modules of `urc` that exactly one other module imports, at any level,
+  or names in an entry `"urc.module:name"` of a table; packages and `__main__` do not count;
 - class names used more than once: names that `urc` defines in two or more places;
 - functions over 60 lines: lines include the docstring, but not decorators;
 - repeated lines: a function counts as a list of statements, with variable names and constants
-  blanked. For compound statements, only the header is counted. Four consecutive statements that
-  also occur in an earlier function are repeated; each line counts once.
+  blanked. Only the header of a compound statement is counted. Four consecutive statements that also
+  occur in an earlier function are repeated; each line counts once.
 """
 
 import argparse

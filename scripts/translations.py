@@ -1,4 +1,4 @@
-"""The catalogues of the pages' texts: update from the sources, check, and compilation.
+"""The program that updates, checks and compiles the catalogues of the pages' texts.
 
     python -m scripts.translations            update translations/*.po and compile them
     python -m scripts.translations --check    exit 1 if a catalogue is out of date or has gaps

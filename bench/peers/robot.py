@@ -1,8 +1,8 @@
 """A robot that sends the time and prints its port: ``python robot.py RATE_HZ``.
 
 Each line is the machine's monotonic clock in tenths of milliseconds, modulo `MODULUS`, plus
-`START`. Each line has ten digits, and its age is known when a page shows the line. At 50 lines a
-second, robot and display have only five relative phases, a fifth of a frame apart. Each line is
+`START`. Each line has ten digits; when a page shows the line, its age can be computed. At 50 lines
+a second, robot and display have only five relative phases, a fifth of a frame apart. Each line is
 therefore shifted by up to half of this interval, so that all phases are equally frequent. The
 shifts are the same in every run.
 """

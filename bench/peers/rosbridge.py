@@ -118,7 +118,7 @@ TOPICS: dict[str, tuple[Callable[[float], dict[str, object]], int]] = {
     "/camera/compressed": (camera, CAMERA_HZ),
     "/battery_state": (battery, 10),
 }
-"""Topic → function from a time to its message, and rate of the messages."""
+"""For each topic, the function that builds the message at a time, and the rate of the messages."""
 
 
 async def publish(line: ServerConnection, topic: str) -> None:

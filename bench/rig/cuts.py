@@ -164,8 +164,7 @@ class CutRig:
 
         Args:
             seconds: length of the cut.
-            order: the relay's order ``cut``, ``cut a`` or ``cut b`` for one direction, or ``down
-            a``.
+            order: ``cut``, ``cut a`` or ``cut b`` for one direction, or ``down a``.
         """
         return self._trial(self.indexes, seconds, order, self._share())
 

@@ -29,7 +29,7 @@ HEALED_S = 0.4
 STOP_WITHIN_S = 3.0
 LIFE_S = 600.0
 LOOK_NS = 25_000_000
-"""Delay until the processor waits of a process are measured, in nanoseconds."""
+"""Time, in nanoseconds, after which the waits of a process for a processor are measured."""
 WITNESSES = 2
 """Number of idle programs that measure late wake-ups, because the server has similar delays."""
 

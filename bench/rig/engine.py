@@ -10,7 +10,7 @@ __all__ = ["ENGINE_DEATHS", "RESTART_MS", "EngineRig"]
 
 ENGINE_DEATHS = ("engine-stopped", "engine-killed", "engine-blocked")
 RESTART_MS = 500.0
-"""Time limit for replacing a killed guard, in ms; the new guard first sends a stop."""
+"""Time limit for the replacement of a killed guard, in ms; the new guard first sends a stop."""
 OPEN_MS = 100.0
 """Additional time for reconnecting and for the transfer, in ms."""
 AGAIN_S = 10.0

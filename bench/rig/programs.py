@@ -185,7 +185,7 @@ class Robots(Program):
         self.late: list[tuple[int, float]] = []
         """Times of late wake-ups of the robots' process, with delays in milliseconds."""
         self.waits: dict[int, list[tuple[int, float]]] = {}
-        """Process id → waits of the process for a processor, with end times and durations in ms."""
+        """Waits for a processor, by process id: end times, and durations in ms."""
         self.visits: list[list[tuple[int, bool]]] = [[] for _ in places]
         """Times at which each robot was connected (True) and disconnected (False)."""
         super().__init__(_script("robot_process.py", *places), inside=inside)
@@ -230,7 +230,7 @@ class Operators(Program):
 
     def __init__(self, *, inside: Sequence[str] = ()) -> None:
         self.news: dict[tuple[str, int], str] = {}
-        """Reports of the pages: (word, number of the plan) → rest of the line."""
+        """Rest of each line reported by a page, by word and number of the plan."""
         super().__init__(_script("operator_process.py"), inside=inside)
 
     def take(self, line: str) -> None:

@@ -65,9 +65,9 @@ class Weather:
     jitter_ns: int = 0
     loss: float = 0.0
     is_cut: dict[str, bool] = field(default_factory=lambda: {"a": False, "b": False})
-    """Side → whether all packets from this side are lost."""
+    """For each side, whether all packets from this side are lost."""
     ports: dict[str, set[int]] = field(default_factory=lambda: {"a": set(), "b": set()})
-    """Side → ports; packets from this side that use one of these ports are lost."""
+    """For each side, ports; packets from this side that use one of the ports are lost."""
 
 
 def made(name: str) -> Side:

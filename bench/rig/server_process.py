@@ -1,6 +1,6 @@
 """A real ``urc serve`` that a signal can block: a separate program.
 
-``python server_process.py serve …``. At SIGUSR2, the main thread matches a pattern that takes twice
+``python server_process.py serve …``. On SIGUSR2, the main thread matches a pattern that takes twice
 as long for each additional letter. The interpreter is blocked during the match. It then prints::
 
     backtracked TIME TIME   from when to when, monotonic nanoseconds
