@@ -137,7 +137,7 @@ def add_port(parser: argparse.ArgumentParser) -> None:
 
 
 def load(word: str) -> "Profile":
-    """Return the profile with the name or path `word`; raise `UrcError` with its problems."""
+    """Return the profile with the name or path `word`; raise `UrcError` for an invalid profile."""
     from urc.runtime.open_profile import open_document
 
     return open_document(profile_path(word))

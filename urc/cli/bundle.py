@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the bundle. The same packages always produce the same bytes."""
+    """Write the bundle. Bundles of the same packages always have the same bytes."""
     from urc.cli.error_report import Misuse
     from urc.cli.packages import open_store
     from urc.packages.atomic_files import put_file

@@ -1,4 +1,4 @@
-"""Code shared by `urc serve` and `urc demo`: start a dashboard for profiles."""
+"""Start of a dashboard for profiles, shared by `urc serve` and `urc demo`."""
 
 import asyncio
 import gc

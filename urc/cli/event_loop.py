@@ -60,7 +60,7 @@ async def _until_signal(work: Coroutine[Any, Any, int], code_when_ended: int | N
 
 
 class _OneLine(logging.Formatter):
-    """Log lines for people, with exception names but without tracebacks."""
+    """A formatter of log lines for people: exception names, but no tracebacks."""
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line."""

@@ -158,7 +158,7 @@ def _flush(code: int) -> int:
 def _discard_output() -> None:
     """Discard pending output.
 
-    Without this step, Python would retry the failed write and print an error at exit.
+    Python would otherwise retry the failed write and print an error at exit.
     """
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

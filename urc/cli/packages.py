@@ -191,9 +191,9 @@ def _is_yes_enough(gains: bool, has_risks: bool, arguments: argparse.Namespace) 
 
 
 def used_lock(store: "Store", key: "PackageId") -> "Lock | None":
-    """Return the version in use of a robot, a driver or another package.
+    """Return the installed version of a package that is in use.
 
-    If a robot and a driver have the same name, the result may be of the other kind.
+    If a robot and a driver have the same name, the result may have a different kind from `key`.
     """
     from urc.runtime.settings_store import DRIVEN, in_use
 

@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Record for the duration or until a signal arrives; return 1 if nothing was received."""
+    """Record the robot for the duration or until a signal; return 1 if nothing was received."""
     from urc.cli.event_loop import run_loop
     from urc.cli.settings import complete_settings
 
@@ -69,7 +69,7 @@ async def _record(
 
 
 async def _until_over(recorder: "Recorder", seconds: float | None) -> None:
-    """Return when the duration has elapsed or recording has failed, or at Ctrl-C."""
+    """Wait until the duration has elapsed, recording has failed, or Ctrl-C is pressed."""
     try:
         async with asyncio.timeout(seconds):
             while not recorder.fault:  # noqa: ASYNC110 - a thread sets it

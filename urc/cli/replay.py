@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Serve until Ctrl-C or SIGTERM."""
+    """Serve the recording until Ctrl-C or SIGTERM."""
     from urc.cli.event_loop import run_loop
     from urc.runtime.document_tests import sample_settings
     from urc.runtime.recording.player import Player

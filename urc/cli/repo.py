@@ -80,7 +80,7 @@ _RENEW_S = 3600.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command-line arguments: action and its options."""
+    """Declare the command-line arguments: action and options."""
     parser.add_argument(
         "action",
         metavar="ACTION",

@@ -1,7 +1,7 @@
 """`urc send`: run one command of a robot and print the reply as JSON.
 
 Motion is refused or stopped while STOP is latched or an operator has the controls. If another
-process latches STOP, the engine is informed.
+process latches STOP, this module informs the engine.
 """
 
 import argparse
@@ -65,7 +65,7 @@ class MotionInterlock:
         """Reason for refusing motion at the last call of `look`; "" if motion is allowed."""
 
     async def check(self) -> str:
-        """Read the interlocks and return `why`."""
+        """Read the interlocks, update the attribute `why` and return its value."""
         return await asyncio.to_thread(self._check)
 
     async def follow(self, on_change: Callable[[str], None]) -> None:

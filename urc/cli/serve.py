@@ -19,7 +19,7 @@ EXAMPLE = "urc serve puppet --set host=192.168.1.20"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command-line arguments: profiles, their settings and address."""
+    """Declare the command-line arguments: profiles, settings and address."""
     parser.add_argument(
         "profiles",
         metavar="PROFILE",

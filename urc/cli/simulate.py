@@ -21,7 +21,7 @@ EXAMPLE = "urc simulate puppet --set port=6789"
 _SOURCE: Final = "urc.simulator.emulated_robot"
 """Name of the logger for frames without a reply."""
 _AGAIN_S: Final = 10.0
-"""Minimum interval between repetitions of a warning, in seconds. A repetition contains a count."""
+"""Minimum interval between repetitions of a warning, in seconds."""
 _LINES_A_SECOND: Final = 5
 _LAST_LINES: Final = 10
 """Maximum number of different warnings in the final summary."""
@@ -84,7 +84,7 @@ async def _simulate(
 
 
 class UnansweredLog(logging.Handler):
-    """A reporter of frames without a reply. Each frame has one line with a count.
+    """A reporter of frames without a reply. Each frame gets one line with a count.
 
     Args:
         tell: function that prints one line.

@@ -41,7 +41,7 @@ class ReadyDashboard(NamedTuple):
         return self.access.address_once(self.url)
 
     def lines(self) -> Iterator[str]:
-        """Yield the lines to print. The first line is the address with all rights."""
+        """Yield the lines of the start message. The first line is the address with all rights."""
         yield f"dashboard {self.address}"
         if self.access.is_open:
             yield f"for others {self.url} (without a key: watch and drive)"
@@ -101,7 +101,7 @@ def announce(
 
 
 def _near(url: str, host: str) -> str:
-    """Return the address for programs on this machine."""
+    """Return the dashboard's address for programs on this machine."""
     port = urlsplit(url).port
     try:
         address = ip_address(host)

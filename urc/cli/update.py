@@ -106,7 +106,7 @@ def _update(
 def _told(
     old: "Lock", plan: "InstallPlan", difference: "UpdateDiff", origins: list[str]
 ) -> list[str]:
-    """Return the changes as text."""
+    """Return the changes of an update as text."""
     from urc.packages.update import headline
 
     lines = [headline(old, plan.lock)]

@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Watch for the duration or until a signal arrives; return 1 if nothing was received."""
+    """Watch the robot for the duration or until a signal; return 1 if nothing was received."""
     from urc.cli.event_loop import run_loop
     from urc.cli.settings import complete_settings
 

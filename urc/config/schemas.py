@@ -3,9 +3,9 @@
 The library `jsonschema` is too slow for both speed goals of `urc validate` (decision 4).
 
 This module compiles the keywords of the schemas to closures. A positive result of the fast check is
-always correct. All other cases, including unknown keywords, need `jsonschema`. A contract test
-compares the fast check with `jsonschema`. Each part of a schema is compiled at its first use, so
-small documents compile few parts.
+always correct. In all other cases, including unknown keywords, URC uses `jsonschema`. A contract
+test compares the fast check with `jsonschema`. Each part of a schema is compiled at its first use,
+so small documents compile few parts.
 """
 
 import json

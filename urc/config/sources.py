@@ -54,7 +54,7 @@ class Sources:
 
 
 def _over(below: Node | None, part: Node) -> Node:
-    """Merge a part of a simulator over the same part of the driver's simulator."""
+    """Merge a part of a simulator into the driver's simulator; the new values take precedence."""
     if below is None:
         return part
     merged = merge(_tree(below), _tree(part), part.path)

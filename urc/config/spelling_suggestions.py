@@ -7,7 +7,7 @@ __all__ = ["did_you_mean", "listed"]
 
 _MOST: Final = 16
 _SPARE: Final = 8
-"""Maximum number of extra words before a list is shortened."""
+"""Number of words by which a list may exceed its maximum before it is shortened."""
 
 
 def did_you_mean(word: str, known: Iterable[str], noun: str = "") -> str:

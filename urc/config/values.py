@@ -69,7 +69,7 @@ def fit(value: Value, kind: str) -> Value:
 
 
 def fit_argument(value: Any, kind: str, of: str, size: int | None) -> tuple[Value, ...]:
-    """Return the elements of an array argument, or a tuple with the one value of an argument.
+    """Return the elements of an array argument, or the value of another argument as a tuple.
 
     Raises:
         ValueError: the value has another type or size.

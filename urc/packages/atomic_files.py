@@ -19,7 +19,7 @@ _POLL_S: Final = 0.05
 
 
 def put_file(file: Path, data: bytes, work: Path) -> None:
-    """Write a file atomically. After a power failure, the content is either old or new.
+    """Write a file atomically: after a power failure, its content is either old or new.
 
     Args:
         file: path of the file; missing folders are created.
@@ -27,7 +27,8 @@ def put_file(file: Path, data: bytes, work: Path) -> None:
         work: folder on the same file system, for incomplete files.
 
     Raises:
-        OSError: the write failed, for example because the disk is full. The old content remains.
+        OSError: the write failed, for example because the disk is full. The file keeps its old
+            content.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
     work.mkdir(parents=True, exist_ok=True)

@@ -67,7 +67,7 @@ class IndexEntry(msgspec.Struct, frozen=True):
 
     @property
     def number(self) -> Version:
-        """Version of the package, for comparisons."""
+        """Comparable version of the package."""
         return parse_version(self.version)
 
     @property
@@ -89,7 +89,7 @@ class Index(msgspec.Struct, frozen=True):
     """Number that increases with every change of the repository; 0 in unnumbered indexes."""
 
     def to_bytes(self) -> bytes:
-        """Return the content of the index file. The same packages always produce the same bytes."""
+        """Return the content of the index file: equal indexes have the same bytes."""
         return msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n"
 
 
@@ -131,7 +131,7 @@ def read_index(data: bytes, where: str) -> Index:
 
 
 def in_order(entries: Iterable[IndexEntry]) -> tuple[IndexEntry, ...]:
-    """Return entries in the order of an index."""
+    """Return the entries, sorted as in an index."""
     return tuple(sorted(entries, key=lambda entry: (entry.key, entry.number)))
 
 
@@ -150,9 +150,9 @@ def check_entries(entries: Iterable[IndexEntry]) -> None:
 
 
 def search(entries: Iterable[IndexEntry], words: Sequence[str], kind: str = "") -> list[IndexEntry]:
-    """Return the newest version of each package that contains all words. Name matches are first.
+    """Return the newest version of each package that contains all words.
 
-    Withdrawn versions are omitted.
+    Matches in package names precede other matches. Withdrawn versions are omitted.
     """
     wanted = [word.casefold() for word in words]
     found: dict[tuple[str, str], IndexEntry] = {}

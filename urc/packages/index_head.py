@@ -35,7 +35,7 @@ _TIME: Final = "%Y-%m-%dT%H:%M:%SZ"
 
 
 class IndexSigner(NamedTuple):
-    """The maintainer's signer of an index."""
+    """The signer of an index, with the maintainer's key."""
 
     signer: Signer
     valid_s: float = VALID_S

@@ -72,7 +72,7 @@ def plan_file(
 ) -> InstallPlan:
     """Return the install plan of the package in a file or folder.
 
-    The other sources are used only for missing dependencies.
+    Other sources are used only for missing dependencies.
     """
     root = source.roots[0]
     own = merged([source], complain)
@@ -143,7 +143,7 @@ def check_names(chosen: Iterable[PackageId]) -> None:
 
 
 def origin_lines(plan: InstallPlan, store: Store) -> list[str]:
-    """Return a line with origin and signer for each package."""
+    """Return one line for each package, with its origin and signer."""
     keys = store.state().keys
     lines: list[str] = []
     for name, pin in plan.lock.packages.items():
@@ -163,7 +163,7 @@ def origin_lines(plan: InstallPlan, store: Store) -> list[str]:
 
 
 def withdrawn_lines(lock: Lock, entries: Sequence[IndexEntry]) -> list[str]:
-    """Return a line with the reason for each withdrawn package in a lock."""
+    """Return one line for each withdrawn package in a lock, with the reason."""
     return [
         phrase("{package} was withdrawn: {why}", package=entry, why=entry.why_withdrawn)
         for name, pin in lock.packages.items()

@@ -54,7 +54,7 @@ class Lock(msgspec.Struct, frozen=True):
 
     @property
     def number(self) -> Version:
-        """Version of the root package, for comparisons."""
+        """Comparable version of the root package."""
         return parse_version(self.version)
 
     @property
@@ -63,7 +63,7 @@ class Lock(msgspec.Struct, frozen=True):
         return sha256(self.to_bytes())
 
     def to_bytes(self) -> bytes:
-        """Return the content of the file. The same versions always produce the same bytes."""
+        """Return the content of the lock file: equal locks have the same bytes."""
         return msgspec.json.format(msgspec.json.encode(self, order="sorted"), indent=1) + b"\n"
 
     def __str__(self) -> str:

@@ -95,7 +95,7 @@ def _package(files: dict[str, bytes], data: bytes, name: str) -> Package:
 
 
 def _check_document(content: bytes, manifest: Manifest, file: str) -> None:
-    """Check that kind and name of the document agree with the manifest."""
+    """Check that the document's kind and name agree with the manifest."""
     try:
         data = parse_document(content, file).data
     except ProblemsError as error:

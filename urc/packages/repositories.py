@@ -45,8 +45,8 @@ class Repository:
 
     The last index is stored for use while the repository is unreachable.
 
-    The index number only increases. For an index with a lower number, URC reports an error and uses
-    the stored index. The first signing key is pinned. An index with another key or without a
+    The index number never decreases. For an index with a lower number, URC reports an error and
+    uses the stored index. The first signing key is pinned. An index with another key or without a
     signature is rejected.
     """
 
@@ -205,7 +205,7 @@ class Repositories:
         self._complain = complain
 
     def all(self) -> list[Repository]:
-        """Return the repositories in the order of addition."""
+        """Return the repositories, in the order in which the user added them."""
         return [self._repository(url) for url in self._urls()]
 
     def add(self, text: str) -> tuple[str, Index]:

@@ -146,7 +146,7 @@ class UploadService:
 
 
 async def _body(request: Request, *, is_kept: bool) -> bytes:
-    """Return the body, or b"" unless `is_kept`; raise `SubmissionRefused` if it is too large."""
+    """Return the body if `is_kept`, otherwise b""; raise `SubmissionRefused` for a large body."""
     size = 0
     pieces = []
     async for piece in request.stream():

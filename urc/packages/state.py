@@ -53,7 +53,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
         return self._next((*others, old), {**self.before, old.digest: lock}, None)
 
     def without(self, gone: Iterable[Lock]) -> "StoreState":
-        """Return the state without the removed locks `gone`."""
+        """Return the state without the locks in `gone`."""
         digests = {lock.digest for lock in gone}
         kept = tuple(lock for lock in self.installed if lock.digest not in digests)
         return self._next(kept, self.before, None)

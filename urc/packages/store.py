@@ -52,7 +52,7 @@ class Store:
         return self.state().installed
 
     def state(self) -> StoreState:
-        """Return the state; raise `PackageError`."""
+        """Return the state of the store; raise `PackageError`."""
         try:
             with open(self._state, "rb") as file:
                 data = file.read(_STATE_BYTES)

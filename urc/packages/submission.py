@@ -60,8 +60,8 @@ def take(
 
     Raises:
         SubmissionRefused: the upload is rejected.
-        OSError: writing failed, for example because the disk is full. The repository's index is
-            then unchanged.
+        OSError: writing failed, for example because the disk is full. A failed write leaves the
+            repository's index unchanged.
     """
     package, entry = _opened(entry_file, data, signature)
     with changing(folder) as work:

@@ -73,7 +73,7 @@ class UploadTokens:
         return found
 
     def add(self, name: str, may: tuple[str, ...]) -> str:
-        """Generate a token and return its text. The text itself is not stored.
+        """Generate a token and return its text. Only the digest of the token is stored.
 
         Raises:
             PackageError: the name is in use or invalid, or `may` contains an invalid package.

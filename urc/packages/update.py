@@ -60,7 +60,7 @@ class PackageSummary(Protocol):
 
 
 Look = Callable[[Path, Path, Sequence[str]], PackageSummary]
-"""Function from a document's path, its package's folder and its widgets to a preview."""
+"""Function that returns a preview, given the document, the package's folder and widget names."""
 
 
 class UpdateDiff(NamedTuple):
@@ -83,7 +83,8 @@ def newer(
 ) -> list[AvailableUpdate]:
     """Return the available updates; download only the indexes of the repositories.
 
-    If several versions of a package are installed, only the newest is compared.
+    If several versions of a package are installed, only the newest version is compared with the
+    sources.
 
     Args:
         store: store with the installed packages.
@@ -159,7 +160,7 @@ def staged_difference(
 
 
 def differences(before: Iterable[str], after: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Return the items only in `after`, and the items only in `before`, in their original order."""
+    """Return the items that are only in `after`, and the items that are only in `before`."""
     old, new = list(before), list(after)
     return [one for one in new if one not in old], [one for one in old if one not in new]
 

@@ -96,7 +96,7 @@ def _core(version: Version) -> tuple[int, int, int]:
 def parse_range(text: str) -> Range:
     """Parse a range of comma-separated parts; raise `PackageError`.
 
-    A version must match all parts.
+    A version must match all parts of the range.
     """
     if text.strip() == "*":
         return Range("*", ())
@@ -113,7 +113,7 @@ def parse_range(text: str) -> Range:
 
 
 def _bounds(found: re.Match[str]) -> list[_Bound]:
-    """Return the bounds of one part. An omitted number matches any number."""
+    """Return the bounds of one part of a range; an omitted number matches any number."""
     sign = found["sign"] or "="
     major, minor, patch = (
         None if found[name] is None else int(found[name]) for name in ("major", "minor", "patch")
@@ -143,7 +143,7 @@ def _after(low: Version, minor: int | None) -> Version:
 
 
 def _caret(major: int, minor: int | None, patch: int | None) -> Version:
-    """Return the first incompatible version: the left-most nonzero number changes."""
+    """Return the first incompatible version, with the left-most nonzero number increased."""
     if major or minor is None:
         return Version(major + 1, 0, 0, "0")
     if minor or patch is None:

@@ -1,7 +1,7 @@
 """Replacement of a driver's parameters, such as ``{params.id}``, in keys and texts.
 
 Each robot gives the values of its driver's parameters, and URC replaces the parameters while it
-loads the documents. In contrast, the operator gives the values of settings.
+loads the documents. The values of settings come from the operator.
 """
 
 from collections.abc import Mapping

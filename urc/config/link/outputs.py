@@ -21,7 +21,7 @@ _GIVERS: Final = {
     "boolean": "switch",
     "string": "text",
 }
-"""Names of the shipped widgets that give a value of an argument's type, by type."""
+"""Names of the shipped widgets that give a value of a certain type, by type."""
 
 
 def link_output(

@@ -25,7 +25,8 @@ def link_together(
 ) -> None:
     """Check the bindings and options that depend on each other.
 
-    `use` is the complete slot. `part` is the part of the slot that this document declares.
+    `use` is the complete declaration of the slot. `part` is the part of the slot that this document
+    declares.
     """
     bound = {**use.inputs, **use.lists, **use.outputs}
     _check_needs(part, use, widget, bound, problems)

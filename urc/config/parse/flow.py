@@ -361,7 +361,7 @@ def parse_choice_questions(part: Node, argument: Argument, problems: Problems) -
 
 
 def _written(value: Value) -> str:
-    """Return a choice as a key of a document."""
+    """Return a choice in the notation of a document's key."""
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

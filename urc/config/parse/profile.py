@@ -19,7 +19,7 @@ _VALUE_TYPES: Final = {
 
 
 def parse_setting(part: Node, problems: Problems) -> Setting:
-    """Return the setting at `part`; report its mistakes."""
+    """Return the setting at `part`; report mistakes in the declaration."""
     kind = part.text("type")
     low, high = check_range(
         part, _VALUE_TYPES.get(kind, "string") if kind != "port" else kind, problems

@@ -23,7 +23,7 @@ _COMMON: Final = (
 
 
 def parse_transport(part: Node, problems: Problems, catalog: Registries) -> TransportSpec:
-    """Return the transport at `part`; report its mistakes."""
+    """Return the transport at `part`; report mistakes in the declaration."""
     kind = part.must("type")
     if catalog.transports.get(kind.data) is None:
         problems.error(

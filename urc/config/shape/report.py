@@ -28,7 +28,7 @@ __all__ = ["report"]
 
 
 class _Error(NamedTuple):
-    """One error from `jsonschema`."""
+    """One validation error from `jsonschema`."""
 
     keyword: str
     limit: Any
@@ -245,7 +245,7 @@ def _other_one(document: Document, path: Path, error: _Error) -> Problem:
 
 
 def _in_names(tell: _Report) -> _Report:
-    """Wrap a report function for errors about key names, which have the path of the mapping."""
+    """Wrap a report function for errors about key names; the errors have the mapping's path."""
 
     def choose(document: Document, path: Path, error: _Error) -> list[Problem]:
         return (_wrong_name if error.is_name else tell)(document, path, error)

@@ -110,7 +110,7 @@ def _inside(place: Node, name: str) -> dict[str, Any]:
 
 
 def _named(part: Node, outer: str) -> Iterator[tuple[Node, str]]:
-    """Yield node and name of every item with a name or a type; the name may be ""."""
+    """Yield the node and the name of every item with a name or a type; the name may be ""."""
     for item in part.items():
         if isinstance(item.data, str):
             _, _, name = item.data.strip().partition(" ")
