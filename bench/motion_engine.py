@@ -21,7 +21,7 @@ ROBOTS = 20
 EACH, EACH_IF_FULL = 40, 1000
 BIN_MS = 10
 MOST_BOUTS = 3
-"""Maximum number of bouts on a busy machine, as a multiple of the required number."""
+"""Maximum number of rounds of trials on a busy machine, as a multiple of the required number."""
 
 
 def run(*, full: bool) -> Sequence[Result]:
@@ -40,7 +40,7 @@ def run(*, full: bool) -> Sequence[Result]:
 
 
 def repeated(bout: Callable[[], list[Trial]], wanted: int, robot_count: int) -> list[Trial]:
-    """Repeat bouts until enough trials are valid, or the maximum number of bouts is reached."""
+    """Repeat rounds until enough trials are valid, or the maximum number of rounds is reached."""
     trials: list[Trial] = []
     for _ in range(MOST_BOUTS * wanted // robot_count):
         trials += bout()

@@ -23,7 +23,7 @@ EACH, EACH_IF_FULL = 100, 1000
 ROBOTS = 20
 BIN_MS = 10
 MOST_BOUTS = 3
-"""Maximum number of bouts on a busy machine, as a multiple of the required number."""
+"""Maximum number of rounds of trials on a busy machine, as a multiple of the required number."""
 
 
 def run(*, full: bool) -> Sequence[Result]:

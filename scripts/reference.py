@@ -194,7 +194,7 @@ def _type(file: str, schema: Any) -> str:
 
 
 def _kinds(file: str, schema: Schema) -> list[str]:
-    """Return the types of the branches of `if`."""
+    """Return the types that the branches of `if` allow."""
     if "if" not in schema or ("properties" in schema and not _refers(schema)):
         return []
     found: list[str] = []

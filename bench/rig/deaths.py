@@ -1,7 +1,7 @@
 """Times from the loss of an operator to the stop, for eight kinds of loss.
 
-In a *bout*, all robots are driven in parallel, each by one page, and all pages vanish. Each motion
-value is the send time of its tick, so the robots' logs contain all results.
+In a round of trials, all robots are driven in parallel, each by one page, and all pages vanish.
+Each motion value is the send time of its tick, so the robots' logs contain all results.
 """
 
 import random

@@ -67,7 +67,7 @@ class Weather:
     is_cut: dict[str, bool] = field(default_factory=lambda: {"a": False, "b": False})
     """For each side, whether all packets from this side are lost."""
     ports: dict[str, set[int]] = field(default_factory=lambda: {"a": set(), "b": set()})
-    """For each side, ports; packets from this side that use one of the ports are lost."""
+    """Blocked ports of each side: packets from this side that use one of these ports are lost."""
 
 
 def made(name: str) -> Side:
