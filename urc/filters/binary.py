@@ -1,8 +1,8 @@
 """Filters of expressions that create bytes, hash bytes, or convert bytes to text.
 
 Private to `urc.filters.table`. Text is encoded as UTF-8 before it is hashed. Each filter accepts
-any value from a document: the filter returns a result, or raises TypeError or ValueError with a
-message for people.
+any value from a document, and returns a result or raises TypeError or ValueError with a message for
+people.
 """
 
 import binascii

@@ -1,8 +1,8 @@
 """Filters and operators of expressions for lists and texts.
 
-Private to `urc.filters.table`. Each function accepts any value from a document: the function
-returns a result, or raises TypeError or ValueError with a message for people. The size of the input
-limits the size of the result.
+Private to `urc.filters.table`. Each function accepts any value from a document, and returns a
+result or raises TypeError or ValueError with a message for people. The size of the input limits the
+size of the result.
 """
 
 import re
@@ -136,5 +136,5 @@ LIST_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "split": (_split, (0, 1)),
     "sum": (_sum, (0, 0)),
 }
-"""Each filter with its function, and its minimum and maximum number of arguments after the
-subject."""
+"""Function of each filter, with the minimum and maximum number of arguments after the filtered
+value."""

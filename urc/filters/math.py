@@ -19,7 +19,7 @@ def _number(value: object) -> float:
 
 
 def _of(name: str, function: Callable[..., float], where: str = "") -> Callable[..., float]:
-    """Return a filter that applies `function`; error messages end in `where`, its valid range."""
+    """Return a filter that applies `function`; `where` is the valid range for error messages."""
 
     def filtered(*values: object) -> float:
         numbers = [_number(value) for value in values]
@@ -50,5 +50,5 @@ GEOMETRY_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] =
     "sqrt": (_of("sqrt", math.sqrt, "expected a number of at least 0"), (0, 0)),
     "tan": (_of("tan", math.tan), (0, 0)),
 }
-"""Each filter with its function, and its minimum and maximum number of arguments after the
-subject."""
+"""Function of each filter, with the minimum and maximum number of arguments after the filtered
+value."""

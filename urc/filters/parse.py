@@ -83,7 +83,7 @@ def _cut(value: Any, start: Any, stop: Any = None) -> list[Any]:
 
 
 def _digits(value: Any, width: Any, base: Any, zero: Any = 48) -> list[int]:
-    """Return numbers with a fixed `width` in characters, each with its highest digit first."""
+    """Return numbers of `width` digits each from a text; the highest digit is first."""
     text, size = _text(value), _whole(width, "the width", 1, 16)
     radix = _whole(base, "the base", 2, 256)
     first = ord(zero) if isinstance(zero, str) and len(zero) == 1 else zero
@@ -110,7 +110,7 @@ def _signed(value: Any, bits: Any) -> int:
 
 
 class _Short(ValueError):
-    """The error for bytes that are too short for a number."""
+    """The error for bytes that are too few for a number."""
 
 
 @cache  # the type names are few
@@ -128,7 +128,7 @@ def _bytes(value: Any) -> bytes:
 
 
 def _unpack(value: Any, name: Any, at: Any = 0) -> int | float:
-    """Return the number of a type at a byte offset."""
+    """Return the number of a given type at a byte offset."""
     read = _reader(_text(name))
     data, place = _bytes(value), _whole(at, "the offset", 0, MAX_PARTS)
     try:
@@ -157,7 +157,7 @@ def _hexdigits(value: Any) -> str:
 
 
 def _ramp(value: Any, step: Any, count: Any) -> list[float]:
-    """Return `count` numbers that start at the subject and increase by `step`."""
+    """Return `count` numbers that begin with the filtered value and increase by `step`."""
     for one in (value, step):
         if not isinstance(one, (int, float)):
             raise TypeError(f"expected a number, found {_short(one)}")

@@ -1,8 +1,8 @@
 """Operators and filters of expressions: all functions that compiled templates call.
 
-Private to `urc.expressions`. Every function accepts any value from a document: the function returns
-a result, or raises TypeError, ValueError or ArithmeticError with a message for people. No function
-produces a large result from small operands.
+Private to `urc.expressions`. Every function accepts any value from a document, and returns a result
+or raises TypeError, ValueError or ArithmeticError with a message for people. No function produces a
+large result from small operands.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -210,14 +210,14 @@ def _sign(value: Any) -> str:
 
 
 class Filter(NamedTuple):
-    """A filter: its function, and its number of arguments after the subject."""
+    """A filter: its function, and its number of arguments after the filtered value."""
 
     function: Callable[..., Any]
     arity: tuple[int, int]
     gives_bytes: bool = False
     """Whether the filter returns bytes, which only ``hex:`` and ``bytes:`` can send."""
     refuses: Callable[[str], str] | None = None
-    """Check of a constant first argument, which returns the error or ""."""
+    """Function that checks a constant first argument, and returns the error or ""."""
 
 
 FILTERS: dict[str, Filter] = {
@@ -286,5 +286,5 @@ SCOPE |= {f"_filter_{name}": filter_.function for name, filter_ in FILTERS.items
 
 
 def filter_names() -> str:
-    """Return the filter names for messages, except the many filters that return bytes."""
+    """Return the names of the filters for messages, except filters that return bytes."""
     return ", ".join(sorted(name for name, one in FILTERS.items() if not one.gives_bytes))

@@ -83,7 +83,7 @@ async def _guard(line: socket.socket, priority: RealTimePriority) -> None:
 
 
 def _line(place: str) -> socket.socket:
-    """Return this end of the pipe: an inherited socket, or a connection to the server's port."""
+    """Return the guard's end of the pipe: an inherited socket, or a connection to the server."""
     if not place.startswith(DOOR):
         return socket.socket(fileno=int(place))
     line = socket.create_connection(("127.0.0.1", int(place.removeprefix(DOOR))), timeout=_ENTER_S)

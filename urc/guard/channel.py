@@ -2,7 +2,7 @@
 
 `urc.guard.pipe_channel.PipeChannel` connects to a guard process, and
 `urc.guard.local_channel.LocalChannel` to a guard in this process. Only the client keeps the table
-of armed controls; channels have no access to the table.
+of armed controls; a channel cannot access this table.
 """
 
 from collections.abc import Iterable
@@ -19,8 +19,8 @@ class GuardedLineSpec(NamedTuple):
 
     make: messages.MakeTransport
     transport: Transport
-    """Transport object in this process, equivalent to `make`. Only a guard in this process opens
-    the transport object."""
+    """Transport object in this process, equivalent to the result of `make`. Only a guard in this
+    process opens the transport object."""
 
 
 class ChannelListener(Protocol):
@@ -33,7 +33,7 @@ class ChannelListener(Protocol):
     def briefing(self) -> Iterable[messages.ToGuard]:
         """Return the messages that initialise a new guard, in sending order.
 
-        The channel calls this method once per new guard; the call marks pending stops as sent.
+        The channel calls this method once for each new guard. The call marks pending stops as sent.
         """
 
     def handle(self, message: messages.FromGuard, size: int) -> None:
@@ -60,8 +60,8 @@ class Channel(Protocol):
 
         Args:
             message: the message.
-            slot: replacement key: a newer message replaces an unsent message with the same key; ""
-                for none.
+            slot: a newer message replaces an unsent message with the same slot; "" to replace no
+                message.
             is_urgent: whether to send the message before all unsent messages.
 
         Raises:

@@ -3,13 +3,12 @@
 Theory of operation. The guard's state is lost when the guard process dies. The client therefore
 keeps a table of all held commands that were armed or stopped. Each entry stores the terms of the
 command, and whether the command may be moving. A new guard is initialised from this table. The new
-guard receives the list of transports, a pending stop for each possibly moving command, and the
-terms of the other armed commands. For each pending stop, the guard opens the connection and writes
+guard receives the list of transports, a pending stop for each command that may be moving, and the
+terms of all other armed commands. For each pending stop, the guard opens the connection and writes
 the stop first. Motion never resumes automatically.
 
-A control *may be moving* from its first tick or stop request. The state *may be moving* ends when
-the guard reports that the stop after the newest tick was written. A pending stop therefore survives
-the death of the guard process.
+A control *may be moving* from its first tick or stop request until the guard reports that the stop
+after the newest tick was written. A pending stop is therefore not lost when the guard process dies.
 """
 
 import asyncio
@@ -38,7 +37,8 @@ class HeldSpec(NamedTuple):
 
     line: str
     terms: HoldTerms
-    """Initial terms, without a stop frame, for a stop before the control is first armed."""
+    """Initial terms without a stop frame, used for a stop before the control is armed for the first
+    time."""
 
 
 @dataclass(slots=True)
@@ -53,10 +53,10 @@ class _Control:
     at_s: float = 0.0
     """Time of the newest tick on the guard's clock, in seconds."""
     counted: CountedFrame | None = None
-    """Frame of the newest tick of a held control, if the frame carries counters; otherwise None."""
+    """Frame of the newest tick, if the frame contains counters; otherwise None."""
     may_move: bool = False
     stopped_s: float = float("-inf")
-    """Time of the last stop that the guard reported as written."""
+    """Time of the last written stop, as reported by the guard, in seconds."""
 
 
 class GuardClient:
@@ -92,12 +92,12 @@ class GuardClient:
         }
         """Guarded transports by name, for the links of the session."""
         self.on_stand: Stands = _unheard
-        """Callback with the counters of a transport, and whether all counted frames of the engine
-        were sent.
+        """Callback with the counters of a transport, and whether all of the engine's frames with
+        counters were sent.
         """
         self._held = dict(held)
         self._controls: dict[str, _Control] = {}
-        """Table of armed and possibly moving commands."""
+        """Table of all commands that are armed or may be moving."""
         self._stops: deque[tuple[str, Reason]] = deque(maxlen=_MOST_STOPS)
         self._stopped = asyncio.Event()
 
@@ -199,7 +199,7 @@ class GuardClient:
         return self.transports[self._held[command].line].is_open
 
     async def stops(self) -> Sequence[tuple[str, Reason]]:
-        """Wait for written stops; return the command and the reason of each stop.
+        """Wait for written stops; return the command and the reason for each stop.
 
         Cancelling loses none.
         """
@@ -217,7 +217,7 @@ class GuardClient:
         return control
 
     def _discard_tick(self, command: str) -> None:
-        """Discard an unsent tick permanently, because the tick would start a motion."""
+        """Discard an unsent tick, so that it cannot start a motion later."""
         self.channel.drop(command)
         control = self._controls.get(command)
         if control is not None:

@@ -1,10 +1,11 @@
 """The guard's side of a connection to a robot.
 
 Theory of operation. One task at a time opens the transport, reads until the connection ends, and
-closes the transport. The engine requests opening and closing, and receives data within its
-flow-control credit. If the connection is lost while the robot may be moving, the guard does not
-wait for the engine. The engine may be frozen or dead. The guard itself reopens the connection (a
-*rescue*) and writes the stop first. The open connection is then kept for the engine's next attempt.
+closes the transport. The engine requests the opening and the closing. The guard sends received data
+to the engine within the engine's flow-control credit. If the connection is lost while the robot may
+be moving, the guard does not wait for the engine. The engine may be frozen or dead. The guard
+itself reopens the connection (a *rescue*) and writes the stop first. The open connection is then
+kept for the engine's next attempt.
 """
 
 import asyncio
@@ -36,35 +37,37 @@ __all__ = ["WINDOW_BYTES", "GuardedConnection"]
 WINDOW_BYTES: Final = 65536
 """Maximum number of bytes sent to the engine before an acknowledgement."""
 _GRACE_S: Final = 1.0
-"""Extra time for a transport after its own timeout, in seconds."""
+"""Grace period for a transport that exceeds its own timeout, in seconds."""
 _CLOSE_S: Final = 1.0
 _RESCUE_S: Final = 90.0
-"""Time limit of a rescue, in seconds; afterwards, only the engine tries to connect."""
+"""Time limit of a rescue, in seconds. After this time, only the engine tries to connect."""
 _KEPT_S: Final = 6.0
 """Time for which a rescued connection is kept for the engine, in seconds."""
 _EVERY_S: Final = 0.05
-"""Minimum interval between two attempts, in seconds; five times as long for transports that are
-slow to open."""
+"""Minimum interval between two connection attempts, in seconds; five times as long for a transport
+that is slow to open."""
 _SHORTEST_S: Final = 0.07
 _LONGEST_S: Final = 2.0
-"""Bounds of the timeout of one attempt, in seconds. The timeout is a multiple of the usual duration
-of successful attempts. An attempt that begins before the robot is reachable fails, and delays the
-next attempt.
+"""Maximum timeout of one connection attempt, in seconds; `_SHORTEST_S` is the minimum. The timeout
+is a multiple of the usual duration of successful attempts. A short timeout is needed because an
+attempt that begins before the robot is reachable fails, and delays the next attempt.
 """
 _REMEMBERED: Final = 5
 _TIMES: Final = 4.0
 _LOG_IN_S: Final = 6.0
 _GROWTH: Final = 1.25
 _LONG_S: Final = 0.5
-"""Maximum timeout of attempts that cannot overlap, in seconds; the timeout grows with each attempt.
+"""Maximum timeout of connection attempts that cannot overlap, in seconds. The timeout grows with
+each attempt.
 """
 _USUAL_S: Final = 0.25
 _WITHIN_S: Final = 0.7
-"""Time allowed for repeating a stop, and for the last repeat on a slow connection, in seconds."""
+"""Maximum time for the repeats of a stop, including the last repeat on a slow connection, in
+seconds."""
 _PAUSE_S: Final = 0.01
 
 Emit = Callable[[messages.FromGuard], int]
-"""Function that passes a message on, and returns the approximate size in bytes."""
+"""Function that passes on a message and returns its approximate size in bytes."""
 
 log = logging.getLogger(__name__)
 
@@ -116,12 +119,12 @@ class GuardedConnection:
         self._handed = asyncio.Event()
         self._is_rescuing = False
         self._waiting: TimerHandle | None = None
-        """Timer of the engine's timeout while the engine waits for a rescue, or None."""
+        """Timer of the engine's timeout while the engine waits for a rescue; otherwise None."""
         self._fault = ""
         self._patience_s = _USUAL_S
         self._took_s: deque[float] = deque(maxlen=_REMEMBERED)
-        """Durations of the last successful attempts, in seconds; the shortest duration contains the
-        least local delay.
+        """Durations of the last successful attempts, in seconds. The shortest duration is the least
+        affected by delays on this machine.
         """
         self._hurry = ConnectRace(_SHORTEST_S)
         self._credit = 0
@@ -129,9 +132,10 @@ class GuardedConnection:
         self._is_reading = False
         self._acked = 0
         self._counted = 0
-        """Number of the newest counted frame of the engine that was sent."""
+        """Number of the newest sent frame of the engine that contains counters."""
         self._round = 0
-        """Number of refusals of engine frames because their counter values were already used."""
+        """Number of times that frames of the engine were refused because their counter values were
+        already used."""
 
     # -- requests of the engine
 
@@ -175,7 +179,7 @@ class GuardedConnection:
                 self._acked = number
 
     def _leave(self, said: messages.SendBytes) -> Payload | None:
-        """Return the data to send when the frame is next in the queue; None if outdated."""
+        """Return the data to send for the next frame in the queue; None for an outdated frame."""
         if said.round != self._round:
             return None
         if not self._sent_counters.fits(said.count):
@@ -192,7 +196,7 @@ class GuardedConnection:
             self._counted = said.number
 
     def _refuse(self, number: int) -> None:
-        """Discard the other frames of this round, because their counter values are already used."""
+        """Discard the other frames of this round, because their counter values were used."""
         self._round += 1
         self._emit(messages.SendStale(self.name, self._turn, number, self._sent_counters.stand))
 
@@ -269,7 +273,7 @@ class GuardedConnection:
         await self._serve()
 
     async def _attempt(self, timeout_s: float) -> str:
-        """Open the transport; return the reason of a failure, or ""."""
+        """Open the transport; return the reason for a failure, or "" on success."""
         began_s = self._clock.now()
         try:
             async with asyncio.timeout(timeout_s + _GRACE_S):

@@ -30,7 +30,7 @@ class LivenessWatch:
         Args:
             transport: the transport; probed if the transport is a `SupportsProbe`.
             clock: the time.
-            silent_s: maximum silence of the robot without a probe, in seconds; None for no limit.
+            silent_s: maximum silence of a robot that is not probed, in seconds; None for no limit.
             is_moving: returns whether a control is moving.
             failed: callback with the reason when the program is frozen.
         """
@@ -66,7 +66,7 @@ class LivenessWatch:
             self._asking = None
 
     def note_arrival(self) -> None:
-        """Record received bytes, or a local pause in reading."""
+        """Record received bytes, or a pause in reading on this machine."""
         self._liveness.note_arrival(self._clock.now())
 
     def start(self) -> None:

@@ -55,8 +55,7 @@ class MakeTransport(msgspec.Struct, array_like=True, frozen=True, tag=1):
     tunnel: str
     """Name of the previously created tunnel that carries this transport; "" without a tunnel."""
     stalled_s: float
-    """Age of unsent motion data at which a connection counts as stalled, in seconds. A stalled
-    connection is reset.
+    """Age of unsent motion data, in seconds, at which a connection counts as stalled and is reset.
     """
     is_strict: bool
     """Whether the transport is slow to open; if so, a frame is written only when no byte is unsent.
@@ -83,11 +82,11 @@ class SendBytes(msgspec.Struct, array_like=True, frozen=True, tag=3):
     """Number of the frame on this connection."""
     data: Payload
     count: Count | None = None
-    """Counter values of the frame, or None; the frame is sent only if all values are the next in
-    order."""
+    """Counter values of the frame, or None. The frame is sent only if each value directly follows
+    the last sent value."""
     round: int = 0
-    """Expected number of `SendStale` messages on this connection; the frame is dropped if the
-    numbers differ."""
+    """Number of `SendStale` messages on this connection that the engine knows. The guard drops the
+    frame if the guard has sent a different number."""
 
 
 class CloseLine(msgspec.Struct, array_like=True, frozen=True, tag=4):
@@ -98,7 +97,7 @@ class CloseLine(msgspec.Struct, array_like=True, frozen=True, tag=4):
 
 
 class FlowCredit(msgspec.Struct, array_like=True, frozen=True, tag=5):
-    """The engine has processed this number of bytes from a connection."""
+    """The acknowledgement that the engine has processed `amount` bytes from a connection."""
 
     line: str
     turn: int
@@ -134,7 +133,7 @@ class ReleaseControl(msgspec.Struct, array_like=True, frozen=True, tag=8):
 
 
 class StopMotion(msgspec.Struct, array_like=True, frozen=True, tag=9):
-    """Stop the listed controls, moving or not; each entry has line, control and terms."""
+    """Stop the listed controls, even if they are idle; each entry has line, control and terms."""
 
     controls: list[tuple[str, str, HoldTerms]]
 
@@ -161,7 +160,7 @@ class LineOpened(msgspec.Struct, array_like=True, frozen=True, tag=21):
     line: str
     turn: int
     address: str
-    """Address to display; may be more precise than the configured address."""
+    """Address to display, which may be more precise than the configured address."""
     stand: dict[str, int] = {}
     """Counter values that stop frames have already used."""
 
@@ -183,7 +182,7 @@ class BytesReceived(msgspec.Struct, array_like=True, frozen=True, tag=23):
 
 
 class SendDone(msgspec.Struct, array_like=True, frozen=True, tag=24):
-    """All frames up to this number were handed to the transport."""
+    """All frames up to `number` were handed to the transport."""
 
     line: str
     turn: int
@@ -240,14 +239,14 @@ class CountersAdvanced(msgspec.Struct, array_like=True, frozen=True, tag=30):
     sent: int
     """Number of the newest counted `SendBytes` that was sent."""
     stand: dict[str, int]
-    """Counter name → last sent value."""
+    """Last sent value of each counter, by name."""
     stale: list[tuple[str, int]]
-    """Control and number of each tick that cannot be sent, because its counter values were used by
-    other frames."""
+    """Control and number of each tick that cannot be sent, because other frames used its counter
+    values."""
 
 
 class SendStale(msgspec.Struct, array_like=True, frozen=True, tag=31):
-    """A `SendBytes` with used counter values, and all later frames of its round, were not sent."""
+    """The refusal of a `SendBytes` with used counter values, and of all later `SendBytes`."""
 
     line: str
     turn: int
@@ -293,8 +292,8 @@ def _plain(value: object) -> object:
 def encoder() -> msgspec.msgpack.Encoder:
     """Return a new encoder for messages of either side.
 
-    Encoding raises `TypeError`, `OverflowError` or `NotImplementedError` for a body that cannot be
-    encoded, never `msgspec.EncodeError`.
+    For a body that cannot be encoded, the encoder raises `TypeError`, `OverflowError` or
+    `NotImplementedError`, never `msgspec.EncodeError`.
     """
     return msgspec.msgpack.Encoder(enc_hook=_plain)
 

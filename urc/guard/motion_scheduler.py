@@ -1,9 +1,10 @@
-"""The scheduler of one connection's held commands: writes their frames and detects a stall.
+"""The scheduler of one connection's held commands, which writes frames and detects stalls.
 
 Theory of operation. `step` writes the due frames of every control. Stops are written first,
-regardless of unsent data; motion frames only if the connection is clear. `step` runs after every
-message, and by a timer at the next due time. Until the other side acknowledges a write, `step` also
-runs every few milliseconds, because the kernel does not report sent bytes.
+regardless of unsent data. Motion frames are written only if no earlier data has been waiting too
+long. `step` runs after every message, and at the time when the next frame is due. Until the other
+side acknowledges a write, `step` also runs every few milliseconds, because the kernel does not
+report sent bytes.
 
 A control is *in doubt* while a written frame may not have arrived at the robot. If the connection
 is lost while a control is in doubt, a stop becomes pending.
@@ -32,8 +33,8 @@ __all__ = ["MotionScheduler"]
 _LOOK_S: Final = 0.005
 """Minimum interval between checks of a connection with unsent data, in seconds."""
 _LONGEST_LOOK_S: Final = 0.02
-"""Maximum interval between checks of a connection with unsent data, in seconds; the interval
-doubles while no frame waits."""
+"""Maximum interval between checks of a connection with unsent data, in seconds. While no frame
+waits, the interval doubles after each check."""
 
 
 class MotionScheduler:
@@ -51,7 +52,7 @@ class MotionScheduler:
         sent_counters: SentCounters | None = None,
         counted: Callable[[list[tuple[str, int]]], None] | None = None,
     ) -> None:
-        """Create the scheduler, which writes nothing before `begin`.
+        """Create the scheduler; nothing is written before the call of `begin`.
 
         Args:
             transport: the transport; `SupportsUnsent`, `SupportsOffer` and `SupportsForget` are
@@ -59,12 +60,12 @@ class MotionScheduler:
             clock: the time.
             stalled_s: age of unsent bytes at which the connection counts as stalled, in seconds.
             is_strict: whether motion waits until all earlier bytes are sent.
-            told: callback for each written stop, with the control, the reason and the number of the
-                newest tick.
+            told: callback for each written stop; the arguments are the control, the reason and the
+                number of the newest tick.
             failed: callback with the reason when the connection stalls or refuses data.
             sent_counters: counter values sent on the connection; None to create new counters.
-            counted: callback after a change of the counters, with the control and number of each
-                tick that became obsolete.
+            counted: callback after a change of the counters; the argument lists the control and
+                number of each tick that became obsolete.
         """
         self._clock = clock
         self._unsent = transport.unsent if isinstance(transport, SupportsUnsent) else None
@@ -76,11 +77,11 @@ class MotionScheduler:
         self._sent_counters = sent_counters or SentCounters()
         self._counted = counted
         self._counts: dict[str, Count | None] = {}
-        """Control → effect of the control's newest tick on the counters."""
+        """Effect of each control's newest tick on the counters, by control."""
         self._stale: list[tuple[str, int]] = []
         self._watch = StallWatch(stalled_s)
         self.queue: SendQueue[tuple[str, bool]] = SendQueue(transport, clock, self._sent)
-        """Frames that the transport cannot accept immediately."""
+        """Queue of the frames that the transport cannot accept immediately."""
         self._holds: dict[str, HoldToRun] = {}
         self._numbers: dict[str, int] = {}
         self._doubtful: set[str] = set()
@@ -173,7 +174,7 @@ class MotionScheduler:
         return hold_to_run
 
     def check_arrivals(self) -> None:
-        """Record the acknowledged frames; must be called only on a working connection."""
+        """Record the acknowledged frames; the caller checks that the connection works."""
         if self._unsent is not None and self.queue.is_idle and not self._unsent():
             self._all_arrived()
 
@@ -301,7 +302,7 @@ class MotionScheduler:
         return data
 
     def _leave(self, control: str, data: Payload, count: Count | None) -> Payload | None:
-        """Return a motion frame when next in the queue; None if its counter values are used up."""
+        """Return a motion frame at the head of the queue; None for used counter values."""
         fits = self._sent_counters.fits(count)
         if fits:
             self._sent_counters.left(count)
@@ -311,7 +312,7 @@ class MotionScheduler:
         return data if fits else None
 
     def _tell_soon(self) -> None:
-        """Report the counters after sending the frame, because the engine may reply immediately."""
+        """Report the counters after a frame was sent, because the engine may reply immediately."""
         asyncio.get_running_loop().call_soon(self.tell_counted)
 
     def _sent(self, tag: tuple[str, bool], fault: TransportError | None) -> None:
@@ -385,10 +386,10 @@ class MotionScheduler:
 
     @property
     def _is_watched(self) -> bool:
-        """Whether unsent bytes matter, because the bytes contain motion or delay motion.
+        """Whether unsent bytes must be watched, because they contain or delay motion frames.
 
-        Motion waits for unsent bytes only on a transport that is slow to open. A ping sent during
-        an interruption would block motion until the interruption ends, and old motion would then
-        continue.
+        Motion frames wait for unsent bytes only on a transport that is slow to open. On other
+        transports, waiting for a ping sent during an interruption would block motion until the
+        interruption ends; the old motion would then continue.
         """
         return bool(self._doubtful) or (self._is_strict and self._is_wanted)

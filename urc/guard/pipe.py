@@ -2,8 +2,8 @@
 
 Each message on the wire is a four-byte length followed by the body. Writing never waits: unsent
 messages are queued. Urgent messages go first, and a newer message replaces an older one of the same
-slot. The senders limit the queue: replies by flow-control credit, requests by the limit of pending
-requests.
+slot. The senders limit the length of the queue: flow-control credit limits replies, and the maximum
+number of pending requests limits requests.
 """
 
 import asyncio
@@ -64,14 +64,14 @@ class Pipe:
         self._is_behind = False
         """Whether received messages wait for the next iteration of the event loop."""
         self._rest = b""
-        """Unsent bytes of a partly written message."""
+        """Unsent bytes of a message that was written in part."""
         self._urgent: deque[bytes] = deque()
         self._queue: deque[bytes] = deque()
         self._newest: dict[str, bytes] = {}
         self._is_writing = False
         self.is_open = True
         self.taken_bytes = 0
-        """Size in bytes of the message being handled, equal to the result of the sender's `post`.
+        """Size of the message being handled, in bytes; equal to the result of `post` at the sender.
         """
         self._loop.add_reader(line, self._readable)
 
@@ -85,7 +85,7 @@ class Pipe:
 
         Args:
             message: a message for the encoder.
-            slot: replacement key: a newer message replaces an unsent message with the same key.
+            slot: a newer message replaces an unsent message with the same slot.
             is_urgent: whether to send the message before all unsent messages.
 
         Raises:

@@ -2,8 +2,8 @@
 
 Theory of operation. The guard sends a heartbeat ten times a second. A guard that has ended, or has
 been silent for half a second, is killed and replaced immediately. A guard that is ready to run but
-gets no processor time is not replaced: a new guard would get none either. A new guard has no state,
-so the client initialises it first.
+gets no processor time is not replaced, because a new guard would get no processor time either. A
+new guard has no state, so the client initialises it first.
 """
 
 import asyncio
@@ -32,11 +32,11 @@ _START_LOOKS: Final = 100
 """Maximum number of checks before the first heartbeat, because Python starts slowly on a busy
 machine."""
 _STEADY_S: Final = 0.5
-"""Minimum lifetime of a guard that counts as successfully started, in seconds; opening a connection
-also counts as success."""
+"""Lifetime after which a guard counts as successfully started, in seconds. A guard that has opened
+a connection also counts as successfully started."""
 _AT_ONCE: Final = 3
-"""Number of short-lived guards that are replaced immediately; each later replacement waits
-`_AGAIN_S`."""
+"""Number of short-lived guards that are replaced immediately. Each later replacement is delayed by
+`_AGAIN_S` seconds."""
 _AGAIN_S: Final = 1.0
 _FINISH_S: Final = 3.0
 _DIED: Final = "the guard of this connection ended; a new guard is starting"
@@ -233,7 +233,7 @@ class PipeChannel:
         self._listener.lost(_DIED)
 
     def _bury(self) -> None:
-        """Kill the process, so that no connection is ever owned by two guards."""
+        """Kill the process, so that two guards never own the same connection."""
         process, self._process = self._process, None
         if process is not None:
             with suppress(ProcessLookupError):

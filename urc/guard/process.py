@@ -17,7 +17,8 @@ __all__ = ["CAN_INHERIT", "DOOR", "GuardAcceptor", "launch", "reap", "standing"]
 CAN_INHERIT: Final = os.name == "posix"
 """Whether this system can pass an open socket to another process."""
 DOOR: Final = "door:"
-"""Prefix of the port argument, on systems where the guard connects to the server."""
+"""Prefix of the command-line argument with the port, on systems where the guard connects to the
+server."""
 TOKEN_BYTES: Final = 64
 _LOOPBACK: Final = "127.0.0.1"
 _ADMIT_S: Final = 10.0
@@ -80,7 +81,7 @@ class GuardAcceptor:
 def launch(
     *, is_inherited: bool = CAN_INHERIT
 ) -> tuple["subprocess.Popen[bytes]", socket.socket | GuardAcceptor]:
-    """Start the guard process; return the process, and our pipe end or the `GuardAcceptor`."""
+    """Start the guard process; return the process, and our end of the pipe or the acceptor."""
     return _heir() if is_inherited else _visitor()
 
 
@@ -125,15 +126,15 @@ class ProcessState(NamedTuple):
     """The state of a process, as the system reports it."""
 
     wants_to_run: bool = False
-    """Whether the process is running, or waits for a processor or a disk; false if asleep or
-    stopped.
+    """Whether the process is running or waiting for a processor or a disk; false for a sleeping or
+    stopped process.
     """
     ran_s: float = 0.0
     """Processor time of the first thread, in seconds."""
 
 
 def standing(process: int, proc: Path = Path("/proc")) -> ProcessState:
-    """Return the state of a process from Linux's ``/proc``; return a default on other systems."""
+    """Return the state of a process from ``/proc`` on Linux; on other systems, return a default."""
     try:
         # The name before the state may hold anything, brackets and spaces too.
         state = (proc / str(process) / "stat").read_text("latin-1").rpartition(")")[2].split()[0]

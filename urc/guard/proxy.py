@@ -1,6 +1,6 @@
-"""The engine's proxy of a transport in the guard, with the five members of a transport.
+"""The engine's proxy for a transport in the guard; the proxy has the members of `Transport`.
 
-Each connection has a number, its turn; messages of an earlier turn are ignored.
+The turn is the number of the connection; messages of an earlier turn are ignored.
 """
 
 import asyncio
@@ -23,7 +23,7 @@ _OPEN_GRACE_S: Final = 0.7
 _CLOSE_S: Final = 1.0
 _CREDIT_BYTES: Final = WINDOW_BYTES // 4
 _OFFERED_BYTES: Final = 65536
-"""Maximum number of pending bytes without a waiting caller."""
+"""Maximum number of pending bytes that were accepted without waiting."""
 _CLOGGED_BYTES: Final = 4096
 
 log = logging.getLogger(__name__)
@@ -64,8 +64,8 @@ class GuardedTransport:
             address: address of the robot, for display.
             post: sends a message to the guard without waiting.
             ready: returns once a guard is ready.
-            stands: callback with the counters of the transport, and whether no counted frame is
-                pending.
+            stands: callback with the counters of the transport, and whether no frame with counters
+                is pending.
         """
         self._stands = stands
         self._name = name
@@ -75,7 +75,7 @@ class GuardedTransport:
         self._turn = 0
         self._is_open = False
         self._is_known = False
-        """Whether the guard may have data of the present connection."""
+        """Whether the guard may hold unsent data of the present connection."""
         self._opening: asyncio.Future[str] | None = None
         self._closing: asyncio.Future[None] | None = None
         self._ended = _CLOSED
@@ -163,7 +163,7 @@ class GuardedTransport:
         return True
 
     def offer_counted(self, counted: CountedFrame, left: Callable[[Payload], None]) -> bool:
-        """Pass on a counted frame; render the frame again if other frames use its counter values.
+        """Pass on a frame with counters; render it again if other frames use its counter values.
 
         Returns:
             Whether the frame was accepted; `left` then receives the data that was handed over.
@@ -333,7 +333,7 @@ class GuardedTransport:
                 taken.set_result(None)
 
     def _end(self, reason: str) -> None:
-        """Fail all waiting calls; if called again, keep the first reason."""
+        """Make all waiting calls fail with a reason; repeated calls keep the first reason."""
         if not self._is_open:
             return
         self._is_open = False

@@ -20,7 +20,7 @@ class TimerHandle(Protocol):
     """A timer."""
 
     def cancel(self) -> None:
-        """Cancel the timer; does nothing after the timer has fired."""
+        """Cancel the timer; do nothing if the timer has fired."""
 
 
 class LaneClock(Protocol):
@@ -44,7 +44,7 @@ class Sender(Protocol):
 
 
 class SendQueue(Generic[_Tag]):
-    """A short send queue for one transport; one task sends its frames in order."""
+    """A short send queue for one transport, with one task that sends the frames in order."""
 
     def __init__(
         self,
@@ -59,9 +59,10 @@ class SendQueue(Generic[_Tag]):
         Args:
             sender: the transport.
             clock: the time.
-            done: callback for each frame with its tag, and with the error or None.
-            after: queue with precedence: its frames are sent before the frames of this queue; None
-                without one.
+            done: callback for each frame; the arguments are the tag of the frame, and the error or
+                None.
+            after: queue whose frames are sent before the frames of this queue; None for no such
+                queue.
         """
         self._sender = sender
         self._clock = clock
@@ -89,7 +90,7 @@ class SendQueue(Generic[_Tag]):
 
         Args:
             make: renders the frame at the head of the queue; a result of None drops the frame.
-            tag: argument for `done`, which is not called for a dropped frame.
+            tag: argument for the callback `done`. The callback is not called for a dropped frame.
         """
         if not self._waiting:
             self.busy_since_s = self._clock.now()

@@ -1,8 +1,8 @@
 """The counter values that were sent on one connection.
 
 The guard evaluates no templates. Each rendered frame includes its effect on the counters. A frame
-is sent only if its counter values are the next in order. The values on the wire therefore rise
-without gaps, regardless of the order of arrival and of frames that were rendered in advance.
+is sent only if its counter values are the next in order. The values on the wire therefore increase
+without gaps, regardless of the order in which frames are rendered or arrive.
 """
 
 from collections.abc import Sequence
@@ -17,12 +17,12 @@ class SentCounters:
 
     def __init__(self) -> None:
         self.stand: dict[str, int] = {}
-        """Counter name → last value sent; missing before the first value."""
+        """Last sent value of each counter, by name; a counter without a sent value is missing."""
         self.is_changed = False
-        """Whether sent values were not yet reported to the engine."""
+        """Whether some sent values have not been reported to the engine yet."""
 
     def reset(self) -> None:
-        """Begin a new connection, on which no counter values were sent."""
+        """Prepare for a new connection, on which no counter value has been sent."""
         self.stand = {}
         self.is_changed = False
 
@@ -40,8 +40,8 @@ class SentCounters:
             self.is_changed = True
 
     def choose(self, stops: Sequence[Numbered]) -> Numbered:
-        """Return the stop frame with the next counter values; if none fits, return the last one.
+        """Return the stop frame with the next counter values, or else the last stop frame.
 
-        A wrong counter value is better than no stop.
+        A stop with a wrong counter value is better than no stop.
         """
         return next((one for one in stops if self.fits(one.takes)), stops[-1])

@@ -62,7 +62,7 @@ class GuardServer:
             line.settle()
 
     async def finish(self) -> None:
-        """Stop all controls and close all connections, within little more than `FINISH_S`."""
+        """Stop all controls and close all connections, within about `FINISH_S` seconds."""
         self._is_finishing = True
         ends = [line.finish(FINISH_S) for line in self._lines.values()]
         await asyncio.gather(*ends)

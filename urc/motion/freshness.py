@@ -1,9 +1,9 @@
 """Freshness checks for control inputs that do not rely on the clock of the browser.
 
-The server sends numbered beats to every page. Each input carries the newest beat that its page has
-received, the epoch of its lease, and a sequence number. The server can therefore refuse inputs that
-were buffered, recorded and replayed, or sent under an earlier lease. Clocks of different machines
-are never compared.
+The server sends numbered heartbeats to every page. Each input carries the number of the newest
+heartbeat that its page has received, the epoch of its lease, and a sequence number. The server can
+therefore refuse inputs that were buffered, recorded and replayed, or sent under an earlier lease.
+Clocks of different machines are never compared.
 """
 
 from collections import deque
@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 __all__ = ["OLDEST_S", "DuplicateElimination", "Freshness", "ControlInput"]
 
 OLDEST_S: Final = 0.4
-"""Maximum age of the beat that an input echoes, in seconds."""
+"""Maximum age of the heartbeat that an input echoes, in seconds."""
 _KEPT: Final = 64
 
 
@@ -24,32 +24,32 @@ class ControlInput(NamedTuple):
     number: int
     """Number of the tick, which grows with every tick of this page."""
     echo: int
-    """Number of the newest server beat that the page has received."""
+    """Number of the newest heartbeat that the page has received from the server."""
 
 
 class Freshness:
-    """The beats sent to one page, and the page's newest input for each control."""
+    """The heartbeats sent to one page, and the page's newest input for each control."""
 
     def __init__(self, first: int = 1) -> None:
-        """Begin without beats.
+        """Create a check without heartbeats.
 
         Args:
-            first: number of the first beat. An unpredictable number invalidates inputs that were
-                recorded before a restart.
+            first: number of the first heartbeat. An unpredictable number invalidates inputs that
+                were recorded before a restart.
         """
         self._issued: deque[float] = deque(maxlen=_KEPT)
-        """Send times of the newest beats, which have consecutive numbers."""
+        """Send times of the newest heartbeats, which have consecutive numbers."""
         self._number = first - 1
         self._newest: dict[str, int] = {}
 
     def issue(self, now: float) -> int:
-        """Return the number of a new beat, which the caller sends to the page now."""
+        """Return the number of a new heartbeat, which the caller sends to the page now."""
         self._number += 1
         self._issued.append(now)
         return self._number
 
     def refusal(self, given: ControlInput, epoch: int, now: float, of: str = "") -> str:
-        """Return the reason to refuse an input; for a valid input, store its number and return "".
+        """Return the reason to refuse an input; store the number of a valid input and return "".
 
         Args:
             given: the numbers sent with the input.
@@ -74,9 +74,9 @@ class Freshness:
 class DuplicateElimination:
     """A filter for messages that a page sends twice, over two independent lossy connections.
 
-    The first copy counts. A page's numbers only grow, and each connection keeps their order. A
-    message without a higher number is a copy, or a newer message has arrived earlier. A delayed
-    tick must not move a control that was released over the other connection.
+    Only the first copy of a message takes effect. A page's numbers only increase, and each
+    connection keeps their order. A message with a lower or equal number is therefore a copy or
+    outdated. A delayed tick must not move a control that was released over the other connection.
     """
 
     def __init__(self) -> None:

@@ -1,11 +1,11 @@
 """One hold-to-run control: its frames during motion, and its stop.
 
 Theory of operation. A `HoldToRun` is idle, moving or stopping. The control moves the robot only
-while *ticks of sampled input* arrive. Each tick renews a short lease and replaces the unwritten
-value. Only the newest value is sent; values are never queued. The stop frame is sent before all
-other data when the lease expires, the control is released, or a stop is requested. The stop frame
-was rendered when the control was armed. After the stop, nothing is sent, because repeated zeros
-would override other sources of motion.
+while *ticks of sampled input* arrive. Each tick renews a short lease and replaces a value that was
+not written yet. Only the newest value is sent; values are never queued. The stop frame is sent
+before all other data when the lease expires, the control is released, or a stop is requested. The
+stop frame was rendered when the control was armed. After the stop, nothing is sent, because
+repeated stop frames would override other sources of motion.
 
 Motion never resumes automatically. Every stop except a release disarms the control; further ticks
 are then refused. The operator must release the control and press again, which arms the control
@@ -34,13 +34,16 @@ Reason = Literal["released", "expired", "stopped", "revoked"]
 
 
 class HoldTerms(NamedTuple):
-    """The terms of an armed control. Only the stop frame can change during motion."""
+    """The stop frame and the time limits of an armed control.
+
+    Only the stop frame can change during motion.
+    """
 
     stop: Payload
     """Complete frame that stops the motion. Empty for a robot that moves in steps, because each
     step ends without a stop frame."""
     period_s: float
-    """Minimum mean time between two writes, in seconds."""
+    """Minimum time between two writes on average, in seconds."""
     lease_s: float = LEASE_S
     """Time for which motion continues after the last tick, 0.1 to 1.0 seconds."""
     is_lossy: bool = False
@@ -50,7 +53,7 @@ class HoldTerms(NamedTuple):
     """
 
     def stopped_by(self, stop: Payload | FrameVariants) -> "HoldTerms":
-        """Return a copy of the terms with a different stop frame."""
+        """Return a copy of these terms with a different stop frame."""
         if isinstance(stop, FrameVariants):
             return self._replace(stop=stop.frames[0].data, stops=stop.frames)
         return self._replace(stop=stop, stops=())
@@ -76,7 +79,7 @@ class HoldToRun:
         self.is_told = True
         """Whether the last stop was reported; set by the owner of the connection."""
         self.owes_stop = False
-        """Whether the connection was lost before the robot can have received the stop."""
+        """Whether the connection was lost before the stop could reach the robot."""
         self._rate_limiter = RateLimiter(terms.period_s, is_strict=terms.stop == b"")
         self._waiting: Payload | None = None
         self._expires_at = 0.0
@@ -119,11 +122,11 @@ class HoldToRun:
     def tick(self, data: Payload | None, now: float) -> bool:
         """Accept a tick of sampled input: renew the lease, and store `data` as the newest value.
 
-        Without `data`, renew the lease but store no value, because the input's value cannot be
-        sent.
+        Without `data`, the tick renews the lease but stores no value, because the value of the
+        input cannot be sent.
 
         Returns:
-            Whether the tick was accepted. After a result of False, the control must be armed again.
+            Whether the tick was accepted. If the result is False, the control must be armed again.
         """
         if self.state == "moving" and now >= self._expires_at:
             self.stop("expired", now)  # a tick after the lease belongs to no motion
@@ -159,7 +162,7 @@ class HoldToRun:
 
         Args:
             now: the time.
-            is_clear: whether the connection has no unsent bytes. Motion waits for a clear
+            is_clear: whether the connection has no unsent bytes. A motion frame waits for a clear
                 connection; meanwhile, newer values replace the waiting value. A stop does not wait.
         """
         if self.state == "moving" and now >= self._expires_at:
@@ -184,7 +187,7 @@ class HoldToRun:
         """Record the loss of the connection: drop the unsent value, and owe a stop if needed.
 
         Args:
-            is_doubtful: whether a written stop may have been lost with the connection.
+            is_doubtful: whether the loss of the connection may have lost a written stop.
         """
         if self.state != "idle" or is_doubtful:
             self.owes_stop = True

@@ -1,8 +1,8 @@
 """The lease of one robot: the exclusive right of one operator to drive the robot.
 
-Theory of operation. At most one operator holds the lease. Every change of the holder, and every
-stop, raises the epoch of the lease and first sends a stop to the robot. Inputs with an older epoch
-are refused, so that no motion continues by mistake. A holder without input for `SILENT_S` loses the
+Theory of operation. At most one operator holds the lease. Every change of the holder and every stop
+first send a stop to the robot, and increase the epoch of the lease. Inputs with an older epoch are
+refused, so that no motion continues by mistake. A holder without input for `SILENT_S` loses the
 lease. STOP needs no lease and is latched: nothing moves until an operator resets the latch. A reset
 never starts motion.
 """
@@ -46,8 +46,8 @@ class LeaseState(NamedTuple):
     latched_by: str = ""
     """Name of the operator who pressed STOP; "" if no stop is latched."""
     stops: int = 0
-    """Number of stops since the server started. A request from before the last stop is void, even
-    after a reset."""
+    """Number of stops since the server started. A request made before the last stop is invalid,
+    even after a reset."""
 
 
 class LeaseChanged(NamedTuple):
@@ -62,14 +62,14 @@ class LeaseRefused(NamedTuple):
     """A refusal to change the lease."""
 
     message: str
-    """Reason for display; names the holder if the holder blocks the change."""
+    """Reason to display, with the name of the holder if the holder blocks the change."""
 
 
 class Lease:
     """The lease of one robot."""
 
     def __init__(self, state: LeaseState | None = None) -> None:
-        """Start from `state`, as stored before a restart: keep the latch, drop the holder."""
+        """Restore a lease stored before a restart: keep the latch, drop the holder."""
         kept = state or LeaseState()
         self.state = LeaseState(kept.epoch + 1, latched_by=kept.latched_by, stops=kept.stops)
         self._touched_at = 0.0
@@ -171,7 +171,7 @@ class Lease:
         return self._grant(client, now)
 
     def leave(self, client: str) -> LeaseChanged | None:
-        """Remove a client as holder or asker; return None if the client was neither."""
+        """Remove a client as holder or asker; return None for any other client."""
         state = self.state
         if state.holder is not None and state.holder.id == client:
             self.state = self._next(latched_by=state.latched_by)
@@ -217,7 +217,7 @@ class Lease:
         return LeaseChanged(self.state, must_stop=True)
 
     def _next(self, holder: Operator | None = None, latched_by: str = "") -> LeaseState:
-        """Return a state with the next epoch and without an asker."""
+        """Return a lease state with the next epoch and without an asker."""
         return LeaseState(
             self.state.epoch + 1, holder, latched_by=latched_by, stops=self.state.stops
         )

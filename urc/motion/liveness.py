@@ -1,7 +1,7 @@
 """The liveness of the program at the other end of a connection, judged by received bytes.
 
 The kernel of a frozen program still acknowledges bytes, although the program does not read the
-bytes. Acknowledgements are therefore no proof of liveness. The guard instead sends probes, and
+bytes. Acknowledgements therefore do not prove liveness. The guard instead sends probes, and
 measures the time until each reply.
 """
 
@@ -15,7 +15,7 @@ SILENCE_S: Final = 0.5
 ASKED_EVERY_S: Final = 0.05
 """Interval between a reply and the next probe, in seconds."""
 _ON_THE_WAY_S: Final = 0.03
-"""Time reserved for the delivery of a reply, or for the reset after a missing reply, in seconds."""
+"""Time allowed for the delivery of a reply, or for the reset after a missing reply, in seconds."""
 
 
 class Liveness:
@@ -24,7 +24,11 @@ class Liveness:
     __slots__ = ("_asked_s", "_heard_s", "_silent_s")
 
     def __init__(self, silent_s: float | None) -> None:
-        """Begin; `silent_s` is the maximum silence without a probe, in seconds; None: unlimited."""
+        """Create the watch.
+
+        Args:
+            silent_s: maximum silence without a probe, in seconds; None for no limit.
+        """
         self._silent_s = inf if silent_s is None else silent_s
         self._heard_s = -inf
         self._asked_s: float | None = None

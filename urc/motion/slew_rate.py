@@ -1,8 +1,8 @@
-"""A slew rate limit for held commands: limits acceleration, never braking.
+"""A slew rate limit for held commands, which limits acceleration and never limits braking.
 
 Distances are measured from rest, the value at which the robot stands still. A change towards rest
-is applied immediately. A change away from rest is limited. A change through rest reaches rest
-immediately, and is limited beyond rest.
+is applied immediately. A change away from rest is limited. A change from one side of rest to the
+other reaches rest immediately, and is limited only after rest.
 """
 
 import math
@@ -14,7 +14,7 @@ from urc.model.values import Reading
 __all__ = ["SlewRateLimiter"]
 
 _LONGEST_S: Final = 1.0
-"""Maximum time step for the calculation, in seconds; no lease is longer."""
+"""Maximum time step for the calculation, in seconds; equal to the longest permitted lease."""
 
 
 class SlewRateLimiter:
@@ -28,15 +28,15 @@ class SlewRateLimiter:
         """Begin at rest.
 
         Args:
-            per_s: argument → maximum increase per second, in the unit of the argument.
-            rest: argument → value at standstill; 0 if omitted.
+            per_s: maximum increase of each argument per second, in the unit of the argument.
+            rest: value of each argument at standstill; 0 for a missing argument.
             first_s: time credited to the first value of a motion, in seconds.
         """
         self._per_s = per_s
         self._rest = {name: rest.get(name) for name in per_s}
         self._first_s = first_s
         self._reached: dict[str, tuple[float, ...]] = {}
-        """Argument → present distance of each array element from rest."""
+        """Present distance of each array element from rest, by argument."""
         self._last_s: float | None = None
 
     def reset(self) -> None:
@@ -88,7 +88,7 @@ def _grown(wanted: float, was: float, room: float) -> float:
 
 
 def _written(wanted: float, rest: float, far: float) -> float:
-    """Return the value at the distance `far` from rest, or `wanted` if no limit applied."""
+    """Return the value at the distance `far` from rest; without a limit, return `wanted`."""
     if abs(wanted - rest) <= abs(far):
         return wanted
     return int(rest) + math.trunc(far) if isinstance(wanted, int) else rest + far

@@ -1,9 +1,9 @@
 """Detection of stalled connections by the age of the oldest unsent byte.
 
-The system reports only the number of unsent bytes. The number of unsent bytes grows with each write
-and shrinks with each acknowledgement, in the same order. The history of the number therefore
-reveals the write time of the oldest unsent byte. A large number alone proves no stall, because a
-busy connection may always have unsent bytes.
+The system reports only the number of unsent bytes. Each write increases this number. Each
+acknowledgement of the oldest bytes decreases this number. The write time of the oldest unsent byte
+can therefore be computed from earlier numbers of unsent bytes. A large number of unsent bytes does
+not prove a stall, because a busy connection may always have unsent bytes.
 """
 
 import sys
@@ -83,7 +83,7 @@ class StallWatch:
         return self.age_s(now) >= self.limit_s
 
     def wrote(self, size: int, now: float) -> None:
-        """Record a write of `size` bytes; the next call of `saw` corrects the estimate."""
+        """Record a write of `size` bytes; the next call of `saw` records the exact number."""
         self._written += size
         self._mark(now)
 

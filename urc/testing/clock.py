@@ -8,10 +8,10 @@ from itertools import count
 __all__ = ["FakeClock", "settle"]
 
 _TURNS = 30
-"""Number of loop turns after which all ready tasks have run; longer than every chain of tasks in
-URC."""
+"""Number of event loop turns after which all ready tasks have run; greater than the length of any
+chain of tasks in URC."""
 _QUIET_TURNS = 3
-"""Number of consecutive idle loop turns that prove that no task is ready."""
+"""Number of consecutive turns without a ready task after which the event loop counts as idle."""
 
 
 async def settle() -> None:
@@ -35,7 +35,7 @@ class _FakeAlarm:
 
 
 class FakeClock:
-    """A replacement for `urc.runtime.clock.LoopClock`; its time starts at `start_s`."""
+    """A replacement for `urc.runtime.clock.LoopClock`; the time starts at `start_s`."""
 
     def __init__(self, start_s: float = 1000.0) -> None:
         self._now = start_s
@@ -65,7 +65,7 @@ class FakeClock:
         return alarm
 
     async def hold_up(self, seconds: float) -> None:
-        """Move the time without running any call, as a blocked loop; then run overdue calls."""
+        """Move the time like a blocked event loop, which runs all overdue calls only afterwards."""
         self._now += seconds
         await self.advance(0)
 

@@ -85,9 +85,9 @@ def dashboard_profile(
     settings: Mapping[str, Setting] | None = None,
     commands: Mapping[str, Command] | None = None,
 ) -> Profile:
-    """Return a profile with all slots in one row; by default, one battery as in the puppet.
+    """Return a profile with all slots in one row; the default is the puppet's battery signal.
 
-    Missing options of a widget use take the defaults of the widget's manifest.
+    A missing option of a widget takes the default in the widget's manifest.
     """
     wanted = uses or (WidgetUse("battery", "battery", {"level": "battery"}),)
     known = {each.name: each for each in widgets}
@@ -139,11 +139,11 @@ class FakeRobot:
         self.on_motion: Callable[[MotionEvent], None] | None = None
         """Callback for the events of held commands."""
         self.on_command: Callable[[str, Mapping[str, Reading]], Mapping[str, Value]] | None = None
-        """Callback that returns the values of a command's reply, or raises an error; None replies
-        without values."""
+        """Callback that returns the values in the reply to a command, or raises an error; None for
+        replies without values."""
 
     def open(self) -> AbstractAsyncContextManager["FakeRobot"]:
-        """Return the context of a connected robot."""
+        """Return a context in which the robot is connected."""
         return self._open()
 
     @asynccontextmanager

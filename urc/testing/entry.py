@@ -19,10 +19,10 @@ OPEN = copy(ACCESS)
 OPEN.is_open = True
 
 HERE = {ACCESS.cookie: str(ACCESS.admit(KEY))}
-"""Cookies of a browser that has handed in the start key."""
+"""Cookies of a browser that has sent the start key."""
 HERE_COOKIE = f"{ACCESS.cookie}={HERE[ACCESS.cookie]}"
-"""Cookie header of a browser that has handed in the start key."""
+"""Cookie header of a browser that has sent the start key."""
 MANAGER = {ACCESS.cookie: str(ACCESS.admit(TOKEN))}
-"""Cookies of a browser that has handed in the token of managers."""
+"""Cookies of a browser that has sent the token of managers."""
 BEARER = {"authorization": f"Bearer {KEY}"}
 """Authorization header for requests from a program."""

@@ -1,4 +1,4 @@
-"""A helper that tests a framing with the same data, split in different ways."""
+"""A helper that tests a framing by splitting the same data in different ways."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol, TypeVar
@@ -18,7 +18,7 @@ class Feedable(Protocol[Frame]):
 def feed_three_ways(
     decoder: Callable[[], Feedable[Frame]], data: bytes, trailing: bytes = b"\x00trailing"
 ) -> list[Frame]:
-    """Decode `data` whole, byte by byte, and followed by `trailing`; return the frames.
+    """Decode `data` in one piece, byte by byte, and with `trailing`; return the frames.
 
     Args:
         decoder: returns a new decoder for each of the three ways.

@@ -22,7 +22,7 @@ class FakeFrames:
     def __init__(self, driver: Driver) -> None:
         self.driver = driver
         self.refusal = ""
-        """Reason for refusing frames; "" accepts frames."""
+        """Reason for refusing frames; "" to accept all frames."""
         self.on_motion: Callable[[MotionEvent], None] | None = None
         """Callback for the motion events of the engine."""
         self.is_greeted = True
@@ -96,7 +96,7 @@ class FakeSession:
 
 
 class FakeMotionBackend:
-    """Real hold-to-run state machines with a fake transport that accepts data while `is_up`."""
+    """Real hold-to-run state machines with a fake transport, which accepts data if `is_up`."""
 
     def __init__(self, clock: Clock, write: Callable[[bytes], None] | None = None) -> None:
         self.written: list[tuple[float, str]] = []

@@ -15,8 +15,8 @@ class MemoryTransport:
 
     The transport receives bytes from `feed`, and from `answer`. The callback `answer` gets all sent
     data, and returns the chunks of a reply. `sent` contains the sent data, in its original pieces.
-    `hang_up` closes the connection, `refuse` rejects connections, and `stall_open` and
-    `stall_sends` block.
+    `hang_up` closes the connection, `refuse` rejects connection attempts, and `stall_open` and
+    `stall_sends` block `open` and `send`.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class MemoryTransport:
 
 
 def table_of(**transports: Transport) -> Table:
-    """Return a table of these transports by name; the table ignores options."""
+    """Return a table with these transports by name; the transports ignore all options."""
     return _GivenTable(transports)
 
 
