@@ -1,7 +1,7 @@
-"""Access control of pages: admits browsers with a key, and tells other browsers how to get one.
+"""Access control of pages: admission of browsers with a key, and instructions for other browsers.
 
-Layer 5. An ASGI middleware inside the page policy. STOP and the files of the access page need no
-key.
+Layer 5. The module contains an ASGI middleware inside the page policy. STOP and the files of the
+access page need no key.
 """
 
 import re
@@ -27,13 +27,13 @@ _OPEN = re.compile(
 )
 """Paths of static files without any data about a robot."""
 _CODE = re.compile(r"/(?:static|vendor|words|widgets)/.+\.\w+")
-"""Paths of the files that frames load, without their secret prefix."""
+"""Paths of the files that frames load, without the secret prefix."""
 _HEADERS = {"cache-control": "no-store"}
 _REFUSED = {**_HEADERS, "www-authenticate": 'Bearer realm="URC"'}
 
 
 class Stoppable(NamedTuple):
-    """A robot that has a STOP."""
+    """A robot that STOP can stop."""
 
     name: str
     """Name of the robot in URLs."""
@@ -47,15 +47,16 @@ class Stoppable(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class AccessPage:
-    """Context of ``door.html.j2``: instructions or a link to the page, and STOP."""
+    """Context of ``door.html.j2``: instructions or a link to the page, and STOP buttons."""
 
     head: PageHead
     url: str
     """Path of the requested page; "" if only the printed address gives access."""
     is_old: bool
-    """Whether the request had an invalid key, which the page reports first."""
+    """Whether the request had an invalid key; the page reports an invalid key first."""
     path: str
-    """Path of this page, for the reload link: a link from another site sends no cookie."""
+    """Path of this page, for the reload link. The link is needed because a link from another site
+    sends no cookie."""
     robots: tuple[Stoppable, ...]
 
 
@@ -70,7 +71,7 @@ class AccessMiddleware:
         Args:
             app: the wrapped application.
             access: the keys and sessions of the server.
-            robots: returns the robots with a STOP.
+            robots: returns the robots that STOP can stop.
         """
         self._app = app
         self._access = access

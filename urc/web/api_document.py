@@ -44,7 +44,7 @@ class _Call(NamedTuple):
     summary: str
     answer: type
     body: type | None = None
-    """Type of the request body; None for a GET, or a POST without a body."""
+    """Type of the request body; None for a GET request, or for a POST request without a body."""
     is_post: bool = True
     status: int = 200
     query: tuple[str, ...] = ()

@@ -81,11 +81,11 @@ def build_app(
 
     Args:
         robots: the robots, by the name in their URL.
-        access: the keys of the server; None creates keys that are never shown.
+        access: the keys of the server; None to create keys that are never shown.
         allowed_hosts: further accepted host names, besides addresses, ``localhost`` and the
             server's own names.
         linger_s: time for which a robot stays connected after its last client has left, in seconds.
-        data: folder of the latches and the audit log; None stores neither.
+        data: folder of the latches and the audit log; None to store neither.
         tiles: folder of map tiles, ``z/x/y.png``; None for no tiles.
         remake: functions that create a robot from its saved document; None for a server without
             developer pages.
@@ -142,7 +142,7 @@ def _recorder(audit: AuditLog | None, name: str, robot: Robot) -> AuditRecorder 
 
 
 class _Dashboard(Starlette):
-    """Starlette with the page policy as outermost middleware, even for error responses."""
+    """A Starlette application that applies the page policy even to error responses."""
 
     def __init__(
         self,
@@ -228,7 +228,7 @@ class _Routes:
         return [*manage.routes(), *SettingsRoutes(self.manager, manage, self.ways).routes()]
 
     def stoppable(self) -> list[Stoppable]:
-        """Return all robots that have a STOP."""
+        """Return all robots that STOP can stop."""
         return [
             Stoppable(name, each.profile.title or name)
             for name, each in self.robots.items()
@@ -240,7 +240,7 @@ class _Routes:
         return [each.profile for each in self.robots.values()]
 
     def widget_files(self) -> tuple[Assets, ...]:
-        """Return the widget files of the robots, then those of the gallery."""
+        """Return the widget files of the robots, followed by the widget files of the gallery."""
         return self.fleet.widgets, self.gallery.assets
 
     def renew(self, name: str, robot: Robot, latch: LatchStore | None) -> None:
@@ -252,7 +252,7 @@ class _Routes:
 
     @asynccontextmanager
     async def lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        """Run one session supervisor for each robot while the server runs."""
+        """Run one session supervisor for each robot, until the server ends."""
         try:
             async with self.fleet.running() as group:
                 if self.manager is not None:
@@ -314,7 +314,7 @@ class _Routes:
         return JSONResponse({"status": "ok", "version": __version__}, headers=_PAGE)
 
     async def stop(self, request: Request) -> Response:
-        """Stop a robot and latch; pages without a working socket use this request."""
+        """Stop a robot and latch the stop; pages without a working socket use this request."""
         service = self.stations.get(request.path_params["name"])
         if service is None:
             return JSONResponse({"error": "no robot of that name is served here"}, 404, _PAGE)

@@ -1,4 +1,4 @@
-"""The WebSocket of one page: it checks each message, and lets no page wait for another page.
+"""The WebSocket of one page, which checks each message and never waits for another page.
 
 Layer 5. Two tasks of one group read and write. The writer sends the newest state as soon as the
 socket is free, so a slow page skips frames. A page that reads nothing for `STALL_S` seconds is
@@ -32,8 +32,8 @@ __all__ = ["TokenBucket", "BrowserClient", "FlowControl", "SocketPeer", "ClientS
 
 MESSAGES_PER_S = 100
 TICKS_PER_S = 2000
-"""Maximum rate of ticks of held controls; a higher rate closes the socket. Below this rate, ticks
-above the rate limit are thinned, and the socket stays open."""
+"""Maximum rate of ticks of held controls; a higher rate closes the socket. Below this rate, newer
+ticks replace excess ticks, and the socket stays open."""
 TICK = b'{"t":"tick",'
 """First bytes of a page's tick; ticks in any other form are decoded more slowly."""
 BAD_MESSAGES = 10
@@ -65,7 +65,8 @@ class BrowserClient:
         self._pong = ""
         self._place = Place()
         self._live: LiveSession | None = None
-        """The robot's open session, once the page has received the indexes of its values."""
+        """The robot's open session; None until the page has received the indexes of the session's
+        values."""
         self._is_listening = False
         self._closing: tuple[int, str] | None = None
         self._commands: set[asyncio.Task[None]] = set()
@@ -161,7 +162,7 @@ class BrowserClient:
             await self._news.wait()
 
     def _flushed(self) -> None:
-        """Send a flush of the fan-out now if the socket is free; leave all else to the writer.
+        """Send a flush of the fan-out now if the socket is free; leave other work to the writer.
 
         Waking the writer for every flush would take three times as long as the direct send.
         """
@@ -339,7 +340,7 @@ class BrowserClient:
         return None if known is not None and known.steps else COMMAND_TIMEOUT_S
 
     async def _confirmed(self, asked: wire.CommandRequest) -> tuple[str, ...]:
-        """Return the people who confirmed a command; raise `CommandFailed` if it is not allowed."""
+        """Return the people who confirmed a command; raise `CommandFailed` if it is refused."""
         if self._operator is None:
             return ()
         known = self._service.robot.profile.driver.commands.get(asked.command)

@@ -1,9 +1,9 @@
 """Texts of the pages in the user's language; the English text is the key and the fallback.
 
 Layer 5. The catalogues are in gettext format (``translations/*.po``), written and checked by
-``scripts.translations``. This module reads their compiled form, with one flat table for each
-language. The modules of the pages import the same table as ``urc/words``, so server and pages use
-the same texts.
+``scripts.translations``. This module reads the compiled form of the catalogues, with one flat table
+for each language. The pages' modules import the same table under the name ``urc/words``, so the
+server and the pages use the same texts.
 
 Texts from the documents of a robot, such as the titles of signals, are not translated.
 """
@@ -35,7 +35,7 @@ __all__ = [
 
 
 def spoken(line: str) -> str:
-    """Return a line in the current language; return a text that is not a phrase unchanged."""
+    """Return a line in the current language; a text that is no `Phrase` stays unchanged."""
     if not isinstance(line, Phrase):
         return line
     if line.pieces:
@@ -51,7 +51,7 @@ LANGUAGES: Mapping[str, str] = {
     "fr": "Français",
     "it": "Italiano",
 }
-"""Maps a BCP 47 tag to the name of the language in that language."""
+"""Name of each language in the language itself, by BCP 47 tag."""
 MOST_WISHES = 20
 """Maximum number of entries that are read from an Accept-Language header."""
 
@@ -69,7 +69,7 @@ def t(text: str, /, **names: object) -> str:
 
 @lru_cache(maxsize=len(LANGUAGES))
 def table(tag: str) -> Mapping[str, str]:
-    """Return the translations of English texts; empty for English, and without a catalogue."""
+    """Return the translations of English texts; empty for English or a missing catalogue."""
     place = FOLDER / f"{tag}.json"
     if tag not in LANGUAGES or not place.is_file():
         return {}

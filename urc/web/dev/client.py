@@ -1,8 +1,8 @@
 """The WebSocket of one developer page: sends the robot's traffic, and answers requests.
 
 Layer 5. Each page has its own backlog of traffic; the oldest rows are dropped and counted. A page
-that reads nothing for `STALL_S` seconds is disconnected. A thread handles the requests one by one;
-the number of pending requests is limited.
+that reads nothing for `STALL_S` seconds is disconnected. A thread handles the page's requests one
+by one; the number of pending requests is limited.
 """
 
 import asyncio
@@ -50,7 +50,7 @@ BEHIND_S = 0.05
 """Interval between messages with rows, in seconds. A robot may produce a thousand rows per
 second."""
 HELD_S = 0.5
-"""Time after which withheld text is shown even if it may be the start of a secret, in seconds."""
+"""Maximum time to hold back text that may be the beginning of a secret, in seconds."""
 RETRY_S = 1.0
 
 log = logging.getLogger(__name__)
@@ -69,7 +69,7 @@ class Backlog:
         return len(self._rows)
 
     def push(self, row: TrafficRow) -> None:
-        """Append a row; drop the oldest rows above the limit."""
+        """Append a row; if the queue exceeds its limit, drop the oldest rows."""
         row.n = self.first + len(self._rows)
         self._rows.append(row)
         self._bytes += row.weight
@@ -77,7 +77,7 @@ class Backlog:
             self._pop()
 
     def pop(self) -> list[TrafficRow]:
-        """Remove and return the oldest rows, up to the limit of one message."""
+        """Remove and return the oldest rows, as many as one message may contain."""
         return [self._pop() for _ in range(min(ROWS_AT_ONCE, len(self._rows)))]
 
     def _pop(self) -> TrafficRow:
@@ -88,7 +88,7 @@ class Backlog:
 
 
 class _Known(NamedTuple):
-    """The running version of the robot, for requests of the page."""
+    """The running version of the robot, which answers the requests of the page."""
 
     profile: Profile
     settings: dict[str, Value]
@@ -137,7 +137,7 @@ class DevClient:
     # -- traffic
 
     async def _follow(self) -> None:
-        """Append the robot's traffic to the backlog, session after session."""
+        """Append the robot's traffic to the backlog, one session after the other."""
         while True:
             if missing_settings(self._service.robot) or self._service.is_full:
                 await self._clock.sleep(RETRY_S)

@@ -32,11 +32,11 @@ class PreviewLine(NamedTuple):
     """Name of the transport; "" for a line without a frame."""
     payload: Payload
     text: str
-    """Description of a step without a frame, or the reason for not showing the frame."""
+    """Description of a step without a frame, or the reason why the frame is not shown."""
 
 
 class Preview(NamedTuple):
-    """The effect of a command."""
+    """The preview of one command: its frames, questions and conditions, or its refusal."""
 
     refusal: str
     """Reason for the refusal; "" if the command is allowed."""
@@ -44,7 +44,7 @@ class Preview(NamedTuple):
     questions: tuple[str, ...] = ()
     """Confirmation questions that the operator answers before the command runs."""
     requires: tuple[str, ...] = ()
-    """Interlock conditions on signals of the robot; a preview cannot check them."""
+    """Interlock conditions on signals of the robot, which a preview cannot check."""
 
 
 def preview(
@@ -57,9 +57,10 @@ def preview(
 
     Args:
         driver: the loaded driver.
-        settings: value of every setting; a placeholder represents each secret.
+        settings: value of every setting, with a placeholder for each secret.
         command: its name.
-        arguments: values for some arguments of the command; the others take their defaults.
+        arguments: values for some arguments of the command; all other arguments take their
+            defaults.
     """
     found = driver.commands.get(command)
     if found is None:

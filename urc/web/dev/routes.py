@@ -32,7 +32,7 @@ CLIENTS = 16
 
 @dataclass(frozen=True, slots=True)
 class DevPage:
-    """Context of ``dev.html.j2``; all other data reaches the page over two sockets."""
+    """Context of ``dev.html.j2``. The page receives all other data over two sockets."""
 
     head: PageHead
     title: str

@@ -1,4 +1,4 @@
-"""Rows of the traffic log: frames, shortened for display, and notes.
+"""Rows of the traffic log: frames shortened for display, and notes.
 
 Layer 5, pure.
 """
@@ -22,7 +22,7 @@ __all__ = [
 ]
 
 SHOWN_BYTES = 4096
-"""Maximum number of bytes shown of one frame; the rest is only counted."""
+"""Maximum number of displayed bytes of one frame; further bytes are only counted."""
 THUMBNAIL_BYTES = 48 * 1024
 """Maximum size of an image that is shown as an image, in bytes."""
 _SHOWN = ("image/png", "image/jpeg", "image/gif")
@@ -35,7 +35,7 @@ class TrafficRow(msgspec.Struct, omit_defaults=True):
 
     n: int
     time_s: float
-    """Monotonic time of the row in seconds; the page receives the age."""
+    """Monotonic time of the row, in seconds; the page receives the age of the row instead."""
     kind: str
     """Kind of the row: ``sent``, ``received`` or ``note``."""
     line: str
@@ -58,7 +58,7 @@ class TrafficRow(msgspec.Struct, omit_defaults=True):
 
 
 def traffic_row(traffic: Traffic) -> TrafficRow:
-    """Return the log row for sent or received data."""
+    """Return the row of the traffic log for sent or received data."""
     row = TrafficRow(0, traffic.time_s, traffic.direction, traffic.transport)
     if traffic.envelope is not None:
         fill(row, traffic.envelope)
@@ -68,7 +68,7 @@ def traffic_row(traffic: Traffic) -> TrafficRow:
 
 
 def note_row(note: LogEntry) -> TrafficRow:
-    """Return the log row for a fault or a state change."""
+    """Return the row of the traffic log for a fault or a state change."""
     return TrafficRow(0, note.time_s, "note", note.source, level=note.level, text=cut(note.text))
 
 

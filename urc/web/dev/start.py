@@ -1,8 +1,8 @@
-"""The developer start page: one robot with fixed values; each start reloads its documents.
+"""The developer start page: one robot with fixed values, and a button that reloads its documents.
 
 Layer 5. These routes exist only with ``--dev``, and only for holders of the start key. The
 developer page loads a document as soon as the document is saved. The start page reloads all
-documents, even if no change was noticed.
+documents, even if the server has noticed no change.
 """
 
 import asyncio
@@ -87,7 +87,7 @@ class DevStart:
         ]
 
     async def page(self, request: Request) -> Response:
-        """Show the page with the fixed values."""
+        """Return the page that shows the fixed values."""
         if not self._is_here(request):
             raise HTTPException(
                 403, t("The dev interface needs the key in the address that URC printed.")

@@ -1,8 +1,8 @@
-"""The audit log of one robot as JSON, for the developer page: the causes of its motion.
+"""The audit log of one robot as JSON, which shows the causes of its motion on the developer page.
 
 Layer 5. The timeline contains traffic of the robot, so it requires the start key, like the
-developer page. ``?last=`` is the number of entries, newest first; ``?since=`` is the earliest time
-in seconds since 1970 (UTC).
+developer page. The query parameter ``last`` is the maximum number of entries; the newest entry is
+first. The query parameter ``since`` is the earliest time, in seconds since 1970 (UTC).
 """
 
 import asyncio

@@ -1,8 +1,8 @@
 """Try-out of the parser: the frames in pasted bytes, and the consumers of each frame.
 
-A pure module of layer 5: it builds separate readers and never touches a live robot. As in the
-engine, an unsolicited frame goes to the first message that matches. Matching replies are also
-listed, because the try-out has no pending request.
+Layer 5, pure. The module builds separate readers and never uses a live robot. As in the engine, an
+unsolicited frame goes to the first message that matches. The result also lists matching replies,
+because the try-out has no pending request.
 """
 
 import json
@@ -35,7 +35,7 @@ _ESCAPE = re.compile(r"\\(x[0-9A-Fa-f]{2}|.|$)", re.DOTALL)
 
 
 class FrameConsumer(NamedTuple):
-    """The consumer of a frame."""
+    """The consumer of a frame: a message, a reply or an error reply."""
 
     kind: str
     """Kind of the consumer: ``message``, ``reply`` or ``refusal`` (an error reply)."""
@@ -45,7 +45,7 @@ class FrameConsumer(NamedTuple):
     samples: tuple[tuple[str, object, str], ...]
     """Signal, value, alarm."""
     refused: tuple[str, ...]
-    """Invalid values with the reasons; for an error reply, the text of its error."""
+    """Invalid values with the reasons why they are invalid; for an error reply, the error text."""
 
 
 class ParsedPiece(NamedTuple):
@@ -60,7 +60,7 @@ class ParsedPiece(NamedTuple):
     """Reason why the bytes are not a frame; "" for a frame."""
     takers: tuple[FrameConsumer, ...] = ()
     reasons: tuple[str, ...] = ()
-    """Reason why each candidate does not match, if none matches."""
+    """Reason why each candidate does not match; empty if a candidate matches."""
 
 
 class ParseResult(NamedTuple):
@@ -89,9 +89,9 @@ def pasted_bytes(text: str, *, is_hex: bool, encoding: str) -> bytes:
 
     Args:
         text: the input.
-        is_hex: whether the text is pairs of hex digits; blanks, commas, colons and ``0x`` between
-            the pairs are ignored. Other text may contain the escapes ``\n \r \t \0 \e \\`` and
-            ``\xHH``.
+        is_hex: whether the text consists of pairs of hex digits; blanks, commas, colons and ``0x``
+            between the pairs are ignored. Other text may contain the escapes ``\n \r \t \0 \e \\``
+            and ``\xHH``.
         encoding: character encoding of the text, if not hex.
 
     Raises:
@@ -148,7 +148,7 @@ def try_out(
 def _cut(
     spec: TransportSpec, data: bytes
 ) -> tuple[list[tuple[int, int, bytes | FrameFault]], int, int]:
-    """Cut `data` into frames and faults with their positions; also count the remainder."""
+    """Cut `data` into frames and faults with their positions; also count the remaining bytes."""
     decoder = build_framing(spec.framing).decoder()
     decoder.push(data, 0.0)
     cut: list[tuple[int, int, bytes | FrameFault]] = []
@@ -198,7 +198,7 @@ def _take(
 
 
 def _add(takers: list[FrameConsumer], taker: FrameConsumer) -> None:
-    """Add a consumer; merge it with an equal consumer in the list."""
+    """Add a consumer to the list; merge equal consumers."""
     for place, other in enumerate(takers):
         if other._replace(names=()) == taker._replace(names=()) and taker.kind != "message":
             takers[place] = other._replace(names=(*other.names, *taker.names))
@@ -269,7 +269,7 @@ def _candidates(
 
 
 def _replies(driver: Driver, spec: TransportSpec) -> Iterator[tuple[str, Reply]]:
-    """Yield all expected replies on a transport; each stage and each step is one reply."""
+    """Yield all expected replies on a transport, one for each stage and step."""
     asked = [(f"reply to {one.name}", one.transport, one.reply) for one in driver.commands.values()]
     asked += [
         (f"reply to poll {one.name}", one.transport, one.reply)

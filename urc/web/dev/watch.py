@@ -1,4 +1,4 @@
-"""Watches the documents of one robot, and switches to the new version when a document is saved.
+"""Watching of one robot's documents, with a switch to the new version when a document is saved.
 
 Layer 5. A version with errors changes nothing: the previous version keeps running, and the problems
 are reported. A valid version waits until no operator drives the robot, because the switch briefly
@@ -23,7 +23,7 @@ from urc.web.fleet.robots import Robot, RobotService
 __all__ = ["CheckedProfile", "ProfileWatch", "Remake", "examine"]
 
 Remake = Callable[[Profile], Robot]
-"""Creates the robot of a new version of its profile; may raise `UrcError`."""
+"""Function that creates a robot from a new version of its profile; may raise `UrcError`."""
 State = Literal["running", "waiting", "broken"]
 
 log = logging.getLogger(__name__)
@@ -50,12 +50,12 @@ def examine(file: str) -> CheckedProfile:
 
 @dataclass(slots=True)
 class ProfileWatch:
-    """Watches the documents of one robot."""
+    """A watcher of one robot's documents."""
 
     service: RobotService
     remake: Remake
     take: Callable[[Robot], None]
-    """Switches all users of the robot to another version; may raise `UrcError`."""
+    """Function that switches all users of the robot to another version; may raise `UrcError`."""
     state: State = "running"
     told: str = ""
     """Description of the last event, for people."""
@@ -99,7 +99,7 @@ class ProfileWatch:
                 self._report("broken", f"the check failed ({type(bug).__name__}: {bug})")
 
     async def _settled(self, watched: FileWatcher) -> None:
-        """Wait until the files no longer change: a program may write a file in several steps."""
+        """Wait until the files are stable: a program may write a file in several steps."""
         before: list[object] = []
         while (now := watched.states()) != before:
             before = now

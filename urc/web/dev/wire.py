@@ -1,4 +1,4 @@
-"""Message types of the developer page's WebSocket, without behaviour.
+"""Message types of the developer page's WebSocket, without any logic.
 
 Layer 5. Messages are JSON text in both directions; bytes are encoded as base64. Messages from the
 server to the page, listed by their tag ``t``::
@@ -88,13 +88,14 @@ class _Rows(Outbound, tag="rows", omit_defaults=False, frozen=True):
     first: int
     now: int
     rows: list[TrafficRow]
-    """Rows with ages in milliseconds; see `encode_rows`."""
+    """Rows of the traffic log, with ages in milliseconds; see `encode_rows`."""
 
 
 class _Found(msgspec.Struct, frozen=True):
     severity: str
     text: str
-    """Headline, source line, caret and hint, in the format of `urc validate`."""
+    """Text of the problem in the format of `urc validate`: headline, source line, caret and
+    hint."""
 
 
 class _Argument(msgspec.Struct, frozen=True):
@@ -213,8 +214,8 @@ def encode_profile(
         driver: the running driver.
         messaging: types of the transports that carry messages.
         edition: number of changes to the published state.
-        state: ``running``; ``waiting``, while a valid new version is pending; or ``broken``, for a
-            file with errors.
+        state: ``running``, ``waiting`` (a valid new version is pending) or ``broken`` (the file has
+            errors).
         file: path of the robot's document.
         told: description of the last event, for people.
         problems: all problems of the document.

@@ -1,8 +1,8 @@
 """The controls of one robot: one motion controller, and one operator session for each page.
 
-Layer 5. No call blocks. When the socket of a page is free, the page gets the newest lease, the
-newest heartbeat and one notice for each control. Ticks above the rate limit are thinned: the newest
-tick replaces older ones, and the last tick always takes effect.
+Layer 5. No call blocks. When the socket of a page is free, the page receives the newest lease, the
+newest heartbeat and one notice for each control. Above the rate limit, the newest tick replaces
+older ticks, and the last tick always takes effect.
 """
 
 import asyncio
@@ -35,11 +35,11 @@ echo the numbers."""
 THINNED_S = 0.01
 """Minimum mean interval between two applied ticks of one control, in seconds."""
 PATIENCE_S = 0.25
-"""Time after a motion of the control within which a late tick is not reported, in seconds."""
+"""Time after the end of a control's motion for which late ticks are not reported, in seconds."""
 
 
 Offered = Literal["in time", "one more", "no tick"]
-"""The kind of a message: a tick within the rate limit, a tick above the limit, or another
+"""The kind of a message: a tick within the rate limit, a tick above the rate limit, or any other
 message."""
 
 
@@ -55,8 +55,9 @@ class ControlService:
     ) -> None:
         """Restore the latch from `file`.
 
-        The controls are the held commands of `driver`. `file` preserves the latch over a restart,
-        and `recorder` receives the events of the audit log; both may be None.
+        The controls are the held commands of `driver`. The file `file` preserves the latch over a
+        restart; None to keep no latch. The `recorder` receives the events of the audit log; None to
+        record no events.
         """
         self.recorder = recorder or AuditRecorder("", _unread, utc=lambda: 0.0)
         self.controller = self._controller(
@@ -88,7 +89,7 @@ class ControlService:
         return tuple(name for name, one in self._driver.commands.items() if one.hold is not None)
 
     def renew(self, driver: Driver, file: LatchStore | None) -> None:
-        """Switch to another version of the driver, between two sessions.
+        """Switch to another version of the driver while no session is open.
 
         A latched STOP stays latched, and a STOP that the robot has not acknowledged is still sent.
         All leases end, and all controls are disarmed.
@@ -150,7 +151,7 @@ class ControlService:
         Args:
             place: address of the page, shown to other operators; "" for this machine.
             role: its rights.
-            wake: callback that is called when new messages for the page exist.
+            wake: callback for new messages to the page.
         """
         self._peers += 1
         name = f"screen {self._peers}{f' at {place}' if place else ''}"
@@ -199,8 +200,8 @@ class ControlService:
     def offer(self, operator: OperatorSession, data: bytes) -> Offered:
         """Accept a tick as raw bytes; return its kind.
 
-        A new tick replaces a pending tick without being decoded. A flood of ticks pauses the
-        socket, and therefore costs little time.
+        A new tick replaces a pending tick without being decoded. Too many ticks pause the socket,
+        so that they cost little time.
         """
         if operator.alarms and operator.doubled is None:
             command = wire.command_of(data)
@@ -290,7 +291,7 @@ class ControlService:
             self._wait(operator, tick.command, tick)
 
     def _wait(self, operator: OperatorSession, command: str, tick: wire.Tick | bytes) -> None:
-        """Store a tick until the rate limit allows it; a newer tick replaces it."""
+        """Store a tick until the rate limit permits the tick, or a newer tick replaces it."""
         operator.dropped += command in operator.pending
         operator.pending[command] = tick
 
@@ -353,7 +354,7 @@ class ControlService:
             file.on_fault = self._latch_fault
 
     def _latch_fault(self, fault: str) -> None:
-        """Report that STOP would no longer survive a restart, or that it would survive again."""
+        """Report that the latched STOP can no longer be stored, or can be stored again."""
         if fault:
             text = f"STOP works, but would not survive a restart of the server: {fault}"
             self._log("error", text)
@@ -416,4 +417,4 @@ class ControlService:
 
 
 def _unread(entry: AuditEntry) -> None:
-    """Ignore the entry: this robot has no audit log."""
+    """Ignore the entry, because this robot has no audit log."""

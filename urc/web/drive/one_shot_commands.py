@@ -1,4 +1,4 @@
-"""Commands without a held control: their permission check, and the effect of STOP.
+"""Commands without a held control: permission checks, and the effect of STOP on these commands.
 
 Layer 5. Only held commands require the lease. All other commands require the role of an operator: a
 watcher cannot send commands. A command that starts autonomous motion (``moves``) also fails while
@@ -25,7 +25,7 @@ from urc.web.drive.operator_session import Drivable
 __all__ = ["HELD", "CommandRefused", "OneShotCommands", "can_move", "needs_holding"]
 
 AGAIN_S = 1.0
-"""Delay before the next attempt while a STOP has not reached the robot, in seconds."""
+"""Delay before a STOP that has not reached the robot is sent again, in seconds."""
 _STOP = Operator("", "STOP")
 HELD = "this command moves the robot only while a control is held; it cannot be sent once"
 
@@ -35,7 +35,7 @@ class CommandRefused(CommandFailed):
 
 
 def can_move(driver: Driver) -> bool:
-    """Return whether the robot can move, and therefore needs STOP and its latch."""
+    """Return whether the robot can move; such a robot needs STOP and the latch."""
     return any(one.hold is not None or one.moves or one.stops for one in driver.commands.values())
 
 
@@ -91,7 +91,7 @@ class OneShotCommands:
         arguments: Mapping[str, object] = NOTHING,
         stops: int | None = None,
     ) -> str:
-        """Return the reason why the page may not run a command or sequence now; "" if it may.
+        """Return the reason why the page may not run a command or sequence now, or "".
 
         `stops` is the number of STOPs that the page knew at the operator's click; None means the
         current number.
@@ -102,7 +102,10 @@ class OneShotCommands:
         return "" if includes(client.role, "drive") else WATCHES
 
     def pull_refusal(self, client: Operator, sequence: str, what: Pull) -> str:
-        """Return why the page may not steer a sequence; any operator may pause or end one."""
+        """Return the reason to refuse control of a sequence.
+
+        Any operator may pause or end a sequence.
+        """
         if what in ("pause", "abort"):
             return "" if includes(client.role, "drive") else WATCHES
         return self.refusal(client, sequence)
@@ -128,14 +131,14 @@ class OneShotCommands:
             self._session = None
 
     def stopped(self) -> None:
-        """Start a stop after a press of STOP."""
+        """Start sending the stop commands after a press of STOP."""
         self.on_stopped()
         if self._session is not None:
             self._session.latch(self._controller().lease.latched)
             self._pressed.set()
 
     def reset(self) -> None:
-        """End the stop after its reset."""
+        """End the sending of stop commands after a reset."""
         if self._session is not None:
             self._session.latch("")
 

@@ -21,12 +21,12 @@ from urc.web.wire import drive as wire
 __all__ = ["FLOOD", "Drivable", "OperatorSession", "RedundantLine"]
 
 FLOOD = 4
-"""Maximum number of ticks accepted while one tick is pending; further ticks stay in the socket's
-buffer."""
+"""Maximum number of ticks that are accepted while a tick is pending. Further ticks stay in the
+socket's buffer."""
 
 
 class RedundantLine(Protocol):
-    """The redundant socket of a page; see `urc.web.drive.redundant_socket`."""
+    """The part of a redundant socket that a session uses; see `urc.web.drive.redundant_socket`."""
 
     def heartbeat(self, number: int) -> None:
         """Send a heartbeat number to the page."""
@@ -36,7 +36,7 @@ class RedundantLine(Protocol):
 
 
 class Drivable(MotionSession, Protocol):
-    """The interface of a session that the controls use."""
+    """The part of a robot's session that the controls use."""
 
     @property
     def hub(self) -> Hub:
@@ -52,7 +52,7 @@ class Drivable(MotionSession, Protocol):
         """Run a command and return its reply; raise `CommandFailed` if the command fails."""
 
     def latch(self, reason: str) -> None:
-        """Latch STOP, end sequences and block autonomous motion; a `reason` of "" resets."""
+        """Latch STOP, end sequences and block autonomous motion; an empty `reason` resets."""
 
 
 class OperatorSession:
@@ -63,28 +63,29 @@ class OperatorSession:
         self.wake = wake
         self.heartbeat: int | None = None
         self.notices: dict[str, str] = {}
-        """Maps a control or verb to the newest notice about it."""
+        """Newest notice about each control or verb, by name."""
         self.seen = -1
         """Number of the newest lease sent to the page."""
         self.pending: dict[str, wire.Tick | bytes] = {}
-        """Maps a control to its newest pending tick, decoded or as raw bytes."""
+        """Newest pending tick of each control, decoded or as raw bytes, by control."""
         self.paces: dict[str, RateLimiter] = {}
         self.alarms: dict[str, Timer] = {}
         self.moved_s: dict[str, float] = {}
-        """Maps a control to the time of its last applied tick."""
+        """Time of the last applied tick of each control, in seconds, by control."""
         self.moved_at_s = float("-inf")
-        """Time of the last applied tick of any control."""
+        """Time of the last applied tick of any control, in seconds."""
         self.key = secrets.token_urlsafe(16)
         """Secret key with which a redundant socket joins the page."""
         self.spare: RedundantLine | None = None
         self.doubled: DuplicateElimination | None = None
-        """Filter of duplicate messages, used once the page has a redundant socket."""
+        """Filter for duplicate messages, used after the page has opened a redundant socket."""
         self.hold_back: Callable[[bool], None] = _nothing
         """Callback that pauses (True) or resumes (False) reading from the page's socket."""
         self.crowd = 0
-        """Number of ticks received since one became pending; too many ticks pause the socket."""
+        """Number of ticks received since the first pending tick; too many ticks pause the
+        socket."""
         self.dropped = 0
-        """Number of pending ticks that a newer tick replaced."""
+        """Number of pending ticks that newer ticks have replaced."""
 
     def notice(self, key: str, text: str) -> None:
         """Queue a notice, in place of an unsent notice with the same key."""
@@ -99,7 +100,7 @@ class OperatorSession:
         )
 
     def is_first(self, about: str, number: int) -> bool:
-        """Return whether a message is new, by its number, and not a duplicate."""
+        """Return whether the number of a message shows that the message is not a duplicate."""
         return self.doubled is None or not number or self.doubled.accept(about, number)
 
     def forget(self, command: str) -> None:
@@ -118,4 +119,4 @@ class OperatorSession:
 
 
 def _nothing(is_held: bool) -> None:
-    """Do nothing: this socket cannot be paused."""
+    """Do nothing, because this socket cannot be paused."""

@@ -1,13 +1,13 @@
 """The redundant socket of a page, for links with packet loss.
 
 Layer 5. A lost packet delays all later data of its TCP connection by at least one round trip. If
-the retransmission is lost too, the delay doubles and exceeds the duration of a lease. Packet losses
-rarely hit two connections at the same time. On a link with packet loss, a page sends each message
-about held controls over both sockets, and receives heartbeats over both. Each message has a number,
-and only the first copy of a message takes effect.
+the retransmitted packet is lost too, the delay doubles and exceeds the duration of a lease. Packet
+losses rarely hit two connections at the same time. On a link with packet loss, a page sends each
+message about held controls over both sockets, and receives heartbeats over both. Each message has a
+number, and only the first copy of a message takes effect.
 
-A redundant socket has no rights without its page. The socket joins the page with a key that only
-this page has, and closes with the page.
+A redundant socket has no rights without a page. The socket joins a page with a key that only this
+page has, and closes together with the page.
 """
 
 import msgspec
@@ -66,12 +66,12 @@ class RedundantSocket:
             pass
 
     def heartbeat(self, number: int) -> None:
-        """Send a heartbeat number, unless an older number is still in the buffer."""
+        """Send a heartbeat number, unless an earlier number is still unsent."""
         if self._flow.is_free():
             self._flow.write(as_frame(wire.encode_beat(number).encode(), is_text=True))
 
     def end(self) -> None:
-        """Close the socket, because its page has closed or opened a newer redundant socket."""
+        """Close the socket after its page has closed or opened a newer redundant socket."""
         self._is_over = True
         self._flow.abort()
 

@@ -3,9 +3,9 @@
 Layer 5. Users do not sign in, so each page that may drive counts as one person. A page cannot
 approve its own command. The number of pending questions and the wait for an answer are limited.
 
-A token from the server represents a confirmation. A token is valid once, for a few seconds, on one
-page, for one command with unchanged arguments. Therefore a replayed, changed or delayed
-confirmation is invalid.
+A token from the server represents a confirmation. A token is valid only once and for a few seconds,
+on one page, and for one command with unchanged arguments. A replayed, changed or delayed
+confirmation is therefore invalid.
 """
 
 import asyncio
@@ -34,7 +34,7 @@ WAIT_S: Final = 30.0
 TOKEN_S: Final = 5.0
 """Time for which a token is valid, in seconds."""
 _MOST: Final = 8
-"""Maximum number of pending questions, and of tokens for one page."""
+"""Maximum number of pending questions of one robot, and maximum number of tokens of one page."""
 
 
 @dataclass(slots=True)
@@ -60,7 +60,7 @@ class TwoPersonRule:
     """The pending questions of one robot."""
 
     def __init__(self, operators: Callable[[], tuple[OperatorSession, ...]], clock: Clock) -> None:
-        """Start without questions; `operators` returns the pages that watch the robot."""
+        """Create the list of questions; `operators` returns the pages that watch the robot."""
         self._operators = operators
         self._clock = clock
         self._numbers = count(1)
@@ -91,7 +91,7 @@ class TwoPersonRule:
 
         Args:
             asker: the page that runs the command.
-            run: number of the command on the page.
+            run: number that the page has given to this run of the command.
             known: the command.
             arguments: its arguments.
             token: the token from `prepare`, valid once; "" without a confirmation.
@@ -118,7 +118,7 @@ class TwoPersonRule:
     async def second(self, asker: OperatorSession, run: int, command: str, confirm: Confirm) -> str:
         """Ask all other pages that may drive for approval; return the name of the second person.
 
-        `run` is the number of the command on the asking page.
+        `run` is the number that the asking page has given to this run of the command.
 
         Raises:
             CommandFailed: approval was refused, withdrawn or too late, or STOP was pressed.
@@ -148,7 +148,7 @@ class TwoPersonRule:
         return second.client.name
 
     def stop(self) -> None:
-        """End every question and revoke every token, after a press of STOP."""
+        """End every question and revoke every token after a press of STOP."""
         self._tokens.clear()
         for one in self._questions.values():
             if not one.answer.done():
@@ -160,7 +160,7 @@ class TwoPersonRule:
             self._send(operator, one)
 
     def handle(self, operator: OperatorSession, said: wire.Approval) -> None:
-        """Handle the answer of a page; ignore an answer to a question that is over."""
+        """Handle the answer of a page; ignore an answer to a question that has ended."""
         one = self._questions.get(said.n)
         if one is None or one.answer.done() or not includes(operator.client.role, "drive"):
             return

@@ -24,7 +24,7 @@ class ClientSocket(Protocol):
         """Send one text message."""
 
     async def close(self, code: int = 1000, reason: str | None = None) -> None:
-        """Begin the closing handshake."""
+        """Begin the closing handshake of the WebSocket."""
 
 
 class FlowControl(Protocol):
@@ -42,8 +42,8 @@ class FlowControl(Protocol):
     def listen(self, sink: Callable[[bytes], bool]) -> None:
         """Pass each whole text message to `sink` before `ClientSocket.receive` gets the message.
 
-        The direct call saves two task switches per message. If `sink` returns False, the message
-        goes to `receive`.
+        The direct call saves two task switches per message. If `sink` returns False, `receive`
+        returns the message.
         """
 
     def hold_back(self, is_held: bool) -> None:
@@ -54,7 +54,7 @@ class FlowControl(Protocol):
 
 
 class SocketFlow:
-    """Flow control of a socket: writes whole frames, waits for an empty buffer, or aborts."""
+    """The flow control of a socket: writing of frames, waiting for an empty buffer, and abort."""
 
     def __init__(self) -> None:
         self.sink: Callable[[bytes], bool] | None = None
@@ -145,6 +145,7 @@ class SocketPeer(NamedTuple):
     """Network address, shown to other pages; "" for this machine."""
     role: Role = "drive"
     who: str = ""
-    """Identity for the limit on sockets: a browser, program or address; "" for no limit."""
+    """Browser, program or address by which the sockets of one client are counted and limited; ""
+    for no limit."""
     is_known: bool = False
-    """Whether the visitor has a key; if not, `who` is an address."""
+    """Whether the visitor has a key; if false, `who` is an address."""

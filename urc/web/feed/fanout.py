@@ -1,9 +1,9 @@
 """Sends the readings of one robot to every page that shows it, at most once per display frame.
 
-Layer 5. Clients have no queues. A flush wakes every client. As soon as its socket is free, each
-client receives all values newer than its last frame. A frame is encoded once for all clients with
-the same position. A slow client receives the newest values in one frame, and delays no other
-client.
+Layer 5. Clients have no queues. A flush wakes every client. As soon as the socket of a client is
+free, the client receives all values that are newer than its last frame. A frame is encoded once for
+all clients with the same position. A slow client receives the newest values in one frame, and
+delays no other client.
 """
 
 import asyncio
@@ -38,9 +38,9 @@ class FanoutPosition(NamedTuple):
     progress: int = 0
     """Number of the newest sequence states that the client has."""
     notes: int = 0
-    """Number of log lines that the client has received or missed."""
+    """Number of log lines that were sent to the client or dropped."""
     joined: int = 0
-    """Hub revision when the client joined; 0 after its first values."""
+    """Hub revision at which the client joined; 0 after the client has received its first values."""
 
 
 @dataclass(slots=True)
@@ -63,8 +63,8 @@ class _Update(NamedTuple):
 class Pacer:
     """A rate limiter that passes the first event of a burst immediately, then a steady rate.
 
-    The limiter tolerates a jitter of one period, so a source at exactly this rate is never delayed.
-    In any second, the number of events exceeds the rate by at most one.
+    The limiter tolerates a jitter of one period, so it never delays a source with exactly the
+    permitted rate. In any second, at most one event more than the rate passes.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -89,7 +89,7 @@ class Fanout:
         clock: Clock | None = None,
         each: Iterable[str] = (),
     ) -> None:
-        """Start without clients; `each` names the signals for which every reading is sent."""
+        """Create the fan-out; `each` names the signals for which every reading is sent."""
         hub.streams.watch(each)
         self.hub = hub
         self._wakes: set[Callable[[], None]] = set()
@@ -142,7 +142,7 @@ class Fanout:
                 self._broken.set_exception(fault)
 
     def flush(self) -> None:
-        """Release the newest values, and wake every client."""
+        """Make the newest values available, and wake every client."""
         self._head = self.hub.revision
         self._updates.clear()
         for wake in tuple(self._wakes):
@@ -159,7 +159,7 @@ class Fanout:
         self._wakes.discard(wake)
 
     def frames_for(self, place: Place) -> bytes:
-        """Return the frames that bring `place` up to date, possibly none, and advance `place`."""
+        """Return the frames that the client at `place` still needs, and advance `place`."""
         if self._encoded_at != self.hub.revision:
             self._encoded_at = self.hub.revision
             self._updates.clear()
@@ -191,7 +191,7 @@ class Fanout:
         return _Update(after, frames, now_s)
 
     def _without_pictures(self, samples: Sequence[Sample]) -> Sequence[Sample]:
-        """Remove images, which are sent separately; keep samples that mark the end of an image."""
+        """Remove images, which are sent separately; keep samples that end an image."""
         pictures = self._pictures
         if not pictures:
             return samples

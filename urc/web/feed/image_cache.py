@@ -1,7 +1,7 @@
 """The newest image of each signal, encoded once for all pages that show it.
 
-Layer 5. Images are never queued: when its socket is free, a client receives the newest image and
-skips older images.
+Layer 5. Images are never queued. When the socket of a client is free, the client receives the
+newest image and skips older images.
 """
 
 from collections.abc import Iterable
@@ -16,34 +16,35 @@ from urc.web.wire.picture import as_frame, encode_picture
 __all__ = ["EncodedImage", "ImageSubscription", "ImageCache", "is_picture"]
 
 SHARED_FOR_S = 0.05
-"""Time for which an encoded image is reused, in seconds. The message contains the age at its
-encoding. An error of a few milliseconds does not justify another copy of several kilobytes.
+"""Time for which an encoded image is reused, in seconds. The message contains the age of the image
+at the time of encoding. During this time, the age is wrong by a few milliseconds, which does not
+justify another copy of several kilobytes.
 """
 
 
 class EncodedImage(NamedTuple):
-    """An encoded image for any client."""
+    """An encoded image, which can be sent to any client."""
 
     frame: bytes
     """The complete WebSocket frame."""
     sample: Sample
     number: int
-    """Number of the image, counted over the images of all signals."""
+    """Number of the image in a common count of all signals' images."""
     made_s: float
 
 
 @dataclass(slots=True)
 class ImageSubscription:
-    """The images that one client shows, and the newest images that it has."""
+    """The images that one client shows, and the newest images that the client has received."""
 
     names: tuple[str, ...] = ()
     seen: dict[str, int] = field(default_factory=dict)
-    """Maps a signal to the number of the last image sent to the client."""
+    """Number of the last image sent to the client, by signal."""
     turn: int = 0
-    """Round-robin position, so that a fast camera does not block other cameras."""
+    """Round-robin position among the images, so that a fast camera does not block other cameras."""
 
     def show(self, names: Iterable[str]) -> None:
-        """Set the shown images; an image that was hidden is sent again."""
+        """Set the images that the client shows; an image that was hidden is sent again."""
         self.names = tuple(dict.fromkeys(names))
         self.seen = {name: number for name, number in self.seen.items() if name in self.names}
 

@@ -34,7 +34,7 @@ class Fleet:
     def __init__(
         self, robots: Mapping[str, Robot], service: Callable[[str, Robot], RobotService]
     ) -> None:
-        """Prepare the robots that are known at the start.
+        """Prepare the robots that are known at the start of the server.
 
         Args:
             robots: the robots, by the name in their URL.
@@ -105,9 +105,9 @@ class Fleet:
     def driven_by(self, name: str) -> str:
         """Return the name of the operator who drives a robot; "" if no operator drives it.
 
-        A pending stop counts as driving while a session can deliver the stop. Without a session,
-        for example because of a wrong address, a pending stop must not block a change of the
-        address.
+        A pending stop counts as driving while a session can deliver the stop. Without a session, a
+        pending stop does not count as driving; otherwise, an operator could not correct a wrong
+        address of the robot.
         """
         service = self.stations.get(name)
         if service is None or service.is_at_rest:

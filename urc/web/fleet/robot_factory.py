@@ -1,4 +1,4 @@
-"""Creates the robots of a dashboard from documents, settings and installed packages.
+"""A factory that creates a dashboard's robots from documents, settings and installed packages.
 
 Layer 5. The factory reads files and stores settings, but opens no session of a served robot.
 Reading files takes time, so the event loop calls the factory in a thread.
@@ -41,12 +41,13 @@ class RobotOptions:
     data: Path
     """Folder of the settings and packages."""
     make: Callable[[Profile, Mapping[str, Value]], Robot]
-    """Returns the robot of a profile with the given settings."""
+    """Function that returns the robot of a profile with the given settings."""
     tried: Callable[[Profile, Mapping[str, Value]], AbstractAsyncContextManager[Session]]
-    """Opens a session that only tests the transports, without any control of the robot."""
+    """Function that opens a session to test the transports, without any control of the robot."""
     given: Callable[[Profile], Mapping[str, Value]]
-    """Returns the settings given at the start of the server; these settings override stored
-    settings. Raises `UrcError` for given settings that no longer fit the profile."""
+    """Function that returns the settings given at the start of the server; these settings override
+    stored settings. The function raises `UrcError` for given settings that no longer fit the
+    profile."""
     shows_installed: bool = False
     """Whether the menu lists the installed robots and drivers."""
 
@@ -55,9 +56,9 @@ class ResolvedSettings(NamedTuple):
     """The resolved settings of a robot."""
 
     values: dict[str, Value]
-    """Values of all settings that may be used, by name."""
+    """Values of all usable settings, by name of the setting."""
     given: dict[str, Value]
-    """Values given at the start of the server, by name."""
+    """Values given at the start of the server, by name of the setting."""
     destination: str
     """Hosts and ports of the robot's transports."""
     withheld: frozenset[str]
@@ -72,7 +73,7 @@ class InstalledInterface(NamedTuple):
 
 
 class RobotFactory:
-    """Reads the documents of the robots."""
+    """A factory that creates robots from their documents."""
 
     def __init__(self, robot_options: RobotOptions) -> None:
         """List the installed packages, without reading their documents."""
@@ -81,11 +82,11 @@ class RobotFactory:
         self._there = self._roots()
         """Packages that were installed at the start of the server."""
         self._begun: dict[str, str] = {}
-        """Maps a robot to its first destination; settings given at the start are valid only for
+        """First destination of each robot, by robot. Settings given at the start are valid only for
         this destination."""
         self._manifests: dict[tuple[str, int, int], Manifest] = {}
-        """Manifests by digest and state of the archive, cached because pages often need all of
-        them."""
+        """Cache of manifests, by digest and state of the archive; pages often need all
+        manifests."""
 
     def _roots(self) -> frozenset[str]:
         try:
@@ -111,7 +112,7 @@ class RobotFactory:
         Args:
             name: name of the robot in URLs.
             profile: the profile as its document defines it.
-            kept: the stored settings of the robot; None reads them from the file.
+            kept: the stored settings of the robot; None to read the settings from the file.
         """
         chosen = self.kept(name).load() if kept is None else kept
         filled = self.filled(profile, chosen)
@@ -128,8 +129,8 @@ class RobotFactory:
         """Return the resolved settings of a robot; raise `UrcError`.
 
         A value given at the start overrides a stored value, and a stored value overrides the
-        default. A stored value that no longer fits counts as missing, for example after an update.
-        A secret is used only for the destination for which it was entered.
+        default. A stored value that has become invalid, for example after an update, counts as
+        missing. A secret is used only for the destination for which it was entered.
         """
         defaults: dict[str, Value] = {
             name: setting.default
@@ -224,7 +225,7 @@ class RobotFactory:
         return dict(sorted(found.items()))
 
     def chosen(self, locks: list[Lock], version: str) -> Lock:
-        """Return the chosen version of a robot's package; if not installed, the newest."""
+        """Return the chosen version of a robot's package, or the newest if it is not installed."""
         return next((lock for lock in locks if lock.version == version), locks[-1])
 
     def profile(self, lock: Lock) -> Profile:

@@ -1,4 +1,4 @@
-"""A robot that the dashboard serves, and the lifetime of its session.
+"""A robot that the dashboard serves, and the opening and closing of its session.
 
 Layer 5. The session opens when the first client connects. The session closes a short time after the
 last client has disconnected. Therefore a reload of the page keeps the robot connected, but leaving
@@ -67,7 +67,7 @@ class Playback(Protocol):
         """Playback speed; 1 is real time."""
 
     def play(self) -> None:
-        """Play, from the beginning if the position is at the end."""
+        """Start the playback; at the end of the recording, restart from the beginning."""
 
     def pause(self) -> None:
         """Pause at the current position."""
@@ -81,8 +81,8 @@ OPEN_TIMEOUT_S = 10.0
 RETRY_S = 1.0
 CLIENTS = 256
 SEATS, KNOWN_SEATS = 8, 64
-"""Maximum number of clients of one robot: from one unknown address, and from one visitor with a
-key."""
+"""Maximum number of one robot's clients from one unknown address. `KNOWN_SEATS` is the maximum
+number from one visitor with a key."""
 CLOSE_TIMEOUT_S = 8.0
 """Maximum wait for the end of a session, in seconds."""
 STOP_WITHIN_S = 1.0
@@ -128,12 +128,13 @@ class Robot:
     settings: Mapping[str, Value]
     """Current values of the settings, with defaults."""
     open_session: Callable[[], AbstractAsyncContextManager[SessionLike]]
-    """Keeps the robot connected while the context lasts. Entering the context must not wait for a
-    reply from the robot."""
+    """Function that returns a context; the robot stays connected while the context is open.
+    Entering the context must not wait for a reply from the robot."""
     glimpse: Callable[[], Glimpse] | None = None
-    """Returns a view of an emulated robot without a connection; None for a real robot."""
+    """Function that returns a view of an emulated robot without a connection; None for a real
+    robot."""
     is_emulated: bool = False
-    """Whether the robot is emulated: real and emulated robots of the same name share no stored
+    """Whether the robot is emulated. Real and emulated robots with the same name share no stored
     state."""
     playback: Playback | None = None
     """The recording that plays in place of the robot; None for a robot."""
@@ -148,7 +149,7 @@ class LiveSession:
     number: str
     """Number of the session, unique even across restarts of the server."""
     ended: asyncio.Event
-    """Set when the session has ended for any reason."""
+    """Event that is set when the session has ended for any reason."""
 
 
 class SessionFailed(UrcError):
@@ -179,7 +180,7 @@ def each_counts(profile: Profile) -> frozenset[str]:
 
 
 class RobotService:
-    """Opens the session of one robot for the first client, and closes it after the last client."""
+    """A service that opens a robot's session for the first client, and closes it after the last."""
 
     def __init__(
         self,
@@ -197,8 +198,8 @@ class RobotService:
             linger_s: time for which the session stays open after its last client has left, in
                 seconds.
             clock: the clock.
-            latch: stores a latched STOP over a restart; None stores nothing.
-            recorder: receives the events of the audit log; None records nothing.
+            latch: store that preserves a latched STOP over a restart; None to store nothing.
+            recorder: receives the events of the audit log; None to record nothing.
         """
         self.robot = robot
         self.clock: Clock = clock or LoopClock()
@@ -212,7 +213,7 @@ class RobotService:
         self._next: asyncio.Future[LiveSession] | None = None
         self._is_open = False
         self._held_off = 0
-        """Number of callers that require a disconnected robot."""
+        """Number of callers that currently require a disconnected robot."""
         self._successor: tuple[Robot, LatchStore | None] | None = None
 
     @property
@@ -221,13 +222,13 @@ class RobotService:
         return self._visitors >= CLIENTS
 
     def has_place_for(self, peer: SocketPeer) -> bool:
-        """Return whether `peer` may open another client without exceeding its share."""
+        """Return whether `peer` may open another client within its limit."""
         most = KNOWN_SEATS if peer.is_known else SEATS
         return not peer.who or self._operators[peer.who] < most
 
     @contextmanager
     def visit(self, who: str = "") -> Iterator[None]:
-        """Count as a client while the context lasts; `who` is the identity from `SocketPeer`."""
+        """Count one more client of `who` while the context is open; for `who`, see `SocketPeer`."""
         self._visitors += 1
         self._operators[who] += 1
         self._stirred.set()
@@ -289,10 +290,10 @@ class RobotService:
 
     @asynccontextmanager
     async def held_off(self) -> AsyncIterator[None]:
-        """Keep the robot disconnected while the context lasts.
+        """Keep the robot disconnected while the context is open.
 
-        Many robots accept only one connection. The robot must not be driven. An open session ends
-        first, and clients wait for the next session.
+        The context is needed because many robots accept only one connection. No operator may be
+        driving the robot. An open session ends first, and clients wait for the next session.
         """
         self._held_off += 1
         self._stirred.set()
@@ -381,11 +382,11 @@ class RobotService:
 
     @property
     def _is_unwanted(self) -> bool:
-        """Return whether an open session must end, despite its clients."""
+        """Return whether an open session must end although it has clients."""
         return self._successor is not None or self._held_off > 0
 
     async def _wait_for(self, *, present: bool) -> None:
-        """Wait until the robot needs a session; if not `present`, until no session is needed."""
+        """Wait until a session is needed; with a false `present`, until no session is needed."""
         while not (self._is_wanted if present else self._visitors == 0 or self._is_unwanted):
             self._stirred.clear()
             await self._stirred.wait()

@@ -1,7 +1,8 @@
-"""Files that a page may load: known before the first request, never looked up by path.
+"""Tables of the files that a page may load; no request can name a path outside these tables.
 
-Layer 5. Every table is filled from folders that ship with URC, or from widget manifests; a request
-only looks up its URL. A changed file is read again, so edits are visible immediately.
+Layer 5. Every table is filled from folders that ship with URC or from widget manifests, and a
+request only looks up its URL in a table. A changed file is read again, so edits are visible
+immediately.
 """
 
 import hashlib

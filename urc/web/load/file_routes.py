@@ -24,7 +24,8 @@ class FileRoutes:
     Args:
         vendor: folder of the third-party modules of the build; None without a build.
         tiles: folder of map tiles, ``z/x/y.png``; None for no tiles.
-        widgets: returns the tables of widget files; the first table that contains a file is used.
+        widgets: returns the tables of widget files. If several tables contain a file, the first
+            table is used.
     """
 
     def __init__(
@@ -59,7 +60,7 @@ class FileRoutes:
         return self._static.respond("app.webmanifest", request)
 
     async def _worker(self, request: Request) -> Response:
-        """Serve the service worker from the root folder, because the URL limits its scope."""
+        """Serve the service worker from the root URL, because this URL determines its scope."""
         return self._static.respond("sw.js", request)
 
     async def _words(self, request: Request) -> Response:
@@ -84,7 +85,7 @@ class FileRoutes:
         return answer
 
     async def _tile(self, request: Request) -> Response:
-        """Serve a map tile if a folder of tiles is configured, else 404."""
+        """Serve a map tile; without a configured folder of tiles, respond with status 404."""
         if self._tiles is None:
             raise HTTPException(404)
         return tile(self._tiles, **request.path_params, request=request)

@@ -1,4 +1,4 @@
-"""Map tiles, and the files that a robot's documents name for their widgets.
+"""Map tiles, and the files that a robot's documents name in the options of widgets.
 
 Layer 5. A URL contains either a key into a table of the loaded profile, or the three numbers of a
 tile. Text from a browser never becomes part of a path. Third-party pages are looked up in the same
@@ -48,7 +48,7 @@ EMPTY_TILE = bytes.fromhex(
 
 
 def linked_options(use: WidgetUse, robot: str) -> dict[str, object]:
-    """Return a widget's options for its page, with URLs in place of file names.
+    """Return the options of a widget for the page, with URLs in place of file names.
 
     The URL of a third-party page is replaced by the URL of the document that frames the page.
     """

@@ -1,4 +1,4 @@
-"""Decides which widgets run in the page and which widgets run in a sandboxed frame.
+"""The rule that decides which widgets run in the page, and which in a sandboxed frame.
 
 Layer 5. Widgets that ship with URC run in the page. Every other widget is third-party code and runs
 in a sandboxed frame, unless the server was started with the option to trust this widget.
@@ -21,12 +21,13 @@ OURS = frozenset({
     "slider", "speed", "state", "stop", "switch", "table", "terminal", "text", "tilt", "value",
     "vector-pad",
 })  # fmt: skip
-"""Names of the widgets that ship with URC; other folders next to these widgets are not trusted."""
+"""Names of the widgets that ship with URC. Any other folder next to these widgets is not
+trusted."""
 
 
 @dataclass(frozen=True, slots=True)
 class WidgetTrust:
-    """Distinguishes third-party widgets from trusted widgets."""
+    """The rule that distinguishes third-party widgets from trusted widgets."""
 
     trusted: frozenset[str] = frozenset()
     """Names of third-party widgets that run in the page."""

@@ -1,4 +1,4 @@
-"""Different versions of one widget on a dashboard: each robot keeps its installed version.
+"""Support for different versions of one widget: each robot keeps its installed version.
 
 Layer 5. Pages load widgets by name. If two different widgets have the same name, the second widget
 is renamed.
@@ -17,7 +17,7 @@ __all__ = ["apart", "is_same", "unified"]
 
 
 def apart(profile: Profile, others: Iterable[Profile]) -> Profile:
-    """Return the profile with new names for widgets that differ from those of other profiles."""
+    """Return the profile with new names for widgets that differ from other profiles' widgets."""
     taken: dict[str, Path] = {}
     for other in others:
         for widget in other.widgets.values():

@@ -29,7 +29,7 @@ class PackageCatalog:
     """The packages of all repositories that the user has added."""
 
     def __init__(self, folder: Path, now: Callable[[], float]) -> None:
-        """Prepare without contacting any repository.
+        """Prepare the lists without contacting any repository.
 
         Args:
             folder: folder of the packages and of the list of repositories.

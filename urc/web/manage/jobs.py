@@ -1,7 +1,8 @@
-"""The installation job: planned, reviewed, approved and done, or cancelled at any step.
+"""The installation job, with the steps plan, review, approval and installation.
 
-Layer 5. No function of this module blocks the event loop. Downloads run in a thread that is
-abandoned on cancellation; the package store changes in one step at the end.
+Layer 5. A job can be cancelled at any step. No function of this module blocks the event loop.
+Downloads run in a thread, which is abandoned if the job is cancelled. The package store changes
+only at the end, in one step.
 """
 
 import asyncio
@@ -32,10 +33,10 @@ from urc.web.words import spoken
 __all__ = ["Busy", "Job", "Jobs", "Wanted"]
 
 _WIRE_MOST: Final = 100
-"""Maximum number of reported changes in the frames to the robot."""
+"""Maximum number of changes in the frames to the robot that a job reports."""
 _INSTALLING: Final = phrase("installing")
 _LEFT_MOST: Final = 4
-"""Maximum number of abandoned threads that still wait for a server."""
+"""Maximum number of abandoned threads that are still waiting for a server."""
 
 
 Wanted = PackageRequirement | Path | FileSource | Lock
@@ -44,7 +45,7 @@ package to update."""
 
 
 class Busy(UrcError):
-    """The refusal of a job or change that cannot run now."""
+    """The refusal of a job or a change that is not possible at present."""
 
 
 class _Planned(NamedTuple):
@@ -52,11 +53,11 @@ class _Planned(NamedTuple):
     origins: tuple[str, ...]
     may: tuple[str, ...]
     risks: tuple[str, ...] = ()
-    """Resources of this machine that the package uses without any action by the user."""
+    """Resources of this machine that the package uses without any setting by the user."""
     old: Lock | None = None
-    """The version that the update replaces; None for a new installation."""
+    """The version that an update replaces; None for a new installation."""
     stays: Lock | None = None
-    """The version in use, if it stays in use after the installation of another version."""
+    """The version that stays in use after the installation of another version, if any."""
     changes: UpdateDiff | None = None
 
 
@@ -64,7 +65,7 @@ class _Planned(NamedTuple):
 class Job:
     """One installation job, from the request to its end.
 
-    The thread of a job only writes texts and numbers.
+    The thread of a job writes only the job's texts and numbers.
     """
 
     number: int
@@ -134,7 +135,10 @@ class _Watched:
 
 
 class Jobs:
-    """The jobs of one package store: one job at a time; the newest job stays visible."""
+    """The jobs of one package store.
+
+    Only one job runs at a time, and the newest job stays visible.
+    """
 
     def __init__(
         self,
@@ -146,8 +150,9 @@ class Jobs:
 
         Args:
             store: the store of installed packages.
-            sources: returns the repositories, and passes warnings to its argument.
-            used: returns the version in use of a package, also of a package with the same name.
+            sources: function that returns the repositories, and passes warnings to its argument.
+            used: function that returns the version in use of a package, or of another package with
+                the same name.
         """
         self._store = store
         self._used = used
@@ -170,7 +175,7 @@ class Jobs:
         return job
 
     def touched(self, number: int) -> tuple[PackageId | None, Lock | None]:
-        """Return the package that a job installs, and the version in use that must stay in use."""
+        """Return the package that a job installs, and the version that must stay in use."""
         planned = self._asked(number).planned
         if planned is None:
             return None, None
@@ -283,7 +288,7 @@ class Jobs:
     def _changes(
         self, job: Job, before: Lock | None, plan: InstallPlan, folder: Path, look: PreviewWorker
     ) -> UpdateDiff | None:
-        """Return the differences from the installed version, as far as they are known."""
+        """Return the known differences from the installed version."""
         if before is None:
             return None
         if before.key != plan.lock.key:
@@ -336,6 +341,6 @@ def _clean(lines: Iterable[str]) -> tuple[str, ...]:
 
 
 def _line(error: Exception) -> str:
-    """Return a failure as one line; of several problems, only the first."""
+    """Return a failure as one line of text; of several problems, return only the first."""
     text = str(error).strip().splitlines()
     return text[0] if text else type(error).__name__

@@ -1,4 +1,4 @@
-"""Keeps the robots on the menu consistent with the installed packages.
+"""A manager that keeps the robots on the menu consistent with the installed packages.
 
 Layer 5. The manager has no routes and no pages: `urc.web.manage.routes` uses it.
 """
@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 
 class Manager:
-    """The operations of the managers' pages."""
+    """The operations of the manager pages."""
 
     def __init__(
         self,
@@ -55,15 +55,15 @@ class Manager:
         self.catalogue = PackageCatalog(factory.robot_options.data / "packages", now)
         self.jobs = Jobs(factory.store, self._sources, self._used)
         self._parked: dict[str, Lock] = {}
-        """Robots that are on the menu because their packages are installed: maps the name to the
-        served version."""
+        """Served version of each robot that is on the menu because its package is installed, by
+        name."""
         self._offered: dict[str, str] = {}
-        """Interfaces that robots offer because the interfaces are installed: maps the name to the
-        digest."""
+        """Digest of each interface that robots offer because the interface is installed, by
+        name."""
         self._seen: object = None
         """Fingerprint of the package store's state at the last update of the menu."""
         self._is_behind = False
-        """Whether a change waits until a robot is no longer driven."""
+        """Whether a change is pending until a robot is no longer driven."""
         self._changing = asyncio.Lock()
 
     def _sources(self, complain: Callable[[str], None]) -> list[Source]:
@@ -119,7 +119,7 @@ class Manager:
         return is_driven
 
     async def refurnish(self) -> None:
-        """Offer the installed interfaces on every robot that is not driven."""
+        """Add the installed interfaces to every robot that is not being driven."""
         added = await asyncio.to_thread(self.factory.interfaces)
         now = {one.lock.key.name: one.lock.digest for one in added}
         changed = {name for name, _ in now.items() ^ self._offered.items()}
@@ -138,7 +138,7 @@ class Manager:
                 log.warning("%s: %s", name, error)
 
     async def apply_settings(self, name: str, robot: Robot, version: str) -> None:
-        """Switch to a robot with new settings; raise `UrcError` when widgets conflict."""
+        """Switch a robot to new settings; raise `UrcError` if widgets conflict."""
         if name in self.fleet.robots:
             self._renew(name, robot)
         else:
@@ -203,7 +203,7 @@ class Manager:
         return sorted(_all(before) - _all(after))
 
     def _meant(self, required: PackageRequirement) -> list[Lock]:
-        """Return the installed packages that match a requirement; raise `PackageError` for none."""
+        """Return the installed packages that match a requirement, or raise `PackageError`."""
         meant = [
             lock
             for lock in self.factory.store.installed()
@@ -223,7 +223,7 @@ class Manager:
     async def remove(self, text: str, *, forgets: bool = True) -> list[str]:
         """Remove a package and its unneeded dependencies; return the names of removed packages.
 
-        `forgets` also deletes the settings of its robot.
+        If `forgets` is true, the settings of the robot are deleted too.
 
         Raises:
             PackageError: the package is not installed.
@@ -284,7 +284,7 @@ class Manager:
                 self.check_idle(name)
 
     def _used(self, key: PackageId) -> Lock | None:
-        """Return the version of a package in use; a robot's package is looked up by its name."""
+        """Return the package version in use; a robot's package is found by the robot's name."""
         installed = self.factory.store.installed()
         if key.kind in DRIVEN:
             return in_use(self._kept_folder, key.name, installed)
@@ -304,7 +304,9 @@ class Manager:
     # Data for pages
 
     def cache(self, words: str, kinds: tuple[str, ...], *, may_manage: bool) -> PackageList:
-        """Return the package lists for a page; the caller needs a thread, because files are read.
+        """Return the package lists for a page.
+
+        Call this method in a thread, because it reads files.
 
         Args:
             words: search words for packages of repositories.

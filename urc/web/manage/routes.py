@@ -45,7 +45,7 @@ KINDS = {
     "interfaces": ("interface",),
     "widgets": ("widget",),
 }
-"""Maps a page to the kinds of packages that it shows."""
+"""Kinds of packages on each manager page, by name of the page."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class ManagePage:
     nav: Nav
     title: str
     about: str
-    """One sentence about the packages of the page."""
+    """One sentence that describes the packages on the page."""
     kinds: str
     """Kinds of packages, separated by commas."""
     may_manage: bool
@@ -226,7 +226,7 @@ class ManageRoutes:
 
     @_api
     async def cache(self, request: Request) -> Response:
-        """Return the packages that match ``kinds`` and ``words``, from memory."""
+        """Return the packages that match ``kinds`` and ``words``, from the lists in memory."""
         query = request.query_params
         kinds = tuple(one for one in query.get("kinds", "").split(",") if one in _KINDS) or _KINDS
         cache = await asyncio.to_thread(
@@ -239,7 +239,7 @@ class ManageRoutes:
 
     @_api
     async def refresh(self, request: Request) -> Response:
-        """Start a refresh from the repositories; ``force`` ignores the age of the lists.
+        """Start a refresh from the repositories; with ``force``, regardless of the lists' age.
 
         Any visitor may start a refresh, at most once per `FRESH_S` seconds.
         """
@@ -260,7 +260,7 @@ class ManageRoutes:
 
     @_api
     async def disconnect(self, request: Request) -> Response:
-        """Remove a repository; the packages installed from it stay."""
+        """Remove a repository; the packages installed from this repository stay."""
         self.check(request)
         said = await body_of(request, Url)
         await self._manager.disconnect(said.url)
@@ -268,14 +268,14 @@ class ManageRoutes:
 
     @_api
     async def install(self, request: Request) -> Response:
-        """Start a job for a package by name: download it, and list its permissions."""
+        """Start a job that downloads a package given by name, and lists its permissions."""
         self.check(request)
         said = await body_of(request, InstallRequest)
         return self._begun(parse_requirement(said.package))
 
     @_api
     async def add(self, request: Request) -> Response:
-        """Start a job for a package by its path in a repository, or on this machine."""
+        """Start a job for a package given by its path in a repository or on this machine."""
         self.check(request)
         said = await body_of(request, Add)
         return self._begun(self._meant(said.path.strip(), request))
@@ -295,7 +295,7 @@ class ManageRoutes:
 
     @_api
     async def update(self, request: Request) -> Response:
-        """Start the update of a package: download the newest version, and list its changes."""
+        """Start the update of a package: download the newest version, and list the changes."""
         self.check(request)
         said = await body_of(request, InstallRequest)
         return self._begun(await asyncio.to_thread(self._manager.installed, said.package))

@@ -1,7 +1,6 @@
 """Data of a robot's settings page: one form field per setting, chosen by the setting's type.
 
-Layer 5. A pure module: it fills the fields, and `urc.web.manage.settings_routes` reads their
-values.
+Layer 5. This pure module fills the fields, and `urc.web.manage.settings_routes` reads their values.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -27,8 +26,8 @@ _INPUTS: Final = {
     "number": ("text", "decimal"),
     "path": ("text", ""),
 }
-"""Maps the type of a setting to the type of its field and of the on-screen keyboard. Numbers are
-entered in text fields, because a number field drops invalid input."""
+"""Type of the field and of the on-screen keyboard for each type of setting. Numbers are entered in
+text fields, because a number field drops invalid input."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +54,12 @@ class Field:
     value: str
     """Entered value; always "" for a secret."""
     placeholder: str
-    """Value in effect while the field is empty."""
+    """Value of the setting while the field is empty."""
     options: tuple[Option, ...]
     is_given: bool
     """Whether the value was given at the start of the server, and therefore cannot be changed."""
     is_set: bool
-    """Whether the secret has a value."""
+    """Whether a value of the secret is stored."""
     is_withheld: bool
     """Whether the stored secret is unused because it was entered for another destination."""
 
@@ -114,7 +113,7 @@ def settings_page(
         withheld: names of secrets that are unused because they were entered for another
             destination.
         ways: navigation links of this server.
-        driver: the name of the package or file in use.
+        driver: name of the driver package or driver file in use.
         versions: installed versions of the driver, newest first.
         may_manage: whether the visitor may change packages and settings.
         fault: reason why the robot cannot be used; "" if it can.
@@ -219,5 +218,5 @@ def _about(setting: Setting) -> str:
 
 
 def _text(value: Value) -> str:
-    """Return a value as text, in the form in which a user enters it."""
+    """Return a value as text, in the form that a user enters."""
     return str(value).lower() if isinstance(value, bool) else str(value)

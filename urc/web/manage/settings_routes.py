@@ -1,6 +1,6 @@
 """Routes of a robot's settings page, which tests, stores and applies the entered settings.
 
-Layer 5. Settings that fail the test are stored only if the user insists, because a robot may be
+Layer 5. Settings that fail the test are stored only if the user confirms; the robot may be switched
 off.
 """
 
@@ -48,7 +48,7 @@ class SettingsRoutes:
         Args:
             manager: the operations on packages and robots.
             manage: the routes of the managers, which check permissions.
-            ways: the pages of this server, for links.
+            ways: the pages of this server, for the navigation links.
         """
         self._manager = manager
         self._manage = manage

@@ -1,6 +1,7 @@
 """Sources of uploaded packages: a bundle, an archive, or an interface document without a package.
 
-Layer 5. A document is wrapped in a package, so it is stored, listed and removed like all packages.
+Layer 5. A document without a package is wrapped in a package, so the document is stored, listed and
+removed like all packages.
 """
 
 from collections.abc import Sequence
@@ -32,7 +33,7 @@ def given_source(name: str, data: bytes, installed: Sequence[Lock]) -> FileSourc
     Args:
         name: file name from the browser; only the suffix matters.
         data: its content.
-        installed: installed packages; a document gets a version that none of them uses.
+        installed: installed packages. A document gets a version that no installed package uses.
 
     Raises:
         PackageError: the file is neither a package nor an interface.

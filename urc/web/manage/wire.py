@@ -95,17 +95,19 @@ class JobNews(ManageMessage, frozen=True):
     title: str
     state: JobState
     line: str
-    """Current activity or result of the job, in one line."""
+    """Current activity of the job, or its result, in one line."""
     done: int
     of: int
-    """Number of steps; 0 while the number is unknown."""
+    """Number of steps of the job; 0 while the number is unknown."""
     is_update: bool = False
     packages: tuple[str, ...] = ()
-    """Origin and signer of each package; for an update, the changes of origin and signer."""
+    """Origin and signer of each package; for an update, the changes of the origin and the
+    signer."""
     may: tuple[str, ...] = ()
     """Permissions of the package, one per line."""
     risks: tuple[str, ...] = ()
-    """The package's own access to this machine; for an update, only additional access."""
+    """Access to this machine that the package has without a setting; for an update, only additional
+    access."""
     gained: tuple[str, ...] = ()
     """Permissions that the update adds."""
     lost: tuple[str, ...] = ()
@@ -149,7 +151,7 @@ class Installed(ManageMessage, frozen=True):
     newer: str
     """Newer version in a repository; "" if this version is the newest."""
     before: str
-    """Version before the update; "" if no earlier version can be restored."""
+    """Earlier version that can be restored; "" if no earlier version can be restored."""
     url: str
     """URL of the package's page; "" if it has none."""
     settings_url: str
@@ -158,7 +160,7 @@ class Installed(ManageMessage, frozen=True):
     fault: str
     """Reason why the package cannot be used; "" if it can."""
     withdrawn: tuple[str, ...] = ()
-    """Withdrawn packages among the package and its dependencies with the reasons, one per line."""
+    """Withdrawn packages and the reasons, one per line; includes dependencies of the package."""
 
 
 class Available(ManageMessage, frozen=True):
@@ -194,7 +196,7 @@ class PackageList(ManageMessage, frozen=True):
 
 
 class ResultLine(ManageMessage, frozen=True):
-    """Result of an action, as one line of text."""
+    """Result of a request, as one line of text."""
 
     line: str
 
@@ -267,7 +269,7 @@ class Timeline(ManageMessage, frozen=True):
 
     entries: list[dict[str, Any]]
     fault: str
-    """Reason why the log is no longer written; "" if the log is written."""
+    """Reason why the audit log is no longer written; "" if the log is written."""
 
 
 class ReloadResult(ManageMessage, frozen=True):
@@ -282,13 +284,13 @@ class SettingsAsked(ManageMessage, frozen=True):
     """Settings of a robot, as submitted by the page."""
 
     settings: _Settings = {}
-    """Maps a setting to the typed text; None leaves a secret unchanged."""
+    """Typed text of each setting, by name; None leaves a secret unchanged."""
     version: _Short = ""
     interface: _Short = ""
     test: bool = True
-    """Whether to test the connection."""
+    """Whether to test the connection before saving."""
     anyway: bool = False
-    """Whether to save even if the connection test fails."""
+    """Whether to save the settings even if the connection test fails."""
 
 
 class ProbedTransport(ManageMessage, frozen=True):
@@ -308,7 +310,7 @@ class SettingsAnswer(ManageMessage, frozen=True):
     is_saved: bool
     text: str
     faults: dict[str, str] = {}
-    """Maps a setting to its error, as one line of text."""
+    """Error of each invalid setting, as one line of text, by name of the setting."""
     missing: tuple[str, ...] = ()
     """Titles of required settings without a value."""
     lines: tuple[ProbedTransport, ...] = ()

@@ -1,8 +1,8 @@
-"""Identity of visitors, proved by a secret that changes at each start, never by an address.
+"""Identity of visitors. The proof is a secret that changes at each start, never an address.
 
-Layer 5. Pure. The address printed by URC contains the start key. A browser hands in the key once,
-and gets a session in a cookie that scripts cannot read. A program sends the key with each request.
-Keys and sessions expire when the server stops.
+Layer 5. Pure. The address printed by URC contains the start key. A browser sends the key once, and
+gets a session in a cookie that scripts cannot read. A program sends the key with each request. Keys
+and sessions expire when the server stops.
 """
 
 import secrets
@@ -20,8 +20,8 @@ SESSIONS = 1000
 """Maximum number of known browsers; beyond this number, the oldest browser is forgotten."""
 CODES = 16
 OLD_COOKIES = 8
-"""Maximum number of cookies from earlier starts in one browser; beyond this number, all of them are
-deleted."""
+"""Maximum number of cookies from earlier starts in one browser; beyond this number, all such
+cookies are deleted."""
 
 Standing = Literal["here", "manager", "stranger"]
 """Rights of a visitor: ``here`` has the start key, ``manager`` the token of ``--manage``,
@@ -36,7 +36,7 @@ class Visitor(NamedTuple):
     name: str = ""
     """Identifier of the browser or program; "" for an unknown visitor. No secret."""
     is_program: bool = False
-    """Whether the request itself carries the key, as a page of another site cannot do."""
+    """Whether the request carries the key; a page of another site cannot send such a request."""
 
 
 UNKNOWN_VISITOR = Visitor()
@@ -51,9 +51,10 @@ class Access:
         """Make the key.
 
         Args:
-            is_open: whether unknown visitors may watch and drive; if not, they may only press STOP.
-            key: the start key; "" generates one.
-            instance: identifier of this start in the cookie's name; "" generates one.
+            is_open: whether unknown visitors may watch and drive; if false, they may only press
+                STOP.
+            key: the start key; "" to generate a key.
+            instance: identifier of this start in the cookie's name; "" to generate an identifier.
             token: the secret of managers; "" for no managers.
         """
         self.is_open = is_open
@@ -61,7 +62,8 @@ class Access:
         self.instance = instance or secrets.token_hex(4)
         self.cookie = PREFIX + self.instance
         self.frame_code = f"/frame-code/{secrets.token_urlsafe(16)}"
-        """Path prefix of code for frames: a frame has no origin, and therefore sends no cookies."""
+        """Secret path prefix of code for frames; needed because a frame has no origin and therefore
+        sends no cookies."""
         self._token = token
         self._sessions: dict[str, Visitor] = {}
         self._codes: dict[str, None] = {}
@@ -72,7 +74,7 @@ class Access:
         return f"{url}?{PARAMETER}={quote(self.key, safe='')}"
 
     def address_once(self, url: str) -> str:
-        """Return an address that admits only the first browser, and does not contain the start key.
+        """Return an address without the start key that admits only the first browser.
 
         The address may become visible to others, for example in the command line of a browser.
         """
@@ -87,7 +89,7 @@ class Access:
         return f"{url}?{PARAMETER}={quote(self._token, safe='')}" if self._token else ""
 
     def admit(self, word: str) -> str | None:
-        """Return a new session for a browser that hands in the key `word`; None if invalid."""
+        """Return a new session for a browser that has sent the key `word`; None for a wrong key."""
         standing = self._standing(word)
         if standing is None and word in self._codes:
             del self._codes[word]

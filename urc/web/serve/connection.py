@@ -1,8 +1,8 @@
 """One HTTP connection, with a time limit for requests and with policy headers in every refusal.
 
-Layer 5. A thin layer over uvicorn's protocol, used only by `server`. By itself, uvicorn refuses
+Layer 5. A thin layer over uvicorn's protocol, used only by `server`. The library uvicorn refuses
 invalid HTTP, and connections above its limit. Without this layer, refusals by uvicorn would lack
-the page policy.
+the headers of the page policy.
 """
 
 import asyncio
@@ -21,10 +21,9 @@ __all__ = ["CONNECTIONS", "REQUEST_S", "RESERVE", "HttpConnection", "refusal"]
 
 CONNECTIONS = 1024
 """Maximum number of open connections, including WebSockets. If the limit is reached, a new
-connection closes an idle connection: the oldest one of the address with the most idle
-connections."""
+connection closes the oldest idle connection of the address with the most idle connections."""
 RESERVE = 64
-"""Number of additional connections that are reserved for STOP while no connection is idle."""
+"""Number of additional connections that accept only STOP, used while no connection is idle."""
 REQUEST_S = 5.0
 """Time limit for the arrival of a complete request with its body, in seconds. The time starts at
 the opening of the connection for the first request, and at the first byte for later requests.
@@ -46,7 +45,7 @@ def refusal(status: HTTPStatus, text: str) -> bytes:
 
 
 def _stops(data: bytes) -> bool:
-    """Return whether a request that begins with `data` is a STOP."""
+    """Return whether a request that begins with `data` is a STOP request."""
     method, _, rest = data.partition(b"\r\n")[0].partition(b" ")
     return is_stop(method.decode("latin-1"), rest.partition(b" ")[0].decode("latin-1"))
 
@@ -55,8 +54,8 @@ class HttpConnection(H11Protocol):
     """uvicorn's HTTP/1.1 protocol, with a time limit for the arrival of a request.
 
     WARNING: this class depends on asyncio's protocol methods and on parts of its base class. The
-        parts in use are the arguments of the constructor, `send_400_response`, and the attributes
-        `conn`, `connections`, `loop` and `transport`. The tests in
+        class uses the constructor's arguments, the method `send_400_response`, and the attributes
+        `conn`, `connections`, `loop` and `transport` of its base class. The tests in
         tests/e2e/test_dashboard_server.py fail when one of these parts changes.
     """
 
@@ -110,7 +109,7 @@ class HttpConnection(H11Protocol):
         self._refuse(HTTPStatus.BAD_REQUEST, msg)
 
     def _make_room(self) -> bool:
-        """Close an idle connection; return whether there was one."""
+        """Close an idle connection; return False if no connection is idle."""
         waiting: dict[str, list[HttpConnection]] = {}
         for one in self.connections:
             if isinstance(one, HttpConnection) and one is not self and one.only_waits:
@@ -129,7 +128,7 @@ class HttpConnection(H11Protocol):
         return is_ours and self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
 
     def _watch(self) -> None:
-        """Start the time limit while a request is incomplete, else cancel it."""
+        """Start the time limit while a request is incomplete; otherwise, cancel the time limit."""
         is_ours = self.transport.get_protocol() is self  # else it is a WebSocket
         is_open = self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
         if not (is_ours and is_open) or self.transport.is_closing():

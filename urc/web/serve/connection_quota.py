@@ -15,7 +15,8 @@ __all__ = ["KNOWN_PLACES", "PLACES", "ConnectionQuota", "is_stop"]
 
 PLACES = 32
 """Maximum number of concurrent requests and sockets from one unknown address. A page uses up to two
-sockets and six requests. So the limit allows several pages, and a few people behind one address."""
+sockets and six requests. The limit therefore permits several pages, and a few people behind one
+address."""
 KNOWN_PLACES = 256
 """Maximum number of concurrent requests and sockets of a known browser or program, which may watch
 many robots."""
@@ -37,7 +38,7 @@ class ConnectionQuota:
 
     @contextmanager
     def taken(self, visitor: Visitor, address: str) -> Iterator[bool]:
-        """Occupy a place while the context lasts; yield whether a place was free.
+        """Count a request while the context is open; yield whether the limit permits the request.
 
         `address` identifies an unknown visitor.
         """

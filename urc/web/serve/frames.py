@@ -1,8 +1,8 @@
-"""Finds WebSocket frames that contain one whole text message, such as nearly every tick.
+"""A parser that finds WebSocket frames with one whole text message, such as nearly every tick.
 
-Layer 5, pure. It only reads. The WebSocket library processes all other frames from the same bytes:
-fragments, control frames and protocol errors. This module only counts the bytes of other frames, to
-find the start of the next frame.
+Layer 5, pure. The parser only reads the bytes. From the same bytes, the WebSocket library processes
+all other frames: fragments, control frames and protocol errors. This module only counts the bytes
+of other frames, to find the start of the next frame.
 """
 
 from typing import Final
@@ -27,7 +27,7 @@ class WebSocketFrames:
         self._is_between = True
         """Whether the next byte starts a new message."""
         self._left = 0
-        """Number of missing bytes of the current frame."""
+        """Number of bytes of the current frame that have not arrived yet."""
         self._head = b""
         """Bytes of an incomplete frame header."""
         self._is_inside = False

@@ -1,9 +1,9 @@
 """Access checks and page policy for every request, before any route is looked up.
 
-Layer 5. Pure ASGI middleware around the whole application, so that error responses also get its
-headers. The check of Host refuses foreign host names that resolve to this machine. The check of
-Origin prevents foreign pages from opening a WebSocket or posting a form. The response headers block
-injected markup. The module depends on no route, robot or template.
+Layer 5. This ASGI middleware wraps the whole application, so that error responses also get the
+headers of the policy. The check of Host refuses foreign host names that resolve to this machine.
+The check of Origin prevents foreign pages from opening a WebSocket or posting a form. The response
+headers block injected markup. The module depends on no route, robot or template.
 """
 
 import ipaddress
@@ -109,7 +109,7 @@ class Authority(NamedTuple):
 
 
 def parse_host(text: str) -> Authority | None:
-    """Return the host and port of a ``Host`` header; None if the header is invalid."""
+    """Return the host and port of a ``Host`` header, or None for an invalid header."""
     match = _HOST.fullmatch(text)
     return _authority(match) if match else None
 
@@ -120,13 +120,13 @@ def is_host_allowed(
     """Return whether the server accepts requests for the host in `authority`.
 
     DNS rebinding from a foreign name server affects neither a literal address nor ``localhost``.
-    All other names must be among `names`, because any device on the network may claim a name under
+    Any other name must be in `names`, because every device on the network can claim a name under
     ``.local``.
 
     Args:
         authority: the host.
         names: allowed names in lower case, including the names of this machine.
-        is_loopback: whether the request came over loopback; if so, only loopback addresses are
+        is_loopback: whether the request came over loopback. If true, only loopback addresses are
             valid.
     """
     host = authority.host
@@ -176,7 +176,7 @@ def frame_policy(scope: Scope, widget: str, digest: str, place: str) -> str:
     request to a foreign address can leak data. The digest allows only the import map.
 
     Args:
-        scope: scope of the request for the frame, whose host was already checked.
+        scope: ASGI scope of the request for the frame, with a host that was already checked.
         widget: name of the widget in URLs.
         digest: digest ``sha256-…`` of the import map.
         place: path prefix of code for frames.
@@ -203,7 +203,7 @@ class Policy:
         self._places = ConnectionQuota()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Refuse the request, or call the application and add the policy headers."""
+        """Refuse the request, or call the application and add the headers of the policy."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -249,9 +249,9 @@ class Policy:
 class _Answer:
     """Adds the page policy's headers to a response.
 
-    A route may set three keys in the state of its request. ``frame_policy`` is the policy of a
-    frame in place of the page policy. ``is_code`` marks files that frames may load too. ``is_file``
-    marks third-party content, which must not act as a page of URC when opened directly.
+    A route may set three keys in the state of a request. ``frame_policy`` is the policy of a frame
+    in place of the page policy. ``is_code`` marks files that frames may load too. ``is_file`` marks
+    third-party content, which must not act as a page of URC when opened directly.
     """
 
     def __init__(self, scope: Scope, send: Send, nonce: str) -> None:

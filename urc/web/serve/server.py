@@ -1,7 +1,8 @@
 """The HTTP server: uvicorn, run by a coroutine, with small send buffers.
 
-Layer 5. Only this module and `connection` depend on uvicorn. Kernel and process buffer as little
-unsent data per client as possible, because buffered data becomes outdated and cannot be withdrawn.
+Layer 5. Only this module and `connection` depend on uvicorn. The kernel and the process buffer as
+little unsent data per client as possible, because buffered data becomes outdated and cannot be
+withdrawn.
 """
 
 import asyncio
@@ -95,7 +96,7 @@ async def serve(
 
 
 class _Server(uvicorn.Server):
-    """uvicorn's server with an event for its end, instead of polling ten times per second."""
+    """A uvicorn server that signals its end with an event, instead of polling."""
 
     def __init__(self, config: uvicorn.Config) -> None:
         super().__init__(config)
@@ -115,12 +116,12 @@ class _Server(uvicorn.Server):
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Leave signals to `_ending`: uvicorn's handler would raise them again at the end."""
+        """Leave signals to `_ending`; uvicorn's handler would raise each signal again."""
         yield
 
 
 class _DashboardSocket(WebSocketsSansIOProtocol):
-    """uvicorn's WebSocket without a send queue, and with a callback when the socket is writable.
+    """A uvicorn WebSocket without a send queue, with a callback when the socket is writable.
 
     WARNING: this class may use only asyncio's protocol methods and the arguments of the
         constructor; the rest of the base class is private to uvicorn. The application finds the
@@ -219,9 +220,9 @@ def _listen(host: str, port: int) -> socket.socket:
 def reachable_urls(host: str, port: int) -> tuple[str, ...]:
     """Return the URLs of a dashboard that listens on `host`.
 
-    For ``0.0.0.0`` and ``::``, these are the addresses of all network interfaces of this machine,
-    or else loopback. For any other host, the URL contains `host`. Network addresses precede
-    loopback. The function sends no packet.
+    For ``0.0.0.0`` and ``::``, the URLs contain the addresses of all network interfaces of this
+    machine, or else the loopback address. For any other host, the URL contains `host`. Network
+    addresses precede loopback. The function sends no packet.
 
     Args:
         host: the address or name on which the server listens.
@@ -248,7 +249,7 @@ async def _until_ready(server: uvicorn.Server, running: "asyncio.Future[None]") 
 
 
 async def _follow(server: _Server, running: "asyncio.Future[None]") -> None:
-    """Wait until the server ends; on cancellation, close it gracefully."""
+    """Wait until the server ends; if cancelled, close the server gracefully."""
     try:
         await asyncio.shield(running)
     except asyncio.CancelledError:
@@ -260,7 +261,7 @@ async def _follow(server: _Server, running: "asyncio.Future[None]") -> None:
 
 @contextlib.contextmanager
 def _ending(server: _Server) -> Iterator[None]:
-    """Let SIGINT and SIGTERM end the server while the context lasts, if the platform allows."""
+    """Let SIGINT and SIGTERM end the server while the context is open, if the platform permits."""
     loop = asyncio.get_running_loop()
     caught: list[signal.Signals] = []
 

@@ -1,4 +1,4 @@
-"""Rights of a visitor: the start key adds rights, and a page may choose to only watch.
+"""Rights of a visitor. The start key adds rights, and a page may choose only to watch.
 
 Layer 5. Pure.
 """
@@ -33,7 +33,7 @@ def guest_of(connection: HTTPConnection) -> SocketPeer:
 
 
 def is_here(connection: HTTPConnection) -> bool:
-    """Return whether the visitor has the start key, regardless of its address."""
+    """Return whether the visitor has the start key, regardless of the visitor's address."""
     return visitor_of(connection).standing == "here"
 
 

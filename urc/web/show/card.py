@@ -27,7 +27,7 @@ _UNSHOWN = ("image", "blob", "array")
 
 
 class Cards:
-    """Serves the current content of the cards on the menu.
+    """The route that serves the current content of the cards on the menu.
 
     Args:
         stations: the served robots, by the name in their URL.
@@ -55,7 +55,7 @@ class Cards:
 
 
 def small_values(driver: Driver, readings: Mapping[str, Reading]) -> list[tuple[str, str]]:
-    """Return the first values of a robot that fit on a card, each with its title, as text."""
+    """Return the title and the text of the robot's first values that fit on a card."""
     found = [
         (one.title or spoken(name), _text(one, readings[name]))
         for name, one in driver.signals.items()

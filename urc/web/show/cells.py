@@ -40,7 +40,7 @@ class Cell:
     """One slot of the grid, with the markup of its widget."""
 
     index: int
-    """Number of the cell on the page, which the rules of the grid refer to."""
+    """Number of the cell on the page, as used in the CSS rules of the grid."""
     config: str
     """JSON for the widget host: slot, widget, inputs, outputs (see ``output.js``), options,
     title."""
@@ -57,7 +57,7 @@ class Cell:
 class WidgetContext:
     """Context of ``widgets/*/template.html.j2``; its fields are the variables of the template.
 
-    The markup is shown before the widget's module has loaded. Therefore the markup must be
+    The page shows the markup before the widget's module has loaded. The markup must therefore be
     understandable without any value.
     """
 
@@ -67,15 +67,15 @@ class WidgetContext:
     options: Mapping[str, object]
     """Checked options. Every declared option has a key; None means that the option has no value."""
     inputs: Mapping[str, Signal | tuple[Signal, ...]]
-    """Maps an input to its signal, or a multiple input to its signals. Unbound inputs are
-    omitted."""
+    """Signal of each input, or list of signals of each multiple input, by name of the input.
+    Unbound inputs are omitted."""
     widget: str
     """The widget's name."""
     uid: str
     """Identifier that is unique on the page, for ``id`` and ``aria-labelledby``."""
     outputs: Mapping[str, str] = field(default_factory=dict)
-    """Maps an output to the readable name of its command. Unbound outputs are omitted, so a widget
-    can leave out their controls."""
+    """Readable name of each output's command, by name of the output. Unbound outputs are omitted,
+    so a widget can leave out their controls."""
 
 
 def render_widget(widget: Widget, context: WidgetContext) -> Markup:
@@ -85,7 +85,7 @@ def render_widget(widget: Widget, context: WidgetContext) -> Markup:
 
 
 def render_foreign(uses: Iterable[tuple[WidgetUse, Profile]], trust: WidgetTrust) -> None:
-    """Render the markup of all third-party widgets of a page together, to save time.
+    """Render the markup of all third-party widgets of a page in one step, to save time.
 
     Args:
         uses: the widget uses in the order of the cells, each with the profile of its robot.
@@ -125,9 +125,10 @@ def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -
 
 
 def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str, str]) -> str:
-    """Return the subject of a widget: its first required signal, else its command.
+    """Return the subject of a widget: its first required signal, or else its command.
 
-    An optional output is not the subject: a camera widget with pan and tilt still shows a camera.
+    An optional output is not the subject: the subject of a camera widget with pan and tilt is the
+    camera.
     """
     needed = [name for name in inputs if widget.inputs[name].is_required]
     about = [inputs[name].title or spoken(inputs[name].name) for name in (*needed, *inputs)]
@@ -152,7 +153,7 @@ def widget_cell(
     *,
     is_background: bool = False,
 ) -> Cell:
-    """Return one slot with its widget; an exception of the template affects only this cell.
+    """Return one slot with its widget; an exception in the template affects only this cell.
 
     A separate process renders the template of a third-party widget. The call waits for this
     process, unless `render_foreign` has already rendered the template.

@@ -98,8 +98,8 @@ _FOLLOW: Final = dict.fromkeys(
 def check_demo(widget: Widget, document: Document) -> list[Problem]:
     """Return all problems of a demo.
 
-    The states of a demo refer to its bindings. Therefore the options of states are checked only if
-    the bindings are valid.
+    The states of a demo refer to the demo's bindings. The options of states are therefore checked
+    only if the bindings are valid.
     """
     data = document.data
     problems = check_inline(document, (), data, _demo(widget, data))
@@ -146,7 +146,7 @@ def _part(data: Any, key: str) -> dict[str, Any]:
 def _state(
     bound: Mapping[str, Any], signals: Mapping[str, Any], outputs: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the schema of a state, for its own signals and those of the whole demo."""
+    """Return the schema of a state, for the signals of the state and of the whole demo."""
     values = {name: _values(given) for name, given in signals.items()}
     past = {"type": "array", "items": {"type": "array", "minItems": 2, "maxItems": 2}}
     answered = {*outputs, *_commands(outputs.values())}
@@ -183,7 +183,7 @@ def _ages(names: Iterable[str]) -> dict[str, Any]:
 
 
 def _single(signals: Mapping[str, Any]) -> list[str]:
-    """Return the names of single signals; a list of signals yields one name per element."""
+    """Return the names of single signals; a list of signals results in one name per element."""
     names = []
     for name, given in signals.items():
         many = isinstance(given, list)

@@ -231,7 +231,7 @@ def _file(folder: Path, name: str) -> bytes:
 
 
 def colour_bars(width: int, height: int) -> bytes:
-    """Return a PNG with colour bars above a grey ramp; equal sizes give identical bytes."""
+    """Return a PNG with colour bars above a grey ramp; equal sizes return equal bytes."""
     if not (1 <= width <= 2048 and 1 <= height <= 2048):
         raise UrcError(f"a test picture has 1 to 2048 pixels a side, not {width} x {height}")
     bars = b"".join(bytes(_BARS[x * len(_BARS) // width]) for x in range(width))

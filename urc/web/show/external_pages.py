@@ -83,9 +83,9 @@ class ExternalPages:
 
 
 def framed_page(profile: Profile, key: str, request: Request) -> Response:
-    """Return the document around a page that an option names; raise status 404 for any other page.
+    """Return the document around a page that an option names; respond with 404 for any other.
 
-    A page of this server is refused, because in a frame it could access the dashboard.
+    A page of this server is refused, because such a page could access the dashboard from the frame.
     """
     pages = (many for use in uses_of(profile) for many in use.pages.values())
     urls = {page_key(url): url for many in pages for url in many}

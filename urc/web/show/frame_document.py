@@ -41,7 +41,7 @@ class FrameDocuments:
 
     Args:
         modules: import map of the pages.
-        has: returns whether a widget with this name exists.
+        has: function that returns whether a widget with a given name exists.
         place: path prefix of code for frames.
     """
 

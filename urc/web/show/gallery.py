@@ -1,7 +1,7 @@
 """The gallery: every widget in all states of its demo, without a robot.
 
-Layer 5. The page itself simulates the robot (``gallery.js``); the page opens no socket and sends
-nothing.
+Layer 5. The script ``gallery.js`` simulates the robot in the page, so the page opens no socket and
+sends nothing.
 """
 
 import asyncio
@@ -41,7 +41,7 @@ class Found(NamedTuple):
 
     folder: Path
     widget: Widget | None
-    """The widget from its manifest; None for an invalid manifest."""
+    """The widget that the manifest describes; None for an invalid manifest."""
     problems: tuple[Problem, ...] = ()
     """Problems in the manifest."""
 
@@ -51,7 +51,7 @@ class WidgetLookup:
 
     Args:
         profiles: returns the profiles of the served robots.
-        is_fresh: whether each look-up reads the manifest again; if not, the widgets loaded by
+        is_fresh: whether each look-up reads the manifest again; if false, the widgets loaded by
             robots are used.
     """
 
@@ -96,12 +96,15 @@ def _on(registry: WidgetFolder, name: str) -> Found:
 
 
 def mark(text: str) -> str:
-    """Return `text`, marked for the catalogues; pages translate the text with `t`."""
+    """Return `text`.
+
+    The call marks the text for the catalogues; pages translate the text with `t`.
+    """
     return text
 
 
 EXAMPLES = (mark("normal"), mark("stale"), mark("gone"), mark("none"), mark("hostile"))
-"""Names of states that most widgets have; a demo may add others."""
+"""Names of states that most widgets have; a demo may add further states."""
 SEPARATOR = "+"
 MOST_AT_ONCE = 16
 """Maximum number of widgets on one page."""
@@ -119,7 +122,7 @@ class GalleryEntry:
     summary: str
     url: str
     fault: str
-    """Reason why the widget cannot be shown; "" if it can."""
+    """Reason why the widget cannot be shown; "" if the widget can be shown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,9 +177,10 @@ class DemoPage:
     faults: tuple[WidgetProblem, ...]
     """Problems of widgets that cannot be shown."""
     stamp_url: str
-    """URL of the current stamp, for reloads after an edit; "" without reloads."""
+    """URL that returns the current stamp, for reloads after an edit; "" for a page without
+    reloads."""
     stamp: str
-    """The stamp, computed before the files were read."""
+    """The stamp of the widget files, computed before the files were read."""
 
 
 class Gallery:

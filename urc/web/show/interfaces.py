@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 DEBUGGING: Final = Interface(DEBUG, "Debug")
-"""Placeholder for the debug interface, which has no grid."""
+"""Placeholder for the debug interface, because the debug interface has no grid."""
 DEBUG_STYLES: Final = ("/static/dev/dev.css", "/static/dev/debug.css")
 KEPT: Final = "urc-interface"
 """Name of the cookie with the robot's last shown interface on this device. The cookie's path is the
@@ -79,8 +79,8 @@ def chosen(profile: Profile, wanted: str | None, kept: str = "") -> Interface | 
 
     Args:
         profile: profile of the robot.
-        wanted: name of the interface in the URL; None if the URL has none.
-        kept: name of the interface last shown on the device; ignored if the interface no longer
+        wanted: name of the interface in the URL; None for a URL without an interface.
+        kept: name of the interface that the device showed last; ignored if this interface no longer
             exists.
     """
     known = {**profile.interfaces, DEBUG: DEBUGGING}
@@ -98,7 +98,7 @@ def choices(
         profile: profile of the robot.
         interface: the interface that is shown.
         url: path of the robot's page.
-        more: text that is appended to each URL.
+        more: text to append to each URL.
     """
     every = (*profile.interfaces.values(), DEBUGGING)
     return tuple(
@@ -123,7 +123,7 @@ def page_tabs(interface: Interface, wanted: str = "") -> tuple[PageTab, ...]:
 
 
 def is_turned(interface: Interface, slots: tuple[str, ...]) -> bool:
-    """Return whether a phone shows the layout as designed only in landscape."""
+    """Return whether a phone shows the designed layout only in landscape."""
     return any(needs_turning(page, slots) for page in interface.pages)
 
 

@@ -1,4 +1,4 @@
-"""Renders the templates of third-party widgets in a separate process with limited memory and time.
+"""Rendering of third-party widget templates in a separate process with limited memory and time.
 
 ``python -m urc.web.show.isolated_markup`` reads templates and their variables as JSON from standard
 input, and writes the markup to standard output. Layer 5.
@@ -26,7 +26,7 @@ __all__ = ["MOST_CHARACTERS", "RenderedMarkup", "markup_of"]
 MOST_CHARACTERS: Final = 65536
 """Maximum number of characters in the markup of one cell."""
 TOTAL_S: Final = 20.0
-"""Time limit for rendering several templates together, in seconds; generous, for slow or busy
+"""Time limit for rendering several templates together, in seconds; long enough for slow or busy
 machines."""
 PROCESSOR_S: Final = 4
 MEMORY_BYTES: Final = 512 << 20
@@ -50,7 +50,7 @@ _lock = Lock()
 
 
 def markup_of(wanted: Sequence[tuple[str, Mapping[str, object]]]) -> list[RenderedMarkup]:
-    """Return the markup of templates in the current language; block until it is rendered.
+    """Return the markup of templates in the current language; block until all are rendered.
 
     Each element of `wanted` has the source and the variables of one template.
     """

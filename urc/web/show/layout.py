@@ -3,14 +3,15 @@
 Layer 5. Pure. The rules contain only numbers, so no text from a document can close the style
 element.
 
-A row or column without a slot is a margin: it keeps its position, with an eighth of the normal
-size. Phones show no margins. A phone in portrait shows the grid ``phone_portrait``, else
-``portrait``, else ``landscape``. Of these grids, the last two are stacked in reading order if they
-have more than two columns. A phone in landscape shows the grid ``phone_landscape``, else
-``landscape``.
+A row or column without a slot is a margin: the margin keeps its position, with an eighth of the
+normal size. Phones show no margins. A phone in portrait shows the grid ``phone_portrait``, else
+``portrait``, else ``landscape``. The grids ``portrait`` and ``landscape`` are stacked in reading
+order on such a phone if they have more than two columns. A phone in landscape shows the grid
+``phone_landscape``, else ``landscape``.
 
 Over a background, an empty cell keeps its full size on every screen, so that the background is
-visible. On screens of low height, empty rows shrink in favour of rows with widgets.
+visible. On screens of low height, empty rows become smaller, to leave more space for rows with
+widgets.
 
 All pages of an interface share the cells. The grid attribute ``data-page`` selects the page; a cell
 on two pages keeps its state.
@@ -31,7 +32,7 @@ LEFT_HAND = ':root[data-hand="left"]'
 """Selector for left-handed operators; ``handedness.js`` sets the attribute."""
 _USED_COLUMN, _USED_ROW, _MARGIN = "minmax(0,1fr)", "minmax(8rem,1fr)", "minmax(0,.12fr)"
 _LOW_ROW = "minmax(6.5rem,1fr)"
-"""Height of a row on a phone in landscape, chosen so that two rows fit."""
+"""Height of a row on a phone in landscape; two rows of this height fit on the screen."""
 _WINDOW = ("minmax(5rem,1fr)", "minmax(0,1fr)")
 """Sizes of rows and columns through which the background is visible."""
 
@@ -58,8 +59,8 @@ class _Canvas(NamedTuple):
 
     slots: Sequence[str]
     background: str
-    """Slot behind all other slots. Empty cells keep their full size, so that this slot is
-    visible."""
+    """Slot behind all other slots, such as a camera. Empty cells keep their full size, so that this
+    slot is visible."""
 
 
 def _left_hand(page: Tab, right: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
@@ -83,7 +84,7 @@ def mirrored(grid: Layout) -> Layout:
 
 
 def needs_turning(page: Tab, slots: Sequence[str]) -> bool:
-    """Return whether a phone in portrait shows a different layout than the designed one."""
+    """Return whether a phone in portrait shows a layout that differs from the designed layout."""
     base = _placed(page.layouts, _Canvas(slots, "")).get("base")
     is_drawn = "phone_portrait" in page.layouts or "portrait" in page.layouts
     return base is not None and not is_drawn and _cropped(base).columns > PHONE_COLUMNS

@@ -35,8 +35,8 @@ class Nav:
     """Context of ``nav.html.j2``: the navigation bar of the pages around the dashboard."""
 
     current: str
-    """Current page: ``menu``, ``drivers``, ``interfaces``, ``widgets``, ``dev``, or "" for any
-    other page."""
+    """Name of the current page: ``menu``, ``drivers``, ``interfaces``, ``widgets``, ``dev``, or ""
+    for any other page."""
     ways: NavigationLinks
 
 
@@ -67,13 +67,13 @@ class Card:
     """Title of the robot's first interface."""
     rows: tuple[SettingRow, ...]
     missing: tuple[str, ...]
-    """Titles of missing settings, which disable Connect."""
+    """Titles of missing settings; a missing setting disables the button Connect."""
     missing_names: tuple[str, ...]
     """Names of the missing settings, for use on a command line."""
     settings_url: str = ""
     """URL of the robot's settings; "" if the settings are fixed."""
     dev_url: str = ""
-    """URL of the robot's developer page; "" if the robot has none."""
+    """URL of the robot's developer page; "" for a robot without a developer page."""
     is_looked_at: bool = False
     """Whether a live image is available without a connection."""
     fault: str = ""
@@ -105,7 +105,7 @@ def menu_page(
         head: data for the head of the page.
         robots: the robots, by the name in their URL.
         ways: navigation links of this server.
-        drivers: maps a robot's name to its installed package with version.
+        drivers: installed package of each robot with its version, by name of the robot.
         broken: robots that cannot be used, by name.
     """
     cards = [

@@ -70,7 +70,7 @@ def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -
 def _moves(command: Command, given: OutputBinding) -> bool:
     """Return whether the command with these fixed arguments always starts autonomous motion.
 
-    If that depends on a value chosen by the operator, the server checks the value.
+    If the motion depends on a value that the operator chooses, the server checks the value.
     """
     condition = command.moves_if
     is_told = condition is None or condition.names <= given.fixed.keys()
@@ -78,7 +78,7 @@ def _moves(command: Command, given: OutputBinding) -> bool:
 
 
 def _arguments(command: Command | None, given: OutputBinding) -> dict[str, dict[str, object]]:
-    """Return the arguments that are not fixed, by name."""
+    """Return the arguments without a fixed value, by name."""
     found: dict[str, dict[str, object]] = {}
     for name, one in (command.arguments if command is not None else {}).items():
         if name not in given.fixed:
@@ -98,7 +98,7 @@ def _arguments(command: Command | None, given: OutputBinding) -> dict[str, dict[
 
 
 def asked_before(command: Command | None) -> list[dict[str, object]]:
-    """Return the confirmations of a command, and of single values of its arguments."""
+    """Return the confirmations that a command, or a single value of an argument, requires."""
     if command is None:
         return []
     asked = [] if command.confirm is None else [("", "", command.confirm)]
@@ -124,7 +124,7 @@ def motion_lines(driver: Driver) -> list[str]:
 
 
 def _line(command: Command | None, driver: Driver) -> str:
-    """Return the transport whose loss disables the command; "" if no loss does."""
+    """Return the transport whose loss disables the command; "" for no such transport."""
     line = command.transport if command else ""
     spec = driver.transports.get(line)
     # A transport that opens on demand is only opened again by the next command. A lost one must
@@ -140,7 +140,7 @@ def _line(command: Command | None, driver: Driver) -> str:
 def _ranges(
     command: Command | None, port: WidgetPort, given: OutputBinding
 ) -> dict[str, dict[str, object]]:
-    """Return minimum, maximum and rest value of each argument that a deflection controls."""
+    """Return minimum, maximum and rest value of each argument set by a stick or slider."""
     if command is None:
         return {}
     found: dict[str, dict[str, object]] = {}
@@ -177,7 +177,7 @@ def _release_of(command: Command) -> Mapping[str, Reading]:
 
 
 def mark(text: str) -> str:
-    """Return `text`, marked for the catalogues; the page translates the text."""
+    """Return `text`. The call marks the text for the catalogues; the page translates the text."""
     return text
 
 

@@ -76,9 +76,10 @@ class RobotPage:
     number: int
     """Number of the open page, from 0."""
     is_turned: bool
-    """Whether a phone shows the layout as designed only in landscape."""
+    """Whether a phone shows the designed layout only in landscape."""
     is_part: bool
-    """Whether ``interfaces.js`` sent the request; the script uses only the grid and its style."""
+    """Whether the script ``interfaces.js`` sent the request; this script uses only the grid and the
+    style of the grid."""
     debug: DebugPart | None
     """Content of the debug interface, in place of a grid; None for other interfaces."""
     cells: tuple[Cell, ...]
@@ -94,7 +95,7 @@ class RobotPage:
 
 @dataclass(frozen=True, slots=True)
 class ErrorPage:
-    """Context of ``error.html.j2``: one sentence, and a link back."""
+    """Context of ``error.html.j2``: a message of one sentence, and a link back."""
 
     head: PageHead
     status: int
@@ -128,7 +129,7 @@ def robot_page(
         wire: path of the developer page; "" if the visitor may not use it.
         playback: path of the playback's state; "" without a playback.
         is_part: whether an open page requests this page to replace its interface.
-        trust: tells third-party widgets from trusted ones.
+        trust: distinguishes third-party widgets from trusted widgets.
     """
     uses = _uses(profile, interface)
     slots = tuple(uses)

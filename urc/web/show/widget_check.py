@@ -1,7 +1,7 @@
 """The checks of a widget's template, module and demo, for `urc validate` and the pages.
 
-Layer 5. Each file is checked exactly as the dashboard loads it. The module is only searched as
-text, because this check runs no JavaScript.
+Layer 5. Each file is checked exactly as the dashboard loads it. The check runs no JavaScript, and
+only searches the text of the module.
 """
 
 import re
@@ -179,7 +179,7 @@ def _asked(tree: nodes.Template) -> set[int]:
 
 
 def _key(node: nodes.Getattr | nodes.Getitem) -> str:
-    """Return the key of a look-up; "" for a computed key."""
+    """Return the key of a look-up in a template; "" for a computed key."""
     if isinstance(node, nodes.Getattr):
         return node.attr
     key = node.arg.value if isinstance(node.arg, nodes.Const) else ""

@@ -1,1 +1,1 @@
-"""Message types of the dashboard's sockets, without behaviour."""
+"""Message types of the dashboard's sockets, without any logic."""

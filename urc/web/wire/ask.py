@@ -1,6 +1,7 @@
-"""Message types for questions and sequences, without behaviour.
+"""Message types for questions and sequences, without any logic.
 
-Layer 5. Part of `urc.web.wire.messages`, which documents the direction of each message.
+Layer 5. These types are part of `urc.web.wire.messages`, which documents the direction of each
+message.
 """
 
 from typing import Literal
@@ -27,7 +28,7 @@ class _Ask(Outbound, tag="ask", omit_defaults=False, frozen=True):
     n: int
     """Number of the question."""
     id: int
-    """Number of the command on the page that asks; 0 on other pages."""
+    """Number of the command on the asking page; 0 in messages to other pages."""
     who: str
     command: str
     text: str
@@ -58,7 +59,7 @@ class _AllProgress(Outbound, tag="progress", omit_defaults=False, frozen=True):
 
 
 class Approval(msgspec.Struct, tag_field="t", tag="agree", forbid_unknown_fields=True, frozen=True):
-    """The answer to question `n`; a no from the asking page withdraws the question."""
+    """The answer to question `n`; False from the asking page withdraws the question."""
 
     n: int
     yes: bool
@@ -72,13 +73,13 @@ Arguments = dict[str, bool | int | float | str | tuple[_Scalar, ...] | None]
 class ApprovalRequest(
     msgspec.Struct, tag_field="t", tag="prepare", forbid_unknown_fields=True, frozen=True
 ):
-    """The operator's confirmation of one command with its arguments; requests a `token`."""
+    """The operator's confirmation of one command with its arguments; the reply is a `token`."""
 
     id: int
     command: str
     arguments: Arguments = {}
     stops: int | None = None
-    """Number of STOPs that the page knew; only the number in `CommandRequest` is checked."""
+    """Number of STOPs that the page knew. The server checks only the number in `CommandRequest`."""
 
 
 class SequenceAction(
@@ -99,7 +100,7 @@ def encode_ask(
     level: Literal["normal", "hazardous"],
     left_s: float,
 ) -> str:
-    """Return a question to the second person; the first person's page also gets it."""
+    """Return a question to the second person; the page of the first person gets a copy."""
     return encoded(_Ask(number, run, who, command, cut(text), level, milliseconds(left_s)))
 
 

@@ -1,4 +1,4 @@
-"""Message types for the controls, without behaviour.
+"""Message types for the controls, without any logic.
 
 Layer 5. Part of `urc.web.wire.messages`, which documents the direction of each message.
 """
@@ -55,7 +55,7 @@ class _Lease(Outbound, tag="lease", omit_defaults=False, frozen=True):
     drives: bool
     """Whether the page may drive."""
     forces: bool
-    """Whether the page may take the controls from another page."""
+    """Whether the page may take the lease from another page without its consent."""
     spare: str
     """Secret key for the redundant socket of the page; "" for watchers."""
 
@@ -79,7 +79,7 @@ Verb = Literal["take", "ask", "yes", "no", "force", "leave", "reset"]
 
 
 class Drive(msgspec.Struct, tag_field="t", tag="drive", forbid_unknown_fields=True, frozen=True):
-    """A request about the controls; `for_s` is the holder's time to answer, in seconds."""
+    """A request about the lease; `for_s` is the time for the holder's answer, in seconds."""
 
     verb: Verb
     for_s: float = REQUEST_S
@@ -98,14 +98,17 @@ class Tick(msgspec.Struct, tag_field="t", tag="tick", forbid_unknown_fields=True
 class Release(
     msgspec.Struct, tag_field="t", tag="release", forbid_unknown_fields=True, frozen=True
 ):
-    """The release of a held control, numbered with the ticks; 0 without redundant socket."""
+    """The release of a held control.
+
+    Releases and ticks share one count; without a redundant socket, the number is 0.
+    """
 
     command: str
     number: int = 0
 
 
 class Stop(msgspec.Struct, tag_field="t", tag="stop", forbid_unknown_fields=True, frozen=True):
-    """A press of STOP; `number` as in `Release`."""
+    """A press of STOP, with a number as in `Release`."""
 
     number: int = 0
 
@@ -119,7 +122,7 @@ _TICK_OF = b'{"t":"tick","command":"'
 
 
 def command_of(data: bytes) -> str:
-    """Return the command of a tick from its first bytes; "" if these bytes do not contain it."""
+    """Return the command of a tick, read from its first bytes; "" if they do not contain it."""
     end = data.find(b'"', len(_TICK_OF)) if data.startswith(_TICK_OF) else -1
     return data[len(_TICK_OF) : end].decode("ascii", "replace") if end > 0 else ""
 

@@ -1,4 +1,4 @@
-"""Message types of a dashboard's WebSocket, without behaviour.
+"""Message types of a dashboard's WebSocket, without any logic.
 
 Layer 5. Messages are JSON text in both directions. Times are in milliseconds on the server's
 monotonic clock; ages are in milliseconds at the moment of encoding. Values are sent as arrays of
@@ -89,7 +89,7 @@ CLOSE_FULL = 4503
 
 
 class BadMessage(Exception):
-    """The error for an invalid message from a page; its text names the expected form."""
+    """The error for an invalid message from a page; the error text names the expected form."""
 
 
 class _Signal(msgspec.Struct, omit_defaults=True, frozen=True):
@@ -107,7 +107,7 @@ class _Signal(msgspec.Struct, omit_defaults=True, frozen=True):
     """Transports that supply readings of the signal; if none of them is connected, the value is
     stale immediately."""
     axes: str = ""
-    """Direction of the signal's axes; "" if unknown."""
+    """Axis convention of the signal; "" if unknown."""
 
 
 class _Hello(Outbound, tag="hello", omit_defaults=False, frozen=True):
@@ -126,7 +126,7 @@ class _Values(Outbound, tag="v", frozen=True):
     i: msgspec.Raw
     v: Sequence[object]
     a: int | Sequence[int]
-    """Ages in milliseconds; a single number if all ages are equal."""
+    """Ages of the values in milliseconds; a single number if all ages are equal."""
     s: Sequence[str] | None = None
     e: Mapping[int, int] | None = None
 
@@ -154,7 +154,7 @@ class _Line(msgspec.Struct, frozen=True):
 
 class _Log(Outbound, tag="log", omit_defaults=False, frozen=True):
     first: int
-    """Number of the first line within the session, from 0."""
+    """Number of the first line of the log within the session, from 0."""
     lines: list[_Line]
 
 
@@ -179,7 +179,7 @@ class _Error(Outbound, tag="error", frozen=True):
 
 
 class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True, frozen=True):
-    """A request for a `pong` with the same `c`, which is the page's clock in milliseconds."""
+    """A request for a `pong` with the same `c`, the page's time in milliseconds."""
 
     c: float
 
@@ -187,7 +187,7 @@ class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True
 class CommandRequest(
     msgspec.Struct, tag_field="t", tag="run", forbid_unknown_fields=True, frozen=True
 ):
-    """One command. The page chooses `id`; exactly one reply has this `id`."""
+    """One command. The page chooses `id`, and exactly one reply contains the same `id`."""
 
     id: int
     command: str
@@ -276,7 +276,7 @@ class Indexes:
 def encode_values(
     samples: Iterable[Sample], indexes: Indexes, now_s: float, firsts: Mapping[str, int] = NOTHING
 ) -> bytes:
-    """Return one frame of readings; `firsts` maps a signal to the number of its first reading."""
+    """Return one frame of readings; `firsts` has the number of each signal's first reading."""
     values: Sequence[object]
     names, values, times, alarms = zip(*samples, strict=True)
     count, first_s = len(names), times[0]
@@ -348,7 +348,7 @@ def encode_error(code: str, message: str) -> str:
 
 
 def _plain(value: object) -> object:
-    """Return the value in a form that browsers can represent; replace bytes by their number."""
+    """Return the value in a form that browsers can represent, with sizes in place of bytes."""
     if isinstance(value, str):
         return cut(value)
     if type(value) is int and not -_EXACT <= value <= _EXACT:
@@ -401,7 +401,7 @@ def _sources(driver: Driver) -> dict[str, tuple[str, ...]]:
 
 
 def _add_sources(name: str, driver: Driver, found: dict[str, dict[str, None]]) -> dict[str, None]:
-    """Return the transports of a signal; a computed signal has the transports of its inputs."""
+    """Return the transports that supply a signal; a computed signal uses its inputs' transports."""
     signal = driver.signals.get(name)
     if signal is not None and signal.formula is not None and name not in found:
         found[name] = {}

@@ -24,8 +24,8 @@ _HEADER = struct.Struct(">BBHId")
 _OLDEST_MS = 2**32 - 1
 _FINAL_TEXT, _FINAL_BINARY = b"\x81", b"\x82"
 _SHORT, _MEDIUM = 126, 1 << 16
-"""Frame lengths below the first limit take one byte, lengths below the second limit three bytes,
-and others nine bytes."""
+"""Frame lengths below `_SHORT` take one byte, lengths below `_MEDIUM` take three bytes, and all
+other lengths take nine bytes."""
 
 
 class ImageSelection(

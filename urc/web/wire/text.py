@@ -16,7 +16,7 @@ __all__ = [
 ]
 
 TEXT_CHARACTERS = 4096
-"""Maximum length of a text value in characters; a longer text is cut and ends in an ellipsis."""
+"""Maximum length of a text value, in characters; a longer text is cut, and an ellipsis is added."""
 
 _encode = msgspec.json.Encoder().encode
 
