@@ -7,8 +7,9 @@ guard receives the list of transports, a pending stop for each command that may 
 terms of all other armed commands. For each pending stop, the guard opens the connection and writes
 the stop first. Motion never resumes automatically.
 
-A control *may be moving* from its first tick or stop request until the guard reports that the stop
-after the newest tick was written. A pending stop is therefore not lost when the guard process dies.
+A control *may be moving* from its first tick or stop request. This state ends when the guard
+reports that the stop after the newest tick was written. A pending stop is therefore not lost when
+the guard process dies.
 """
 
 import asyncio
