@@ -156,10 +156,7 @@ def _flush(code: int) -> int:
 
 
 def _discard_output() -> None:
-    """Discard pending output.
-
-    Python would otherwise retry the failed write and print an error at exit.
-    """
+    """Discard pending output, so that Python does not retry the failed write at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

@@ -2,10 +2,10 @@
 
     DIR/drivers/puppet/package.yaml …     source of a package, edited by the maintainer
     DIR/archives/drivers/puppet/1.0.0.zip every version that was ever listed
-    DIR/archives/drivers/puppet/1.0.0.sig its signature, if any
-    DIR/archives/drivers/puppet/1.0.0.json its origin, and whether it is withdrawn
+    DIR/archives/drivers/puppet/1.0.0.sig signature of the archive, if any
+    DIR/archives/drivers/puppet/1.0.0.json origin and withdrawal of the version
     DIR/index.json                        all versions, with a number that grows with each change
-    DIR/index/head.json                   its number and digest, signed by the maintainer
+    DIR/index/head.json                   number and digest of the index, signed by the maintainer
     DIR/drivers/puppet/urcpm.json         the package's description in the form of the URC thesis
 
 Only files in the index are served.

@@ -57,7 +57,7 @@ class DeclaredChecksum(NamedTuple):
     closes: bool
     before: bytes
     trailer: "DeclaredTrailer | None" = None
-    """Position after a text; None for a fixed position."""
+    """Position of the checksum after a text; None for a fixed position."""
 
     @property
     def size(self) -> int:

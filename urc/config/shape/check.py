@@ -42,8 +42,9 @@ def check_shape(document: Document) -> list[Problem]:
 def check_source(document: Document) -> list[Problem]:
     """Check one source of a merged document for problems that the merge would hide.
 
-    The merge may remove unknown keys, and keys that only the source may have. Missing keys are not
-    reported, because another source may add them. The shape pass also checks the merged document.
+    The merge may remove unknown keys, and keys that are allowed only in the source. Missing keys
+    are not reported, because another source may add them. The shape pass also checks the merged
+    document.
     """
     if not kind_of(document):
         return [_without_kind(document)]
