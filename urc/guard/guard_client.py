@@ -4,8 +4,8 @@ Theory of operation. The guard's state is lost when the guard process dies. The 
 keeps a table of all held commands that were armed or stopped. Each entry stores the terms of the
 command, and whether the command may be moving. A new guard is initialised from this table. The new
 guard receives the list of transports, a pending stop for each command that may be moving, and the
-terms of all other armed commands. For each pending stop, the guard opens the connection and writes
-the stop first. Motion never resumes automatically.
+terms of other armed commands. For each pending stop, the guard opens the connection and writes the
+stop first. Motion never resumes automatically.
 
 A control *may be moving* from its first tick or stop request. This state ends when the guard
 reports that the stop after the newest tick was written. A pending stop is therefore not lost when
