@@ -1,7 +1,7 @@
 """URC: describe a robot in one YAML file, and drive the robot from any browser.
 
-This module contains only the public Python names. Other modules are imported on first use, because
-``urc --version`` must not load a web server.
+The package `urc` itself exports only the public names for Python programs. Other modules are
+imported on first use, because ``urc --version`` must not load a web server.
 """
 
 TYPE_CHECKING = False  # for type checkers; importing `typing` would slow down --version

@@ -1,8 +1,8 @@
 """Addresses of this machine's network interfaces, determined without sending a packet.
 
 Name servers and the host name are unreliable: on many machines, the host name resolves only to
-127.0.1.1. Linux, macOS and the BSDs have getifaddrs in the C library. On other systems, the routing
-table determines the source address of an outgoing packet.
+127.0.1.1. Linux, macOS and the BSDs have getifaddrs in the C library. On systems without
+getifaddrs, the routing table determines the source address of an outgoing packet.
 """
 
 import ctypes
@@ -33,7 +33,7 @@ class _Interface(ctypes.Structure):
 
 
 def local_addresses() -> tuple[Address, ...]:
-    """Return the addresses for reaching this machine from the network, IPv4 first.
+    """Return the addresses at which other machines can reach this machine, IPv4 first.
 
     Loopback and link-local IPv6 addresses are excluded, because browsers cannot open them.
     """
@@ -46,7 +46,8 @@ def local_addresses() -> tuple[Address, ...]:
 def is_of_this_machine(address: Address) -> bool:
     """Return whether `address` belongs to an interface of this machine.
 
-    The address of a router or container host that forwards packets to this machine does not count.
+    The result is False for the address of a router or container host that forwards packets to this
+    machine.
     """
     plain = unmapped(address)
     return plain.is_loopback or plain.is_unspecified or plain in _all()

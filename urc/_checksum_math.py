@@ -1,7 +1,7 @@
 """Checksum algorithms: parameters, and functions that compute checksums of bytes.
 
-CRCs are computed by `anycrc`, except for two CRCs in `zlib` and `binascii`. A sum checksum or fold
-checksum takes a single call of a C function.
+`anycrc` computes all CRCs, except for the CRCs that `zlib` and `binascii` provide. A sum checksum
+or fold checksum takes a single call of a C function.
 """
 
 import binascii

@@ -12,7 +12,8 @@ def data_folder(environ: Mapping[str, str] = os.environ) -> Path:
     """Return the data folder of URC, which may not exist yet.
 
     ``URC_DATA_DIR`` overrides the system's default. The default is in ``XDG_DATA_HOME`` or
-    ``~/.local/share``, in ``~/Library/Application Support``, or in ``LOCALAPPDATA``.
+    ``~/.local/share`` on Linux, in ``~/Library/Application Support`` on macOS, and in
+    ``LOCALAPPDATA`` on Windows.
     """
     if named := environ.get("URC_DATA_DIR"):
         return Path(named).expanduser()

@@ -13,7 +13,7 @@ from urc.problems import printable
 __all__ = ["quoted", "spelt"]
 
 _ENDS = {"\n": "\\n", "\r": "\\r", "\t": "\\t"}
-"""Escape sequences of control characters with a short escape."""
+"""Short escape sequences of line feed, carriage return and tab, by character."""
 
 
 def spelt(value: object) -> str:

@@ -45,11 +45,11 @@ class Mark:
 
 
 class UnfilledText(NamedTuple):
-    """The original of a text in which names were substituted."""
+    """The original text of a value, before names were substituted."""
 
     text: str
     edits: tuple[tuple[int, int, int], ...]
-    """Start offset, length and replacement length of each name."""
+    """Substituted names: start offset, length, and length of the replacement."""
 
     def offset(self, offset: int) -> int:
         """Return the offset in the original text that corresponds to `offset` in the final text."""

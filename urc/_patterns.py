@@ -2,17 +2,17 @@ r"""Regular expressions of documents, with matching in linear time.
 
 Only `urc.patterns` and `urc.filters.lists` use this module. The dialect of all patterns is RE2,
 without look-around and back-references. In RE2, ``$`` matches only the end of the text, and ``\d``
-only ASCII digits. Patterns that `_is_linear` proves linear run on `re`, which is ten times faster
-for short lines. Other patterns run on RE2, or are refused if RE2 is not installed.
+only ASCII digits. A pattern runs on `re` if `_is_linear` proves linear time, because `re` is ten
+times faster for short lines. Other patterns run on RE2, or are refused if RE2 is not installed.
 
 Theory of operation: backtracking takes more than linear time only if two parts of a pattern can
 match the same characters in many ways. A proven pattern must therefore have a start anchor, and
 alternatives with different first characters. Every repeat must match a single set of characters,
 without any character that may follow the repeat.
 
-The run time of RE2 is proportional to the size of the text and to the size of the program, with
-expanded ``{n}``. The size of an unproven pattern is therefore limited. This module computes the
-size from the source, so the result does not depend on RE2.
+The run time of RE2 is proportional to the size of the text and to the size of the program. In the
+program, every repeat ``{n}`` is expanded. The size of an unproven pattern is therefore limited.
+This module computes the size from the source, so the result does not depend on RE2.
 """
 
 import re
@@ -44,8 +44,8 @@ The pattern ``\\$[^\\r\\n]{1,80}\\r\\n`` for an NMEA 0183 sentence has size 802.
 within the limit takes about half a second for a frame of 64 KiB.
 """
 _RE2_BYTES: Final = 4 << 20
-"""Memory limit of RE2 for one pattern. With only 1 MiB, RE2 is a hundred times slower for repeats
-of optional parts."""
+"""Memory limit of RE2 for one pattern, in bytes. With only 1 MiB, RE2 is a hundred times slower for
+repeats of optional parts."""
 _BEYOND_ASCII: Final = 6
 """Number of RE2 instructions for the set of all non-ASCII characters, which RE2 matches byte by
 byte."""
@@ -306,7 +306,7 @@ def _check_dialect(tree: Any, text: str) -> None:
 
 
 def _parts(operation: Any, argument: Any) -> list[Any]:
-    """Return the sequences directly inside one node."""
+    """Return the syntax trees of the direct parts of one node."""
     if operation is _constants.SUBPATTERN:
         return [argument[3]]
     if operation in (_constants.MAX_REPEAT, _constants.MIN_REPEAT):
@@ -320,7 +320,7 @@ def cost_of(source: str) -> int:
 
 
 def _cost(tree: Any, beyond: int = _BEYOND_ASCII) -> int:
-    """Return the size of the RE2 program; `beyond` is the size of all non-ASCII characters."""
+    """Return the size of the RE2 program; `beyond` is the size for all non-ASCII characters."""
     return sum(_cost_of_item(operation, argument, beyond) for operation, argument in tree)
 
 
@@ -364,7 +364,7 @@ def _re2_search(text: str) -> Any:
 
 
 class _NotProven(Exception):
-    """A part of a pattern without proof of linear time; the part may still be harmless."""
+    """The pattern has no proof of linear time, but may still match in linear time."""
 
 
 def _is_linear(tree: Any, text: str) -> bool:

@@ -18,7 +18,7 @@ class Phrase(str):
     """English text with a placeholder ``{name}`` for each of `names`."""
     names: Mapping[str, str]
     pieces: tuple[str, ...]
-    """Parts of a joined phrase; `text` is then empty."""
+    """Parts of a joined phrase; a joined phrase has an empty `text`."""
     between: str
 
 

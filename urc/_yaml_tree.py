@@ -1,7 +1,7 @@
 """Conversion of YAML events into plain data and a parallel tree of marks.
 
 Private to `urc.source`. The reader processes the events of the YAML parser directly, without the
-library's composer. Nesting and aliases are therefore limited *during* reading, so a document with
+library's composer. Nesting and aliases are limited *during* reading, so a document with
 exponentially many aliases is rejected early. Every key and value has a position, and scalars follow
 the core schema of YAML 1.2.
 """

@@ -1,8 +1,8 @@
 """Templates and expressions in documents: a subset of Jinja, compiled to Python functions.
 
 `urc._grammar` defines the supported subset. Expressions are a sandbox: no attributes of Python
-objects, no loops, and no operator that turns a short text into a very long text. Filters of
-`urc.filters.table` are the only functions. Literal text is preserved exactly, whereas Jinja
+objects, no loops, and no operator that turns a short text into a very long text. Expressions can
+call only the filters of `urc.filters.table`. Literal text is preserved exactly, whereas Jinja
 converts CR to LF and drops a final newline. URC raises errors that Jinja hides (in Jinja, ``'abc' |
 int`` is 0), because a wrong reading must not become zero.
 

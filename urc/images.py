@@ -22,7 +22,7 @@ _SIGNS: Final = (
     (b"BM", "image/bmp"),
 )
 _SIZE_MARKERS: Final = frozenset((*range(0xC0, 0xD0),)) - {0xC4, 0xC8, 0xCC}
-"""JPEG start-of-frame markers (SOF), without the three markers for tables and an extension."""
+"""JPEG start-of-frame markers (SOF): all markers 0xC0 to 0xCF except for DHT, JPG and DAC."""
 _ALONE: Final = frozenset((0x01, *range(0xD0, 0xD9)))
 """JPEG markers without a length field."""
 

@@ -34,7 +34,7 @@ _IN_JSON = {code: f"\\u{code:04x}" for code in (*_CONTROLS[0x20:], *_MARKS, *_HA
 class UrcError(Exception):
     """An expected error, with a one-line message for people.
 
-    Any exception of another class is a bug in URC.
+    An exception that is not a `UrcError` is a bug in URC.
     """
 
 

@@ -1,7 +1,7 @@
 """Conversion of YAML text into a `Document`: plain data with the position of every value.
 
 This module is independent of robots. All errors are raised as `ProblemsError` with the position and
-a hint. Time and memory are bounded for any content.
+a hint. Reading takes bounded time and memory for any content.
 """
 
 import re

@@ -1,4 +1,4 @@
-"""Axis conventions, and the conversion of values between them.
+"""Axis conventions, and the conversion of values between two conventions.
 
 Arithmetic only. Body axes are FLU (x forward, y left, z up; REP-103) and FRD (x forward, y right, z
 down). World axes are ENU (east, north, up) and NED (north, east, down). A bearing is a clockwise
@@ -65,8 +65,8 @@ def turn_angle(
 
     Args:
         angle: angle, angular rate or heading to convert, in `unit`.
-        here: current axes; ENU, NED or bearing for a heading.
-        there: target axes.
+        here: current axis convention of `angle`; ENU, NED or bearing for a heading.
+        there: target axis convention.
         about: rotation axis for body axes: ``x`` (roll), ``y`` (pitch) or ``z`` (yaw).
         unit: ``rad``, ``deg`` or ``°``; needed for headings, because headings wrap at a full turn.
     """

@@ -33,7 +33,8 @@ __all__ = [
 
 FRAME_NAMES: Final = frozenset(("_size", "_left"))
 """Names that expressions of a struct can use in addition to its items. `_size` is the size of the
-whole frame in bytes. `_left` is the number of bytes from the start of the item to the end."""
+whole frame in bytes. `_left` is the number of bytes from the start of the item to the end of the
+frame."""
 OUTER_NAMES: Final = frozenset(("settings", COUNTERS))
 """Names that expressions inside a named type may use in addition to the items of the type."""
 WORDS_OF_TYPES: Final = ("bytes", "text")
@@ -61,7 +62,7 @@ class Item(NamedTuple):
     id: str = ""
     """Name of the field or argument; "" for a nameless item."""
     number: Number = Number("integer", 8)
-    """Type of a ``number``, or of the container of ``bits``."""
+    """Number type of a ``number``, or of the number that contains the ``bits``."""
     size: Extent | None = None
     """Size of bytes, text, padding or a struct's window; None: unlimited."""
     times: Extent | None = None
@@ -70,7 +71,7 @@ class Item(NamedTuple):
     condition: Template | None = None
     """Condition under which the item is present; None: always present."""
     const: int | float | bool | bytes | None = None
-    """Required raw value; a frame with a different value does not match. With None, any value
+    """Required raw value; a frame with a different value does not match. None: any value
     matches."""
     scale: float = 1
     offset: float = 0
@@ -210,7 +211,7 @@ def _least(item: Item) -> int:
 
 
 def derived_sizes(items: tuple[Item, ...]) -> Mapping[str, Template]:
-    """Return the formulas for sizes and counts, by the name of the item that contains the number.
+    """Return the formulas for sizes and counts, by name of the item with the size or count.
 
     URC computes sizes and counts from the data to send.
     """

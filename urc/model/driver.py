@@ -83,9 +83,9 @@ class TransportSpec(NamedTuple):
     queue: Queue = Queue()
     keepalive: Keepalive | None = None
     on_connect: tuple[Step, ...] = ()
-    """Steps that prepare a new connection; other requests wait for the last step."""
+    """Steps that prepare a new connection; other requests wait until all steps are complete."""
     on_close: tuple[Step, ...] = ()
-    """Steps before the connection is closed in an orderly way."""
+    """Steps that run before an orderly close of the connection."""
     stale_after_s: float | None = None
     """Time without received data before the connection is stale, in seconds; None: never."""
     tunnel: str = ""
@@ -205,8 +205,8 @@ class Command(NamedTuple):
     """Delays before the retries."""
     hold: Hold | None = None
     moves: bool = False
-    """Whether the command starts autonomous motion. A sequence with a held command, or with a
-    command that starts autonomous motion, also counts."""
+    """Whether the command starts autonomous motion. The value is also true for a sequence with a
+    held command, or with a command that starts autonomous motion."""
     moves_if: Template | None = None
     """Condition over the arguments for autonomous motion; None: every call moves if `moves` is
     true."""
@@ -220,7 +220,7 @@ class Command(NamedTuple):
     is the first transport of the steps."""
 
     def moves_with(self, arguments: Mapping[str, object]) -> bool:
-        """Return whether these arguments start motion; True when `moves_if` cannot be evaluated."""
+        """Return whether `arguments` start motion; True if `moves_if` cannot be evaluated."""
         if self.moves_if is None or not self.moves:
             return self.moves
         defaults = {name: one.default for name, one in self.arguments.items()}

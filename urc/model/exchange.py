@@ -110,7 +110,7 @@ class Hold(NamedTuple):
     setpoint. The value ``inf`` means that the robot has no watchdog, and None that the watchdog is
     unknown. Only rules of the loader use the watchdog timeout."""
     slew: Mapping[str, float] = NOTHING
-    """Maximum increase per second away from the stop value, by argument."""
+    """Maximum change per second in the direction away from the stop value, by argument."""
     on_stall: Literal["abort", "wait"] | None = None
     """Reaction to a stalled connection during motion; None: the default of the transport."""
     step_s: float | None = None

@@ -1,7 +1,7 @@
 """Layout of a frame: constant bytes, length field, checksum, and the position of the payload.
 
-The loader resolves every default. A position of 0 or more counts from the first byte of the frame.
-A negative position counts back from the end of the frame.
+The loader fills in every default value. A position of 0 or more counts from the first byte of the
+frame. A negative position counts back from the end of the frame.
 """
 
 from collections.abc import Mapping
@@ -51,8 +51,8 @@ class Salt(NamedTuple):
     table: Mapping[Any, bytes] = NOTHING
     """Secret bytes, by the number in the frame that selects the secret bytes."""
     otherwise: Literal["fault", "skip", "pass"] = "fault"
-    """Handling of a frame with an unknown number: report and drop (``fault``), drop silently
-    (``skip``), or accept unchecked (``pass``)."""
+    """Handling of a frame with a number that is missing in `table`: report and drop (``fault``),
+    drop silently (``skip``), or accept unchecked (``pass``)."""
 
     def number(self, frame: bytes | bytearray) -> int | None:
         """Return the number that selects the secret bytes; None when the frame is too short."""
@@ -90,7 +90,8 @@ class TrailerSpec(NamedTuple):
     """A checksum after a text of variable length."""
 
     checksum: ChecksumSpec
-    """Checksum parameters. The range refers to the text without the checksum; `at` is unused."""
+    """Checksum parameters. The range refers to the text without the checksum. The attribute `at` is
+    unused."""
     mark: bytes = b""
     """Separator between the text and the checksum."""
     is_padded: bool = True
@@ -144,7 +145,8 @@ class EscapeSpec(NamedTuple):
     """XOR mask for decoding any stuffed byte, because a robot may stuff bytes outside `table`.
     Without an XOR mask, only bytes of `table` may be stuffed."""
     after: bytes = b""
-    """Sequence after which `insert` is stuffed; `byte` and `table` are then unused."""
+    """Sequence after which the byte `insert` is stuffed; with a sequence, `byte` and `table` are
+    unused."""
     insert: int = 0
     is_of_payload: bool = False
     """Whether length field and checksum refer to the stuffed bytes instead of the original
@@ -178,7 +180,7 @@ class FrameLayout(NamedTuple):
 
 
 def spelt_size(bits: int, spelling: Spelling) -> int:
-    """Return the size in the frame of a number with `bits` bits, in bytes."""
+    """Return the size in bytes that a number with `bits` bits has in the frame."""
     size = (bits + 7) // 8
     if spelling == "raw":
         return size

@@ -58,7 +58,7 @@ class Slot(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """A layout: numbers of rows and columns, and the slots."""
+    """A layout: the number of rows, the number of columns, and the slots."""
 
     rows: int
     columns: int

@@ -35,7 +35,7 @@ __all__ = [
 
 
 class Envelope(NamedTuple):
-    """The unit of a transport that carries messages instead of bytes."""
+    """A message on a transport that carries messages instead of bytes."""
 
     verb: str
     """Operation of the envelope. The driver sends ``publish``, ``call``, ``goal``, ``cancel`` and
@@ -49,7 +49,7 @@ class Envelope(NamedTuple):
 
 
 NUMBERED: Final = frozenset(("call", "goal", "request"))
-"""Verbs of requests. The ``response`` to a request has the same ``id``."""
+"""Verbs of requests. The ``response`` to a request has the ``id`` of the request."""
 
 Payload = bytes | Envelope
 """The content of one frame, without its framing."""
@@ -65,7 +65,7 @@ class Count(NamedTuple):
 
 
 class Numbered(NamedTuple):
-    """A frame with counters, valid only while its numbers are the next numbers."""
+    """A frame with counters, valid only until another frame uses the same counters."""
 
     data: Payload
     takes: Count
@@ -133,19 +133,19 @@ class Collect(NamedTuple):
     """Condition for the last frame of a value; None: the first frame of the next value ends the
     previous value."""
     max: int = 4096
-    """Maximum total number of values or bytes."""
+    """Maximum number of elements or bytes of the assembled value."""
 
 
 class ReadSpec(NamedTuple):
     """Rules for decoding a frame into fields."""
 
     form: str
-    """Name of a reader in the readers' table, such as ``regex``."""
+    """Name of a form for reading, such as ``regex``."""
     options: Mapping[str, object] = NOTHING
     fields: tuple[str, ...] = ()
     """Names of all possible fields in frame order, followed by the names in `sets`."""
     conversions: Mapping[str, Conversion] = NOTHING
-    """Conversions for this frame by field, applied before the conversion of the signal."""
+    """Conversions of fields in this frame, by field; the conversion of the signal follows."""
     sets: Mapping[str, Template] = NOTHING
     """Expressions over the converted fields, by signal."""
     when: Template | None = None
@@ -168,7 +168,7 @@ class WriteSpec(NamedTuple):
     """Rules for encoding arguments into a frame."""
 
     form: str
-    """Name of a writer in the writers' table, such as ``text``; ``frames`` contains several
+    """Name of a form for writing, such as ``text``. The form ``frames`` contains several
     specifications."""
     options: Mapping[str, object] = NOTHING
     names: frozenset[str] = frozenset()

@@ -60,7 +60,7 @@ Fed = str | bytes | Envelope
 
 
 def pieces_of(fed: Fed | tuple[Fed, ...]) -> tuple[Fed, ...]:
-    """Return the pieces of the input, which arrive separately."""
+    """Return the pieces of a test input; each piece arrives separately."""
     return (fed,) if isinstance(fed, (str, bytes, Envelope)) else fed
 
 
@@ -84,7 +84,7 @@ class DialogueStep(NamedTuple):
     """One step of a test: at most one action, followed by the expected results."""
 
     line: int = 1
-    """1-based line in the document."""
+    """Line of the step in the document, 1-based."""
     column: int = 1
     """1-based."""
     source: str = ""
@@ -120,7 +120,7 @@ class DocumentTest(NamedTuple):
 
     name: str
     line: int
-    """1-based line in the document."""
+    """Line of the test in the document, 1-based."""
     feed: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
     """Input from the robot, by transport, in one piece or several; see `pieces_of`."""
     reply_to: int | str | None = None
@@ -131,7 +131,8 @@ class DocumentTest(NamedTuple):
     expect: Mapping[str, Expected] = NOTHING
     """Expected values after the test, by signal."""
     sent: Mapping[str, "Fed | tuple[Fed, ...]"] = NOTHING
-    """Exact payload without framing, or all bytes on the wire, by transport."""
+    """Expected output, by transport: the exact payload without framing, or all bytes on the
+    wire."""
     fails: str | None = None
     """Expected failure message; None: the test expects success."""
     file: str = ""
@@ -141,7 +142,7 @@ class DocumentTest(NamedTuple):
     source: str = ""
     """Source line of the test in the document, for error messages."""
     settings: Mapping[str, Value] = NOTHING
-    """Values that differ from the default, by setting."""
+    """Values of settings that differ from their defaults, by setting."""
     steps: tuple[DialogueStep, ...] = ()
     """Steps of the test in order; () for a test without steps."""
     polls: tuple[str, ...] = ()
@@ -199,7 +200,7 @@ class Profile(NamedTuple):
     slots: Mapping[str, WidgetUse] = NOTHING
     """Widgets of the driver by slot; an interface may override a widget."""
     interfaces: Mapping[str, Interface] = NOTHING
-    """Interfaces by name; never empty, because a missing ``default`` is added."""
+    """Interfaces by name; never empty, because the loader adds a missing interface ``default``."""
     widgets: Mapping[str, Widget] = NOTHING
     """All widgets of the profile, by name."""
     tests: tuple[DocumentTest, ...] = ()

@@ -8,9 +8,9 @@ from typing import Final, Literal
 __all__ = ["ROLES", "Role", "includes"]
 
 Role = Literal["watch", "drive", "maintain", "administer"]
-"""The role ``watch`` may read and press STOP. The role ``drive`` may also send commands, drive and
-reset STOP. The role ``maintain`` may also change settings and packages, and take the controls by
-force. The role ``administer`` may also manage people, devices and tokens."""
+"""The role ``watch`` may read all values and press STOP. The role ``drive`` may also send commands,
+drive and reset STOP. The role ``maintain`` may also change settings and packages, and take the
+controls by force. The role ``administer`` may also manage people, devices and tokens."""
 ROLES: Final[tuple[Role, ...]] = ("watch", "drive", "maintain", "administer")
 """All roles, in order of increasing rights."""
 _RANK: Final = {role: rank for rank, role in enumerate(ROLES)}

@@ -1,7 +1,7 @@
 """Units by quantity, and the conversion of values between them. Pure.
 
-The table contains only units that occur in robot documents. Unit symbols follow UCUM, unless the
-UCUM symbol is uncommon. An unknown unit converts only to the same unit.
+The table of units contains only units that occur in robot documents. Unit symbols follow UCUM,
+unless the UCUM symbol is uncommon. A value in an unknown unit converts only to the same unit.
 """
 
 import math

@@ -1,8 +1,8 @@
 """Signals (named, typed values of a robot) and their samples.
 
 All values in `urc.model` are named tuples. Named tuples are as immutable and typed as frozen
-dataclasses. Defining a named tuple takes a tenth of the time of a dataclass, and constructing an
-instance takes a third. The definition time matters at every start of the command line, and the
+dataclasses. Compared to a dataclass, a named tuple takes a tenth of the time to define, and a third
+of the time to construct. The definition time matters at every start of the command line, and the
 construction time at every sample.
 """
 

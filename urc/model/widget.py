@@ -52,12 +52,12 @@ class Widget(NamedTuple):
     options: Mapping[str, object] = NOTHING
     """JSON Schema ``properties`` of the widget's options."""
     at_least_one_of: tuple[str, ...] = ()
-    """Group of inputs, outputs and options; at least one is required. The default () means no
-    requirement."""
+    """Group of inputs, outputs and options; at least one is required. An empty group requires
+    nothing."""
     required_together: tuple[tuple[str, ...], ...] = ()
     """Groups of inputs or outputs that work only when all members of the group are bound."""
     min_cells: tuple[int, int] = (1, 1)
-    """Minimum numbers of columns and rows."""
+    """Minimum number of columns and minimum number of rows of the slot."""
     is_dead_man: bool = False
     """Whether the widget is a dead-man control; no motion is sent while a dead-man control is
     released."""

@@ -112,7 +112,7 @@ class PlanSpec(NamedTuple):
     walls: tuple[Wall, ...] = ()
     boxes: tuple[Box, ...] = ()
     holes: tuple[Box, ...] = ()
-    """Areas without ground; height and colour are unused."""
+    """Areas without ground; the height and the colour of each box are unused."""
     ground: Literal["floor", "grass", "water"] = "floor"
 
 
@@ -165,7 +165,7 @@ class LaserSpec(NamedTuple):
     first: float = -pi
     """Direction of the first ray, in radians."""
     last: float = pi
-    """End of the field of view, one step after the last ray; the rays are evenly spaced."""
+    """End of the field of view, in radians: one step after the last of the evenly spaced rays."""
     max: float = 8.0
     """Maximum range of the laser scanner, in metres."""
     noise: float = 0.01
@@ -227,7 +227,7 @@ class WorldSpec(NamedTuple):
     map: PlanSpec | None = None
     """Surroundings of the robot; None: the default room."""
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Initial x, y and direction of the robot."""
+    """Initial x and y of the robot, in metres, and its initial direction, in radians."""
     datum: tuple[float, float, float] = (46.5191, 6.5668, 400.0)
     """Latitude and longitude in degrees, and altitude in metres, of the origin x = y = 0."""
     seed: int = 1

@@ -1,8 +1,8 @@
 """The engine: the synchronous state machine of one driver.
 
-The engine is pure: no I/O, no clock, no callbacks, no tasks. The owner of a transport reports timed
-events, and executes the returned events. Live robots, document tests, playback and the simulator
-share this engine.
+The engine is pure: no I/O, no clock, no callbacks, no tasks. The owner of a transport passes
+received data and the time to the engine, and executes the events that the engine returns. Live
+robots, document tests, playback and the simulator share this engine.
 
     events = engine.start("wire", now)            # the transport is connected
     events = engine.receive("wire", data, now)    # bytes were received
@@ -225,7 +225,7 @@ class Engine:
         return told + self._submit_polls(now)
 
     def latch(self, reason: str, now: float) -> list[Event]:
-        """Stop every sequence, and refuse autonomous motion until the reason is "".
+        """Stop every sequence and refuse autonomous motion; `reason` "" allows motion again.
 
         Login sequences continue, because a stop can reach the robot only after the login.
         """

@@ -1,4 +1,4 @@
-"""Input and output events of an engine, its only external interface."""
+"""Input and output events of an engine: the only external interface of the engine."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -77,7 +77,7 @@ class Samples(NamedTuple):
 
 
 class Replied(NamedTuple):
-    """The request has succeeded; `values` has the reply fields by name."""
+    """The request has succeeded; `values` contains the reply fields, by name."""
 
     id: int
     command: str
@@ -97,7 +97,7 @@ class Failed(NamedTuple):
 
 
 class Violation(NamedTuple):
-    """A protocol violation by the robot, which is counted and shown but never raised."""
+    """A protocol violation by the robot, which is counted and shown but is not an exception."""
 
     transport: str
     code: str

@@ -58,7 +58,7 @@ class MotionEncoder:
         lines: Mapping[str, Conversation],
         known: SignalState,
     ) -> None:
-        """Initialise the encoder with tables of the engine, without copying the tables."""
+        """Initialise the encoder with mappings of the engine, which are shared and not copied."""
         self._held = {name: one for name, one in commands.items() if one.hold is not None}
         self._ways = {
             name: _Way(one, checks[name], asks[name], lines[one.transport])
@@ -85,7 +85,8 @@ class MotionEncoder:
         """Share the counters with the sender of motion, which must confirm the transmitted numbers.
 
         Args:
-            repeating: connections that repeat a stop, because a frame may be lost.
+            repeating: connections on which every stop is sent several times, because frames may be
+                lost.
         """
         for line, controls in self._counting.items():
             self._lines[line].counters.is_shared = True

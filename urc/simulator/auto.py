@@ -56,7 +56,7 @@ _FASTEST_S: Final = 0.1
 
 
 class Unanswered(Exception):
-    """Raised if no reply can be built for a declared request; the text is for people."""
+    """No reply can be built for a declared request; the message is for people."""
 
 
 class SimulatedReply(NamedTuple):

@@ -1,7 +1,7 @@
 """A profile that connects to an emulated robot on free ports.
 
-Layer 4. `urc demo` and `urc serve --simulate` use free ports. `urc simulate` uses the profile's
-ports instead.
+Layer 4. `urc demo` and `urc serve --simulate` use free ports. By contrast, `urc simulate` uses the
+ports of the profile.
 """
 
 from collections.abc import AsyncIterator, Mapping

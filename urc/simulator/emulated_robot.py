@@ -2,9 +2,9 @@
 
 If no rule matches a frame, the driver's declarations define the reply (`urc.simulator.auto`).
 
-Pure: no sockets and no clock. Frames are encoded and decoded with the reversed framing of the
-driver, as in the real robot. Each client has a separate connection, but all connections share the
-robot's state.
+The module uses no sockets and no clock. Like the real robot, the emulated robot uses the driver's
+framing in reverse. Each client has a separate connection, but all connections share the robot's
+state.
 """
 
 import logging
@@ -48,7 +48,7 @@ class TimedSetters:
         self._lines: dict[int, weakref.ref[_Line]] = {}
 
     def sets(self, rule: SimulatorRule, line: _Line) -> bool:
-        """Return whether `line` may change state for `rule`.
+        """Return whether `line` may change the robot's state for `rule`.
 
         An unassigned rule is assigned to `line`.
         """
@@ -115,7 +115,7 @@ class EmulatedRobot:
         return self._values.body
 
     def prepare(self) -> None:
-        """Load the image modules in advance, so that the first image has no delay; may block."""
+        """Load the image modules early, so the first image has no delay; the call may block."""
         if self._values.body is not None:
             self._values.body.prepare()
 
@@ -410,7 +410,7 @@ class EmulatedConnection:
         self._running_rules.append(running_rule)
 
     def _try(self, make: Callable[[], list[Payload] | None]) -> list[Payload] | None:
-        """Return the result of `make`. If no reply can be built, count and log a fault."""
+        """Call `make` and return its result. If no reply can be built, count and log a fault."""
         try:
             return make()
         except Unanswered as problem:

@@ -26,7 +26,8 @@ def computed_fields(spec: ReadSpec, raw: Callable[[str], object]) -> dict[str, o
 
     Args:
         spec: the frame.
-        raw: returns the raw value of a signal; raises `BadValue` if there is no value.
+        raw: function that returns the raw value of a signal, or raises `BadValue` if there is no
+            value.
     """
     wanted: dict[str, list[tuple[Template, object]]] = {}
     for name, template in spec.sets.items():

@@ -16,7 +16,7 @@ __all__ = ["inject", "mend"]
 
 
 def inject(fault: Fault, values: Values, now_s: float) -> None:
-    """Inject `fault` into the robot with these values.
+    """Inject `fault` into the emulated robot with the given values.
 
     Raises:
         UrcError: the fault is impossible for this robot.

@@ -41,7 +41,7 @@ class Fault(NamedTuple):
     amount: float = 0.0
     """Delay in seconds, share of lost frames (0 to 1), or noise factor."""
     signal: str = ""
-    """Name of the affected signal, for dropout and stuck."""
+    """Name of the affected signal, for the faults ``dropout`` and ``stuck``."""
     text: str = ""
     """Text of the fault, in the syntax of `FAULTS`."""
 
@@ -157,7 +157,7 @@ class DelayLine:
         return self._waiting[0][0] if self._waiting else math.inf
 
     def push(self, frames: Sequence[Payload], due_s: float) -> None:
-        """Queue frames until `due_s`."""
+        """Queue frames until the time `due_s`."""
         for one in frames:
             if len(self._waiting) >= MOST_LATE:
                 self.lost += 1

@@ -136,7 +136,7 @@ def guesses(
 
 
 def is_alike(made: Payload, came: Payload) -> bool:
-    """Return whether a frame equals the built frame. An envelope may have additional attributes."""
+    """Return whether a frame equals the built frame, ignoring additional envelope attributes."""
     if not isinstance(made, Envelope) or not isinstance(came, Envelope):
         return made == came
     said = came.attributes

@@ -52,7 +52,7 @@ class SimulatedBody:
         self._evaluate = evaluate
         self._put = put
         self._heard_s = -math.inf
-        """Time of the last command that prevents the fail-safe."""
+        """Time of the last command that reset the fail-safe timer."""
         self._is_safe = True
         """Whether the fail-safe has acted since the last command."""
         self._last_fault = ""
@@ -63,7 +63,7 @@ class SimulatedBody:
             self._heard_s, self._is_safe = now_s, False
 
     def prepare(self) -> None:
-        """Load the laser and camera modules if a signal needs them; may block."""
+        """Load the laser and camera modules if a signal needs the modules; the call may block."""
         if any(_LOOKS.search(one.python) for one in self.spec.senses.values()):
             import urc.simulator.world.laser
             import urc.simulator.world.picture  # noqa: F401  # loaded is all that is wanted

@@ -23,7 +23,7 @@ __all__ = ["Names", "Unsettable", "Values"]
 
 
 _PERIOD_S: Final = 60.0
-"""Period of the signal's slow wave, in seconds."""
+"""Period of the slow wave in plausible signal values, in seconds."""
 _WIDTH: Final = (0.0, 100.0)
 """Default range of a number."""
 _ELEMENTS: Final = 4
@@ -89,7 +89,7 @@ _DIGITS: Final = 7
 """Number of decimal places of world values; in degrees of latitude, the last place is a
 centimetre."""
 _DEEPEST: Final = 16
-"""Maximum depth of chained computed signals."""
+"""Maximum length of a chain of computed signals."""
 
 
 class Unsettable(UrcError):

@@ -1,8 +1,9 @@
 """Construction of functions from generated source text, with readable tracebacks.
 
 The callers of `function_of` build the source from fixed names and from the `repr()` of constants.
-No other text of a document becomes part of the generated source. `linecache` keeps the source
-during the lifetime of the function, so tracebacks show the generated lines.
+Text of a document becomes part of the generated source only inside the `repr()` of a constant.
+`linecache` keeps the source during the lifetime of the function, so tracebacks show the generated
+lines.
 """
 
 import weakref

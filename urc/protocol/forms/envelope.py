@@ -34,8 +34,8 @@ class PathTemplate:
     """A writer for addresses: paths of requests, and names of topics, services and actions.
 
     An argument value fills exactly one segment of the address, so the value cannot redirect the
-    request. An argument value that is the whole address may have several segments. Settings are as
-    trusted as the document.
+    request. An argument value that is the whole address may have several segments. The values of
+    settings are trusted like the text of the document.
     """
 
     def __init__(self, pieces: tuple[_Piece, ...], written: Callable[[str, bool], str]) -> None:

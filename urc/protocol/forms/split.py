@@ -105,7 +105,7 @@ class KeyvalueReader:
         return found or None
 
     def _bare(self, pairs: list[str]) -> dict[str, object] | None:
-        """Remove and return the leading parts; None if a leading part is a pair."""
+        """Remove and return the leading parts; None if a leading part is a key-value pair."""
         parts = [part for part in pairs if part.strip(self._strip)]
         front = parts[: len(self._first)]
         if len(front) < len(self._first) or any(self._separator in part for part in front):
@@ -115,7 +115,7 @@ class KeyvalueReader:
         return {name: part.strip(self._strip) for name, part in named if name}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return the key-value pairs of `fields`, joined."""
+        """Return the key-value pairs of `fields` as one text."""
         keys = {name: key for key, name in self._names.items()}
         texts = {keys[name]: field_text(value) for name, value in fields.items() if name in keys}
         pairs = [field_text(fields.get(name)) or "-" for name in self._first]

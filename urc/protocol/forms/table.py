@@ -1,7 +1,8 @@
 """Tables of the forms for reading and writing, and the construction of readers and writers.
 
-Pure. A row of `READERS` or `WRITERS` is a factory ``(spec, context) -> reader`` (or writer). Each
-engine calls the factory once. The interfaces are in `urc.protocol.values.payload`.
+Pure. Each value of `READERS` and `WRITERS` is a factory with the parameters ``(spec, context)``,
+which returns a reader or a writer. Each engine calls the factory once for each declaration.
+`urc.protocol.values.payload` defines the interfaces of readers and writers.
 """
 
 from urc.model.payload import ReadSpec, WriteSpec

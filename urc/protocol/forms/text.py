@@ -16,7 +16,8 @@ _NAME = re.compile(
     r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*"
     r"(?:\|\s*(?:fixed|round|int|float|string|pad|trim|join)\s*(?:\([^()]*\))?\s*)*"
 )
-"""A name with only formatting filters, so the value can be read back."""
+"""Pattern of an expression with a name and formatting filters only, so the value can be read
+back."""
 
 
 class TextWriter:

@@ -24,7 +24,7 @@ FEEDBACK = "/feedback"
 class TopicReader:
     """A reader for the messages of one topic, using the reader of another form.
 
-    For a topic with wildcards, the field ``_topic`` has the actual topic.
+    For a topic with wildcards, the field ``_topic`` contains the actual topic.
     """
 
     def __init__(self, reader: PayloadReader, spec: ReadSpec, context: CodecContext) -> None:

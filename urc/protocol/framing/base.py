@@ -81,7 +81,7 @@ class Framing(Protocol):
     """A framing method with its options."""
 
     def encode(self, payload: bytes) -> bytes:
-        """Return the frame of `payload` in wire form; raise `FramingError` if impossible."""
+        """Return the frame of `payload` in wire form; raise `FramingError` on failure."""
 
     def decoder(self, stream: ReceiveBuffer | None = None) -> Decoder:
         """Return a new decoder for the bytes in `stream` and all later bytes."""
@@ -132,7 +132,7 @@ class StreamDecoder:
         return []
 
     def restart(self) -> None:
-        """Reset the state for a new frame, selected by a `switch`."""
+        """Reset the state for a new frame that a `switch` assigns to the decoder."""
         self._is_lost = False
         self._is_case = True
 
@@ -143,7 +143,7 @@ class StreamDecoder:
         return FrameFault(error.code, str(error), error.closes)
 
     def _before(self, mark: bytes) -> int:
-        """Return the number of bytes before the next `mark`, which may be incomplete."""
+        """Return the number of bytes before the next `mark`, complete or cut off at the end."""
         stream, data = self._stream, self._stream.data
         found = data.find(mark, stream.at)
         if found < 0:
@@ -176,7 +176,7 @@ def frame_codec_of(spec: FramingSpec) -> FrameCodec | None:
 
 
 def encode_frame(codec: FrameCodec | None, payload: bytes, max_bytes: int) -> bytes:
-    """Return the frame of `payload`; raise `FramingError` if impossible."""
+    """Return the frame of `payload`; raise `FramingError` if no frame can contain the payload."""
     try:
         frame = payload if codec is None else codec.close(payload)
     except BadFrame as error:

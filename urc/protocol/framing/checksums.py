@@ -1,6 +1,7 @@
 """Checksums over part of a frame, verified on receipt and written when sending.
 
-Pure. The arithmetic is in `urc._checksum_math`. All operations take linear time.
+Pure. `urc._checksum_math` computes the checksums. All operations take time linear in the size of
+the frame.
 """
 
 import binascii
@@ -24,7 +25,7 @@ class BadFrame(UrcError):
 
 
 class Checksum:
-    """A checksum in a frame layout."""
+    """A checksum at a fixed position of a frame."""
 
     def __init__(self, spec: ChecksumSpec) -> None:
         self.spec = spec

@@ -21,7 +21,7 @@ class DigitLength:
         read."""
 
     def total(self, data: bytes | bytearray, at: int) -> int | None:
-        """Return the frame size at `at` in bytes; negative if invalid, None if incomplete."""
+        """Return the size in bytes of the frame at `at`: negative if invalid, None if unknown."""
         digits = self._digits(data, at)
         if digits is None:
             return None

@@ -121,7 +121,7 @@ class _DoubledDecoder(StreamDecoder):
                 return found
 
     def _to_start(self) -> FrameFault | None:
-        """Advance to the next start of a frame, skipping doubled escapes and ends."""
+        """Advance to the next start of a frame, skipping doubled escape bytes and ends."""
         stream, start = self._stream, self._start
         if not start:
             self._searched = 0 if len(stream) else -1
@@ -147,7 +147,7 @@ class _DoubledDecoder(StreamDecoder):
         return self._skip(place - stream.at) if place > stream.at else None
 
     def _to_end(self) -> bytes | FrameFault | None:
-        """Return the frame or a violation, or None; `_searched` -1 requires another search."""
+        """Return the frame, a violation or None; if `_searched` is -1, search again."""
         stream, data, end = self._stream, self._stream.data, self._end
         while True:
             place = data.find(self._escape, stream.at + self._searched)
@@ -249,7 +249,7 @@ class _LengthDecoder(StreamDecoder):
                 return "bad-stuffing", "a frame has invalid byte stuffing; skipped"
 
     def _ending(self) -> tuple[str, ...] | None:
-        """Check the end bytes; the possible results are the results of `_read`."""
+        """Check the end bytes; the result has the same form as the result of `_read`."""
         at = self._stream.at + self._taken
         there = bytes(self._stream.data[at : at + len(self._end)])
         if there == self._end:

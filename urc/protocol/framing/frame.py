@@ -1,6 +1,7 @@
 """Conversion between a payload and its frame, according to the frame layout.
 
-Pure. A `FrameCodec` implements one layout. The framings only search the stream for frames.
+Pure. A `FrameCodec` implements one layout. The framings find the frames in the stream, and use the
+codec to convert each frame.
 """
 
 import binascii
@@ -150,7 +151,7 @@ class FrameCodec:
         return start + _bytes_of(content, self.layout.digits) + end
 
     def _spelt(self, frame: bytes) -> bytes:
-        """Return the frame in wire form, the inverse of `_read`."""
+        """Return the frame in wire form; this function is the inverse of `_read`."""
         start, end = self.layout.start, self.layout.end
         content = _digits_of(frame[len(start) : len(frame) - len(end)], self.layout.digits)
         if self._trailer is not None:

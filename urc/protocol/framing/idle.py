@@ -66,7 +66,7 @@ class DatagramFraming(NamedTuple):
 
 
 class _WholeDecoder(StreamDecoder):
-    """A decoder that returns all received bytes as one frame."""
+    """A decoder that returns the bytes of each receive as one frame."""
 
     def __init__(
         self, stream: ReceiveBuffer | None, codec: FrameCodec | None, max_bytes: int

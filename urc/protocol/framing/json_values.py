@@ -74,7 +74,7 @@ class _JsonDecoder(StreamDecoder):
     def restart(self) -> None:
         super().restart()
         self._open: list[int] = []
-        """Expected closing brackets, in the order of the open brackets."""
+        """Closing brackets that are still missing, in the order of the opening brackets."""
         self._is_in_string = False
         self._looked = 0
         """Number of scanned bytes of the current value."""

@@ -26,10 +26,9 @@ Search = Callable[[bytes | bytearray, int], Any]
 """Search function: returns the next match of `re` or RE2 after a start offset, or None."""
 
 _SMALL: Final = 256
-"""Maximum buffer size for a new search after every receive, in bytes."""
+"""Maximum size of a buffer that is searched after every receive, in bytes."""
 _GROWTH: Final = 8
-"""Divisor for larger buffers: the buffer is searched again after growing by its size /
-`_GROWTH`."""
+"""A larger buffer is searched again after growing by 1 / `_GROWTH` of its size."""
 _QUIET_S: Final = 0.005
 """Duration of silence after which a larger buffer is searched regardless of its growth, in
 seconds."""
@@ -38,7 +37,7 @@ seconds."""
 class RegexFraming(NamedTuple):
     """Frames that match a pattern.
 
-    With `tx`, a sent frame ends with `tx` and need not match the pattern.
+    If `tx` is declared, every sent frame ends with `tx`, and need not match the pattern.
     """
 
     search: Search

@@ -75,7 +75,7 @@ def _meant(spec: EscapeSpec) -> Mapping[int, int]:
 
 
 class Unstuffer:
-    """An incremental decoder of byte stuffing, byte by byte."""
+    """An incremental decoder of byte stuffing, for one byte at a time."""
 
     def __init__(self, stuffing: Stuffing) -> None:
         self._stuffing = stuffing

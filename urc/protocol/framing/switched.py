@@ -136,7 +136,7 @@ class _SwitchDecoder(StreamDecoder):
         return frames
 
     def _end_case(self, found: bytes | FrameFault) -> bytes | FrameFault | None:
-        """End the case after `found`; return None for a violation that is already reported."""
+        """End the case after the result `found`; return None for a violation already reported."""
         self._active = None
         if isinstance(found, bytes):
             self._is_lost = False

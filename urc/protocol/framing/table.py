@@ -1,7 +1,8 @@
 """Framings: conversion between byte streams and frames.
 
 Pure. This module contains the table of framings, and builds framings from their declarations. Each
-family of framings is imported on first use. The interfaces are in `urc.protocol.framing.base`.
+family of framings is imported on first use. `urc.protocol.framing.base` defines the interfaces of
+framings.
 """
 
 from typing import NamedTuple
@@ -16,7 +17,7 @@ __all__ = ["FRAMINGS", "build_framing"]
 
 
 class AsymmetricFraming(NamedTuple):
-    """A framing with different framings for sent and received data."""
+    """A framing that combines a framing for sent data with another framing for received data."""
 
     sent: Framing
     received: Framing

@@ -110,7 +110,7 @@ class _PatientDecoder:
         return told + frames
 
     def _discard(self, now: float) -> None:
-        """After the timeout, drop the incomplete frame and record the following frames."""
+        """Drop the incomplete frame after its timeout; record the frames that follow."""
         timeout, stream = self._framing.timeout_s, self._stream
         if timeout is None or self._newest is None or now < self._newest + timeout:
             return

@@ -1,7 +1,7 @@
 """Dead band and debounce of samples.
 
-Pure: callers pass the time. The keys ``deadband`` and ``debounce`` of a signal declare both
-filters.
+Callers pass the time, because the module reads no clock. The keys ``deadband`` and ``debounce`` of
+a signal declare both filters.
 """
 
 from urc.model.values import Reading, Sample, Signal

@@ -1,7 +1,7 @@
 """Samples of one engine: conversion of fields, alarms, and computed signals.
 
-Pure: callers pass the time. Each engine has one `Readings`. A signal has one alarm state, even if
-several frames set the signal. A computed signal uses the newest value of each input.
+Pure: callers pass the time. Each engine has exactly one `Readings` object. A signal has one alarm
+state, even if several frames set the signal. A computed signal uses the newest value of each input.
 """
 
 from collections.abc import Callable, Iterable, Mapping

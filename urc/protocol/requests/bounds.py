@@ -1,7 +1,7 @@
 """Limits of a command: maximum duration, and transports in use.
 
 Pure. Every wait of an engine has a timeout. The maximum duration of a command is the sum of all
-timeouts.
+timeouts in the command.
 """
 
 from collections.abc import Callable, Mapping

@@ -36,7 +36,7 @@ _LARGEST: Final = 1e308
 
 
 class _Unsupported(Exception):
-    """A part of the template cannot be translated."""
+    """A part of the template cannot be translated to Python."""
 
 
 def build_fast_encode(

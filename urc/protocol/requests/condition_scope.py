@@ -54,7 +54,7 @@ class SignalState:
         Args:
             now: current time, in seconds.
             names: values with precedence over signals, such as arguments, by name.
-            since: minimum time of valid samples, in seconds.
+            since: earliest arrival time of valid samples, in seconds.
         """
         return ConditionScope(self, now, names, since)
 

@@ -142,7 +142,7 @@ class Connection:
         return _disconnected(lost, self.receiver.secrets.hide(reason))
 
     def _lost(self) -> list[Exchange]:
-        """Remove and return the requests that fail with this connection."""
+        """Remove and return the requests that fail because the connection is lost."""
         lost = self._pending_replies.drain()
         if not self.is_per_request:
             return lost + self._request_queue.drain()

@@ -1,8 +1,8 @@
 """Requests and their execution, from submission to outcome.
 
-Pure. A `CompiledRequest` is a request, compiled once. An `Exchange` is one execution of a request,
-from the queue to the outcome. `urc.protocol.requests.reply_match.CompiledReply` describes the
-expected reply.
+Pure. A `CompiledRequest` is a declared request in compiled form. An `Exchange` is one execution of
+a request, from the queue to the outcome. `urc.protocol.requests.reply_match.CompiledReply`
+describes the expected reply.
 """
 
 import re
@@ -139,11 +139,10 @@ class Exchange:
     is_secret = False
     """Whether the payload is secret, and must not appear in any message."""
     condition: Callable[[float], str] | None = None
-    """Function that returns why the request is not allowed, evaluated before sending; "":
-    allowed."""
+    """Function that returns the reason for refusing the request, or ""; evaluated before
+    sending."""
     unless: Callable[[], str] | None = None
-    """Function that returns why the request is obsolete, evaluated before sending; "": not
-    obsolete."""
+    """Function that returns why the request is obsolete, or ""; evaluated before sending."""
     waits_until = float("-inf")
     """Earliest time of a retry, in seconds."""
     on_sent: Callable[[Payload], None] | None = None

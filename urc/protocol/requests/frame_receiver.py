@@ -107,7 +107,7 @@ class FrameReceiver:
             self.secrets = SentSecrets()
 
     def cut_by(self, framing: Framing) -> None:
-        """Switch to `framing`, starting with the remaining bytes."""
+        """Switch to `framing`, which first decodes the remaining bytes."""
         if framing is not self._cut_by:
             self._cut(framing)
 

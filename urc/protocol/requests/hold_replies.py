@@ -2,8 +2,7 @@
 
 Pure. Frames of motion bypass the queue of the connection, and have no `PendingReply`. This module
 handles robots that reply to each frame: an acknowledgement is expected, and a refusal ends the
-motion. An unsolicited refusal also ends the motion, such as a refusal because of an open safety
-guard.
+motion. An unsolicited refusal, for example because of an open safety guard, also ends the motion.
 
 In half duplex, frames of motion wait for a pending reply, and queued requests wait for replies to
 motion. The wait for a reply to motion is short, because a lost reply must not prevent motion. A

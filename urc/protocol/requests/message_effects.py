@@ -1,8 +1,8 @@
 """Additional effects of messages: collecting values from several frames, and acknowledgements.
 
-Pure. Both effects of a message occur during the conversion from fields to samples, exactly once per
-message. Incomplete collected values are discarded when the connection is lost. Acknowledgements
-wait in `Acknowledgements` until the conversation has reported the frame.
+Pure. Collecting and acknowledging are part of the conversion from fields to samples, so both occur
+exactly once per message. Incomplete collected values are discarded when the connection is lost.
+Acknowledgements wait in `Acknowledgements` until the conversation has reported the frame.
 """
 
 from collections.abc import Callable, Mapping
@@ -19,7 +19,7 @@ from urc.protocol.values.convert import Unusable
 __all__ = ["Collector", "Acknowledgements", "answering", "collecting"]
 
 MOST_REPLIES: Final = 256
-"""Maximum number of pending acknowledgements; each frame causes at most one."""
+"""Maximum number of pending acknowledgements; each frame causes at most one acknowledgement."""
 
 
 class Acknowledgements(list[Payload | CountedFrame]):
@@ -115,7 +115,7 @@ def answering(
         names: function that returns the namespace for a time and fields.
         counters: function that returns the connection's counters; None for a frame without
             counters.
-        replies: list of pending acknowledgements, which receives the acknowledgement.
+        replies: pending acknowledgements; the new acknowledgement is added to this list.
         decode: function that converts the fields to samples.
     """
 

@@ -1,4 +1,4 @@
-"""Queue of a connection, rate limits and counters.
+"""The queue, the rate limits and the counters of a connection.
 
 Pure. All queues are bounded, and dropped requests are returned for reporting.
 """
@@ -43,7 +43,7 @@ class GcraLimiter:
 
 
 Stand = tuple[tuple[str, int], ...]
-"""Last numbers of all counters, as pairs sorted by name."""
+"""Last numbers of all counters, as pairs of name and number, sorted by name."""
 Made = dict[Stand, Numbered]
 
 
@@ -74,9 +74,9 @@ class FrameCounters:
 class Counters:
     """The counters of one connection.
 
-    Numbers are assigned in the order of transmission. If the engine is the only sender, the order
-    of transmission is known. If the guard also sends motion, the counters are *shared*. The engine
-    then only proposes numbers, and receives the actual numbers later.
+    Counter numbers are assigned in the order of transmission. If the engine is the only sender, the
+    order of transmission is known. If the guard also sends motion, the counters are *shared*. For
+    shared counters, the engine only proposes numbers, and receives the actual numbers later.
     """
 
     __slots__ = ("_known", "_last", "ahead", "is_shared")

@@ -2,8 +2,8 @@
 
 Pure. ``varint`` is LEB128 as in Protocol Buffers, and ``zigzag`` is its signed form. ``bcd`` has
 two decimal digits per byte. ``f32cdab`` has swapped 16-bit words, and ``u14by7le`` has seven bits
-per byte. Packed arrays have consecutive numbers of any width, across byte boundaries. No number has
-more than 64 bits.
+per byte. A packed array contains consecutive numbers of any width, without alignment to bytes. No
+number has more than 64 bits.
 """
 
 from collections.abc import Callable, Mapping

@@ -23,7 +23,8 @@ class StructReader:
         self._names = frozenset(names_of(self._items))
         self._encoding = context.encoding
         self.read = generate_read(self._items, context.encoding)
-        """Generated function that returns the fields, or None for no match; raises `BadItem`."""
+        """Generated function that returns the fields, or None for another frame, or raises
+        `BadItem`."""
         self._steps = build_write_steps(self._items, context.encoding, is_lenient=True)
         # A reply carries the number of its request, which `match` supplies.
         self._outer = {"settings": context.settings, COUNTERS: lambda name, low, high: low}
@@ -47,7 +48,7 @@ class StructWriter:
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         items = cast("tuple[Item, ...]", spec.options["items"])
         self.write = generate_write(items, context.encoding)
-        """Generated function that returns the frame; raises `NotWritable`."""
+        """Generated function that returns the frame, or raises `NotWritable`."""
         named, counters = _with_counters(items)
         self._names = {name: name for name in names_of(items, sent=True)} | counters
         self._read = generate_read(named, context.encoding)

@@ -5,7 +5,7 @@ faster for runs of fixed items. Tests compare the results of the closures and th
 functions. Theory of operation: every item becomes a step ``(data, at, end, out) -> after``. A step
 reads bytes from `at` to at most `end`, and stores the value in `out`. A step raises `OtherFrame`
 for a frame that does not match. After the first invalid value, an error is recorded under the key
-`FAULT`, and reading continues. Only a frame that matches to its end counts as invalid.
+`FAULT`, and reading continues. The error is reported only if the frame matches to its end.
 """
 
 from collections.abc import Callable, Mapping

@@ -22,7 +22,7 @@ Read = Callable[[Frame], Mapping[str, object] | None]
 
 
 def generate_read(items: tuple[Item, ...], encoding: str) -> Read:
-    """Return a function that reads the fields of a frame, or returns None for no match.
+    """Return a function that reads the fields of a frame, or returns None for another frame.
 
     The returned function raises `BadItem` if a matching frame contains an invalid value.
     """

@@ -361,7 +361,7 @@ def _outer(scope: Scope) -> Scope:
 
 
 def _windowed(body: WriteStep, item: Item, size: Extent, rules: StructWriteScope) -> WriteStep:
-    """Return the step for a struct with a size field and without trimmed bytes."""
+    """Return the step that writes a struct with its size field, and without its trimmed bytes."""
     full, name = least_size(item.items), item.id or "a struct"
     is_variable = size.prefix is not None and size.prefix.is_variable
     gap = bytes(size.prefix.size) if size.prefix and not is_variable else b""

@@ -1,4 +1,4 @@
-"""Conversion of raw values to values, and the inverse conversion for emulated robots.
+"""Conversion of raw values to typed values, and the inverse conversion for emulated robots.
 
 Pure. A conversion is a chain of small functions, built once for each engine. Each function converts
 the result of the previous function. The result None means "not available", and ends the chain.
@@ -133,7 +133,7 @@ def spelt(raw: object) -> str:
 
 
 def _is_plain(text: str) -> bool:
-    """Return whether a number is plain ASCII; Python also accepts '1_0' and non-ASCII digits."""
+    """Return whether a number is plain ASCII, because Python accepts '1_0' and non-ASCII digits."""
     return text.isascii() and "_" not in text
 
 
@@ -278,7 +278,7 @@ def _line_back(coefficients: tuple[float, ...]) -> Step:
 
 
 def _tidy(number: float) -> float:
-    """Return `number`, or the nearest whole number if only rounding errors differ."""
+    """Return `number`, or the nearest whole number if the difference is only a rounding error."""
     if not math.isfinite(number):
         return number
     nearest = round(number)

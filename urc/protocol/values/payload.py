@@ -85,8 +85,8 @@ class CodecContext(NamedTuple):
     fresh: TimeAndNonce = FIXED
     """Source of times and nonces for sent frames."""
     is_compiled: bool = False
-    """Whether to generate functions for messages and commands; this saves time only in live
-    sessions."""
+    """Whether to generate functions for messages and commands; generated functions save time only
+    in live sessions."""
 
 
 class PayloadReader(Protocol):

@@ -1,7 +1,7 @@
 """Times and nonces for sent frames.
 
 Pure. Times and nonces have injected sources: a clock and a random generator for a robot, fixed
-sources for tests. With fixed sources, a document always results in the same frames.
+sources for tests. With fixed sources, URC always encodes the same frames for a document.
 """
 
 from collections.abc import Callable

@@ -126,7 +126,7 @@ class HttpServer(UrlServer, StreamServer):
 
 
 class _Talk:
-    """Serve one connection: sequential requests. The last request may be a stream."""
+    """Serve one connection, request by request. The last request may start a stream."""
 
     def __init__(
         self,

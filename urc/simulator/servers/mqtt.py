@@ -23,8 +23,8 @@ OPEN_S = 5.0
 AGAIN_S = 1.0
 """Delay before reconnecting to the broker, in seconds."""
 _NOT_OURS = ("client_id", "will")
-"""Options that are valid only for the driver. With a shared client identifier, the emulated robot
-and the driver would disconnect each other."""
+"""Options that apply only to the driver's connection to the broker. With a shared client
+identifier, the emulated robot and the driver would disconnect each other."""
 
 log = logging.getLogger(__name__)
 

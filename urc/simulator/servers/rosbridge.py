@@ -385,7 +385,7 @@ def _png(data: bytes) -> str:
 MAX_BYTES = 10_000_000
 """Maximum frame size in bytes, equal to the default of the real server."""
 MAX_UNSENT_BYTES = 4_194_304
-"""Maximum number of unsent bytes per client. Clients above the limit miss messages."""
+"""Maximum number of unsent bytes per client. A client above the limit misses messages."""
 
 
 class RosbridgeServer(MessageServer):

@@ -1,7 +1,7 @@
 """An emulated robot behind an SSH server.
 
-The shell, or the driver's command, is connected to the robot. Forwarded connections can reach only
-the other transports of the same robot.
+The server connects the client's shell, or the driver's command, to the emulated robot. Forwarded
+connections can reach only the other transports of the same robot.
 """
 
 import asyncio
@@ -222,7 +222,7 @@ class _Talk:
 def _own_key() -> asyncssh.SSHKey:
     """Return the current user's host key for emulated robots.
 
-    The key is stored, so clients need to trust it only once.
+    The key is stored, so clients need to trust the key only once.
     """
     file = data_folder() / "simulator_host_key"
     try:

@@ -48,7 +48,7 @@ class Motion:
     drive: float = 0.0
     """Amplitude of the body's wave, 0 to 1."""
     bend: float = 0.0
-    """Bend to the left, -1 to 1."""
+    """Bend of the body to the left, -1 to 1."""
     is_up: bool = False
     """Whether a flying body has reached its hover height."""
     accelerations: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])

@@ -1,7 +1,7 @@
 """The camera image of the emulated robot as JPEG, rendered by ray casting: walls, ground and sky.
 
 Pure. The module imports numpy and Pillow, so it is loaded on first use. Each image column is one
-direction on the ground. The obstacles in this direction are drawn from the farthest to the nearest.
+direction on the ground. The obstacles of each column are drawn from the farthest to the nearest.
 """
 
 import io

@@ -73,7 +73,7 @@ class WorldMap:
     def bounds(self) -> tuple[float, float, float, float]:
         """Minimum x and y, and maximum x and y of all obstacles, in metres.
 
-        Without obstacles, the bounds are a square of 10 m.
+        Without obstacles, the bounds are a square with sides of 10 m.
         """
         if not self.edges:
             return -5.0, -5.0, 5.0, 5.0

@@ -1,7 +1,7 @@
 """The sensors of an emulated robot in its world.
 
-Pure. Readings are in metres, radians, seconds and volts. Only bearings, latitudes and longitudes
-are in degrees.
+Pure. Readings are in metres, radians, seconds and volts. As exceptions, bearings, latitudes and
+longitudes are in degrees.
 """
 
 import math
