@@ -77,7 +77,7 @@ class DeclaredDriver:
         return dict((await self._session.command("drive", {"vx": vx, "wz": wz})).values)
 
     async def flood(self, count: int) -> None:
-        """Request `count` lines, and return when all have arrived."""
+        """Request `count` lines, and return when all lines have arrived."""
         await self._session.command("flood", {"count": count})
 
 

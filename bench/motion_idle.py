@@ -1,6 +1,6 @@
 """Data sent to robots at rest after a stop, on every kind of transport in parallel.
 
-Each robot is driven once and released. Its page keeps the controls and continues to receive
+Each robot is driven once and released. The robot's page keeps the controls and continues to receive
 heartbeats. After the stop and its repetitions, no byte may arrive, because zero commands would
 disturb another controller of the robot. Real programs communicate over a relay between two network
 namespaces. The benchmark needs root and /dev/net/tun; otherwise, the benchmark is skipped with a
@@ -24,7 +24,7 @@ __all__ = ["run"]
 
 LASTS_S, LASTS_IF_FULL_S = 20.0, 600.0
 SETTLED_S = STOP_FOR_S + 0.5
-"""Time in seconds after the first stop in which its repetitions arrive, even over a broker."""
+"""Time after the first stop in which all repetitions arrive, even over a broker, in seconds."""
 SPARE_S = 120.0
 
 

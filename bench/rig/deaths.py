@@ -25,7 +25,7 @@ LINK_DEATHS = ("black-hole", "interface-down")
 """Kinds of loss that need the relay."""
 DEATHS = ("close", "kill", "freeze", "block", "reset", "kick", *LINK_DEATHS)
 HEALED_S = 0.4
-"""Time after the link is restored in which no motion may arrive, in seconds."""
+"""Time after the restoration of the link without any motion to the robot, in seconds."""
 STOP_WITHIN_S = 3.0
 LIFE_S = 600.0
 LOOK_NS = 25_000_000
