@@ -55,8 +55,7 @@ class FoldSpec(NamedTuple):
     ored: int = 0
     """Mask of the bits to set in the result as the last step."""
     is_odd_xored: bool = False
-    """Whether the last byte of an odd number of bytes is combined by XOR; only for 16-bit
-    numbers."""
+    """For 16-bit numbers: whether an unpaired last byte is combined by XOR."""
 
 
 FOLDED: Final = {

@@ -100,7 +100,7 @@ class _Parser:
         """Whether the last filter may return bytes."""
 
     def expression(self) -> str:
-        """Parse ``a if test else b``, and everything with higher precedence."""
+        """Parse ``a if test else b``, and all operators with higher precedence."""
         self._depth += 1
         if self._depth > MAX_DEPTH:
             raise ExpressionSyntaxError("the expression is nested too deeply", self._next.offset)
@@ -349,7 +349,7 @@ class _Parser:
                 return value
 
     def _pattern(self, test: Token) -> str:
-        """Parse ``('regular expression')`` after a test, and compile the regular expression."""
+        """Parse the argument ``('regular expression')`` of a test, and compile the argument."""
         self._expect("(")
         token = self._advance()
         if token.kind != "string":

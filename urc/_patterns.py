@@ -3,16 +3,17 @@ r"""Regular expressions of documents, with matching in linear time.
 Only `urc.patterns` and `urc.filters.lists` use this module. The dialect of all patterns is RE2,
 without look-around and back-references. In RE2, ``$`` matches only the end of the text, and ``\d``
 only ASCII digits. A pattern runs on `re` if `_is_linear` proves linear time, because `re` is ten
-times faster for short lines. Other patterns run on RE2, or are refused if RE2 is not installed.
+times faster for short lines. Unproven patterns run on RE2, or are refused if RE2 is not installed.
 
 Theory of operation: backtracking takes more than linear time only if two parts of a pattern can
-match the same characters in many ways. A proven pattern must therefore have a start anchor, and
-alternatives with different first characters. Every repeat must match a single set of characters,
-without any character that may follow the repeat.
+match the same characters in many ways. Every proven pattern has a start anchor, and alternatives
+with different first characters. Every repeat in a proven pattern matches a single set of
+characters, without any character that may follow the repeat.
 
-The run time of RE2 is proportional to the size of the text and to the size of the program. In the
-program, every repeat ``{n}`` is expanded. The size of an unproven pattern is therefore limited.
-This module computes the size from the source, so the result does not depend on RE2.
+The run time of RE2 is proportional to the size of the text and to the size of the program. The
+program of a pattern contains every repeat ``{n}`` in expanded form. To limit the run time, the size
+of unproven patterns is limited. This module computes the size of a pattern from its source,
+independently of RE2.
 """
 
 import re
@@ -181,7 +182,7 @@ def example(pattern: Pattern, groups: Mapping[str, str], variant: int = 0) -> st
     Args:
         pattern: pattern to match.
         groups: texts of the named groups, by name.
-        variant: number of the text variant. Variant 0 omits every optional part without one of
+        variant: number of the text variant. Variant 0 omits optional parts that contain no group of
             `groups`, and uses the first alternatives and the first printable characters. Other
             variants use other alternatives, characters and numbers of repeats.
     """

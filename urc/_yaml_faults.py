@@ -1,7 +1,8 @@
 """Translation of YAML parser errors into messages and hints for people.
 
-Private to `urc.source`. The module supports both parsers of PyYAML (C and pure Python). The two
-parsers report different messages, so most decisions depend on the document's text at the error.
+Private to `urc.source`. The module supports both parsers of PyYAML (C and pure Python). The C
+parser and the Python parser report different messages, so most decisions depend on the document's
+text at the error.
 """
 
 import re

@@ -39,7 +39,7 @@ __all__ = [
 ]
 
 NOW: Final = "now"
-"""Name of the current Unix time in expressions, in seconds."""
+"""Name ``now`` in expressions: the current Unix time, in seconds."""
 _HASHES: Final = frozenset(f"_filter_{name}" for name in ("md5", "sha1", "sha256", "hmac_sha256"))
 _SUMMARIES: Final = frozenset(("_filter_length", "_is_defined", "_is_none", "_match", "_search"))
 """Functions that reveal almost nothing about the operands, such as a length."""

@@ -58,7 +58,8 @@ class Item(NamedTuple):
     kind: Literal[
         "number", "coded", "packed", "bytes", "text", "padding", "bits", "struct", "switch"
     ]
-    """``coded`` numbers have a special encoding. ``packed`` arrays ignore byte boundaries."""
+    """The kind ``coded`` is a number with a special encoding. The kind ``packed`` is an array of
+    numbers without alignment to bytes."""
     id: str = ""
     """Name of the field or argument; "" for a nameless item."""
     number: Number = Number("integer", 8)
@@ -85,7 +86,7 @@ class Item(NamedTuple):
     encoding: str = ""
     """Text encoding; "": the encoding of the connection."""
     pad: int = 0
-    """Padding byte after text or bytes shorter than the fixed size."""
+    """Padding byte for text or bytes that are shorter than the fixed size."""
     until: bytes = b""
     """Terminator of bytes or text without a declared size."""
     trim: int | None = None
@@ -109,7 +110,7 @@ class Switch(NamedTuple):
     by: Template
     cases: tuple[tuple[int | str, tuple[Item, ...]], ...]
     default: tuple[Item, ...] | None = None
-    """Items for values without a case; None: a frame with such a value does not match."""
+    """Items for values without a case; None: a frame with a value without a case does not match."""
 
 
 def packed_size(number: Number, count: Extent) -> int:

@@ -1,6 +1,7 @@
 """Mapping of the output values of a widget to the arguments of a command. Pure.
 
-The loader's check of bindings and the dashboard share this function, so their results agree.
+The loader and the dashboard both call `targets`, so both map the values of an output in the same
+way.
 """
 
 from urc.model.driver import Command

@@ -205,8 +205,8 @@ class Command(NamedTuple):
     """Delays before the retries."""
     hold: Hold | None = None
     moves: bool = False
-    """Whether the command starts autonomous motion. The value is also true for a sequence with a
-    held command, or with a command that starts autonomous motion."""
+    """Whether the command starts autonomous motion. The attribute `moves` is also true for a
+    sequence with a held command, or with a command that starts autonomous motion."""
     moves_if: Template | None = None
     """Condition over the arguments for autonomous motion; None: every call moves if `moves` is
     true."""

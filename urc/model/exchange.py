@@ -1,6 +1,7 @@
 """Request handling: queues, reply stages and conditions.
 
-This module contains only data: `urc.config` creates the values, and `urc.protocol` applies them.
+This module contains only data classes: `urc.config` creates the objects, and `urc.protocol` applies
+the objects.
 """
 
 from collections.abc import Mapping

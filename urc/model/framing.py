@@ -90,8 +90,8 @@ class TrailerSpec(NamedTuple):
     """A checksum after a text of variable length."""
 
     checksum: ChecksumSpec
-    """Checksum parameters. The range refers to the text without the checksum. The attribute `at` is
-    unused."""
+    """Checksum parameters. The range refers to the text without the checksum. The attribute `at` of
+    `checksum` is unused."""
     mark: bytes = b""
     """Separator between the text and the checksum."""
     is_padded: bool = True

@@ -78,7 +78,7 @@ class FrameVariants(NamedTuple):
 
 
 class CountedFrame(NamedTuple):
-    """A frame with counters, and a function that renders it again."""
+    """A frame with counters, and a function that renders the frame again."""
 
     numbered: Numbered
     again: Callable[[], Numbered | None]
@@ -145,7 +145,8 @@ class ReadSpec(NamedTuple):
     fields: tuple[str, ...] = ()
     """Names of all possible fields in frame order, followed by the names in `sets`."""
     conversions: Mapping[str, Conversion] = NOTHING
-    """Conversions of fields in this frame, by field; the conversion of the signal follows."""
+    """Conversions of the frame's fields, by field, applied before the conversions of the
+    signals."""
     sets: Mapping[str, Template] = NOTHING
     """Expressions over the converted fields, by signal."""
     when: Template | None = None
@@ -168,8 +169,8 @@ class WriteSpec(NamedTuple):
     """Rules for encoding arguments into a frame."""
 
     form: str
-    """Name of a form for writing, such as ``text``. The form ``frames`` contains several
-    specifications."""
+    """Name of a form for writing, such as ``text``. The form ``frames`` contains the specifications
+    of several frames."""
     options: Mapping[str, object] = NOTHING
     names: frozenset[str] = frozenset()
     """Root names that the templates use."""

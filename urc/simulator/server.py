@@ -127,7 +127,7 @@ def _put_inside(
 
 
 def _known_as(context: ServerContext) -> tuple[object, object, str]:
-    """Return the driver's host and port of a transport, and its URL without TLS, or ""."""
+    """Return the host, port and URL of a transport; the URL has a scheme without TLS, or is ""."""
     url = context.options.get("url")
     if not isinstance(url, str):
         host, port = context.options.get("host"), context.options.get("port")

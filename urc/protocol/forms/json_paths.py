@@ -3,9 +3,9 @@
 Theory of operation. Plain paths become `msgspec` types with one member for each path step. The
 decoder of `msgspec` skips all other data, and a generated function extracts the fields
 (`urc.protocol.compile.source`). If a document has another structure, the decoder raises an error.
-After such an error, the reader decodes the whole document, and follows the paths step by step.
-JMESPath expressions always require decoding the whole document. Typed and complete decoding return
-the same fields.
+After an error of the decoder, the reader decodes the whole document, and follows the paths step by
+step. JMESPath expressions always require decoding the whole document. Typed and complete decoding
+return the same fields.
 """
 
 import json

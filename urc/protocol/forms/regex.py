@@ -31,7 +31,7 @@ class RegexReader:
         return {name: text for name, text in found.items() if text is not None}
 
     def write(self, fields: Mapping[str, object]) -> Payload:
-        """Return a matching text with `fields` as groups."""
+        """Return a text that matches the pattern, with `fields` as the named groups."""
         texts = {name: self._text(name, value) for name, value in fields.items()}
         text = example(self._pattern, texts)
         found = self._pattern.search(text)

@@ -1,7 +1,7 @@
 """Checksums over part of a frame, verified on receipt and written when sending.
 
-Pure. `urc._checksum_math` computes the checksums. All operations take time linear in the size of
-the frame.
+Pure. `urc._checksum_math` computes the checksums. Every operation on a checksum takes time linear
+in the size of the frame.
 """
 
 import binascii

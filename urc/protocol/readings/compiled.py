@@ -55,8 +55,8 @@ def build_fast_read(
 def _head_check(prefix: str, encoding: str) -> list[str]:
     """Return source lines that reject most frames without `prefix`.
 
-    Frames with leading blanks or non-ASCII bytes pass this check, because the decoder may skip
-    blanks, or may report undecodable bytes.
+    Frames with leading blanks or non-ASCII bytes pass the generated check, because the decoder may
+    skip blanks, or may report undecodable bytes.
     """
     if not prefix or encoding not in _KEEPS_ASCII:
         return []

@@ -1,6 +1,6 @@
 """Shared code of the generated decoders for converting a raw field to a sample.
 
-Each engine builds the source text once: the field conversions, the checks and the samples. For a
+Each engine builds the source text for field conversions, checks and samples once. For a
 value of the wrong type or range, the closures (`slow`) read the frame again.
 """
 

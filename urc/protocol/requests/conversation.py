@@ -107,7 +107,7 @@ class Conversation(Connection):
         return self.held.must_wait(now, is_owed=is_owed)
 
     def gave_motion(self, command: str, names: Mapping[str, object], now: float) -> None:
-        """Record the sending of a frame of motion with the values `names`."""
+        """Record that a frame of motion was sent with the values `names`."""
         self.held.gave(command, names, now)
         if self.spec.is_half_duplex and now < self.held.owed_until_s:
             self._free_at = now + self._gap_s
@@ -488,8 +488,8 @@ class Conversation(Connection):
     ) -> list[LineEvent]:
         """Return the events of a frame with the match result `offer` for a request.
 
-        A provisional reply may also be a message. Without `frame`, the message has already been
-        reported.
+        A provisional reply may also be a message. Without `frame`, the frame has already been
+        reported as a message.
         """
         exchange = pending.exchange
         events: list[LineEvent] = self.receiver.dropped(offer) if offer.dropped else []

@@ -18,7 +18,7 @@ from urc.protocol.values.payload import CodecContext, NotWritable
 __all__ = ["BadArgument", "Encode", "build_check", "build_encode", "check_arguments"]
 
 Encode = Callable[[Mapping[str, object]], Payload]
-"""Function that encodes a namespace to bytes including framing, or to an envelope; raises
+"""Function that encodes a namespace to bytes including framing, or to an envelope, or raises
 `BadArgument`."""
 
 _LARGEST = 1e308

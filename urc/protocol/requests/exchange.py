@@ -74,7 +74,7 @@ class CompiledRequest(NamedTuple):
     retries: int = 0
     """Maximum number of retries of the request."""
     is_repeated: bool = False
-    """Whether a missing reply also causes a retry, not only a retransmission request by the
+    """Whether a missing reply causes a retry, in addition to a retransmission request by the
     robot."""
     retry: Retry = Retry()
     """Delays before retries of the request."""

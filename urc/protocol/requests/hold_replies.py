@@ -75,7 +75,7 @@ class HoldReplies:
         self._all[command] = _Listening(answer, match)
 
     def gave(self, command: str, names: Mapping[str, object], now: float) -> None:
-        """Record the sending of a frame of a command with the values `names`."""
+        """Record that a frame of a command was sent with the values `names`."""
         one = self._all.get(command)
         if one is not None:
             self.owed_until_s = now + min(one.expectation.answer.timeout_s, LONGEST_WAIT_S)

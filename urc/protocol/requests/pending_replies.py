@@ -39,7 +39,7 @@ class PendingReply:
         self.stage = 0
         self._expectation: Expectation | None = None
         self.due = now + ask.answers[0].timeout_s
-        """Time at which the reply is overdue. A late transmission is removed at this time."""
+        """Time at which the reply is overdue, or at which a late transmission is removed."""
         self.size = 0
         """Size of the request in the robot's receive buffer, in bytes."""
         self.since = now
@@ -51,7 +51,7 @@ class PendingReply:
         another request."""
         self.values: dict[str, Reading] = {}
         self.number: int | None = None
-        """Number that the reply repeats; None: the reply has no number."""
+        """Number of the request that the reply repeats; None: the reply has no number."""
 
     @property
     def expectation(self) -> Expectation:

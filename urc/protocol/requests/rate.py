@@ -13,7 +13,7 @@ from urc.model.payload import Count, FrameVariants, Numbered, Payload
 __all__ = ["RANKS", "REALTIME", "GcraLimiter", "Counters", "FrameCounters", "Made", "PriorityQueue"]
 
 RANKS: Final[dict[Priority, int]] = {"realtime": 0, "high": 1, "normal": 2, "low": 3}
-"""Ranks of the priorities; lower ranks are sent first."""
+"""Rank of each priority; requests with a lower rank are sent first."""
 REALTIME: Final = 0
 
 

@@ -52,7 +52,7 @@ class RequestQueue(PriorityQueue[Exchange]):
         return any(exchange.ask.label == label for exchange in self)
 
     def sent(self, exchange: Exchange, now: float) -> None:
-        """Record the sending of a request."""
+        """Record that a request was sent."""
         self.next_send = now + self._spec.min_gap_s
         if exchange.ask.bucket is not None:
             exchange.ask.bucket.count(now)

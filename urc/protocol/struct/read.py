@@ -1,11 +1,12 @@
 """Closures that read struct items from bytes to fields.
 
-Pure. The module is a readable version of `urc.protocol.struct.read_source`. Generated functions are
-faster for runs of fixed items. Tests compare the results of the closures and the generated
-functions. Theory of operation: every item becomes a step ``(data, at, end, out) -> after``. A step
-reads bytes from `at` to at most `end`, and stores the value in `out`. A step raises `OtherFrame`
-for a frame that does not match. After the first invalid value, an error is recorded under the key
-`FAULT`, and reading continues. The error is reported only if the frame matches to its end.
+Pure. The closures are a readable version of the code that `urc.protocol.struct.read_source`
+generates. Generated functions are faster for runs of fixed items. Tests compare the results of the
+closures and the generated functions. Theory of operation: every item becomes a step ``(data, at,
+end, out) -> after``. A step reads bytes from `at` to at most `end`, and stores the value in `out`.
+A step raises `OtherFrame` for a frame that does not match. After the first invalid value, an error
+is recorded under the key `FAULT`, and reading continues. The error is reported only if the frame
+matches to its end.
 """
 
 from collections.abc import Callable, Mapping

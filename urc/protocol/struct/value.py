@@ -1,8 +1,8 @@
 """Conversion between raw forms and values of struct items.
 
-Pure. The closures and the slow paths of generated functions share this conversion. The raw form of
-an item is the number or the bytes in the frame. The value of an item is a field or argument, such
-as a scaled number, a word of an enum, or a text.
+Pure. The closures and the slow paths of generated functions share the conversions in this module.
+The raw form of an item is the number or the bytes in the frame. The value of an item is a field or
+argument, such as a scaled number, a word of an enum, or a text.
 """
 
 import struct

@@ -1,9 +1,10 @@
 """Closures that write struct items from values to bytes.
 
-Pure. The module is the reverse of `urc.protocol.struct.read`. Theory of operation: every item
-becomes a step ``(pen, scope)`` that appends its bytes. Two kinds of values leave a gap in the frame
-until the missing number can be computed. The `Backpatch` for the size of a later item is stored in
-the scope. Values that depend on the size of the whole frame are stored in `FrameBuilder.late`.
+Pure. The closures reverse the closures of `urc.protocol.struct.read`. Theory of operation: every
+item becomes a step ``(pen, scope)`` that appends its bytes. Two kinds of values leave a gap in the
+frame until the missing number can be computed. The `Backpatch` for the size of a later item is
+stored in the scope. Values that depend on the size of the whole frame are stored in
+`FrameBuilder.late`.
 """
 
 from collections.abc import Callable, Mapping

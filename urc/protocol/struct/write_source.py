@@ -1,7 +1,7 @@
 """Generated functions that write struct items, one per declaration.
 
-Pure. The module is the reverse of `urc.protocol.struct.read_source`. Generated writers support only
-fixed items. Closures handle all other items and all invalid values.
+Pure. Generated writers reverse the generated readers of `urc.protocol.struct.read_source`.
+Generated writers support only fixed items. Closures handle all other items and all invalid values.
 """
 
 import struct

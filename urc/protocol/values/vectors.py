@@ -1,8 +1,8 @@
 """Composite values: arrays, objects, and binary data such as images.
 
 Pure. Raw composite values are JSON-like data, bytes, or text. In text, blanks, commas or semicolons
-separate the elements of an array, and bytes are base64. The size of the frame limits the size of
-the values.
+separate the elements of an array, and bytes are base64. The size of a frame limits the size of its
+composite values.
 """
 
 import re

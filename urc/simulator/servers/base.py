@@ -87,7 +87,8 @@ class SimulatedServer(Protocol):
         """Start to accept clients.
 
         Raises:
-            UrcError: the address is not available. The message starts with ``transports.NAME``.
+            UrcError: the address is not available. The error message starts with
+                ``transports.NAME``.
         """
 
     async def close(self) -> None:

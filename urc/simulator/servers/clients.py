@@ -21,7 +21,7 @@ MAX_CLIENTS = 64
 """Maximum number of connections per transport."""
 READ_BYTES = 4096
 TAKEN_WITHIN_S = 5.0
-"""Write timeout in seconds. A client that does not read its data in this time is disconnected."""
+"""Write timeout in seconds; a client that does not read its data in time is disconnected."""
 
 log = logging.getLogger(__name__)
 

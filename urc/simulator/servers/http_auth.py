@@ -17,7 +17,7 @@ class HttpAuth:
     """A check of requests against the driver's option `auth`."""
 
     def __init__(self, auth: object) -> None:
-        """Read the option `auth`. Without the option, every request is accepted."""
+        """Read the option `auth`. Without the option `auth`, every request is accepted."""
         self._auth: Mapping[str, object] = auth if isinstance(auth, Mapping) else {}
         self._nonce = secrets.token_hex(16)
 

@@ -39,7 +39,7 @@ class MqttRobot:
         self._transport: Transport | None = None
 
     async def open(self) -> Endpoint:
-        """Connect to the broker in the options."""
+        """Connect to the broker that the options declare."""
         context = self._context
         options = {name: value for name, value in context.options.items() if name not in _NOT_OURS}
         try:

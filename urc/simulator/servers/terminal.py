@@ -16,7 +16,7 @@ class TerminalInput:
     """The input of one client, converted to the line ends of the driver."""
 
     def __init__(self, spec: TransportSpec) -> None:
-        """Use the line ends in the framing of `spec`. For other framings, bytes stay unchanged."""
+        """Use the line ends in the framing of `spec`; without line ends, bytes stay unchanged."""
         framing = spec.framing.sent or spec.framing
         end = framing.options.get("tx") if framing.type == "delimiter" else None
         self._end = end if isinstance(end, bytes) and end in _LINE_ENDS else b""

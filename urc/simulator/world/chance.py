@@ -35,7 +35,7 @@ def gauss(seed: int, tick: int, name: str) -> float:
 def wander(seed: int, time_s: float, name: str) -> float:
     """Return a slowly varying number between -1 and 1.
 
-    The number is a sum of four waves with periods of 20 to 190 s.
+    The slowly varying number is the sum of four waves with periods of 20 to 190 s.
     """
     total = 0.0
     for place, period_s in enumerate((23.0, 47.0, 91.0, 187.0)):

@@ -1,6 +1,6 @@
 """A laser scanner: rays from the centre of the robot, with noise.
 
-Pure. The module imports numpy, so it is loaded on first use.
+Pure. Because of the import of numpy, the module is loaded only on first use.
 """
 
 import math

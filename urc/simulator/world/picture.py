@@ -1,7 +1,8 @@
 """The camera image of the emulated robot as JPEG, rendered by ray casting: walls, ground and sky.
 
-Pure. The module imports numpy and Pillow, so it is loaded on first use. Each image column is one
-direction on the ground. The obstacles of each column are drawn from the farthest to the nearest.
+Pure. Because of the import of numpy and Pillow, the module is loaded only on first use. Each image
+column is one direction on the ground. The obstacles of each column are drawn from the farthest to
+the nearest.
 """
 
 import io

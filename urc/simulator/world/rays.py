@@ -1,6 +1,6 @@
 """Vectorized intersection of rays with the edges of a world map.
 
-Pure. The module imports numpy, so it is loaded on first use.
+Pure. Because of the import of numpy, the module is loaded only on first use.
 """
 
 from typing import Final

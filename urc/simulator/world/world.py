@@ -53,8 +53,8 @@ class World:
 
     Args:
         spec: the declaration.
-        inputs: function that returns the inputs of the body at a given time. The function may
-            observe the world at the current step.
+        inputs: function that returns the inputs of the body at a given time. The function `inputs`
+            may observe the world at the current step.
         holds: function that evaluates a condition of the camera, which a document may give as a
             template.
     """
