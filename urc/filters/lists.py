@@ -62,7 +62,7 @@ def sliced(value: Any, start: Any, stop: Any) -> Any:
 
 @lru_cache(maxsize=512)
 def compiled(source: str, test: str) -> "Pattern":
-    """Return the compiled pattern, anchored at the start for ``match``; raise `PatternError`."""
+    """Return the pattern, anchored at the start for ``match``, or raise `PatternError`."""
     from urc._patterns import compile_pattern  # 2 ms that only a driver with such a test pays
 
     pattern = compile_pattern(source)  # first, so that errors refer to the written text

@@ -110,7 +110,7 @@ def _signed(value: Any, bits: Any) -> int:
 
 
 class _Short(ValueError):
-    """The error for bytes that are too few for a number."""
+    """The error for fewer bytes than a number needs."""
 
 
 @cache  # the type names are few
@@ -174,5 +174,5 @@ CUT_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "signed": (_signed, (1, 1)),
     "unpack": (_unpack, (1, 2)),
 }
-"""Each filter with its function, and its minimum and maximum number of arguments after the
-subject."""
+"""Function of each filter, with the minimum and maximum number of arguments after the filtered
+value."""

@@ -7,9 +7,9 @@ guard receives the list of transports, a pending stop for each command that may 
 terms of other armed commands. For each pending stop, the guard opens the connection and writes the
 stop first. Motion never resumes automatically.
 
-A control *may be moving* from its first tick or stop request. This state ends when the guard
-reports that the stop after the newest tick was written. A pending stop is therefore not lost when
-the guard process dies.
+The state *may be moving* of a control begins with its first tick or stop request. The state ends
+when the guard reports that the stop after the newest tick was written. A pending stop is therefore
+not lost when the guard process dies.
 """
 
 import asyncio
@@ -77,7 +77,7 @@ class GuardClient:
         Args:
             lines: the guarded transports; a tunnel precedes the transports inside the tunnel.
             held: the held commands by name.
-            channel_to: creates the channel for this client.
+            channel_to: function that creates the channel for this client.
         """
         self.lines = tuple(lines)
         self.channel = channel_to(self)
@@ -174,8 +174,8 @@ class GuardClient:
         """Stop all commands that may be moving.
 
         Args:
-            stop_frame: returns the current stop frame of a command. If `stop_frame` raises
-                `UrcError`, the last known stop frame is used.
+            stop_frame: function that returns the current stop frame of a command. If `stop_frame`
+                raises `UrcError`, the last known stop frame is used.
         """
         stops: dict[str, Payload | FrameVariants] = {}
         for command, control in self._controls.items():

@@ -40,7 +40,7 @@ _GRACE_S: Final = 1.0
 """Grace period for a transport that exceeds its own timeout, in seconds."""
 _CLOSE_S: Final = 1.0
 _RESCUE_S: Final = 90.0
-"""Time limit of a rescue, in seconds. After this time, only the engine tries to connect."""
+"""Time limit of a rescue, in seconds. After a failed rescue, only the engine tries to connect."""
 _KEPT_S: Final = 6.0
 """Time for which a rescued connection is kept for the engine, in seconds."""
 _EVERY_S: Final = 0.05
@@ -162,7 +162,7 @@ class GuardedConnection:
             self._switch(self._shut(turn))
 
     def send(self, said: messages.SendBytes) -> None:
-        """Send a frame without motion; report `SendDone`, `SendRefused` or `SendStale`."""
+        """Send a frame that causes no motion; report `SendDone`, `SendRefused` or `SendStale`."""
         if said.turn != self._turn or not self._is_handed or said.round != self._round:
             return  # from an earlier connection, or rendered again meanwhile
         data, number = said.data, said.number
@@ -207,7 +207,7 @@ class GuardedConnection:
             self._credited.set()
 
     def settle(self) -> None:
-        """Process the effects of a batch of messages."""
+        """Report the results of a batch of messages, and watch the liveness during motion."""
         if self._acked:
             number, self._acked = self._acked, 0
             self._emit(messages.SendDone(self.name, self._turn, number))

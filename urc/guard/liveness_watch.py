@@ -31,7 +31,7 @@ class LivenessWatch:
             transport: the transport; probed if the transport is a `SupportsProbe`.
             clock: the time.
             silent_s: maximum silence of a robot that is not probed, in seconds; None for no limit.
-            is_moving: returns whether a control is moving.
+            is_moving: function that returns whether a control is moving.
             failed: callback with the reason when the program is frozen.
         """
         self._transport = transport if isinstance(transport, SupportsProbe) else None

@@ -47,7 +47,7 @@ class Pipe:
             decoder: decoder of received messages.
             take: callback for each message.
             settle: callback after each batch of messages.
-            gone: callback when the other side has closed the pipe; called once.
+            gone: callback that is called once, when the other side has closed the pipe.
         """
         line.setblocking(False)
         self._line = line

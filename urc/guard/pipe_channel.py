@@ -35,8 +35,8 @@ _STEADY_S: Final = 0.5
 """Lifetime after which a guard counts as successfully started, in seconds. A guard that has opened
 a connection also counts as successfully started."""
 _AT_ONCE: Final = 3
-"""Number of short-lived guards that are replaced immediately. Each later replacement is delayed by
-`_AGAIN_S` seconds."""
+"""Number of short-lived guards that are replaced immediately. The replacement of further
+short-lived guards is delayed by `_AGAIN_S` seconds."""
 _AGAIN_S: Final = 1.0
 _FINISH_S: Final = 3.0
 _DIED: Final = "the guard of this connection ended; a new guard is starting"

@@ -62,8 +62,8 @@ class GuardedTransport:
         Args:
             name: name of the transport.
             address: address of the robot, for display.
-            post: sends a message to the guard without waiting.
-            ready: returns once a guard is ready.
+            post: function that sends a message to the guard without waiting.
+            ready: function that waits until a guard is ready.
             stands: callback with the counters of the transport, and whether no frame with counters
                 is pending.
         """

@@ -29,7 +29,7 @@ if sys.platform == "linux":
     import resource
 
     def _ask() -> str:
-        """Request real-time priority; return the reason of a refusal, or ""."""
+        """Request real-time priority; return the reason for a refusal, or ""."""
         policy = os.SCHED_RR | os.SCHED_RESET_ON_FORK
         try:
             os.sched_setscheduler(0, policy, os.sched_param(_PRIORITY))
@@ -66,7 +66,7 @@ class RealTimePriority:
         """
 
     def request(self) -> str:
-        """Request real-time priority; return the reason of a refusal, or ""."""
+        """Request real-time priority; return the reason for a refusal, or ""."""
         if os.environ.get(SWITCH, "").lower() == "no":
             return f"{SWITCH} is no"
         refusal = _ask()

@@ -74,7 +74,7 @@ class SendQueue(Generic[_Tag]):
         self._is_free.set()
         self._task: asyncio.Task[None] | None = None
         self.busy_since_s: float | None = None
-        """Time since which the first frame has been waiting; None for an empty queue."""
+        """Time at which the first frame in the queue began to wait; None for an empty queue."""
 
     @property
     def is_idle(self) -> bool:
@@ -89,7 +89,8 @@ class SendQueue(Generic[_Tag]):
         """Add a frame to the queue.
 
         Args:
-            make: renders the frame at the head of the queue; a result of None drops the frame.
+            make: function that renders the frame at the head of the queue; a result of None drops
+                the frame.
             tag: argument for the callback `done`. The callback is not called for a dropped frame.
         """
         if not self._waiting:

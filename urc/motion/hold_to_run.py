@@ -12,7 +12,7 @@ are then refused. The operator must release the control and press again, which a
 again.
 
 If the connection is lost while the robot may be moving, the control owes a stop. The owed stop is
-the first frame on the restored connection. Other unsent values are dropped.
+the first frame on the restored connection. All other unsent values are dropped.
 """
 
 from typing import Final, Literal, NamedTuple
@@ -163,7 +163,8 @@ class HoldToRun:
         Args:
             now: the time.
             is_clear: whether the connection has no unsent bytes. A motion frame waits for a clear
-                connection; meanwhile, newer values replace the waiting value. A stop does not wait.
+                connection; meanwhile, newer values replace the waiting value. A stop frame never
+                waits.
         """
         if self.state == "moving" and now >= self._expires_at:
             self.stop("expired", now)

@@ -175,7 +175,7 @@ class AuditLog:
                 base.close()
 
     def _next_batch(self) -> list[AuditEntry]:
-        """Return the queued entries after a short wait for more; return [] at the end."""
+        """Wait briefly for a batch, and return the queued entries; return [] after `close`."""
         with self._wakes:
             self._is_busy = False
             self._wakes.notify_all()

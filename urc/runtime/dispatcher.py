@@ -314,10 +314,7 @@ class Dispatcher:
         self._waiting.close(reason)
 
     def _refusal(self, request: Request) -> Failed:
-        """Return the reason to refuse a request without calling the engine.
-
-        None to accept the request.
-        """
+        """Return the failure of a request that is refused without calling the engine."""
         if self._is_stopped:
             return Failed(request.id, request.command, "disconnected", "the session is closed")
         if self._waiting.is_full:

@@ -88,8 +88,8 @@ class SampleHistory:
 
 
 LinkState = Literal["idle", "connecting", "live", "silent", "lost"]
-"""Meaning of some states: ``idle``: not requested yet; ``silent``: connected, but data is overdue;
-``lost``: not connected."""
+"""In the state ``idle``, no connection was requested yet. In the state ``silent``, the link is
+connected, but data is overdue. In the state ``lost``, the link is not connected."""
 
 NOTES_KEPT = 500
 TRAFFIC_KEPT = 1000

@@ -77,7 +77,7 @@ class Link:
             dispatcher: the owner of the engine.
             hub: destination of states, log entries and traffic.
             clock: source of time.
-            random: returns a number in [0, 1) for the jitter of the backoff.
+            random: function that returns a number in [0, 1) for the jitter of the backoff.
             expects_frames: whether the robot sends frames without a request. A link that expects
                 frames becomes live with the first frame; other links become live when the
                 connection opens.
@@ -247,7 +247,7 @@ class Link:
             await self._close()
 
     async def _open(self) -> str:
-        """Open the transport; return the reason of a failure, or ""."""
+        """Open the transport; return the reason for a failure, or "" on success."""
         limit_s = self._spec.timeouts.connect_s
         try:
             async with within(self._clock, limit_s + _GRACE_S):

@@ -171,7 +171,7 @@ class MotionController:
     # -- the lease
 
     def drive(self, client: str, verb: Verb, now: float, for_s: float = REQUEST_S) -> str:
-        """Apply a page's lease request; return the reason of a refusal, or ""."""
+        """Apply a page's lease request; return the reason for a refusal, or ""."""
         who, lease = self._screens[client].client, self.lease
         if verb == "take":
             outcome: LeaseChanged | LeaseRefused | None = lease.acquire(who, now)
@@ -233,7 +233,7 @@ class MotionController:
         given: ControlInput,
         now: float,
     ) -> str:
-        """Handle a tick of sampled input; return the reason of a refusal, or ""."""
+        """Handle a tick of sampled input; return the reason for a refusal, or ""."""
         control, screen = self._controls.get(command), self._screens.get(client)
         if control is None or screen is None:
             return f"{command!r} is not a held command of this robot"

@@ -71,10 +71,10 @@ class OutputBuffer:
 
         Args:
             transport: destination of the bytes.
-            report: publishes the written data as traffic.
+            report: the `LinkReport` that publishes the written data as traffic.
             hub: hub of the session, which knows whether traffic has readers.
             clock: source of time.
-            give_up: ends the connection for the given reason.
+            give_up: function that ends the connection for the given reason.
             is_stream: whether bytes may be joined; if false, each piece is a datagram or a message.
         """
         self._transport = transport

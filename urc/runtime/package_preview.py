@@ -32,7 +32,7 @@ def permissions(document: Path, folder: Path, widgets: Sequence[str]) -> list[st
     Args:
         document: the document of the package.
         folder: folder with all files of the package; references to files outside are an error.
-        widgets: names of the included widgets.
+        widgets: names of the widgets in the package.
 
     Raises:
         ProblemsError: the document has errors.
@@ -214,8 +214,8 @@ class PackagePreview(NamedTuple):
     permissions: list[str]
     """Permissions, one per line."""
     wire: Mapping[str, str]
-    """Key path, such as ``commands.beep.send`` → value, for all keys that affect sent bytes or the
-    decoding of replies."""
+    """Values of all keys that affect sent bytes or the decoding of replies, by key path, such as
+    ``commands.beep.send``."""
     risks: list[str]
     """Local resources that the package uses without a setting; see `risks_of`."""
 
@@ -226,7 +226,7 @@ def look(document: Path, folder: Path, widgets: Sequence[str]) -> PackagePreview
     Args:
         document: the document of the package.
         folder: folder with all files of the package; references to files outside are an error.
-        widgets: names of the included widgets.
+        widgets: names of the widgets in the package.
 
     Raises:
         ProblemsError: the document has errors.

@@ -38,8 +38,8 @@ class ProbeResult(NamedTuple):
     address: str
     """Address for people."""
     verdict: Verdict
-    """Meaning of the results: ``answers``: live; ``opens``: connects, but the robot sends nothing;
-    ``fails``: no connection."""
+    """The result ``answers`` means that the transport is live. The result ``opens`` means a
+    connection on which the robot sends nothing, and ``fails`` means no connection."""
     text: str
     """Description of the result, in one line."""
     advice: str
@@ -55,7 +55,7 @@ async def probe(
     """Test every transport of a robot; every wait has a time limit.
 
     Args:
-        opened: returns a new session to test.
+        opened: function that returns a new session to test.
         table: table of the available transport types.
         longest_s: maximum duration of the test, in seconds.
 

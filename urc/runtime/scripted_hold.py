@@ -43,9 +43,9 @@ async def hold(
     Args:
         session: a session opened with ``motion``.
         name: name of a command with ``hold``.
-        arguments: argument name → value.
+        arguments: values of the arguments, by name.
         for_s: duration, from 0 to `LONGEST_HOLD_S` seconds.
-        why_not: returns the reason to end early, or "" to continue.
+        why_not: function that returns the reason to end early, or "" to continue.
 
     Raises:
         CommandFailed: the command was refused, or ended early with a stop.

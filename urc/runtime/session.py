@@ -275,7 +275,7 @@ class Session:
 
         Args:
             name: name of the command in the driver.
-            arguments: argument name → value; missing arguments use their defaults.
+            arguments: values of the arguments, by name; missing arguments use their defaults.
             confirmed_by: people who confirmed the command, for the two-person rule.
             on_sent: callback with each sent payload, except secrets and payloads of a sequence.
 

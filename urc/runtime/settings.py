@@ -33,7 +33,7 @@ _NO_ENVIRONMENT: Mapping[str, str] = MappingProxyType({})
 
 
 def environment_name(name: str) -> str:
-    """Return the environment variable of a setting: ``robot-host`` → ``URC_SET_ROBOT_HOST``."""
+    """Return the environment variable of a setting; for ``robot-host``, ``URC_SET_ROBOT_HOST``."""
     return "URC_SET_" + name.upper().replace("-", "_")
 
 
@@ -48,7 +48,7 @@ def resolve_settings(
 
     Args:
         profile: profile with the settings.
-        given: name → text, from ``--set``; overrides all other sources.
+        given: texts of settings from ``--set``, by name; these texts override all other sources.
         environ: environment variables; ``URC_SET_NAME`` overrides the default of a setting.
         allows_any_port: whether to permit port 0, for a server that lets the system choose.
 

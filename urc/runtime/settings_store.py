@@ -34,7 +34,7 @@ class StoredSettings(msgspec.Struct, frozen=True):
     interface: _Name = ""
     """Interface to show first; "" for the first interface of the document."""
     settings: dict[_Name, _Text] = {}
-    """Setting → text from the operator; missing settings use their defaults."""
+    """Text of each setting from the operator, by name; missing settings use their defaults."""
     destination: _Name = ""
     """Destination for which the secrets were entered, from `urc.runtime.destination`. "" means an
     unknown destination; the secrets must then be entered again."""

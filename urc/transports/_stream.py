@@ -196,7 +196,7 @@ class TcpStream(asyncio.BufferedProtocol):
         self._transport.abort()
 
     def end(self, why: str) -> None:
-        """Wake all waiting tasks with the reason of the stream's end; the first reason is kept."""
+        """Wake all waiting tasks with the reason why the stream ended; keep the first reason."""
         if self._ended is None:
             self._ended = why
         self._arrived.set()

@@ -145,7 +145,7 @@ class _Session:
         self.line = line
         self._loop = asyncio.get_running_loop()
         self._answered: asyncio.Future[str] = self._loop.create_future()
-        """Result of the login: "" for success, or the reason of a refusal."""
+        """Result of the login: "" for success, or the reason for a refusal."""
         self._granted: dict[int | None, asyncio.Future[list[ReasonCode]]] = {}
         self._seen = 0
         self._writable: asyncio.Future[None] | None = None

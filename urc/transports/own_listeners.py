@@ -62,8 +62,8 @@ class OwnListeners:
         Args:
             address: target address.
             port: target port.
-            is_near: whether the connection starts on this machine. If false, a loopback address
-                means another machine.
+            is_near: whether the connection starts on this machine; if not, a loopback address
+                belongs to another machine.
         """
         wanted = unmapped(address)
         if not is_near and (wanted.is_loopback or wanted.is_unspecified):

@@ -168,8 +168,8 @@ class SharedConnection:
         """Initialise.
 
         Args:
-            dial: opens a connection within the given number of seconds; frees all resources if
-                cancelled.
+            dial: function that opens a connection within the given number of seconds; frees all
+                resources if cancelled.
         """
         self._dial = dial
         self._users = 0

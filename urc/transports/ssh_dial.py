@@ -154,7 +154,7 @@ def _known(target: SshTarget) -> HostKeyStatus:
 
 
 def _explain(target: SshTarget, client: _Client, fault: Exception) -> str:
-    """Return a one-line message with the reason of a failed connection."""
+    """Return a one-line message with the reason for a failed connection."""
     place, login = target.address.text, target.login
     if client.offer is not None and client.offer.expected:
         return _explain_key(target, client.offer)

@@ -26,7 +26,7 @@ __all__ = ["READ_AHEAD_BYTES", "TcpListener", "TcpTransport", "from_setup"]
 
 
 HANDOVER_S = 6.0
-"""Time for which a newer connection waits for the next `open`, in seconds. This time is slightly
+"""Time for which a newer connection waits for the next `open`, in seconds. The time is slightly
 longer than the backoff between connection attempts."""
 _WAITING = 8
 _AGAIN_S = 0.1

@@ -31,7 +31,7 @@ class Address:
         return await self._lookup.first(connected, timeout_s)
 
     def explain(self, fault: Exception) -> str:
-        """Return a one-line message with the reason of a failed `dial`."""
+        """Return a one-line message with the reason for a failed `dial`."""
         if isinstance(fault, OSError | UnicodeError):
             return explain(self.host, self.text, fault)
         return f"cannot connect to {self.text} ({reason(fault)})"

@@ -65,7 +65,7 @@ class WebSocketTransport:
 
     @property
     def address(self) -> str:
-        """Target of the transport as text: ``websocket ws://192.168.4.1:80/control``."""
+        """Target of the transport as text, such as ``websocket ws://192.168.4.1:80/control``."""
         place = self._place
         return f"websocket ws{'s' * place.is_secure}://{place.authority}{place.path}"
 
@@ -250,7 +250,7 @@ async def _hang_up(connection: ClientConnection) -> None:
 
 
 def _refusal(fault: Exception, where: str) -> str:
-    """Return a one-line message with the reason of a failed handshake."""
+    """Return a one-line message with the reason for a failed handshake."""
     if isinstance(fault, InvalidStatus):
         response = fault.response
         target = response.headers.get("Location")

@@ -71,7 +71,7 @@ class AccessMiddleware:
         Args:
             app: the wrapped application.
             access: the keys and sessions of the server.
-            robots: returns the robots that STOP can stop.
+            robots: function that returns all robots that STOP can stop.
         """
         self._app = app
         self._access = access

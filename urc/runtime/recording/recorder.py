@@ -282,7 +282,7 @@ async def recorded(
 ) -> AsyncIterator[Recorder]:
     """Record all events of a hub while the context is open, without delaying the hub.
 
-    The hub's log shows the name of the file, or the reason of a failure.
+    The hub's log shows the name of the file, or the reason for a failure.
 
     Args:
         hub: hub of the session, preferably before the session opens; the hub redacts secrets.

@@ -148,7 +148,7 @@ class RecordingEncoder:
 
         Args:
             driver: driver of the robot.
-            utc_ns: converts monotonic seconds to nanoseconds since 1970.
+            utc_ns: function that converts monotonic seconds to nanoseconds since 1970.
         """
         self._signals = driver.signals
         self._commands = driver.commands

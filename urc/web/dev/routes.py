@@ -75,8 +75,8 @@ class Dev:
         Args:
             stations: the robots, by the name in their URL.
             remake: functions that create a robot from a new version of its profile, by name.
-            take: switches to a new version of a robot; may raise `UrcError`.
-            is_here: returns whether the request has the start key.
+            take: function that switches to a new version of a robot; may raise `UrcError`.
+            is_here: function that returns whether the request has the start key.
         """
         self._is_here = is_here
         self._open = 0

@@ -69,9 +69,9 @@ class DevStart:
         Args:
             fleet: the robots.
             remake: functions that create a robot from a new version of its profile, by name.
-            take: switches to the new robot; may raise `UrcError`.
+            take: function that switches to the new robot; may raise `UrcError`.
             ways: navigation links of this server.
-            is_here: returns whether a request has the start key.
+            is_here: function that returns whether a request has the start key.
         """
         self._fleet = fleet
         self._remake = remake

@@ -56,7 +56,7 @@ def _moves(command: Command, arguments: Mapping[str, object]) -> bool:
 
 
 class OneShotCommands:
-    """Commands without a held control, for one robot."""
+    """The commands of one robot that need no held control."""
 
     def __init__(
         self,

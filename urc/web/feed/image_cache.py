@@ -17,7 +17,7 @@ __all__ = ["EncodedImage", "ImageSubscription", "ImageCache", "is_picture"]
 
 SHARED_FOR_S = 0.05
 """Time for which an encoded image is reused, in seconds. The message contains the age of the image
-at the time of encoding. During this time, the age is wrong by a few milliseconds, which does not
+at the time of encoding. In a reused message, the age is wrong by a few milliseconds, which does not
 justify another copy of several kilobytes.
 """
 

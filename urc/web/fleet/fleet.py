@@ -38,7 +38,7 @@ class Fleet:
 
         Args:
             robots: the robots, by the name in their URL.
-            service: creates the station of a robot.
+            service: function that creates the station of a robot.
 
         Raises:
             UrcError: two robots use different widgets of the same name.
@@ -69,7 +69,7 @@ class Fleet:
                     task.cancel()
 
     def add(self, name: str, robot: Robot) -> None:
-        """Add a robot; raise `UrcError` when its widgets cannot be served."""
+        """Add a robot; raise `UrcError` if its widgets cannot be served."""
         robot = self._apart(name, robot)
         self.widgets = _assets({**self.robots, name: robot})
         self.robots[name] = robot

@@ -107,11 +107,11 @@ class RobotFactory:
         return SettingsStore(self.robot_options.data / "robots", name)
 
     def robot(self, name: str, profile: Profile, kept: StoredSettings | None = None) -> Robot:
-        """Return a robot with its settings and all interfaces that fit it; raise `UrcError`.
+        """Return a robot with its settings and all interfaces that fit it, or raise `UrcError`.
 
         Args:
             name: name of the robot in URLs.
-            profile: the profile as its document defines it.
+            profile: the robot's profile, without added interfaces.
             kept: the stored settings of the robot; None to read the settings from the file.
         """
         chosen = self.kept(name).load() if kept is None else kept
@@ -126,7 +126,7 @@ class RobotFactory:
         return self.robot_options.make(self.furnished(profile, chosen.interface), filled.values)
 
     def filled(self, profile: Profile, kept: StoredSettings) -> ResolvedSettings:
-        """Return the resolved settings of a robot; raise `UrcError`.
+        """Return the resolved settings of a robot, or raise `UrcError`.
 
         A value given at the start overrides a stored value, and a stored value overrides the
         default. A stored value that has become invalid, for example after an update, counts as
@@ -229,17 +229,17 @@ class RobotFactory:
         return next((lock for lock in locks if lock.version == version), locks[-1])
 
     def profile(self, lock: Lock) -> Profile:
-        """Return the profile of an installed package; raise `UrcError`."""
+        """Return the profile of an installed package, or raise `UrcError`."""
         profile = open_document(self.store.document(lock))
         check_hosts(profile)
         return profile
 
     def reread(self, profile: Profile) -> Profile:
-        """Reread the profile of a robot that was given at the start; raise `UrcError`."""
+        """Reread the profile of a robot that was given at the start, or raise `UrcError`."""
         return open_document(profile.file)
 
     def manifest(self, lock: Lock) -> Manifest:
-        """Return the manifest of an installed package; raise `UrcError`."""
+        """Return the manifest of an installed package, or raise `UrcError`."""
         digest = lock.packages[lock.root].sha256
         try:
             found = self.store.blob_file(digest).stat()

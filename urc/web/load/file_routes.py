@@ -24,8 +24,8 @@ class FileRoutes:
     Args:
         vendor: folder of the third-party modules of the build; None without a build.
         tiles: folder of map tiles, ``z/x/y.png``; None for no tiles.
-        widgets: returns the tables of widget files. If several tables contain a file, the first
-            table is used.
+        widgets: function that returns the tables of widget files. If several tables contain a file,
+            the first table is used.
     """
 
     def __init__(

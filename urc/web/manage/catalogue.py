@@ -33,7 +33,7 @@ class PackageCatalog:
 
         Args:
             folder: folder of the packages and of the list of repositories.
-            now: returns the current time, in seconds.
+            now: function that returns the current time, in seconds.
         """
         self._folder = folder
         self._now = now

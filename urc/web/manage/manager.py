@@ -44,10 +44,10 @@ class Manager:
         """Prepare.
 
         Args:
-            factory: creates the robots.
+            factory: the factory that creates the robots.
             fleet: the served robots.
             now: returns the current time, in seconds.
-            renew: switches to another version of a robot; may raise `UrcError`.
+            renew: function that switches to another version of a robot; may raise `UrcError`.
         """
         self.factory = factory
         self.fleet = fleet
@@ -184,7 +184,7 @@ class Manager:
                 log.warning("the installed packages cannot be read: %s", error)
 
     async def connect(self, url: str) -> None:
-        """Add a repository, which must respond; raise `PackageError` if it does not."""
+        """Add a repository; raise `PackageError` if the repository does not respond."""
         known = self.catalogue.repositories(log.info)
         await in_daemon(lambda: known.add(url), "connect")
         self.catalogue.refresh(force=True)
@@ -196,7 +196,7 @@ class Manager:
         self.catalogue.refresh(force=True)
 
     def gone(self, required: PackageRequirement) -> list[str]:
-        """Return all packages that a removal would remove; raise `PackageError`."""
+        """Return all packages that a removal would remove, or raise `PackageError`."""
         before = self.factory.store.installed()
         meant = self._meant(required)
         after = [lock for lock in before if lock not in meant]
@@ -215,7 +215,7 @@ class Manager:
         return meant
 
     def forgettable(self, required: PackageRequirement) -> list[str]:
-        """Return the robots whose settings a removal could delete; raise `PackageError`."""
+        """Return the robots whose settings a removal could delete, or raise `PackageError`."""
         meant = self._meant(required)
         left = [lock for lock in self.factory.store.installed() if lock not in meant]
         return names_kept(self._kept_folder, meant, left)
@@ -259,7 +259,7 @@ class Manager:
         return job
 
     def installed(self, text: str) -> Lock:
-        """Return the newest installed version of a package; raise `PackageError`."""
+        """Return the newest installed version of a package, or raise `PackageError`."""
         lock = self.factory.store.find(parse_requirement(text))
         if lock is None:
             raise PackageError(f"{text} is not installed")

@@ -127,7 +127,7 @@ def answer(value: object, status: int = 200) -> Response:
 
 
 async def body_of(request: Request, kind: type[_T]) -> _T:
-    """Return the JSON body of a request, decoded as `kind`; raise `ApiError`."""
+    """Return the JSON body of a request, decoded as `kind`, or raise `ApiError`."""
     if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
         raise ApiError(415, "expected a body of type application/json")
     try:
@@ -176,7 +176,7 @@ class ManageRoutes:
             manager: the operations.
             ways: navigation links of this server.
             is_here: returns whether a request has the start key.
-            may_manage: returns whether a request may change packages and settings.
+            may_manage: function that returns whether a request may change packages and settings.
         """
         self._manager = manager
         self._ways = ways

@@ -54,7 +54,7 @@ def given_source(name: str, data: bytes, installed: Sequence[Lock]) -> FileSourc
 
 
 def source_at(path: Path, installed: Sequence[Lock]) -> FileSource:
-    """Return the package source at a path on this machine; raise `PackageError`.
+    """Return the package source at a path on this machine, or raise `PackageError`.
 
     The path leads to a package folder, a bundle, an archive, an interface document, or the folder
     of an interface document.

@@ -126,8 +126,7 @@ def is_host_allowed(
     Args:
         authority: the host.
         names: allowed names in lower case, including the names of this machine.
-        is_loopback: whether the request came over loopback. If true, only loopback addresses are
-            valid.
+        is_loopback: whether the request came over loopback, and only loopback addresses are valid.
     """
     host = authority.host
     name = host.removesuffix(".")
@@ -306,7 +305,7 @@ class _Answer:
 
 
 def _limited(scope: Scope, receive: Receive) -> Receive:
-    """Return `receive` with a limit on the total size of the body."""
+    """Return a version of `receive` that limits the total size of the body."""
     if scope["type"] == "websocket":
         return receive
     total = 0

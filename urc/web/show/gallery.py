@@ -50,7 +50,7 @@ class WidgetLookup:
     """The existing widgets.
 
     Args:
-        profiles: returns the profiles of the served robots.
+        profiles: function that returns the profiles of the served robots.
         is_fresh: whether each look-up reads the manifest again; if false, the widgets loaded by
             robots are used.
     """
@@ -98,7 +98,7 @@ def _on(registry: WidgetFolder, name: str) -> Found:
 def mark(text: str) -> str:
     """Return `text`.
 
-    The call marks the text for the catalogues; pages translate the text with `t`.
+    The function marks the text for the catalogues; pages translate the text with `t`.
     """
     return text
 
@@ -188,7 +188,7 @@ class Gallery:
 
     Args:
         modules: import map of the pages.
-        profiles: returns the profiles of the served robots.
+        profiles: function that returns the profiles of the served robots.
         is_dev: whether pages reload when a file of their widgets is saved.
         ways: navigation links of this server.
         trust: distinguishes third-party widgets from trusted widgets.

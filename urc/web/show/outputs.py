@@ -177,7 +177,10 @@ def _release_of(command: Command) -> Mapping[str, Reading]:
 
 
 def mark(text: str) -> str:
-    """Return `text`. The call marks the text for the catalogues; the page translates the text."""
+    """Return `text`.
+
+    The function marks the text for the catalogues; the page translates the text.
+    """
     return text
 
 

@@ -64,7 +64,7 @@ def check_widget(widget: Widget, *, with_demo: bool = True) -> list[Problem]:
 
 
 def _text(widget: Widget, name: str) -> str:
-    """Return the text of a widget's file; raise `ProblemsError`."""
+    """Return the text of a widget's file, or raise `ProblemsError`."""
     return read_bytes(str(widget.folder / name), MOST_BYTES).decode("utf-8", "replace")
 
 
