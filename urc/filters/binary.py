@@ -123,4 +123,4 @@ TEXT_FILTERS: Final[dict[str, tuple[Callable[..., Any], int]]] = {
     "sha1": (_hash("sha1"), 0),
     "sha256": (_hash("sha256"), 0),
 }
-"""Filters that return text, each with its function and number of arguments."""
+"""Function and number of arguments of each filter that returns text."""

@@ -237,7 +237,7 @@ class CountersAdvanced(msgspec.Struct, array_like=True, frozen=True, tag=30):
     line: str
     turn: int
     sent: int
-    """Number of the newest counted `SendBytes` that was sent."""
+    """Number of the newest sent `SendBytes` with counters."""
     stand: dict[str, int]
     """Last sent value of each counter, by name."""
     stale: list[tuple[str, int]]

@@ -74,7 +74,7 @@ class GuardAcceptor:
         return hmac.compare_digest(said, self.token)
 
     def close(self) -> None:
-        """Close the port. A second call does nothing."""
+        """Close the port. A second call of this method does nothing."""
         self._listener.close()
 
 

@@ -2,8 +2,8 @@
 
 The limiter implements the generic cell rate algorithm (ITU-T I.371, annex A) with a tolerance of
 one period. Values that arrive at the permitted rate, with network jitter, pass immediately. In any
-second, at most one value more than the rate passes. A fixed minimum interval would instead delay
-every second value.
+second, the number of passed values is at most one above the permitted number. A fixed minimum
+interval would instead delay every second value.
 """
 
 from typing import Final

@@ -40,7 +40,7 @@ class SlewRateLimiter:
         self._last_s: float | None = None
 
     def reset(self) -> None:
-        """Reset to standstill, so that the next motion begins at rest."""
+        """Set all distances to zero, so that the next motion begins at rest."""
         self._reached.clear()
         self._last_s = None
 

@@ -165,7 +165,7 @@ class LinkPort(Protocol):
         """Open the connection for a waiting request."""
 
     def want_close(self, reason: str) -> None:
-        """Close the connection: with a reason, immediately; otherwise, after all output."""
+        """Close the connection after all output; with a `reason`, close immediately."""
 
     def send(self, sent: Send) -> None:
         """Write bytes or a message; secret data is hidden from the traffic view."""

@@ -241,7 +241,8 @@ class Hub:
 
         Args:
             signals: the driver's signals.
-            redactor: removes secrets from all incoming data; None for a robot without secrets.
+            redactor: filter that removes secrets from all incoming data; None for a robot without
+                secrets.
             streams: names of the transports that may split one message into several pieces.
         """
         self.signals = signals

@@ -9,8 +9,8 @@ connection. Every end goes through `_end`, and only `_serve` stops the reader an
 A connection counts as good after its first valid frame; only a good connection resets the backoff.
 URC therefore does not flood a robot that closes every accepted connection again. With
 ``on_connect`` steps, frames do not count until the steps are done, because a robot may send a
-greeting and then refuse the login. Pages show the `LinkState`. During failed attempts, only its
-number of attempts changes.
+greeting and then refuse the login. Pages show the `LinkState`. During failed attempts, only the
+number of attempts in the `LinkState` changes.
 
 The link uses only the five members of `Transport`, so a transport may run in another process. A
 transport that implements `Prompt` saves task switches. Bytes that arrive while the reader waits are

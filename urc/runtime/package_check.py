@@ -31,7 +31,8 @@ def examine(document: Path) -> list[str]:
     """Return the errors of a package's document, one line per error.
 
     Args:
-        document: path such as ``TOP/drivers/puppet/driver.yaml``, next to the required packages.
+        document: path of the document, such as ``TOP/drivers/puppet/driver.yaml``; ``TOP`` also
+            contains the required packages.
     """
     top = document.parent.parent.parent
     checked = check(

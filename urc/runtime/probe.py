@@ -195,7 +195,7 @@ _ADVICE: Final = (
 
 
 def advice(text: str) -> str:
-    """Return advice about a failure, chosen by the words of its message."""
+    """Return advice about a failure, based on the words in the error message."""
     lower = text.lower()
     for words, what in _ADVICE:
         if any(word in lower for word in words):

@@ -117,7 +117,7 @@ class Session:
             settings: a value for every setting of the profile, as returned by `resolve_settings`.
             transports: table of the available transport types.
             clock: source of time; None for the running event loop.
-            random: returns a number in [0, 1) for the jitter of the backoff.
+            random: function that returns a number in [0, 1) for the jitter of the backoff.
             motion: writer of held-command frames; see `Motion`.
 
         Raises:
@@ -310,8 +310,8 @@ class Session:
     def pull(self, sequence: str, what: Pull) -> None:
         """Pause, step, continue or end a sequence.
 
-        ``step`` starts a sequence that is not running, paused at its first step. Other verbs have
-        no effect without a running sequence of this name.
+        ``step`` starts a sequence that is not running, paused at its first step. All verbs except
+        ``step`` have no effect if the sequence is not running.
         """
         self._dispatcher.pull(sequence, what)
 

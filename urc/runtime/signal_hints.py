@@ -48,7 +48,7 @@ class SignalHints:
         self._in_steps = in_steps
 
     def of(self, signal: str) -> str:
-        """Return the reason as text to follow "nothing set it", or "" if unknown."""
+        """Return the reason as text that follows "nothing set it"; "" for an unknown reason."""
         for transport in self._driver.transports:
             reason = self._of_line(transport, signal)
             if reason:

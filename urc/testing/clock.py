@@ -65,7 +65,7 @@ class FakeClock:
         return alarm
 
     async def hold_up(self, seconds: float) -> None:
-        """Move the time like a blocked event loop, which runs all overdue calls only afterwards."""
+        """Move the time without running calls, then run overdue calls, like a blocked loop."""
         self._now += seconds
         await self.advance(0)
 

@@ -36,7 +36,7 @@ process in one step.
 """
 _DRAIN_S, _LOOK_S = 0.3, 0.01
 """Maximum wait for unsent bytes before a port closes, in seconds. `_LOOK_S` is the interval between
-checks."""
+the checks for unsent bytes."""
 
 
 async def open_port(

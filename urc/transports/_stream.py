@@ -296,8 +296,8 @@ def forget_unsent(line: socket.socket) -> None:
 def unsent_in(line: socket.socket) -> int:
     """Return the number of bytes in the kernel that the other side has not acknowledged.
 
-    The result is 0 if the number is unknown. The result is 1 for a closed socket, because the
-    delivery of its data is unknown.
+    The result is 0 if the number is unknown. The result is 1 for a closed socket, because its last
+    bytes may not have arrived.
     """
     if sys.platform != "linux":
         return 0

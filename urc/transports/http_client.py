@@ -387,7 +387,7 @@ class _Connection(httpcore2.AsyncNetworkStream):
         return self.is_readable() if info == "is_readable" else None
 
     def is_readable(self) -> bool:
-        """Return whether `read` would return immediately; an idle connection is then closed.
+        """Return whether `read` would return immediately; the pool closes such an idle stream.
 
         A stream can only be tested by calling `read`; the call is cancelled if no data is
         available.

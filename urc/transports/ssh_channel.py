@@ -19,7 +19,7 @@ __all__ = ["MAX_PACKET", "WINDOW", "SshChannel"]
 READ_AHEAD_BYTES = 65536
 """Size of the receive buffer, in bytes."""
 WINDOW = 262_144
-"""SSH window size of the channel, in bytes; the receive buffer adds to this size."""
+"""SSH window size of the channel without the receive buffer, in bytes."""
 MAX_PACKET = 32768
 _CLOSES_WITHIN_S = 1.0
 """Maximum wait for the exit of a program that has closed its output, in seconds."""

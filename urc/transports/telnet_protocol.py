@@ -84,7 +84,7 @@ class TelnetNegotiation:
         columns: int = 80,
         rows: int = 24,
     ) -> None:
-        """Create the protocol state, without any agreed option.
+        """Create the protocol state of a new connection, with no option enabled.
 
         Args:
             ours: local options that URC enables on request.

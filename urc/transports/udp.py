@@ -88,7 +88,7 @@ class UdpTransport:
 
     @property
     def address(self) -> str:
-        """Target as text: ``udp 192.168.10.1:8889``, or ``udp *:14550 (listening)``."""
+        """Target of the transport: ``udp 192.168.10.1:8889``, or ``udp *:14550 (listening)``."""
         if self._host and self._port:
             return f"udp {place_of(self._host, self._port)}"
         sender = f" for {self._host}" if self._host else ""

@@ -148,7 +148,7 @@ class AccessMiddleware:
 
 
 async def _turn_away(receive: Receive, send: Send) -> None:
-    """Accept a socket, then close it with the reason, because a page cannot read a refusal."""
+    """Accept a socket and close it with the reason; a page cannot read a refused handshake."""
     await receive()
     await send({"type": "websocket.accept"})
     await send({"type": "websocket.send", "text": encode_error("refused", SAID)})

@@ -59,7 +59,7 @@ class Player:
         Args:
             recording: the recording to play.
             profile: profile that pages use to display the recording.
-            settings: valid settings of the profile; the playback opens no connection.
+            settings: valid settings of the profile, although the playback opens no connection.
             speed: playback speed; 1.0 is real time.
             start_s: start position, in seconds.
             is_looped: whether to restart the playback at the end.
@@ -93,7 +93,7 @@ class Player:
 
     @property
     def position_s(self) -> float:
-        """Position in seconds, from 0 to `length_s`."""
+        """Playback position in seconds, from 0 to `length_s`."""
         if self._since_s is None:
             return self._base_s
         return self._within(self._base_s + (self._clock.now() - self._since_s) * self._speed)

@@ -37,7 +37,7 @@ class DevPage:
     head: PageHead
     title: str
     url: str
-    """Path of the robot's own page."""
+    """Path of the robot's page on the dashboard."""
     values: str
     """Path and query of the dashboard's WebSocket, which carries values, links and commands."""
     socket: str

@@ -64,7 +64,8 @@ class Pacer:
     """A rate limiter that passes the first event of a burst immediately, then a steady rate.
 
     The limiter tolerates a jitter of one period, so it never delays a source with exactly the
-    permitted rate. In any second, at most one event more than the rate passes.
+    permitted rate. In any second, the number of passed events is at most one above the permitted
+    number.
     """
 
     def __init__(self, rate_hz: float) -> None:

@@ -56,7 +56,7 @@ class Fleet:
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[asyncio.TaskGroup]:
-        """Run one session supervisor for each robot while the context lasts."""
+        """Run one session supervisor for each robot while the context is open."""
         async with asyncio.TaskGroup() as group:
             self._group = group
             for name in self.stations:

@@ -93,7 +93,7 @@ log = logging.getLogger(__name__)
 
 
 class SessionLike(MotionSession, Protocol):
-    """The interface of an opened profile that the dashboard uses."""
+    """The part of an opened profile that the dashboard uses."""
 
     @property
     def hub(self) -> Hub:

@@ -107,7 +107,7 @@ def tile(folder: Path, z: int, x: int, y: int, kind: str, request: Request) -> R
     """Return a map tile from ``folder/z/x/y.kind``; a missing file gives a transparent tile.
 
     Raises:
-        HTTPException: 404 when the numbers or the media type are out of range.
+        HTTPException: 404 if a number is out of range, or the media type is unknown.
     """
     if kind not in TILE_TYPES or not 0 <= z <= DEEPEST_ZOOM or not (0 <= x < 2**z > y >= 0):
         raise HTTPException(404)

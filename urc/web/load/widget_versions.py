@@ -31,7 +31,7 @@ def apart(profile: Profile, others: Iterable[Profile]) -> Profile:
 
 
 def unified(widgets: Iterable[Widget]) -> list[Widget]:
-    """Return the widgets; equal copies of a widget in several folders become one."""
+    """Return the widgets, with equal copies of a widget in several folders as one widget."""
     found: dict[str, Widget] = {}
     every = []
     for widget in widgets:

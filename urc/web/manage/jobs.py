@@ -190,7 +190,7 @@ class Jobs:
 
         Raises:
             Busy: the job is not waiting for approval.
-            PackageError: the package requires `takes_risks`.
+            PackageError: the package requires `takes_risks`, but `takes_risks` is false.
         """
         job = self._asked(number)
         planned = job.planned

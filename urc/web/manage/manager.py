@@ -46,7 +46,7 @@ class Manager:
         Args:
             factory: the factory that creates the robots.
             fleet: the served robots.
-            now: returns the current time, in seconds.
+            now: function that returns the current time, in seconds.
             renew: function that switches to another version of a robot; may raise `UrcError`.
         """
         self.factory = factory

@@ -175,7 +175,7 @@ class ManageRoutes:
         Args:
             manager: the operations.
             ways: navigation links of this server.
-            is_here: returns whether a request has the start key.
+            is_here: function that returns whether a request has the start key.
             may_manage: function that returns whether a request may change packages and settings.
         """
         self._manager = manager

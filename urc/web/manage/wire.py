@@ -182,13 +182,13 @@ class Available(ManageMessage, frozen=True):
 
 
 class PackageList(ManageMessage, frozen=True):
-    """All lists of a manager page."""
+    """All package lists on a manager page."""
 
     repositories: tuple[RepositoryInfo, ...]
     installed: tuple[Installed, ...]
     available: tuple[Available, ...]
     total: int
-    """Number of packages found; the lists contain at most `MOST_HITS`."""
+    """Number of packages found; the lists contain at most `MOST_HITS` packages."""
     is_asking: bool
     """Whether a refresh is running."""
     may_manage: bool

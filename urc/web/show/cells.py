@@ -89,7 +89,7 @@ def render_foreign(uses: Iterable[tuple[WidgetUse, Profile]], trust: WidgetTrust
 
     Args:
         uses: the widget uses in the order of the cells, each with the profile of its robot.
-        trust: distinguishes third-party widgets from trusted widgets.
+        trust: rule that distinguishes third-party widgets from trusted widgets.
     """
     wanted = []
     for index, (use, profile) in enumerate(uses):

@@ -191,7 +191,7 @@ class Gallery:
         profiles: function that returns the profiles of the served robots.
         is_dev: whether pages reload when a file of their widgets is saved.
         ways: navigation links of this server.
-        trust: distinguishes third-party widgets from trusted widgets.
+        trust: rule that distinguishes third-party widgets from trusted widgets.
     """
 
     def __init__(

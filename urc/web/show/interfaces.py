@@ -35,8 +35,8 @@ DEBUGGING: Final = Interface(DEBUG, "Debug")
 """Placeholder for the debug interface, because the debug interface has no grid."""
 DEBUG_STYLES: Final = ("/static/dev/dev.css", "/static/dev/debug.css")
 KEPT: Final = "urc-interface"
-"""Name of the cookie with the robot's last shown interface on this device. The cookie's path is the
-page of the robot; ``interfaces.js`` writes the cookie.
+"""Name of the cookie that stores the interface last shown on this device for a robot. The cookie's
+path is the page of the robot; ``interfaces.js`` writes the cookie.
 """
 
 

@@ -129,7 +129,7 @@ def robot_page(
         wire: path of the developer page; "" if the visitor may not use it.
         playback: path of the playback's state; "" without a playback.
         is_part: whether an open page requests this page to replace its interface.
-        trust: distinguishes third-party widgets from trusted widgets.
+        trust: rule that distinguishes third-party widgets from trusted widgets.
     """
     uses = _uses(profile, interface)
     slots = tuple(uses)

@@ -71,7 +71,7 @@ def _text(widget: Widget, name: str) -> str:
 def _rendered(
     widget: Widget, states: list[WidgetState], template: "_TemplateCheck"
 ) -> list[Problem]:
-    """Return the first failure to render the template in any of the states."""
+    """Return the first error from rendering the template in the states of the demo."""
     for state in states:
         context = widget_context(state.use, widget, state.profile, uid="cell-0")
         try:

@@ -1,6 +1,7 @@
 """Message types for the controls, without any logic.
 
-Layer 5. Part of `urc.web.wire.messages`, which documents the direction of each message.
+Layer 5. These types are part of `urc.web.wire.messages`, which documents the direction of each
+message.
 """
 
 from typing import Literal
