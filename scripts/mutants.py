@@ -100,7 +100,7 @@ class Kind(NamedTuple):
 
 
 class Explained(NamedTuple):
-    """Explanations of surviving mutants: reasons why no test needs to kill the mutant."""
+    """Explanations of surviving mutants: the reason why no test needs to kill each mutant."""
 
     reasons: dict[tuple[str, Change], str]
     """Reason for each combination of function and change."""

@@ -228,7 +228,7 @@ NEEDS = (
 
 @dataclass(slots=True)
 class Brought:
-    """Environment of the tests after the installation, and the programs still missing."""
+    """Environment variables for the tests after the installation, and the missing programs."""
 
     environment: dict[str, str] = field(default_factory=dict)
     left_out: list[Need] = field(default_factory=list)
