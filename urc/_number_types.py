@@ -31,7 +31,7 @@ class Number(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Size of the number in bytes; the minimum size for a variable-size number."""
+        """Size of the number in bytes, or minimum size of a variable-size number."""
         if self.is_by_seven:
             return self.bits // 7
         return 1 if self.is_variable else self.bits // 8

@@ -115,8 +115,8 @@ class Hold(NamedTuple):
     on_stall: Literal["abort", "wait"] | None = None
     """Reaction to a stalled connection during motion; None: the default of the transport."""
     step_s: float | None = None
-    """Maximum duration of a motion step that the robot ends itself, in seconds; no stop is sent.
-    Without a duration, the robot moves until a stop arrives."""
+    """Maximum duration, in seconds, of a motion step that the robot ends itself, without a stop.
+    None: the robot moves until a stop arrives."""
 
 
 class Confirm(NamedTuple):

@@ -175,8 +175,8 @@ class FrameLayout(NamedTuple):
     """Trailing checksum: the first check of a received frame, and the last part added to a sent
     frame."""
     digits: Digits = ""
-    """Notation of the bytes between start and end; positions and `checksums` refer to decoded
-    bytes."""
+    """Notation of the bytes between start and end. All positions and `checksums` refer to the
+    decoded bytes."""
 
 
 def spelt_size(bits: int, spelling: Spelling) -> int:

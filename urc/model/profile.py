@@ -198,7 +198,7 @@ class Profile(NamedTuple):
     settings: Mapping[str, Setting] = NOTHING
     driver: Driver = Driver()
     slots: Mapping[str, WidgetUse] = NOTHING
-    """Widgets of the driver by slot; an interface may override a widget."""
+    """Widgets of the driver, by slot, which an interface may override."""
     interfaces: Mapping[str, Interface] = NOTHING
     """Interfaces by name; never empty, because the loader adds a missing interface ``default``."""
     widgets: Mapping[str, Widget] = NOTHING

@@ -101,7 +101,7 @@ class Signal(NamedTuple):
     items: ElementType = "number"
     """Type of the elements of an array."""
     size: int | None = None
-    """Number of elements of an array; maximum number of bytes of an image or blob."""
+    """Number of elements of an array, or maximum number of bytes of an image or blob."""
     axes: Axes = ""
     """Axis convention of the value."""
     formula: Template | None = None

@@ -127,7 +127,7 @@ class KeepaliveState:
         self._is_asked = False
 
     def speak(self, run: Callable[[str], list[LineEvent]], now: float) -> list[LineEvent]:
-        """Send a keepalive if due; `run` runs a command and calls `done`."""
+        """Send a keepalive if due. The function `run` runs a command and calls `done`."""
         due = self.deadline
         if due is None or due > now:
             return []

@@ -68,7 +68,7 @@ log = logging.getLogger(__name__)
 
 
 class EmulatedRobot:
-    """One emulated robot; `line` creates the robot's side of a connection."""
+    """One emulated robot. The method `line` creates the robot's side of a connection."""
 
     def __init__(self, profile: Profile, settings: Mapping[str, Value]) -> None:
         self._transports = profile.driver.transports

@@ -32,8 +32,7 @@ class ReceiveBuffer:
 class RescanBudget:
     """The number of bytes that may be rescanned, which grows with each consumed byte.
 
-    The total number of scanned bytes is at most `RATE` + 1 times the size of the stream, plus
-    `MOST`.
+    The total number of scanned bytes is at most (`RATE` + 1) · size of the stream + `MOST`.
     """
 
     RATE: Final = 8

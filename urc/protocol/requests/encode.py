@@ -22,7 +22,7 @@ Encode = Callable[[Mapping[str, object]], Payload]
 `BadArgument`."""
 
 _LARGEST = 1e308
-"""Maximum finite value; the comparison also rejects infinity and not-a-number."""
+"""Maximum finite value. A comparison with this value also rejects infinity and not-a-number."""
 
 
 class BadArgument(UrcError):

@@ -58,7 +58,7 @@ class FrameCounters:
         """Numbers in the frame, by counter."""
 
     def __call__(self, name: str, low: int, high: int) -> int:
-        """Return the next number of a counter; `low` follows `high`."""
+        """Return the next number of a counter, which restarts at `low` after `high`."""
         if name not in self.values:
             last = self._last.get(name, high)
             self.values[name] = last + 1 if low <= last < high else low

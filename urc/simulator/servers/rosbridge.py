@@ -71,7 +71,7 @@ class BridgeClient:
     """One client of the bridge."""
 
     def __init__(self, bridge: Bridge, send: Callable[[str | bytes], None]) -> None:
-        """Join `bridge`; `send` transmits one text or binary frame."""
+        """Join `bridge`. The function `send` transmits one text or binary frame."""
         self._bridge = bridge
         self._send = send
         self.wanted: dict[str, _Wanted] = {}

@@ -31,9 +31,9 @@ class Motion:
     z: float = 0.0
     yaw: float = 0.0
     roll: float = 0.0
-    """Roll in radians; right side down is positive."""
+    """Roll in radians, positive with the right side down."""
     pitch: float = 0.0
-    """Pitch in radians; nose down is positive."""
+    """Pitch in radians, positive with the nose down."""
     forward: float = 0.0
     """Speed along the body's x axis, in m/s. `sideways` and `climb` are the speeds along y and
     z."""

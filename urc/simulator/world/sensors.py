@@ -252,7 +252,7 @@ class Battery:
         self.charge = min(self.charge, self._spec.capacity * level / 100)
 
     def readings(self) -> Mapping[str, object]:
-        """Return ``world.battery``; the discharge current is positive."""
+        """Return ``world.battery``, with a positive current when discharging."""
         spec, share = self._spec, self.level / 100
         sag = 0.02 * (spec.full - spec.empty) * self.current / max(spec.idle + spec.drive, 1e-6)
         voltage = spec.empty + (spec.full - spec.empty) * share - sag
