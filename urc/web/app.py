@@ -97,6 +97,7 @@ def build_app(
         UrcError: two robots use different widgets of the same name.
     """
     audit = AuditLog(data / "audit.sqlite") if data else None
+    turn = asyncio.Lock()
     fleet = Fleet(
         robots,
         lambda name, robot: RobotService(
@@ -104,6 +105,7 @@ def build_app(
             linger_s=linger_s,
             latch=_latch(data, robot),
             recorder=_recorder(audit, name, robot),
+            turn=turn,
         ),
     )
     routes = _Routes(

@@ -2,7 +2,9 @@
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
-from contextlib import ExitStack, asynccontextmanager
+from contextlib import AsyncExitStack, ExitStack, asynccontextmanager
+from functools import partial
+from itertools import pairwise
 
 import pytest
 
@@ -18,13 +20,14 @@ pytestmark = pytest.mark.anyio
 
 @asynccontextmanager
 async def stationed(
-    robot: FakeRobot, clock: FakeClock, opener: object = None
+    robot: FakeRobot, clock: FakeClock, opener: object = None, turn: asyncio.Lock | None = None
 ) -> AsyncIterator[RobotService]:
     """Run a station for the fake robot."""
     open_session = opener or robot.open
     service = RobotService(
         Robot(robot.profile, {"host": "127.0.0.1"}, open_session),  # type: ignore[arg-type]
         clock=clock,
+        turn=turn,
     )
     task = asyncio.create_task(service.run())
     try:
@@ -52,6 +55,38 @@ async def test_the_session_lives_from_the_first_client_to_the_last() -> None:
         await clock.advance(0.2)
         assert not robot.is_open
         assert first.ended.is_set()
+
+
+async def test_sessions_that_start_together_leave_room_for_input_between_two() -> None:
+    """The start of a session blocks the loop; a robot that is driven waits for one at most."""
+    turn, seen = asyncio.Lock(), []
+    clock = FakeClock()
+
+    @asynccontextmanager
+    async def opened(number: int) -> AsyncIterator[object]:
+        seen.append(f"start {number}")
+        robot = FakeRobot(dashboard_profile(), clock)
+        async with robot.open() as session:
+            yield session
+
+    async def drive() -> None:
+        while True:
+            seen.append("input")
+            await asyncio.sleep(0)
+
+    async with AsyncExitStack() as stack:
+        for number in range(3):
+            robot = FakeRobot(dashboard_profile(), clock)
+            service = await stack.enter_async_context(
+                stationed(robot, clock, partial(opened, number), turn)
+            )
+            stack.enter_context(service.visit())
+        driving = asyncio.create_task(drive())
+        await settle()
+        driving.cancel()
+    starts = [at for at, what in enumerate(seen) if what != "input"]
+    assert len(starts) == 3
+    assert all("input" in seen[one:other] for one, other in pairwise(starts))
 
 
 async def test_a_reload_keeps_the_session() -> None:

@@ -10,7 +10,12 @@ import logging
 import secrets
 from collections import Counter
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
-from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
+from contextlib import (
+    AbstractAsyncContextManager,
+    AsyncExitStack,
+    asynccontextmanager,
+    contextmanager,
+)
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -190,6 +195,7 @@ class RobotService:
         clock: Clock | None = None,
         latch: LatchStore | None = None,
         recorder: AuditRecorder | None = None,
+        turn: asyncio.Lock | None = None,
     ) -> None:
         """Prepare the station; the session opens for the first client.
 
@@ -200,6 +206,7 @@ class RobotService:
             clock: the clock.
             latch: store that preserves a latched STOP over a restart; None to store nothing.
             recorder: receives the events of the audit log; None to record nothing.
+            turn: lock that all robots of a server share, so that sessions start one by one.
         """
         self.robot = robot
         self.clock: Clock = clock or LoopClock()
@@ -207,6 +214,7 @@ class RobotService:
         self.consent = TwoPersonRule(lambda: self.controls.operators, self.clock)
         self.controls.once.on_stopped = self.consent.stop
         self._linger_s = linger_s
+        self._turn = turn or asyncio.Lock()
         self._visitors = 0
         self._operators: Counter[str] = Counter()
         self._stirred = asyncio.Event()
@@ -329,7 +337,7 @@ class RobotService:
             await self._wait_for(present=True)
             self._is_open = True
             try:
-                async with self.robot.open_session() as session:
+                async with self._opened() as session:
                     await self._serve(session)
             except UrcError as error:
                 self._fail(str(error))
@@ -338,6 +346,16 @@ class RobotService:
                 log.exception("the session of %s failed", self.robot.profile.name)
                 self._fail("the robot's session failed; the reason is in the server's log")
                 await self.clock.sleep(RETRY_S)
+
+    @asynccontextmanager
+    async def _opened(self) -> AsyncIterator[SessionLike]:
+        async with AsyncExitStack() as stack:
+            # The start of a session compiles the driver and launches the guard, which blocks the
+            # loop for up to 40 ms. The pause lets in the input of driven robots between two starts.
+            async with self._turn:
+                session = await stack.enter_async_context(self.robot.open_session())
+                await asyncio.sleep(0)
+            yield session
 
     async def _serve(self, session: SessionLike) -> None:
         each = each_counts(self.robot.profile)
