@@ -1,10 +1,9 @@
 """Detection of stalled connections by the age of the oldest unsent byte.
 
-The system reports only the number of unsent bytes. Each write increases this number. Each
-acknowledgement decreases the number of unsent bytes, beginning with the oldest bytes. The write
-time of the oldest unsent byte can therefore be computed from earlier numbers of unsent bytes. A
-large number of unsent bytes does not prove a stall, because a busy connection may always have
-unsent bytes.
+The system reports only the number of unsent bytes. Each write increases the number of unsent bytes.
+Each acknowledgement decreases the number, beginning with the oldest bytes. The write time of the
+oldest unsent byte can therefore be computed from earlier numbers of unsent bytes. A large number of
+unsent bytes does not prove a stall, because a busy connection may always have unsent bytes.
 """
 
 import sys

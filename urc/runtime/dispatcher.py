@@ -98,7 +98,7 @@ class PendingCommands:
         self._alarm = self._clock.call_at(due_s, self._ring)
 
     def _ring(self) -> None:
-        """Fail overdue commands; does nothing if the timer fires early."""
+        """Fail overdue commands; do nothing if the timer fires early."""
         self._alarm = None
         now = self._clock.now()
         for number, (_, due_s, name) in list(self._all.items()):

@@ -72,9 +72,9 @@ class MotionBackend(Protocol):
     async def stops(self) -> Sequence[tuple[str, Reason]]:
         """Wait for written stop frames; return the command and the stop reason of each frame.
 
-        The returned list is in order and never empty. Cancelling the wait loses no stop. A control
-        stopped by `stop` is reported as ``stopped`` even without motion, after the transport has
-        accepted the stop.
+        The returned list is in order and never empty. Cancelling the wait loses no stop. After the
+        transport has accepted the stop frame, a control that was stopped by `stop` is reported as
+        ``stopped``, even if it was not moving.
         """
 
 

@@ -7,7 +7,7 @@ writer run while the connection is open. The robot, the engine or a rule of the 
 connection. Every end goes through `_end`, and only `_serve` stops the reader and the writer.
 
 A connection counts as good after its first valid frame; only a good connection resets the backoff.
-URC therefore does not flood a robot that closes every accepted connection again. With
+URC therefore does not flood a robot that accepts every connection and then closes it. With
 ``on_connect`` steps, frames do not count until the steps are done, because a robot may send a
 greeting and then refuse the login. Pages show the `LinkState`. During failed attempts, only the
 number of attempts in the `LinkState` changes.
@@ -138,7 +138,7 @@ class Link:
         self._wanted.set()
 
     def want_close(self, reason: str) -> None:
-        """Write the queued output, then close; with a reason, close immediately."""
+        """Close the connection after all output; with a `reason`, close immediately."""
         if not self._is_persistent:
             self._wanted.clear()
         if self._ended is None:

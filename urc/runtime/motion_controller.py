@@ -12,7 +12,7 @@ that is still held after a reconnection does not move the robot.
 A controller outlives the sessions of its robot, because the latch persists while the robot is
 disconnected. `attach` adds the engine and the backend of a session; `detach` removes both.
 
-This module is synchronous, and callers pass the time. The backend reports each written stop by
+This module is synchronous: callers pass the current time. The backend reports each written stop by
 calling `stopped`.
 """
 

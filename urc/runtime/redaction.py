@@ -22,8 +22,8 @@ REDACTED = "‹secret›".encode()
 """Replacement for secret bytes in displayed data."""
 
 _SHORTEST = 3
-"""Minimum length of a secret to replace inside a frame. Shorter secrets occur too often, so the
-whole frame is hidden."""
+"""Minimum length of a secret to replace inside a frame. A shorter secret would match too many
+bytes, so a frame that contains a shorter secret is hidden completely."""
 _SHORTEST_CODED = 6
 _SHORTEST_PART = 4
 """Minimum length of a truncated secret to redact; shorter parts occur in many words."""

@@ -68,8 +68,8 @@ guard process stops the robot if URC fails."""
 
 _LOOK_S = 0.02
 new = tuple.__new__
-"""Function that creates a named tuple without the constructor's cost, because every command creates
-several."""
+"""Function that creates a named tuple without the cost of the constructor; every command creates
+several named tuples."""
 _GRACE_S = 2.0
 """Tolerance added to the sum of a command's declared waits, in seconds."""
 

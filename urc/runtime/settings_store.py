@@ -18,7 +18,8 @@ from urc.problems import UrcError
 __all__ = ["DRIVEN", "StoredSettings", "SettingsStore", "in_use", "names_kept", "pin"]
 
 DRIVEN: Final = ("robot", "driver")
-"""Kinds of packages that have settings; for equal names, a robot precedes a driver."""
+"""Kinds of packages that have settings, in order of precedence for equal names: a robot precedes a
+driver."""
 
 _MOST_BYTES: Final = 1 << 20
 _Name = Annotated[str, msgspec.Meta(max_length=200)]
@@ -47,7 +48,7 @@ class SettingsStore:
     """The settings file of one robot."""
 
     def __init__(self, folder: Path, name: str) -> None:
-        """Select the file, without reading or writing."""
+        """Set the path of the file, without reading or writing the file."""
         self.file = folder / f"{quote(name, safe='')}.json"
 
     def load(self) -> StoredSettings:

@@ -29,7 +29,7 @@ def make_lines(
     """Return the closed transports by name; each tunnel precedes the transports inside the tunnel.
 
     Args:
-        driver: the loaded driver; tunnels must not be circular.
+        driver: the loaded driver, without circular tunnels.
         settings: a value for every setting.
         table: table of the available transport types.
 

@@ -33,7 +33,7 @@ class LineSplitter:
     """An incremental splitter of a response body into lines without line ends (CR LF, LF or CR)."""
 
     def __init__(self, max_bytes: int, instead: bytes | None = None) -> None:
-        """Create a splitter that skips, or replaces by `instead`, all lines above `max_bytes`."""
+        """Create a splitter; lines above `max_bytes` are skipped or replaced by `instead`."""
         self._most = max_bytes
         self._instead = instead
         self._buffer = bytearray()

@@ -233,7 +233,7 @@ class HttpStream:
         return f"http {self._client.where} {self._spec.path}"
 
     def _pause_s(self) -> float:
-        """Return the delay before the next attempt, in seconds: growing, with random jitter."""
+        """Return the growing, randomly varied delay before the next attempt, in seconds."""
         if self._retry_s is not None and not self._failures:
             return self._retry_s
         wait_s, self._wait_s = self._wait_s, min(2 * self._wait_s, _LONGEST_WAIT_S)

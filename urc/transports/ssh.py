@@ -2,7 +2,7 @@
 
 The users of one shared SSH connection are the transport's own channel and all transports that name
 this transport in ``tunnel``. The first user opens the connection, the last user closes the
-connection, and a lost connection ends all users.
+connection, and a lost connection disconnects all users.
 """
 
 import asyncio

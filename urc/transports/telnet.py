@@ -144,8 +144,8 @@ def _acknowledge(line: socket.socket) -> None:
     """Acknowledge received bytes immediately.
 
     Many Telnet servers send small segments and wait for each acknowledgement. Delayed
-    acknowledgements would cost 40 ms per command. The system resets this socket option with every
-    read.
+    acknowledgements would cost 40 ms per command. The system resets the socket option for immediate
+    acknowledgements with every read.
     """
     if _QUICKACK is not None:
         with suppress(OSError):  # the connection is closing

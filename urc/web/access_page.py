@@ -55,8 +55,8 @@ class AccessPage:
     is_old: bool
     """Whether the request had an invalid key; the page reports an invalid key first."""
     path: str
-    """Path of this page, for the reload link. The link is needed because a link from another site
-    sends no cookie."""
+    """Path of this page, for the reload link. With a link on another site, the browser sends no
+    cookie; with the reload link, the browser sends the cookie."""
     robots: tuple[Stoppable, ...]
 
 

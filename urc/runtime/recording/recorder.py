@@ -285,7 +285,8 @@ async def recorded(
     The hub's log shows the name of the file, or the reason for a failure.
 
     Args:
-        hub: hub of the session, preferably before the session opens; the hub redacts secrets.
+        hub: hub of the session, which redacts secrets; preferably the hub of a session that is not
+            open yet.
         place: path of a new file, or of a folder, as for `Recorder`.
         profile: profile of the robot, loaded from a file.
         is_folder: whether `place` is a folder; if so, a new file is created in this folder.

@@ -2,10 +2,11 @@
 
 roslibpy implements the rosbridge operations, their ids, and pending requests. The network
 connections of roslibpy are not used. After a reconnection, roslibpy would send old messages again;
-roslibpy also fails on binary frames, and never probes the other side. The measurements are in
-docs/decisions. In this module, roslibpy's protocol writes frames into a list, and the transport
-sends these frames over URC's socket. The transport passes received data to the protocol. Each
-object serves only one connection, so no state is carried over to the next connection.
+roslibpy also fails on binary frames, and never probes the other side. Measurements of roslibpy's
+network connections are in docs/decisions. In this module, roslibpy's protocol writes frames into a
+list, and the transport sends these frames over URC's socket. The transport passes received data to
+the protocol. Each object serves only one connection, so no state is carried over to the next
+connection.
 
 The client does no I/O, and uses no task or thread.
 """

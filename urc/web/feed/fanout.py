@@ -1,4 +1,4 @@
-"""Sends the readings of one robot to every page that shows it, at most once per display frame.
+"""The fan-out of one robot's readings to all its pages, at most once per display frame.
 
 Layer 5. Clients have no queues. A flush wakes every client. As soon as the socket of a client is
 free, the client receives all values that are newer than its last frame. A frame is encoded once for

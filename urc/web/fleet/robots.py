@@ -118,7 +118,7 @@ class SessionLike(MotionSession, Protocol):
         """Pause, step, resume or end a running sequence."""
 
     def latch(self, reason: str) -> None:
-        """Latch STOP, end sequences and block autonomous motion; a `reason` of "" resets."""
+        """Latch STOP, end sequences and block autonomous motion; an empty `reason` resets."""
 
 
 Glimpse = bytes | Mapping[str, Reading] | None
@@ -404,7 +404,7 @@ class RobotService:
         return self._successor is not None or self._held_off > 0
 
     async def _wait_for(self, *, present: bool) -> None:
-        """Wait until a session is needed; with a false `present`, until no session is needed."""
+        """Wait until a session is needed or, if not `present`, until no session is needed."""
         while not (self._is_wanted if present else self._visitors == 0 or self._is_unwanted):
             self._stirred.clear()
             await self._stirred.wait()

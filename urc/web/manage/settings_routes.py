@@ -1,7 +1,7 @@
 """Routes of a robot's settings page, which tests, stores and applies the entered settings.
 
-Layer 5. Settings that fail the test are stored only if the user confirms; the robot may be switched
-off.
+Layer 5. Settings that fail the test are stored only if the user confirms, for example because the
+robot is switched off.
 """
 
 import asyncio

@@ -246,7 +246,7 @@ class Policy:
 
 
 class _Answer:
-    """Adds the page policy's headers to a response.
+    """A wrapper of `send` that adds the page policy's headers to a response.
 
     A route may set three keys in the state of a request. ``frame_policy`` is the policy of a frame
     in place of the page policy. ``is_code`` marks files that frames may load too. ``is_file`` marks

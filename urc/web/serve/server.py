@@ -222,7 +222,7 @@ def reachable_urls(host: str, port: int) -> tuple[str, ...]:
 
     For ``0.0.0.0`` and ``::``, the URLs contain the addresses of all network interfaces of this
     machine, or else the loopback address. For any other host, the URL contains `host`. Network
-    addresses precede loopback. The function sends no packet.
+    addresses precede the loopback address. The function sends no packet.
 
     Args:
         host: the address or name on which the server listens.

@@ -116,7 +116,8 @@ class Stop(msgspec.Struct, tag_field="t", tag="stop", forbid_unknown_fields=True
 
 Driving = Drive | Tick | Release | Stop
 decode_tick = msgspec.json.Decoder(Tick).decode
-"""Decodes a text that is probably a tick; raises an exception in `NO_TICK` for other texts."""
+"""Decoder for a text that is probably a tick; raises one of the exceptions in `NO_TICK` for any
+other text."""
 NO_TICK = (msgspec.MsgspecError, UnicodeError, RecursionError)
 _TICK_OF = b'{"t":"tick","command":"'
 """First bytes of a page's tick; ticks in any other form are decoded more slowly."""

@@ -30,7 +30,7 @@ Images are sent as binary messages; see `urc.web.wire.picture`.
 Messages from the page to the server: ``ping``, ``run``, ``show``, ``agree``, ``prepare``,
 ``steer``, and for the controls ``drive``, ``tick``, ``release`` and ``stop``. Ticks, releases and
 stops may also use a redundant socket, which begins with ``spare`` and receives heartbeats. The
-types below limit the nesting depth: the decoder refuses anything deeper than a map of plain
+message types limit the nesting depth: the decoder refuses anything deeper than a map of plain
 arguments.
 """
 

@@ -31,7 +31,7 @@ other lengths take nine bytes."""
 class ImageSelection(
     msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True
 ):
-    """Selects the images that the page shows; the server sends no other images."""
+    """The selection of the images that the page shows; the server sends no other images."""
 
     signals: Annotated[
         tuple[Annotated[str, msgspec.Meta(max_length=256)], ...], msgspec.Meta(max_length=64)
