@@ -119,7 +119,7 @@ async def test_answer_that_was_cut_short_is_no_answer() -> None:
     ):
         told = await asked(robot)
         assert told.attributes["ok"] is False
-        assert "cut short" in str(told.attributes["reason"])
+        assert "ended too early" in str(told.attributes["reason"])
 
 
 async def test_packed_bomb_is_not_unpacked() -> None:

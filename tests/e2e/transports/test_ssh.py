@@ -201,7 +201,7 @@ async def test_what_the_server_cannot_reach_is_told(sshd: Sshd) -> None:
         f"cannot connect to 127.0.0.1:1 through ssh 127.0.0.1:{sshd.port} (connection refused)"
     )
     await (await line.connect("127.0.0.1", sshd.port, OPEN_S)).abort()
-    with pytest.raises(PeerClosed, match="only tunnels others"):
+    with pytest.raises(PeerClosed, match="only tunnels other connections"):
         await line.send(b"?")
     await line.close()
 
