@@ -34,7 +34,7 @@ _QUIET: Final = _words(
     " max min mode name off offset on param pause ping query read reset save select show signal"
     " state status stop store subscribe test timeout trim tune unlock version volume zero"
 )
-"""Words that rule out motion, as in ``drive_mode``."""
+"""Words in a name that rule out motion; ``drive_mode``, for example, has the word ``mode``."""
 _BOUND: Final = _words("limit max maximum min minimum top")
 """Words in the names of arguments that limit motion."""
 _MOVING_ARGUMENTS: Final = _words("omega rudder steering throttle thrust velocity vx vy vz")
