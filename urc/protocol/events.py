@@ -43,7 +43,7 @@ class Open(NamedTuple):
 
 
 class Send(NamedTuple):
-    """Send bytes, including framing, or an envelope."""
+    """Send framed bytes, or send an envelope."""
 
     transport: str
     data: Payload

@@ -1,4 +1,4 @@
-"""Checks of comparisons between a signal and a text that is not one of its states."""
+"""Check of comparisons: a signal with named states is compared only with these names."""
 
 import ast
 from collections.abc import Iterable, Mapping
