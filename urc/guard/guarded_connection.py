@@ -123,9 +123,7 @@ class GuardedConnection:
         self._fault = ""
         self._patience_s = _USUAL_S
         self._took_s: deque[float] = deque(maxlen=_REMEMBERED)
-        """Durations of the last successful attempts, in seconds. The shortest duration is the least
-        affected by delays on this machine.
-        """
+        """Durations of the last successful attempts, in seconds."""
         self._hurry = ConnectRace(_SHORTEST_S)
         self._credit = 0
         self._credited = asyncio.Event()
@@ -134,8 +132,7 @@ class GuardedConnection:
         self._counted = 0
         """Number of the newest sent frame of the engine that contains counters."""
         self._round = 0
-        """Number of times that frames of the engine were refused because their counter values were
-        already used."""
+        """Number of refusals of the engine's frames because of used counter values."""
 
     # -- requests of the engine
 
@@ -286,6 +283,7 @@ class GuardedConnection:
         except Exception as bug:  # supervisor: a foreign transport may raise what it likes
             return why_broken(bug)
         self._took_s.append(self._clock.now() - began_s)
+        # The shortest duration is the least affected by delays of this machine.
         self._patience_s = min(max(_TIMES * min(self._took_s), _SHORTEST_S), _LONGEST_S)
         return ""
 

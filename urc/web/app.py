@@ -97,17 +97,7 @@ def build_app(
         UrcError: two robots use different widgets of the same name.
     """
     audit = AuditLog(data / "audit.sqlite") if data else None
-    turn = asyncio.Lock()
-    fleet = Fleet(
-        robots,
-        lambda name, robot: RobotService(
-            robot,
-            linger_s=linger_s,
-            latch=_latch(data, robot),
-            recorder=_recorder(audit, name, robot),
-            turn=turn,
-        ),
-    )
+    fleet = _fleet(robots, data, audit, linger_s)
     routes = _Routes(
         fleet=fleet,
         modules=import_map(vendored()),
@@ -127,6 +117,22 @@ def build_app(
         routes.dev_start = DevStart(fleet, remake, renew, routes.ways, is_here)
     files = FileRoutes(vendored(), tiles, routes.widget_files)
     return _Dashboard(routes, files, access or Access(), frozenset(allowed_hosts), dev)
+
+
+def _fleet(
+    robots: Mapping[str, Robot], data: Path | None, audit: AuditLog | None, linger_s: float
+) -> Fleet:
+    turn = asyncio.Lock()
+    return Fleet(
+        robots,
+        lambda name, robot: RobotService(
+            robot,
+            linger_s=linger_s,
+            latch=_latch(data, robot),
+            recorder=_recorder(audit, name, robot),
+            turn=turn,
+        ),
+    )
 
 
 def _latch(data: Path | None, robot: Robot) -> LatchStore | None:
