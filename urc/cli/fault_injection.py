@@ -92,7 +92,7 @@ def _is_ours(handle: int) -> bool:
 def add_faults(parser: argparse.ArgumentParser, *, has_names: bool) -> None:
     """Declare the option for initial faults; `has_names` permits the form ROBOT:FAULT."""
     which = (
-        " fault of emulated robots: FAULT affects all robots, ROBOT:FAULT a single robot;"
+        " of emulated robots: FAULT affects all robots, ROBOT:FAULT a single robot;"
         if has_names
         else ","
     )
