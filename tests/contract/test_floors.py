@@ -16,7 +16,7 @@ FLOORS = {
     "__init__": 7,  # the names for Python users: each is imported on first use, from any floor
     "cli": 6,
     "web": 5,
-    "runtime": 4, "simulator": 4,
+    "runtime": 4, "simulator": 4, "access": 4,
     "guard": 3.5,  # a landing: it stands on transports and motion, and sessions stand on it
     "config": 3, "protocol": 3, "transports": 3, "packages": 3, "motion": 3,
     "model": 2,

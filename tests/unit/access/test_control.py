@@ -1,0 +1,119 @@
+"""The access control of one server: the local user, and changes by others."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from urc.access.control import LOCAL_SIGN_INS, AccessControl
+from urc.access.directory import NOBODY
+from urc.access.grants import AccessError, Grant
+from urc.access.store import AccessStore
+
+KEY = "k" * 32
+
+
+class Clock:
+    """UTC time as a test sets it."""
+
+    def __init__(self) -> None:
+        self.now = 1_000_000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[AccessStore]:
+    opened = AccessStore(tmp_path)
+    yield opened
+    opened.close()
+
+
+def test_the_start_key_is_a_token_of_the_local_user() -> None:
+    access = AccessControl(key=KEY)
+    program = access.identify(KEY)
+    assert (program.name, program.kind, program.way) == ("this computer", "person", "token")
+    assert access.role(program, "any robot") == "administer"
+    assert access.identify("k" * 31) == NOBODY
+    assert access.role(NOBODY) is None
+    assert AccessControl().key != AccessControl().key
+
+
+def test_a_browser_hands_the_start_key_in_for_a_session() -> None:
+    access = AccessControl(key=KEY)
+    secret = access.admit(KEY)
+    assert secret is not None
+    assert secret != KEY
+    assert access.role(access.identify(secret)) == "administer"
+    assert access.admit("another") is None
+    code = access.code()
+    assert access.admit(code) is not None
+    assert access.admit(code) is None, "a code works once"
+
+
+def test_local_sessions_are_closed_one_by_one_and_the_oldest_first() -> None:
+    access = AccessControl(key=KEY)
+    first, second = (access.admit(KEY) or "" for _ in range(2))
+    access.close_sign_in(access.identify(second).sign_in)
+    assert access.identify(second) == NOBODY
+    assert access.identify(first) != NOBODY
+    for _ in range(LOCAL_SIGN_INS):
+        access.admit(KEY)
+    assert access.identify(first) == NOBODY
+    assert access.identify(KEY) != NOBODY
+
+
+def test_people_of_the_store_and_the_local_user_stand_side_by_side(store: AccessStore) -> None:
+    access = AccessControl(store, key=KEY)
+    changes: list[str] = []
+    access.on_change.append(lambda: changes.append("changed"))
+    ann = store.add("person", "Ann", [Grant("drive")], now=access.now())
+    sign_in, secret = store.open_sign_in(ann.id, "passkey", now=access.now())
+    access.reload()
+    who = access.identify(secret)
+    assert access.role(who) == "drive"
+    assert access.role(access.identify(KEY)) == "administer"
+    access.close_sign_in(sign_in.id)
+    assert access.role(who) is None
+    assert changes == ["changed"] * 2
+    with pytest.raises(AccessError, match="it was removed already"):
+        access.close_sign_in(sign_in.id)
+
+
+def test_a_change_by_another_process_is_noticed(store: AccessStore, tmp_path: Path) -> None:
+    access = AccessControl(store)
+    ann = store.add("person", "Ann", [Grant("drive")], now=access.now())
+    _, secret = store.open_sign_in(ann.id, "passkey", now=access.now())
+    access.reload()
+    who = access.identify(secret)
+    changes: list[str] = []
+    access.on_change.append(lambda: changes.append("changed"))
+    assert not access.poll()
+    other = AccessStore(tmp_path)
+    other.set_grants(ann.id, [Grant("watch")])
+    assert access.poll()
+    assert (access.role(who), changes) == ("watch", ["changed"])
+    other.remove(ann.id)
+    other.close()
+    assert access.poll()
+    assert access.role(who) is None
+    assert not access.poll()
+    assert not AccessControl().poll(), "without a store"
+
+
+def test_a_clock_that_is_set_back_revives_no_session(store: AccessStore, clock: Clock) -> None:
+    access = AccessControl(store, utc=clock)
+    ann = store.add("person", "Ann", [Grant("drive")], now=clock())
+    _, secret = store.open_sign_in(ann.id, "passkey", now=clock(), ends_at=clock() + 60)
+    access.reload()
+    assert access.identify(secret) != NOBODY
+    clock.now += 61
+    assert access.identify(secret) == NOBODY
+    clock.now -= 3600
+    assert access.identify(secret) == NOBODY

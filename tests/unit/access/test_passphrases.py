@@ -1,0 +1,43 @@
+"""Passphrases: rules and hashes."""
+
+import pytest
+
+from urc.access.grants import AccessError
+from urc.access.passphrases import hash_of, is_stale, matches
+
+GOOD = "correct horse battery"
+
+
+def test_a_passphrase_matches_its_hash_alone() -> None:
+    kept = hash_of(GOOD)
+    assert kept.startswith("$argon2id$")
+    assert GOOD not in kept
+    assert matches(GOOD, kept)
+    assert not matches(GOOD + " ", kept)
+    assert not matches("x" * 300, kept)
+    assert not matches(GOOD, None), "an unknown person"
+    assert not matches(GOOD, "no hash")
+    assert hash_of(GOOD) != kept, "each has a salt"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("short", "the passphrase has 5 characters; at least 8 are needed"),
+        ("x1" * 129, "the passphrase has 258 characters; at most 256 are allowed"),
+        ("aaabbbaaabbb", "the passphrase needs 4 different characters"),
+        ("Margarethe", "the passphrase is the name; choose several words"),
+    ],
+)
+def test_a_weak_passphrase_is_refused(text: str, message: str) -> None:
+    with pytest.raises(AccessError) as caught:
+        hash_of(text, name="margarethe")
+    assert str(caught.value) == message
+
+
+def test_a_hash_with_older_parameters_is_due_for_another() -> None:
+    """RFC 9106, appendix: the hash of another program, with small parameters."""
+    old = "$argon2id$v=19$m=256,t=2,p=1$c29tZXNhbHQ$nf65EOgLrQMR/uIPnA4rEsF5h7TKyQwu9U1bMCHGi/4"
+    assert matches("password", old)
+    assert is_stale(old)
+    assert not is_stale(hash_of(GOOD))

@@ -1,0 +1,1 @@
+"""Access control: people, devices and programs, their rights, credentials and sign-ins."""

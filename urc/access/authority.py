@@ -1,0 +1,265 @@
+"""A local certificate authority: HTTPS for a machine without a public name.
+
+Layer 4. `CertificateAuthority` keeps one root certificate for years, which people trust once on
+each device, and issues the server's certificate from it. The root is limited to names of local
+networks (RFC 5280, 4.2.1.10), so a stolen key cannot imitate public websites.
+
+The machine may have no clock: then all dates start on the day of this version's release.
+"""
+
+import ipaddress
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from urc.access.grants import AccessError
+from urc.private_files import put_private
+
+__all__ = ["CertificateAuthority", "ServerCertificate", "fingerprint"]
+
+AUTHORITY_LASTS: Final = timedelta(days=3650)
+LEAF_LASTS: Final = timedelta(days=397)
+"""Browsers refuse server certificates with a longer life."""
+RENEW_BEFORE: Final = timedelta(days=30)
+OLDEST: Final = datetime(2026, 11, 1, tzinfo=UTC)
+"""An earlier time of the machine's clock is wrong."""
+_BACK: Final = timedelta(days=1)
+"""Devices whose clock is a little late accept the certificate, too."""
+_LOCAL_NAMES: Final = ("localhost", "local", "lan", "internal", "home.arpa")
+_LOCAL_NETWORKS: Final = (
+    "127.0.0.0/8", "10.0.0.0/8", "172.16.0.0/12", "192.168.0.0/16", "169.254.0.0/16",
+    "100.64.0.0/10", "::1/128", "fc00::/7", "fe80::/10",
+)  # fmt: skip
+_DNS: Final = re.compile(r"(?!-)[a-z0-9-]{1,63}(?:\.[a-z0-9-]{1,63})*\.?")
+_Address = ipaddress.IPv4Address | ipaddress.IPv6Address
+
+
+class ServerCertificate(NamedTuple):
+    """The files that a TLS server loads."""
+
+    chain: Path
+    key: Path
+    ends: datetime
+    """Time after which browsers refuse it."""
+    is_new: bool
+    """Whether this call issued it."""
+
+
+class CertificateAuthority:
+    """The authority in one folder; both keys are readable to the owner only."""
+
+    def __init__(self, folder: Path, names: Sequence[str], now: datetime) -> None:
+        """Load the authority, or make one.
+
+        Args:
+            folder: folder for certificates and keys.
+            names: names and addresses of this machine that clients use.
+            now: time of this machine's clock, with a time zone.
+
+        Raises:
+            AccessError: a file cannot be read or written, or a name is invalid.
+        """
+        self._folder = folder
+        self._now = max(now, OLDEST)
+        self._names = _parsed(names)
+        self.file = folder / "authority.pem"
+        """Root certificate, which devices trust; public."""
+        self.is_new = False
+        """Whether devices have to trust a new root."""
+        try:
+            self._load()
+        except FileNotFoundError:
+            self._make()
+        except (OSError, ValueError) as error:
+            raise AccessError(f"{self.file}: cannot be read: {error}") from None
+        if not self._is_usable():
+            self._make()
+
+    @property
+    def fingerprint(self) -> str:
+        """SHA-256 of the root certificate, in groups for people."""
+        return fingerprint(self._root)
+
+    @property
+    def pem(self) -> bytes:
+        """The root certificate in PEM."""
+        return self._root.public_bytes(serialization.Encoding.PEM)
+
+    def issue(self) -> ServerCertificate:
+        """Return the server's certificate; a new one if the old one ends soon or lacks a name.
+
+        Raises:
+            AccessError: the files cannot be written.
+        """
+        chain, key = self._folder / "server.pem", self._folder / "server.key"
+        kept = _certificate(chain)
+        if kept is not None and key.exists() and self._is_good(kept):
+            return ServerCertificate(chain, key, kept.not_valid_after_utc, is_new=False)
+        leaf_key = ec.generate_private_key(ec.SECP256R1())
+        ends = min(self._now + LEAF_LASTS, self._root.not_valid_after_utc)
+        leaf = (
+            self._builder("URC", leaf_key, ends)
+            .issuer_name(self._root.subject)
+            .add_extension(x509.SubjectAlternativeName(self._names), critical=False)
+            .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+            .add_extension(_usage(is_authority=False), critical=True)
+            .add_extension(x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH]), critical=False)
+            .add_extension(
+                x509.AuthorityKeyIdentifier.from_issuer_public_key(self._key.public_key()),
+                critical=False,
+            )
+            .sign(self._key, hashes.SHA256())
+        )
+        self._write(key, _pem_of(leaf_key))
+        self._write(chain, leaf.public_bytes(serialization.Encoding.PEM) + self.pem)
+        return ServerCertificate(chain, key, ends, is_new=True)
+
+    def _load(self) -> None:
+        self._root = x509.load_pem_x509_certificate(self.file.read_bytes())
+        key = serialization.load_pem_private_key(
+            self.file.with_suffix(".key").read_bytes(), password=None
+        )
+        if not isinstance(key, ec.EllipticCurvePrivateKey):
+            raise ValueError("the key is of another kind")
+        if key.public_key() != self._root.public_key():
+            raise ValueError("key and certificate do not belong together")
+        self._key = key
+
+    def _make(self) -> None:
+        self.is_new = True
+        self._key = ec.generate_private_key(ec.SECP256R1())
+        name = f"URC on {next(_dns_of(self._names), 'this machine')}"
+        networks = [x509.IPAddress(ipaddress.ip_network(one)) for one in _LOCAL_NETWORKS]
+        own = [
+            x509.IPAddress(ipaddress.ip_network(one.value))
+            for one in self._names
+            if isinstance(one, x509.IPAddress)
+        ]
+        domains = [x509.DNSName(one) for one in (*_LOCAL_NAMES, *_dns_of(self._names))]
+        self._root = (
+            self._builder(name, self._key, self._now + AUTHORITY_LASTS)
+            .issuer_name(_named(name))
+            .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+            .add_extension(_usage(is_authority=True), critical=True)
+            .add_extension(
+                x509.NameConstraints(list(dict.fromkeys([*domains, *networks, *own])), None),
+                critical=True,
+            )
+            .sign(self._key, hashes.SHA256())
+        )
+        self._write(self.file.with_suffix(".key"), _pem_of(self._key))
+        self._write(self.file, self.pem)
+
+    def _builder(
+        self, name: str, key: ec.EllipticCurvePrivateKey, ends: datetime
+    ) -> x509.CertificateBuilder:
+        return (
+            x509.CertificateBuilder()
+            .subject_name(_named(name))
+            .public_key(key.public_key())
+            .serial_number(x509.random_serial_number())
+            .not_valid_before(min(self._now, OLDEST) - _BACK)
+            .not_valid_after(ends)
+            .add_extension(
+                x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False
+            )
+        )
+
+    def _is_usable(self) -> bool:
+        """Return whether the root lasts, and allows all names of this machine."""
+        if self._root.not_valid_after_utc - self._now < RENEW_BEFORE:
+            return False
+        found = self._root.extensions.get_extension_for_class(x509.NameConstraints).value
+        allowed = found.permitted_subtrees or []
+        return all(_is_allowed(name, allowed) for name in self._names)
+
+    def _is_good(self, leaf: x509.Certificate) -> bool:
+        if leaf.not_valid_after_utc - self._now < RENEW_BEFORE:
+            return False
+        if leaf.issuer != self._root.subject or not _is_signed(leaf, self._root):
+            return False
+        found = leaf.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+        return set(self._names) <= set(found)
+
+    def _write(self, file: Path, data: bytes) -> None:
+        try:
+            put_private(file, data)
+        except OSError as error:
+            raise AccessError(f"{file}: cannot be written: {error.strerror}") from None
+
+
+def fingerprint(certificate: x509.Certificate) -> str:
+    """Return SHA-256 of a certificate as 16 groups of four hex digits."""
+    text = certificate.fingerprint(hashes.SHA256()).hex().upper()
+    return " ".join(text[at : at + 4] for at in range(0, len(text), 4))
+
+
+def _parsed(names: Iterable[str]) -> list[x509.GeneralName]:
+    found: dict[x509.GeneralName, None] = {}
+    for name in names:
+        plain = name.strip().strip("[]").partition("%")[0].lower()
+        try:
+            found[x509.IPAddress(ipaddress.ip_address(plain))] = None
+        except ValueError:
+            if not _DNS.fullmatch(plain):
+                raise AccessError(f"expected a host name or an address, found {name!r}") from None
+            found[x509.DNSName(plain.rstrip("."))] = None
+    return list(found)
+
+
+def _dns_of(names: Iterable[x509.GeneralName]) -> Iterator[str]:
+    return (one.value for one in names if isinstance(one, x509.DNSName))
+
+
+def _is_allowed(name: x509.GeneralName, allowed: Iterable[x509.GeneralName]) -> bool:
+    if isinstance(name, x509.IPAddress):
+        address = name.value
+        return isinstance(address, _Address) and any(
+            address in one.value
+            for one in allowed
+            if isinstance(one, x509.IPAddress)
+            and isinstance(one.value, ipaddress.IPv4Network | ipaddress.IPv6Network)
+        )
+    return any(name.value == one or str(name.value).endswith(f".{one}") for one in _dns_of(allowed))
+
+
+def _certificate(file: Path) -> x509.Certificate | None:
+    try:
+        return x509.load_pem_x509_certificate(file.read_bytes())
+    except (OSError, ValueError):
+        return None  # it is made again
+
+
+def _is_signed(leaf: x509.Certificate, root: x509.Certificate) -> bool:
+    try:
+        leaf.verify_directly_issued_by(root)
+    except Exception:
+        return False
+    return True
+
+
+def _named(name: str) -> x509.Name:
+    return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name[:64])])
+
+
+def _pem_of(key: ec.EllipticCurvePrivateKey) -> bytes:
+    return key.private_bytes(
+        serialization.Encoding.PEM,
+        serialization.PrivateFormat.PKCS8,
+        serialization.NoEncryption(),
+    )
+
+
+def _usage(*, is_authority: bool) -> x509.KeyUsage:
+    return x509.KeyUsage(
+        digital_signature=not is_authority, key_cert_sign=is_authority, crl_sign=is_authority,
+        content_commitment=False, key_encipherment=False, data_encipherment=False,
+        key_agreement=False, encipher_only=False, decipher_only=False,
+    )  # fmt: skip

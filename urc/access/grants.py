@@ -1,0 +1,65 @@
+"""Grants: a role for all robots, for a tag, or for one robot.
+
+Layer 4. Pure. The text form is ``ROLE``, ``ROLE@ROBOT`` or ``ROLE@#TAG``, such as ``drive@#lab``.
+"""
+
+from collections.abc import Collection, Iterable
+from typing import Final, NamedTuple
+
+from urc.model.role import ROLES, Role, includes
+from urc.problems import UrcError
+
+__all__ = ["ALL", "AccessError", "Grant", "parse_grant", "role_at"]
+
+ALL: Final = "*"
+"""Scope of a grant for all robots, now and later."""
+_TAG: Final = "#"
+
+
+class AccessError(UrcError):
+    """A request about people, devices or tokens that cannot be carried out."""
+
+
+class Grant(NamedTuple):
+    """One role within one scope."""
+
+    role: Role
+    scope: str = ALL
+    """`ALL`, the name of a robot, or ``#`` and a tag."""
+
+    def __str__(self) -> str:
+        """Return the text form."""
+        return self.role if self.scope == ALL else f"{self.role}@{self.scope}"
+
+    def covers(self, robot: str, tags: Collection[str]) -> bool:
+        """Return whether the grant is valid for a robot."""
+        if self.scope == ALL:
+            return True
+        if self.scope.startswith(_TAG):
+            return self.scope.removeprefix(_TAG) in tags
+        return self.scope == robot
+
+
+def parse_grant(text: str) -> Grant:
+    """Return the grant that `text` stands for.
+
+    Raises:
+        AccessError: the role is unknown, the scope is empty, or ``administer`` has a scope.
+    """
+    role, separator, scope = text.partition("@")
+    if role not in ROLES:
+        raise AccessError(f"expected a role ({', '.join(ROLES)}), found {role!r} in {text!r}")
+    if separator and scope in ("", _TAG):
+        raise AccessError(f"expected a robot or #tag after @, found {text!r}")
+    if role == "administer" and scope not in ("", ALL):
+        raise AccessError(f"administer is for all robots: write 'administer', found {text!r}")
+    return Grant(role, scope or ALL)
+
+
+def role_at(grants: Iterable[Grant], robot: str = "", tags: Collection[str] = ()) -> Role | None:
+    """Return the highest role of `grants` at a robot; "" asks for the whole server."""
+    best: Role | None = None
+    for grant in grants:
+        if grant.covers(robot, tags) and (best is None or includes(grant.role, best)):
+            best = grant.role
+    return best

@@ -1,0 +1,62 @@
+"""Passphrases: the rules for new ones, and their argon2id hashes.
+
+Layer 4. Pure, and slow on purpose: a hash takes about 50 ms and 64 MiB. Servers therefore make one
+hash at a time, in a thread. RFC 9106 (argon2id, the second recommended choice of
+parameters); NIST SP 800-63B-4 for the rules: length counts, no composition rules.
+"""
+
+from typing import Final
+
+import argon2
+
+from urc.access.grants import AccessError
+
+__all__ = ["LONGEST", "SHORTEST", "hash_of", "is_stale", "matches"]
+
+SHORTEST: Final = 8
+"""Fewest characters."""
+LONGEST: Final = 256
+"""Most characters; the hash of a longer text would cost an attacker nothing and the server time."""
+_FEWEST_DIFFERENT: Final = 4
+_HASHER: Final = argon2.PasswordHasher()
+_NEVER: Final = _HASHER.hash("no passphrase has this hash")
+"""Compared for unknown names, so that the time of the answer does not tell which names exist."""
+
+
+def hash_of(passphrase: str, *, name: str = "") -> str:
+    """Return the hash of a new passphrase, with its salt and parameters.
+
+    Raises:
+        AccessError: the passphrase is too short, too long, too uniform, or is the name.
+    """
+    length = len(passphrase)
+    if length < SHORTEST:
+        raise AccessError(f"the passphrase has {length} characters; at least {SHORTEST} are needed")
+    if length > LONGEST:
+        raise AccessError(f"the passphrase has {length} characters; at most {LONGEST} are allowed")
+    if len(set(passphrase)) < _FEWEST_DIFFERENT:
+        raise AccessError(f"the passphrase needs {_FEWEST_DIFFERENT} different characters")
+    if name and passphrase.casefold() == name.casefold():
+        raise AccessError("the passphrase is the name; choose several words")
+    return _HASHER.hash(passphrase)
+
+
+def matches(passphrase: str, kept: str | None) -> bool:
+    """Return whether `passphrase` belongs to the hash; always takes the time of one hash.
+
+    Args:
+        passphrase: text of the person who signs in.
+        kept: the result of `hash_of`; None for an unknown person.
+    """
+    if len(passphrase) > LONGEST:
+        return False
+    try:
+        _HASHER.verify(kept or _NEVER, passphrase)
+    except (argon2.exceptions.VerificationError, argon2.exceptions.InvalidHashError):
+        return False
+    return kept is not None
+
+
+def is_stale(kept: str) -> bool:
+    """Return whether the hash has older parameters and should be replaced at the next sign-in."""
+    return _HASHER.check_needs_rehash(kept)

@@ -1,0 +1,336 @@
+"""The store of people, devices, programs, sign-ins and pairing codes: one private SQLite file.
+
+Layer 4. Secrets are stored as hashes only. Several processes may use the file: the server, and the
+commands that manage people on the same machine. `changed` tells each of them of the changes of the
+others, so a removal by command line acts on a running server.
+
+Theory of operation. Each change is one transaction. `directory` reads all tables, a few thousand
+rows at most, into an immutable `Directory`; readers never see half a change.
+"""
+
+import json
+import secrets
+import sqlite3
+import threading
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from urc.access.directory import Directory, Kind, Principal, SignIn, Way, digest_of
+from urc.access.grants import AccessError, Grant, parse_grant
+from urc.private_files import make_private
+
+__all__ = ["FILE", "AccessStore", "Invitation", "MOST_SIGN_INS"]
+
+FILE: Final = "access.sqlite"
+MOST_SIGN_INS: Final = 5000
+"""Most sign-ins and tokens; the least recently used sign-in is closed for a new one."""
+MOST_PRINCIPALS: Final = 5000
+LONGEST_NAME: Final = 64
+_VERSION: Final = 1
+_BUSY_S: Final = 5.0
+_CREATE: Final = (
+    "CREATE TABLE principals ( "
+    "id TEXT PRIMARY KEY, kind TEXT NOT NULL, name TEXT NOT NULL, grants TEXT NOT NULL, "
+    "owner TEXT NOT NULL, commands TEXT NOT NULL, created_at REAL NOT NULL, ends_at REAL "
+    ") STRICT",
+    "CREATE UNIQUE INDEX names ON principals (kind, name COLLATE NOCASE)",
+    "CREATE TABLE passphrases ( "
+    "principal TEXT PRIMARY KEY REFERENCES principals ON DELETE CASCADE, hash TEXT NOT NULL "
+    ") STRICT",
+    "CREATE TABLE sign_ins ( "
+    "id TEXT PRIMARY KEY, principal TEXT NOT NULL REFERENCES principals ON DELETE CASCADE, "
+    "way TEXT NOT NULL, digest BLOB NOT NULL UNIQUE, created_at REAL NOT NULL, "
+    "used_at REAL NOT NULL, ends_at REAL, idle_s REAL, place TEXT NOT NULL, agent TEXT NOT NULL "
+    ") STRICT",
+    "CREATE TABLE invitations ( "
+    "digest BLOB PRIMARY KEY, kind TEXT NOT NULL, name TEXT NOT NULL, grants TEXT NOT NULL, "
+    "owner TEXT NOT NULL, ends_at REAL NOT NULL "
+    ") STRICT",
+)
+
+
+class Invitation(NamedTuple):
+    """The right to become a device or a person, by a code that works once."""
+
+    kind: Kind
+    name: str
+    """Suggested name; "" lets the new device choose."""
+    grants: tuple[Grant, ...]
+    owner: str = ""
+    """Id of the person whose device pairs, or who sets a passphrase."""
+    ends_at: float = 0.0
+
+
+class AccessStore:
+    """The file. Its methods block for some milliseconds: servers call them in a thread."""
+
+    def __init__(self, folder: Path) -> None:
+        """Open the file, and create it if it is missing.
+
+        Raises:
+            AccessError: the file cannot be opened, or a newer URC wrote it.
+        """
+        self.file = folder / FILE
+        self._lock = threading.RLock()
+        try:
+            make_private(folder)
+            if not self.file.exists():
+                self.file.touch(mode=0o600)
+            self._base = sqlite3.connect(
+                self.file, timeout=_BUSY_S, isolation_level=None, check_same_thread=False
+            )
+            self._prepare()
+            self._seen = self._version()
+        except (OSError, sqlite3.Error) as error:
+            raise AccessError(f"{self.file}: cannot be used: {error}") from None
+
+    def _prepare(self) -> None:
+        self._base.execute("PRAGMA foreign_keys = ON")
+        self._base.execute("PRAGMA secure_delete = ON")
+        with self._change():
+            (version,) = self._base.execute("PRAGMA user_version").fetchone()
+            if version > _VERSION:
+                raise AccessError(f"{self.file}: a newer version of URC wrote this file")
+            if version == 0:
+                for statement in _CREATE:
+                    self._base.execute(statement)
+                self._base.execute(f"PRAGMA user_version = {_VERSION}")
+
+    def close(self) -> None:
+        """Close the file."""
+        with self._lock:
+            self._base.close()
+
+    def changed(self) -> bool:
+        """Return whether another process changed the file since the last call."""
+        was, self._seen = self._seen, self._version()
+        return was != self._seen
+
+    def directory(self) -> Directory:
+        """Return the present directory."""
+        with self._lock:
+            principals = {row[0]: _principal(row) for row in self._rows("principals")}
+            sign_ins = {row[0]: SignIn(*row) for row in self._rows("sign_ins")}
+        by_digest = {sign_in.digest: sign_in.id for sign_in in sign_ins.values()}
+        return Directory(principals, sign_ins, by_digest)
+
+    # People, devices and programs
+
+    def add(
+        self,
+        kind: Kind,
+        name: str,
+        grants: Iterable[Grant] = (),
+        *,
+        now: float,
+        owner: str = "",
+        commands: Iterable[str] = (),
+        ends_at: float | None = None,
+    ) -> Principal:
+        """Add a principal and return it.
+
+        Args:
+            kind: its kind.
+            name: its name, unique among its kind regardless of case.
+            grants: its rights.
+            now: UTC time in seconds since 1970.
+            owner: id of the person whose device it is.
+            commands: commands that a program may give; none: all of its role.
+            ends_at: UTC time after which all rights end; None: never.
+
+        Raises:
+            AccessError: the name is empty, too long or in use, or there are too many principals.
+        """
+        principal = Principal(
+            secrets.token_hex(8), kind, _name(name), tuple(grants), owner, tuple(commands), now,
+            ends_at,
+        )  # fmt: skip
+        row = principal._replace(
+            grants=_texts(principal.grants),  # type: ignore[arg-type]
+            commands=json.dumps(principal.commands),  # type: ignore[arg-type]
+        )
+        with self._change():
+            (count,) = self._base.execute("SELECT count(*) FROM principals").fetchone()
+            if count >= MOST_PRINCIPALS:
+                raise AccessError(f"there are {count} people, devices and programs; remove some")
+            try:
+                self._insert("principals", row)
+            except sqlite3.IntegrityError:
+                raise AccessError(f"a {kind} has the name {principal.name!r} already") from None
+        return principal
+
+    def rename(self, principal: str, name: str) -> None:
+        """Give a principal another name; raise `AccessError` if it is in use or invalid."""
+        try:
+            self._update("UPDATE principals SET name = ? WHERE id = ?", _name(name), principal)
+        except sqlite3.IntegrityError:
+            raise AccessError(f"the name {name!r} is in use") from None
+
+    def set_grants(self, principal: str, grants: Iterable[Grant]) -> None:
+        """Replace the rights of a principal; raise `AccessError` if it is unknown."""
+        self._update("UPDATE principals SET grants = ? WHERE id = ?", _texts(grants), principal)
+
+    def remove(self, principal: str) -> None:
+        """Remove a principal with its sign-ins, credentials and devices.
+
+        Raises:
+            AccessError: the principal is unknown.
+        """
+        with self._change():
+            self._base.execute("DELETE FROM principals WHERE owner = ?", (principal,))
+            self._base.execute("DELETE FROM invitations WHERE owner = ?", (principal,))
+            self._update("DELETE FROM principals WHERE id = ?", principal)
+
+    # Passphrases
+
+    def set_passphrase(self, principal: str, kept: str) -> None:
+        """Store the hash of a passphrase."""
+        with self._change():
+            self._base.execute(
+                "INSERT OR REPLACE INTO passphrases VALUES (?, ?)", (principal, kept)
+            )
+
+    def passphrase_of(self, name: str) -> tuple[str, str | None]:
+        """Return id and hash of the person with that name; "" and None without one."""
+        with self._lock:
+            row = self._base.execute(
+                "SELECT id, hash FROM principals LEFT JOIN passphrases ON principal = id"
+                " WHERE kind = 'person' AND name = ? COLLATE NOCASE",
+                (name,),
+            ).fetchone()
+        return row or ("", None)
+
+    # Sessions and tokens
+
+    def open_sign_in(
+        self,
+        principal: str,
+        way: Way,
+        *,
+        now: float,
+        ends_at: float | None = None,
+        idle_s: float | None = None,
+        place: str = "",
+        agent: str = "",
+    ) -> tuple[SignIn, str]:
+        """Open a sign-in and return it with its secret, which is never stored.
+
+        Raises:
+            AccessError: the principal was removed.
+        """
+        secret = secrets.token_urlsafe(32)
+        sign_in = SignIn(
+            secrets.token_hex(8), principal, way, digest_of(secret), now, now, ends_at, idle_s,
+            place[:LONGEST_NAME], agent[:LONGEST_NAME],
+        )  # fmt: skip
+        with self._change():
+            self._base.execute(
+                "DELETE FROM sign_ins WHERE ends_at <= ? OR used_at + idle_s <= ?", (now, now)
+            )
+            self._base.execute(
+                "DELETE FROM sign_ins WHERE id IN (SELECT id FROM sign_ins WHERE way <> 'token'"
+                " ORDER BY used_at DESC LIMIT -1 OFFSET ?)",
+                (MOST_SIGN_INS - 1,),
+            )
+            try:
+                self._insert("sign_ins", sign_in)
+            except sqlite3.IntegrityError:
+                raise AccessError("that person, device or program was removed") from None
+        return sign_in, secret
+
+    def touch(self, sign_in: str, now: float) -> None:
+        """Record a use of a sign-in; a removed sign-in stays removed."""
+        with self._change():
+            self._base.execute("UPDATE sign_ins SET used_at = ? WHERE id = ?", (now, sign_in))
+
+    def close_sign_in(self, sign_in: str) -> None:
+        """Close a sign-in; raise `AccessError` if it is unknown."""
+        self._update("DELETE FROM sign_ins WHERE id = ?", sign_in)
+
+    # Codes that work once
+
+    def invite(self, invitation: Invitation) -> str:
+        """Return a new code for `invitation`."""
+        code = secrets.token_urlsafe(16)
+        with self._change():
+            self._base.execute(
+                "INSERT INTO invitations VALUES (?, ?, ?, ?, ?, ?)",
+                (digest_of(code), invitation.kind, invitation.name, _texts(invitation.grants),
+                 invitation.owner, invitation.ends_at),
+            )  # fmt: skip
+        return code
+
+    def redeem(self, code: str, now: float) -> Invitation | None:
+        """Return the invitation of a code, and end it; None if the code is unknown or too old."""
+        with self._change():
+            self._base.execute("DELETE FROM invitations WHERE ends_at <= ?", (now,))
+            row = self._base.execute(
+                "DELETE FROM invitations WHERE digest = ?"
+                " RETURNING kind, name, grants, owner, ends_at",
+                (digest_of(code),),
+            ).fetchone()
+        if row is None:
+            return None
+        kind, name, grants, owner, ends_at = row
+        return Invitation(kind, name, _grants(grants), owner, ends_at)
+
+    # Inside
+
+    def _version(self) -> int:
+        """Return a number that changes with each change by another process."""
+        with self._lock:
+            (version,) = self._base.execute("PRAGMA data_version").fetchone()
+        return int(version)
+
+    @contextmanager
+    def _change(self) -> Iterator[None]:
+        """Run one transaction; a nested one is part of the outer one."""
+        with self._lock:
+            if self._base.in_transaction:
+                yield
+                return
+            self._base.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+            except BaseException:
+                self._base.execute("ROLLBACK")
+                raise
+            self._base.execute("COMMIT")
+
+    def _rows(self, table: str) -> list[Any]:
+        return self._base.execute(f"SELECT * FROM {table}").fetchall()  # noqa: S608 - our names
+
+    def _insert(self, table: str, row: tuple[object, ...]) -> None:
+        marks = ", ".join("?" * len(row))
+        self._base.execute(f"INSERT INTO {table} VALUES ({marks})", row)  # noqa: S608 - our names
+
+    def _update(self, statement: str, *values: object) -> None:
+        with self._change():
+            if self._base.execute(statement, values).rowcount == 0:
+                raise AccessError("it was removed already")
+
+
+def _name(name: str) -> str:
+    name = " ".join(name.split())
+    if not name:
+        raise AccessError("the name is empty")
+    if len(name) > LONGEST_NAME:
+        raise AccessError(f"the name has {len(name)} characters; expected at most {LONGEST_NAME}")
+    if not name.isprintable():
+        raise AccessError("the name has characters that cannot be shown")
+    return name
+
+
+def _texts(grants: Iterable[Grant]) -> str:
+    return json.dumps([str(grant) for grant in grants])
+
+
+def _grants(text: str) -> tuple[Grant, ...]:
+    return tuple(parse_grant(each) for each in json.loads(text))
+
+
+def _principal(row: Any) -> Principal:
+    found = Principal(*row)
+    return found._replace(grants=_grants(str(row[3])), commands=tuple(json.loads(str(row[5]))))
