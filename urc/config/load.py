@@ -16,7 +16,7 @@ from urc.config.link.tests import link_test
 from urc.config.node import Problems
 from urc.config.parse.driver import parse_driver, spoken_name
 from urc.config.parse.interface import check_names, parse_interface
-from urc.config.parse.profile import parse_setting
+from urc.config.parse.profile import parse_setting, parse_tags
 from urc.config.parse.simulator import SimulatorSpec, parse_simulator
 from urc.config.parse.test import parse_test
 from urc.config.parse.widget import WidgetFolder, parse_widget
@@ -150,6 +150,7 @@ class _Parsed(NamedTuple):
     interfaces: dict[str, Interface]
     tests: list[DocumentTest]
     simulated: SimulatorSpec
+    tags: tuple[str, ...]
 
 
 def _profile(
@@ -170,6 +171,7 @@ def _profile(
             if sources.simulator or sources.rules
             else SimulatorSpec()
         ),
+        tags=parse_tags(sources.root, problems) if sources.kind == "robot" else (),
     )
     if has_errors(problems):
         return None
@@ -220,4 +222,5 @@ def _link(
         world=world,
         licence=root.text("licence"),
         author=root.text("author"),
+        tags=parsed.tags,
     )

@@ -22,7 +22,7 @@ from urc.source import Document, Mark
 
 __all__ = ["ResolvedProfile", "resolve", "written"]
 
-_HEADER: Final = ("urc", "kind", "name", "title", "summary", "licence", "author")
+_HEADER: Final = ("urc", "kind", "name", "title", "summary", "licence", "author", "tags")
 _BUILDING: Final = ("extends", "include", "partial", "params", "driver", "interfaces")
 _BESIDE: Final = ("settings", "widgets", "tests", "simulator")
 _PLAIN: Final = re.compile(r"[A-Za-z_](?:[\w./ -]*[\w./-])?|\d+(?:ms|s|m|h)", re.ASCII)

@@ -19,6 +19,7 @@ from urc.model.exchange import (
     Verify,
 )
 from urc.model.payload import FramingSpec, ReadSpec, WriteSpec
+from urc.model.role import Role
 from urc.model.sequence import ExpectStep, RunStep, Step, all_steps
 from urc.model.values import NOTHING, ElementType, Reading, Signal, Value
 from urc.patterns import Pattern
@@ -212,6 +213,9 @@ class Command(NamedTuple):
     true."""
     stops: bool = False
     """Whether STOP sends this command; each STOP sends the command once."""
+    role: Role = "drive"
+    """Role that a visitor needs for the command: ``drive``, ``maintain`` or ``administer``. A
+    sequence needs at least the roles of the commands that it runs. STOP needs no role."""
     confirm: Confirm | None = None
     requires: tuple[Requirement, ...] = ()
     verify: Verify | None = None

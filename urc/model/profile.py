@@ -212,3 +212,5 @@ class Profile(NamedTuple):
     licence: str = ""
     """SPDX licence identifier from the document."""
     author: str = ""
+    tags: tuple[str, ...] = ()
+    """Groups of the robot, for rights that are granted for a tag; at most 16, all different."""

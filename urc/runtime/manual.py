@@ -135,6 +135,8 @@ def _commands(driver: Driver) -> Iterator[str]:
             asked = _plain(command.confirm.text) or "yes"
             two = ", two people" if command.confirm.is_two_person else ""
             yield f"- asks first ({command.confirm.level}{two}): {asked}"
+        if command.role != "drive":
+            yield f"- needs the role {command.role}"
         for argument in command.arguments.values():
             for value, one in argument.confirm.items():
                 two = ", two people" if one.is_two_person else ""

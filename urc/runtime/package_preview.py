@@ -214,8 +214,8 @@ class PackagePreview(NamedTuple):
     permissions: list[str]
     """Permissions, one per line."""
     wire: Mapping[str, str]
-    """Values of all keys that affect sent bytes or the decoding of replies, by key path, such as
-    ``commands.beep.send``."""
+    """Values of all keys that affect sent bytes, the decoding of replies, or rights, by key path,
+    such as ``commands.beep.send``."""
     risks: list[str]
     """Local resources that the package uses without a setting; see `risks_of`."""
 

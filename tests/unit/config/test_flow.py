@@ -79,6 +79,32 @@ polls:
     assert (driver.commands["both"].title, driver.commands["both"].transport) == ("Both", "wire")
 
 
+def test_a_sequence_needs_the_roles_of_its_commands() -> None:
+    """Through sequences and branches too; a higher role of the sequence itself counts."""
+    driver = driver_of(
+        """
+commands:
+  look: { send: LOOK }
+  tune: { send: TUNE, role: maintain }
+sequences:
+  evening: [{ if: 1 > 0, then: [{ wait: 1s }], else: [{ run: morning }] }]
+  morning: [{ run: look }, { run: tune }]
+  plain: [{ run: look }]
+  strict: { steps: [{ run: tune }], role: administer }
+  over: [{ run: strict }, { run: tune }]
+"""
+    )
+    assert {name: one.role for name, one in driver.commands.items()} == {
+        "look": "drive",
+        "tune": "maintain",
+        "evening": "maintain",
+        "morning": "maintain",
+        "plain": "drive",
+        "strict": "administer",
+        "over": "administer",
+    }
+
+
 @pytest.mark.parametrize(("mode", "is_told"), [("4", False), ("10", True), ("'{{ 2 * 2 }}'", True)])
 def test_what_nobody_asks_for_may_end_motion_and_not_begin_it(
     mode: str, is_told: bool, tmp_path: object

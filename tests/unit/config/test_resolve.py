@@ -197,3 +197,50 @@ def test_document_without_reuse_is_passed_on_as_it_is(folder: Folder) -> None:
     assert sources is not None
     assert sources.root.document.mark.origin is None
     assert sources.root.document.text.startswith("urc: 1")
+
+
+# ---- roles and tags
+
+
+def test_a_robot_changes_the_roles_of_its_driver(folder: Folder) -> None:
+    """Also the role of a sequence over the command; a stop keeps its role."""
+    folder.write(
+        line=head("driver", "line")
+        + WIRE
+        + "commands:\n  tune: { send: TUNE, role: administer }\n  halt: { send: H, stop: true }\n"
+        + "sequences: { prepare: [{ run: tune }] }\n",
+        bot=head("robot", "bot")
+        + "driver: { use: line.yaml, overrides: { commands: { tune: { role: maintain } } } }\n",
+        bad=head("robot", "bad")
+        + "driver: { use: line.yaml, overrides: { commands: { halt: { role: maintain } } } }\n",
+    )
+    profile = folder.check("bot").profile
+    assert profile is not None
+    roles = {name: one.role for name, one in profile.driver.commands.items()}
+    assert roles == {"tune": "maintain", "prepare": "maintain", "halt": "drive"}
+    (problem,) = folder.found("bad")
+    assert (problem.code, Path(problem.file).name) == ("misplaced-key", "bad.yaml")
+
+
+def test_tags_are_inherited_and_kept_by_resolve(folder: Folder) -> None:
+    """A robot without own tags has the tags of the robot that it extends."""
+    own = WIRE + "signals: { mode: {} }\nmessages: { m: { regex: '^(?P<mode>.)$' } }\n"
+    folder.write(
+        base=head("robot", "base") + "tags: [lab, course-2]\n" + own,
+        heir=head("robot", "heir") + "extends: base.yaml\n",
+        moved=head("robot", "moved") + "extends: base.yaml\ntags: [hall]\n",
+        part=head("robot", "part") + "include: [base.yaml]\n",
+    )
+    found = {}
+    for name in ("base", "heir", "moved", "part"):
+        profile = folder.check(name).profile
+        assert profile is not None
+        found[name] = profile.tags
+    assert found == {
+        "base": ("lab", "course-2"),
+        "heir": ("lab", "course-2"),
+        "moved": ("hall",),
+        "part": (),
+    }
+    text = resolve(str(folder.folder / "heir.yaml"), WidgetFolder(SHELF)).text
+    assert parse_document(text.encode(), "out").data["tags"] == ["lab", "course-2"]  # type: ignore[index,call-overload]

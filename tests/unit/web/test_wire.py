@@ -6,7 +6,7 @@ import math
 import pytest
 
 from urc.expressions import compile_expression
-from urc.model.driver import Driver, Message, Poll, Reply
+from urc.model.driver import Command, Driver, Message, Poll, Reply
 from urc.model.profile import Profile
 from urc.model.values import AlarmLimits, Sample, Signal
 from urc.runtime.hub import LinkStatus, LogEntry
@@ -72,6 +72,10 @@ def test_hello_says_what_each_signal_means_and_where_it_comes_from() -> None:
         },
         messages={"m": Message("m", "radio", regex(r"(?P<note>.*)"))},
         polls=(Poll("polls.0", "wire", 1.0, text("volts?"), reply),),
+        commands={
+            "home": Command("home", "wire", text("HOME")),
+            "calibrate": Command("calibrate", "wire", text("CAL"), role="maintain"),
+        },
     )
     hello = json.loads(wire.encode_hello(Profile("p", "P", "p.yaml", driver=driver), "s1", 2.0))
     assert hello == {
@@ -83,6 +87,7 @@ def test_hello_says_what_each_signal_means_and_where_it_comes_from() -> None:
             {"name": "note", "type": "string", "states": {"0": "off"},
              "stale_after_s": 2, "sources": ["radio"]},
         ],
+        "roles": {"home": "drive", "calibrate": "maintain"},
     }  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from urc.config.autonomous_motion import refuse_moving
+from urc.config.command_roles import link_role
 from urc.config.link.cycles import cycle_from
 from urc.config.link.flow import (
     Linker,
@@ -41,6 +42,7 @@ def link_sequences(linker: Linker, part: Node) -> None:
         command = linker.driver.commands[name]
         if isinstance(inner.data, dict):
             link_requirements(linker, inner, command)
+            link_role(linker.problems, inner, command)
         _Walk(linker, is_named=True).steps(steps_of(inner), command.steps)
         cycle = cycle_from(name, lambda one: _runs(one, linker.driver))
         if cycle:

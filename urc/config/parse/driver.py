@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from urc.config.autonomous_motion import with_moving_steps
+from urc.config.command_roles import with_roles_of_steps
 from urc.config.node import Node, Problems
 from urc.config.parse.flow import (
     NOTHING_SENT,
@@ -49,6 +50,8 @@ def parse_driver(part: Node, problems: Problems, catalog: Registries) -> Driver:
         name: _message(inner, lines, problems) for name, inner in part.named("messages").items()
     }
     polls = tuple(_poll(inner, lines, commands, problems) for inner in part.listed("polls"))
+    # A sequence with the name of a command is reported by the check of names.
+    commands = {**_sequences(part, lines, problems), **commands}
     signals = {
         name: parse_signal(inner, spoken_name(name), problems)
         for name, inner in part.named("signals").items()
@@ -56,8 +59,7 @@ def parse_driver(part: Node, problems: Problems, catalog: Registries) -> Driver:
     return Driver(
         transports=transports,
         signals=with_ages(aged_by_lines(signals, transports, messages, polls), polls),
-        # A sequence with the name of a command is reported by the check of names.
-        commands=with_moving_steps({**_sequences(part, lines, problems), **commands}),
+        commands=with_roles_of_steps(with_moving_steps(commands)),
         messages=messages,
         polls=polls,
         discovery=_discovery(part.get("discovery")),

@@ -26,6 +26,7 @@ from urc.model.exchange import (
     Verify,
 )
 from urc.model.payload import WriteSpec
+from urc.model.role import Role
 from urc.model.sequence import MAX_STEP_S, ExpectStep, PromptStep, SendStep, all_steps
 from urc.model.values import Reading, Signal, Value
 
@@ -150,6 +151,7 @@ def command_with_flow(command: Command, part: Node, problems: Problems) -> Comma
         moves=moves,
         moves_if=moves_if,
         stops=stops,
+        role=_role(part),
         confirm=_confirm(confirm) if confirm else None,
         requires=_requires(part, problems),
         verify=_verify(verify, problems) if verify else None,
@@ -168,6 +170,15 @@ def _check_stop(command: Command, part: Node, problems: Problems) -> None:
     moves = () if part.data.get("moves") is False else ("moves",)  # false is the default of a stop
     hindering = (*moves, "confirm", "requires", "coalesce", "rate_limit")
     refuse(part, hindering, "has no effect with 'stop', because nothing may delay a stop", problems)
+    if part.text("role", "drive") != "drive":
+        problems.error(
+            part,
+            "misplaced-key",
+            "'role' has no effect with 'stop', because stopping never needs a right",
+            at="role",
+            key=True,
+            hint="remove 'role', or use a separate command for the stop",
+        )
     for name, one in command.arguments.items():
         if one.confirm or (one.is_required and one.default is None):
             what = "asks people" if one.confirm else "has no default"
@@ -242,6 +253,7 @@ def parse_sequence(
         title=part.text("title", title),
         description=part.text("description"),
         moves=part.flag("moves", default=False),
+        role=_role(part),
         confirm=_confirm(confirm) if confirm else None,
         requires=_requires(part, problems),
     )
@@ -325,6 +337,10 @@ def _watchdog_s(part: Node, problems: Problems) -> float | None:
     if part.text("watchdog") == "none":
         return math.inf
     return problems.duration(part, "watchdog", 0.0) or None
+
+
+def _role(part: Node) -> Role:
+    return cast("Role", part.text("role", "drive"))
 
 
 def _confirm(part: Node) -> Confirm:

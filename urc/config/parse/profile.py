@@ -1,4 +1,4 @@
-"""Parser of the settings of a profile."""
+"""Parser of the settings and tags of a profile."""
 
 from typing import Final
 
@@ -7,7 +7,7 @@ from urc.config.values import check_range, check_within, fit, fit_hint, shown
 from urc.model.profile import Setting
 from urc.model.values import Value
 
-__all__ = ["parse_setting", "setting_value"]
+__all__ = ["parse_setting", "parse_tags", "setting_value"]
 
 _VALUE_TYPES: Final = {
     "integer": "integer",
@@ -63,6 +63,21 @@ def parse_setting(part: Node, problems: Problems) -> Setting:
     if default_part is not None:
         check_within(setting.default, low, high, default_part, problems)
     return setting
+
+
+def parse_tags(part: Node, problems: Problems) -> tuple[str, ...]:
+    """Return the tags of the robot at `part`; report each tag that is listed twice."""
+    tags: dict[str, None] = {}
+    for inner in part.listed("tags"):
+        if inner.data in tags:
+            problems.error(
+                inner,
+                "duplicate-name",
+                f"the tag {inner.data!r} is listed twice",
+                hint="remove one of the two",
+            )
+        tags[inner.data] = None
+    return tuple(tags)
 
 
 def _check_choices(part: Node, kind: str, choices: tuple[str, ...], problems: Problems) -> None:

@@ -92,6 +92,8 @@ def _place_hint(value: object, known: Mapping[str, Any]) -> str:
 
 def word_hint(word: str, words: Sequence[str]) -> str:
     """Return a hint with the known word that an unknown word probably means, or ""."""
+    if word == "watch" and "drive" in words:
+        return "visitors with the role 'watch' give no commands; the lowest role is 'drive'"
     other = _SAME_TYPES.get(word.lower(), "")
     if other in words:
         return f"use the word '{other}'"

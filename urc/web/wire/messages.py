@@ -6,7 +6,7 @@ indexes into the names in `Hello`.
 
 Messages from the server to the page, listed by their tag ``t``::
 
-    hello   once, first: names, meaning of each signal, the server's clock
+    hello   once, first: names, meaning of each signal, role of each command, the server's clock
     v       changed signals: i indexes, v values, a ages (one number if all are equal),
             s alarms (left out if all are normal). A signal with a history may have several values,
             oldest first; e has the number of its first one, by index
@@ -41,6 +41,7 @@ import msgspec
 
 from urc.model.driver import Command, Driver, Poll
 from urc.model.profile import Profile
+from urc.model.role import Role
 from urc.model.values import NOTHING, Reading, Sample, Signal
 from urc.runtime.hub import LinkStatus, LogEntry
 from urc.web.wire.ask import Approval, ApprovalRequest, Arguments, SequenceAction
@@ -119,6 +120,8 @@ class _Hello(Outbound, tag="hello", omit_defaults=False, frozen=True):
     now: int
     names: tuple[str, ...]
     signals: list[_Signal]
+    roles: dict[str, Role]
+    """Role that a visitor needs for each command."""
 
 
 class _Values(Outbound, tag="v", frozen=True):
@@ -249,6 +252,7 @@ def encode_hello(profile: Profile, session: str, now_s: float) -> str:
             now=milliseconds(now_s),
             names=tuple(signals),
             signals=[_signal(signal, sources.get(name, ())) for name, signal in signals.items()],
+            roles={name: one.role for name, one in profile.driver.commands.items()},
         )
     )
 
