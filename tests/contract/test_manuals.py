@@ -32,7 +32,7 @@ signals:
     limits: { high: 9, hysteresis: 1 }
     stale_after: 2s
 commands:
-  blink: { title: Blink, description: Three times., send: "B|3 \\t`" }
+  blink: { title: Blink, description: Three times., role: maintain, send: "B|3 \\t`" }
   set:
     send: "SET {{ level }} {{ side }}"
     args:
@@ -82,6 +82,7 @@ Three times.
 - name: `blink`
 - sends `` B\\|3 \\x09`\\x0d\\x0a ``, in hex `42 7c 33 20 09 60 0d 0a`
 - done when the frame is sent
+- needs the role maintain
 
 ### Set
 
