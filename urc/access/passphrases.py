@@ -5,6 +5,7 @@ hash at a time, in a thread. RFC 9106 (argon2id, the second recommended choice o
 parameters); NIST SP 800-63B-4 for the rules: length counts, no composition rules.
 """
 
+import unicodedata
 from typing import Final
 
 import argon2
@@ -29,11 +30,14 @@ def hash_of(passphrase: str, *, name: str = "") -> str:
     Raises:
         AccessError: the passphrase is too short, too long, too uniform, or is the name.
     """
+    passphrase = _normal(passphrase)
     length = len(passphrase)
     if length < SHORTEST:
         raise AccessError(f"the passphrase has {length} characters; at least {SHORTEST} are needed")
     if length > LONGEST:
         raise AccessError(f"the passphrase has {length} characters; at most {LONGEST} are allowed")
+    if not passphrase.isprintable():
+        raise AccessError("the passphrase has characters that cannot be shown")
     if len(set(passphrase)) < _FEWEST_DIFFERENT:
         raise AccessError(f"the passphrase needs {_FEWEST_DIFFERENT} different characters")
     if name and passphrase.casefold() == name.casefold():
@@ -51,8 +55,12 @@ def matches(passphrase: str, kept: str | None) -> bool:
     if len(passphrase) > LONGEST:
         return False
     try:
-        _HASHER.verify(kept or _NEVER, passphrase)
-    except (argon2.exceptions.VerificationError, argon2.exceptions.InvalidHashError):
+        _HASHER.verify(kept or _NEVER, _normal(passphrase))
+    except (
+        argon2.exceptions.VerificationError,
+        argon2.exceptions.InvalidHashError,
+        UnicodeEncodeError,
+    ):
         return False
     return kept is not None
 
@@ -60,3 +68,8 @@ def matches(passphrase: str, kept: str | None) -> bool:
 def is_stale(kept: str) -> bool:
     """Return whether the hash has older parameters and should be replaced at the next sign-in."""
     return _HASHER.check_needs_rehash(kept)
+
+
+def _normal(passphrase: str) -> str:
+    """Return the one form of texts that look equal; keyboards write “é” in two ways (NFKC)."""
+    return unicodedata.normalize("NFKC", passphrase)

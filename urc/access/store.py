@@ -21,12 +21,13 @@ from urc.access.directory import Directory, Kind, Principal, SignIn, Way, digest
 from urc.access.grants import AccessError, Grant, parse_grant
 from urc.private_files import make_private
 
-__all__ = ["FILE", "AccessStore", "Invitation", "MOST_SIGN_INS"]
+__all__ = ["FILE", "AccessStore", "Invitation", "MOST_INVITATIONS", "MOST_SIGN_INS"]
 
 FILE: Final = "access.sqlite"
 MOST_SIGN_INS: Final = 5000
 """Most sign-ins and tokens; the least recently used sign-in is closed for a new one."""
 MOST_PRINCIPALS: Final = 5000
+MOST_INVITATIONS: Final = 1000
 LONGEST_NAME: Final = 64
 _VERSION: Final = 1
 _BUSY_S: Final = 5.0
@@ -59,7 +60,7 @@ class Invitation(NamedTuple):
     """Suggested name; "" lets the new device choose."""
     grants: tuple[Grant, ...]
     owner: str = ""
-    """Id of the person whose device pairs, or who sets a passphrase."""
+    """Id of the person whose device pairs, or of the invited person, who sets a passphrase."""
     ends_at: float = 0.0
 
 
@@ -186,11 +187,14 @@ class AccessStore:
     # Passphrases
 
     def set_passphrase(self, principal: str, kept: str) -> None:
-        """Store the hash of a passphrase."""
+        """Store the hash of a passphrase; raise `AccessError` if the principal is unknown."""
         with self._change():
-            self._base.execute(
-                "INSERT OR REPLACE INTO passphrases VALUES (?, ?)", (principal, kept)
-            )
+            try:
+                self._base.execute(
+                    "INSERT OR REPLACE INTO passphrases VALUES (?, ?)", (principal, kept)
+                )
+            except sqlite3.IntegrityError:
+                raise AccessError("that person was removed") from None
 
     def passphrase_of(self, name: str) -> tuple[str, str | None]:
         """Return id and hash of the person with that name; "" and None without one."""
@@ -251,10 +255,22 @@ class AccessStore:
 
     # Codes that work once
 
-    def invite(self, invitation: Invitation) -> str:
-        """Return a new code for `invitation`."""
+    def invite(self, invitation: Invitation, *, now: float = 0.0) -> str:
+        """Return a new code for `invitation`.
+
+        Args:
+            invitation: the right that the code gives.
+            now: UTC time in seconds since 1970, at which older codes may have ended.
+
+        Raises:
+            AccessError: too many codes are valid.
+        """
         code = secrets.token_urlsafe(16)
         with self._change():
+            self._base.execute("DELETE FROM invitations WHERE ends_at <= ?", (now,))
+            (count,) = self._base.execute("SELECT count(*) FROM invitations").fetchone()
+            if count >= MOST_INVITATIONS:
+                raise AccessError(f"{count} codes are valid; wait until some have ended")
             self._base.execute(
                 "INSERT INTO invitations VALUES (?, ?, ?, ?, ?, ?)",
                 (digest_of(code), invitation.kind, invitation.name, _texts(invitation.grants),
@@ -275,6 +291,16 @@ class AccessStore:
             return None
         kind, name, grants, owner, ends_at = row
         return Invitation(kind, name, _grants(grants), owner, ends_at)
+
+    @contextmanager
+    def transaction(self) -> Iterator[sqlite3.Connection]:
+        """Make one transaction of all changes in the context, and undo all after an error.
+
+        Raises:
+            AccessError: another process has locked the file for several seconds.
+        """
+        with self._change():
+            yield self._base
 
     # Inside
 

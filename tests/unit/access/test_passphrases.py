@@ -41,3 +41,17 @@ def test_a_hash_with_older_parameters_is_due_for_another() -> None:
     assert matches("password", old)
     assert is_stale(old)
     assert not is_stale(hash_of(GOOD))
+
+
+def test_two_forms_of_the_same_letters_are_one_passphrase() -> None:
+    composed, decomposed = "caf\u00e9 au lait", "cafe\u0301 au lait"
+    kept = hash_of(decomposed)
+    assert matches(composed, kept)
+    assert matches(decomposed, kept)
+    assert not matches("cafe au lait", kept)
+
+
+def test_broken_text_is_refused_without_an_exception() -> None:
+    with pytest.raises(AccessError, match="cannot be shown"):
+        hash_of("long enough \udcff")
+    assert not matches("long enough \udcff", hash_of("long enough"))

@@ -1,0 +1,174 @@
+"""The work of administrators: an overview, roles, invitations, and the end of many sign-ins.
+
+Layer 4. Each function makes one transaction of an `AccessStore`, so two administrators never undo
+each other's changes. The functions block for some milliseconds: servers call them in a thread.
+"""
+
+from collections.abc import Callable, Collection, Iterable
+from typing import Final, NamedTuple
+
+from urc.access.directory import Directory, Kind, Principal, SignIn, Way
+from urc.access.grants import AccessError, Grant
+from urc.access.store import AccessStore, Invitation
+
+__all__ = [
+    "KEYS",
+    "PrincipalStatus",
+    "change_grants",
+    "end_after_restore",
+    "end_sign_ins",
+    "invite_person",
+    "newest_time",
+    "overview",
+    "principal_named",
+]
+
+KEYS: Final[frozenset[Way]] = frozenset(("pairing", "token"))
+"""Ways of sign-ins that belong to a device or a program, and last until their removal."""
+
+
+class PrincipalStatus(NamedTuple):
+    """A person, device, program or guest, with the state of its credentials."""
+
+    principal: Principal
+    owner: str = ""
+    """Name of the person whose device this is, or ""."""
+    has_passphrase: bool = False
+    invited_until: float | None = None
+    """UTC time at which the newest invitation ends, in seconds; None without an invitation."""
+    sign_ins: int = 0
+    """Number of sign-ins that have not ended."""
+    used_at: float | None = None
+    """UTC time of the last use, in seconds; None without a sign-in."""
+
+
+def overview(store: AccessStore, now: float, *kinds: Kind) -> list[PrincipalStatus]:
+    """Return all principals of some kinds, sorted by name.
+
+    Args:
+        store: the store.
+        now: UTC time in seconds since 1970.
+        kinds: the kinds; none: all.
+    """
+    with store.transaction() as base:
+        directory = store.directory()
+        known = {row[0] for row in base.execute("SELECT principal FROM passphrases")}
+        invited = dict(
+            base.execute(
+                "SELECT owner, max(ends_at) FROM invitations"
+                " WHERE kind = 'person' AND ends_at > ? GROUP BY owner",
+                (now,),
+            ).fetchall()
+        )
+    chosen = [one for one in directory.principals.values() if not kinds or one.kind in kinds]
+    return [
+        _status(directory, one, one.id in known, invited.get(one.id), now)
+        for one in sorted(chosen, key=lambda one: (one.kind, one.name.casefold()))
+    ]
+
+
+def _status(
+    directory: Directory, one: Principal, has_passphrase: bool, invited: float | None, now: float
+) -> PrincipalStatus:
+    owner = directory.principals.get(one.owner)
+    own = [each for each in directory.sign_ins.values() if each.principal == one.id]
+    return PrincipalStatus(
+        one,
+        owner.name if owner else "",
+        has_passphrase,
+        invited,
+        sum(not each.is_over(now) for each in own),
+        max((each.used_at for each in own), default=None),
+    )
+
+
+def principal_named(directory: Directory, kind: Kind, name: str) -> Principal | None:
+    """Return the principal of a kind with this name, regardless of case; None without one."""
+    wanted = " ".join(name.split()).casefold()
+    found = (one for one in directory.principals.values() if one.kind == kind)
+    return next((one for one in found if one.name.casefold() == wanted), None)
+
+
+def change_grants(
+    store: AccessStore, principal: str, change: Callable[[tuple[Grant, ...]], Iterable[Grant]]
+) -> tuple[Grant, ...]:
+    """Replace the grants of a principal by a function of the present ones, and return the result.
+
+    Raises:
+        AccessError: the principal is unknown.
+    """
+    with store.transaction():
+        found = store.directory().principals.get(principal)
+        if found is None:
+            raise AccessError("it was removed already")
+        grants = tuple(dict.fromkeys(change(found.grants)))
+        store.set_grants(principal, grants)
+    return grants
+
+
+def invite_person(
+    store: AccessStore, name: str, grants: Collection[Grant], *, now: float, ends_at: float
+) -> tuple[Principal, str]:
+    """Invite a person to choose a passphrase; return the person and a code that works once.
+
+    An unknown person is added with `grants`. A newer invitation replaces the person's older one.
+
+    Args:
+        store: the store.
+        name: name of the person.
+        grants: rights of a new person; empty for a known person.
+        now: UTC time in seconds since 1970.
+        ends_at: UTC time after which the code is invalid.
+
+    Raises:
+        AccessError: a known person would get rights, an unknown one none, or the name is invalid.
+    """
+    with store.transaction() as base:
+        person = principal_named(store.directory(), "person", name)
+        if person is None and not grants:
+            raise AccessError(f"no person has the name {name!r}; a new person needs a role")
+        if person is not None and grants:
+            raise AccessError(f"{person.name!r} exists already; change the roles of this person")
+        if person is None:
+            person = store.add("person", name, grants, now=now)
+        base.execute("DELETE FROM invitations WHERE kind = 'person' AND owner = ?", (person.id,))
+        invitation = Invitation("person", person.name, person.grants, person.id, ends_at)
+        return person, store.invite(invitation, now=now)
+
+
+def end_sign_ins(store: AccessStore, is_chosen: Callable[[SignIn, Principal], bool]) -> int:
+    """End all sign-ins for which `is_chosen` returns true, and return their number."""
+    with store.transaction() as base:
+        directory = store.directory()
+        chosen = [
+            (one.id,)
+            for one in directory.sign_ins.values()
+            if is_chosen(one, directory.principals[one.principal])
+        ]
+        base.executemany("DELETE FROM sign_ins WHERE id = ?", chosen)
+    return len(chosen)
+
+
+def end_after_restore(store: AccessStore, *, ends_keys: bool) -> int:
+    """End what an old copy of the store must not revive, and return the number of ended sign-ins.
+
+    All codes end, because they may have been used since. Sign-ins of browsers end, because they may
+    have been revoked since. People keep their passphrases.
+
+    Args:
+        store: the restored store.
+        ends_keys: whether to remove all devices, programs and guests too.
+    """
+    with store.transaction() as base:
+        base.execute("DELETE FROM invitations")
+        ended = end_sign_ins(store, lambda one, _: ends_keys or one.way not in KEYS)
+        if ends_keys:
+            base.execute("DELETE FROM principals WHERE kind <> 'person'")
+    return ended
+
+
+def newest_time(store: AccessStore) -> float:
+    """Return the newest UTC time of an event in the store, in seconds; 0 for an empty store."""
+    directory = store.directory()
+    people = (one.created_at for one in directory.principals.values())
+    return max([0.0, *people, *(one.used_at for one in directory.sign_ins.values())])
