@@ -26,7 +26,7 @@ from urc.web.fleet.robots import LiveSession, RobotService, SessionFailed, missi
 from urc.web.wire import messages as wire
 from urc.web.wire.ask import Approval, ApprovalRequest, SequenceAction, encode_token
 from urc.web.wire.drive import Drive, Driving, Release, Stop, Tick
-from urc.web.wire.picture import ImageSelection
+from urc.wire.client_messages import ImageSelection
 
 __all__ = ["TokenBucket", "BrowserClient", "FlowControl", "SocketPeer", "ClientSocket"]
 

@@ -20,7 +20,8 @@ from urc.web.fleet.robots import Robot, RobotService
 from urc.web.page_socket import BrowserClient
 from urc.web.show.demos import colour_bars
 from urc.web.wire import messages as wire
-from urc.web.wire.picture import ImageSelection, as_frame, encode_picture
+from urc.web.wire.picture import as_frame, encode_picture
+from urc.wire.client_messages import ImageSelection
 
 pytestmark = pytest.mark.anyio
 

@@ -7,6 +7,7 @@ import pytest
 
 from urc.expressions import compile_expression
 from urc.model.driver import Command, Driver, Message, Poll, Reply
+from urc.model.exchange import Hold
 from urc.model.profile import Profile
 from urc.model.values import AlarmLimits, Sample, Signal
 from urc.runtime.hub import LinkStatus, LogEntry
@@ -75,6 +76,7 @@ def test_hello_says_what_each_signal_means_and_where_it_comes_from() -> None:
         commands={
             "home": Command("home", "wire", text("HOME")),
             "calibrate": Command("calibrate", "wire", text("CAL"), role="maintain"),
+            "drive": Command("drive", "wire", text("go"), hold=Hold(0.05, {})),
         },
     )
     hello = json.loads(wire.encode_hello(Profile("p", "P", "p.yaml", driver=driver), "s1", 2.0))
@@ -87,7 +89,8 @@ def test_hello_says_what_each_signal_means_and_where_it_comes_from() -> None:
             {"name": "note", "type": "string", "states": {"0": "off"},
              "stale_after_s": 2, "sources": ["radio"]},
         ],
-        "roles": {"home": "drive", "calibrate": "maintain"},
+        "roles": {"home": "drive", "calibrate": "maintain", "drive": "drive"},
+        "controls": ["drive"],
     }  # fmt: skip
 
 

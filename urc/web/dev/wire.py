@@ -25,7 +25,8 @@ from urc.web.dev.preview import Preview, PreviewLine
 from urc.web.dev.rows import SHOWN_BYTES, TrafficRow, fill, grouped
 from urc.web.dev.tryout import FrameConsumer, ParsedPiece, ParseResult
 from urc.web.wire.messages import Ping, decoded
-from urc.web.wire.text import Outbound, cut, encoded, milliseconds
+from urc.web.wire.text import cut, encoded, milliseconds
+from urc.wire.server_messages import Outbound
 
 __all__ = [
     "Inbound",

@@ -1,1 +1,1 @@
-"""Message types of the dashboard's sockets, without any logic."""
+"""Encoders and decoders of the messages on the dashboard's sockets."""

@@ -1,17 +1,31 @@
-"""Message types for the controls, without any logic.
+"""Encoders of the messages about the controls, and the decoder of ticks.
 
-Layer 5. These types are part of `urc.web.wire.messages`, which documents the direction of each
-message.
+Layer 5. `urc.web.wire.messages` documents the direction of each message.
 """
-
-from typing import Literal
 
 import msgspec
 
 from urc.model.role import includes
 from urc.motion.hold_to_run import Reason
-from urc.motion.lease import REQUEST_S, LeaseState, Operator
-from urc.web.wire.text import Outbound, cut, encoded, milliseconds
+from urc.motion.lease import LeaseState, Operator
+from urc.web.wire.text import cut, encoded, milliseconds
+from urc.wire.client_messages import (
+    Doubled,
+    Drive,
+    Driving,
+    JoinRedundant,
+    Release,
+    Stop,
+    Tick,
+    Verb,
+)
+from urc.wire.server_messages import (
+    HeartbeatMessage,
+    LeaseMessage,
+    OperatorRow,
+    RefusedMessage,
+    StoppedMessage,
+)
 
 __all__ = [
     "NO_TICK",
@@ -22,6 +36,7 @@ __all__ = [
     "JoinRedundant",
     "Stop",
     "Tick",
+    "Verb",
     "command_of",
     "decode_tick",
     "encode_beat",
@@ -30,91 +45,7 @@ __all__ = [
     "encode_stopped",
 ]
 
-_Scalar = bool | int | float | str
 
-
-class _Person(msgspec.Struct, frozen=True):
-    id: str
-    name: str
-
-
-class _Lease(Outbound, tag="lease", omit_defaults=False, frozen=True):
-    you: str
-    name: str
-    """Name of the page, as other pages show it."""
-    epoch: int
-    holder: _Person | None
-    asker: _Person | None
-    left: int
-    """Time until the asking page gets the controls, in milliseconds."""
-    latched: str
-    """Name of the operator who pressed STOP; "" while STOP is not latched."""
-    stops: int
-    """Number of STOPs in this run of the server."""
-    confirmed: bool
-    """Whether all transports of the robot have accepted the stop."""
-    drives: bool
-    """Whether the page may drive."""
-    forces: bool
-    """Whether the page may take the lease from another page without its consent."""
-    spare: str
-    """Secret key for the redundant socket of the page; "" for watchers."""
-
-
-class _Beat(Outbound, tag="beat", frozen=True):
-    n: int
-
-
-class _Stopped(Outbound, tag="stopped", frozen=True):
-    command: str
-    reason: str
-
-
-class _Refused(Outbound, tag="refused", frozen=True):
-    about: str
-    message: str
-    command: str = ""
-
-
-Verb = Literal["take", "ask", "yes", "no", "force", "leave", "reset"]
-
-
-class Drive(msgspec.Struct, tag_field="t", tag="drive", forbid_unknown_fields=True, frozen=True):
-    """A request about the lease; `for_s` is the time for the holder's answer, in seconds."""
-
-    verb: Verb
-    for_s: float = REQUEST_S
-
-
-class Tick(msgspec.Struct, tag_field="t", tag="tick", forbid_unknown_fields=True, frozen=True):
-    """One sample of a held control. See `urc.motion.freshness.ControlInput`."""
-
-    command: str
-    epoch: int
-    number: int
-    echo: int
-    arguments: dict[str, bool | int | float | str | tuple[_Scalar, ...] | None] = {}
-
-
-class Release(
-    msgspec.Struct, tag_field="t", tag="release", forbid_unknown_fields=True, frozen=True
-):
-    """The release of a held control.
-
-    Releases and ticks share one count; without a redundant socket, the number is 0.
-    """
-
-    command: str
-    number: int = 0
-
-
-class Stop(msgspec.Struct, tag_field="t", tag="stop", forbid_unknown_fields=True, frozen=True):
-    """A press of STOP, with a number as in `Release`."""
-
-    number: int = 0
-
-
-Driving = Drive | Tick | Release | Stop
 decode_tick = msgspec.json.Decoder(Tick).decode
 """Decoder for a text that is probably a tick; raises one of the exceptions in `NO_TICK` for any
 other text."""
@@ -129,24 +60,12 @@ def command_of(data: bytes) -> str:
     return data[len(_TICK_OF) : end].decode("ascii", "replace") if end > 0 else ""
 
 
-Doubled = Tick | Release | Stop
-"""Messages that a page may also send over its redundant socket."""
-
-
-class JoinRedundant(
-    msgspec.Struct, tag_field="t", tag="spare", forbid_unknown_fields=True, frozen=True
-):
-    """First message of a redundant socket, with the key from the page's lease."""
-
-    key: str
-
-
 def encode_lease(
     state: LeaseState, you: Operator, *, left_s: float, is_confirmed: bool, spare: str = ""
 ) -> str:
     """Return the lease message for a page; `spare` is the key for its redundant socket."""
     return encoded(
-        _Lease(
+        LeaseMessage(
             you=you.id,
             name=you.name,
             epoch=state.epoch,
@@ -165,18 +84,18 @@ def encode_lease(
 
 def encode_beat(number: int) -> str:
     """Return the message with a heartbeat number, which the page echoes."""
-    return encoded(_Beat(number))
+    return encoded(HeartbeatMessage(number))
 
 
 def encode_stopped(command: str, reason: Reason) -> str:
     """Return the message that a control stopped before its release."""
-    return encoded(_Stopped(command, reason))
+    return encoded(StoppedMessage(command, reason))
 
 
 def encode_refused(about: str, command: str, message: str) -> str:
     """Return the message that a tick, or a request about the controls, was refused."""
-    return encoded(_Refused(about, cut(message), command))
+    return encoded(RefusedMessage(about, cut(message), command))
 
 
-def _person(client: Operator | None) -> _Person | None:
-    return None if client is None else _Person(client.id, client.name)
+def _person(client: Operator | None) -> OperatorRow | None:
+    return None if client is None else OperatorRow(client.id, client.name)

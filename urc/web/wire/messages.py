@@ -1,8 +1,8 @@
-"""Message types of a dashboard's WebSocket, without any logic.
+"""Encoders and decoders of the messages on a dashboard's WebSocket.
 
-Layer 5. Messages are JSON text in both directions. Times are in milliseconds on the server's
-monotonic clock; ages are in milliseconds at the moment of encoding. Values are sent as arrays of
-indexes into the names in `Hello`.
+Layer 5. `urc.wire` contains the shapes of the messages. Messages are JSON text in both directions.
+Times are in milliseconds on the server's monotonic clock; ages are in milliseconds at the moment of
+encoding. Values are sent as arrays of indexes into the names in `HelloMessage`.
 
 Messages from the server to the page, listed by their tag ``t``::
 
@@ -29,9 +29,7 @@ Images are sent as binary messages; see `urc.web.wire.picture`.
 
 Messages from the page to the server: ``ping``, ``run``, ``show``, ``agree``, ``prepare``,
 ``steer``, and for the controls ``drive``, ``tick``, ``release`` and ``stop``. Ticks, releases and
-stops may also use a redundant socket, which begins with ``spare`` and receives heartbeats. The
-message types limit the nesting depth: the decoder refuses anything deeper than a map of plain
-arguments.
+stops may also use a redundant socket, which begins with ``spare`` and receives heartbeats.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -41,13 +39,30 @@ import msgspec
 
 from urc.model.driver import Command, Driver, Poll
 from urc.model.profile import Profile
-from urc.model.role import Role
 from urc.model.values import NOTHING, Reading, Sample, Signal
 from urc.runtime.hub import LinkStatus, LogEntry
-from urc.web.wire.ask import Approval, ApprovalRequest, Arguments, SequenceAction
-from urc.web.wire.drive import Drive, Release, Stop, Tick
-from urc.web.wire.picture import ImageSelection
-from urc.web.wire.text import Outbound, cut, encoded, encoded_bytes, milliseconds, repaired
+from urc.web.wire.text import cut, encoded, encoded_bytes, milliseconds, repaired
+from urc.wire.client_messages import INBOUND_BYTES, ClientMessage, CommandRequest, Ping
+from urc.wire.server_messages import (
+    CLOSE_BAD_MESSAGES,
+    CLOSE_FAILED,
+    CLOSE_FULL,
+    CLOSE_NO_ROBOT,
+    CLOSE_NOT_LET_IN,
+    CLOSE_NOT_READY,
+    CLOSE_TOO_FAST,
+    VERSION,
+    ErrorMessage,
+    HelloMessage,
+    LinkRow,
+    LinksMessage,
+    LogMessage,
+    LogRow,
+    PongMessage,
+    ReplyMessage,
+    SignalRow,
+    ValuesMessage,
+)
 
 __all__ = [
     "CLOSE_BAD_MESSAGES",
@@ -74,145 +89,15 @@ __all__ = [
     "encode_values",
 ]
 
-VERSION = 1
-INBOUND_BYTES = 64 * 1024
-"""Maximum length of a message from a page, in bytes."""
 _AS_THEY_ARE = frozenset((float, bool, type(None)))
 _EXACT = 2**53 - 1  # a browser's numbers skip integers beyond it
-
-CLOSE_BAD_MESSAGES = 4400
-CLOSE_NOT_LET_IN = 4401
-CLOSE_NO_ROBOT = 4404
-CLOSE_NOT_READY = 4409
-CLOSE_TOO_FAST = 4429
-CLOSE_FAILED = 4500
-CLOSE_FULL = 4503
 
 
 class BadMessage(Exception):
     """The error for an invalid message from a page; the error text names the expected form."""
 
 
-class _Signal(msgspec.Struct, omit_defaults=True, frozen=True):
-    name: str
-    type: str
-    title: str = ""
-    unit: str = ""
-    min: float | None = None
-    max: float | None = None
-    precision: int | None = None
-    states: dict[str, str] | None = None
-    limits: dict[str, float] | None = None
-    stale_after_s: float = 0.0
-    sources: tuple[str, ...] = ()
-    """Transports that supply readings of the signal; if none of them is connected, the value is
-    stale immediately."""
-    axes: str = ""
-    """Axis convention of the signal; "" if unknown."""
-
-
-class _Hello(Outbound, tag="hello", omit_defaults=False, frozen=True):
-    version: int
-    session: str
-    """Identifier of the session; in a new session, the numbers of log lines restart."""
-    robot: str
-    title: str
-    now: int
-    names: tuple[str, ...]
-    signals: list[_Signal]
-    roles: dict[str, Role]
-    """Role that a visitor needs for each command."""
-
-
-class _Values(Outbound, tag="v", frozen=True):
-    n: int
-    i: msgspec.Raw
-    v: Sequence[object]
-    a: int | Sequence[int]
-    """Ages of the values in milliseconds; a single number if all ages are equal."""
-    s: Sequence[str] | None = None
-    e: Mapping[int, int] | None = None
-
-
-class _Link(msgspec.Struct, frozen=True):
-    transport: str
-    state: str
-    address: str
-    since: int
-    detail: str
-    attempts: int
-    faults: int
-
-
-class _Links(Outbound, tag="links", omit_defaults=False, frozen=True):
-    links: list[_Link]
-
-
-class _Line(msgspec.Struct, frozen=True):
-    age: int
-    level: str
-    source: str
-    text: str
-
-
-class _Log(Outbound, tag="log", omit_defaults=False, frozen=True):
-    first: int
-    """Number of the first line of the log within the session, from 0."""
-    lines: list[_Line]
-
-
-class _Reply(Outbound, tag="reply", frozen=True):
-    id: int
-    ok: bool
-    values: Mapping[str, object] | None = None
-    code: str = ""
-    message: str = ""
-
-
-class _Pong(Outbound, tag="pong", frozen=True):
-    c: float
-    n: int
-    u: int = 0
-    """Server time in milliseconds since 1970; omitted if unknown."""
-
-
-class _Error(Outbound, tag="error", frozen=True):
-    code: str
-    message: str
-
-
-class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True, frozen=True):
-    """A request for a `pong` with the same `c`, the page's time in milliseconds."""
-
-    c: float
-
-
-class CommandRequest(
-    msgspec.Struct, tag_field="t", tag="run", forbid_unknown_fields=True, frozen=True
-):
-    """One command. The page chooses `id`, and exactly one reply contains the same `id`."""
-
-    id: int
-    command: str
-    arguments: Arguments = {}
-    token: str = ""
-    """Token from `ApprovalRequest`, if the driver requires a confirmation."""
-    stops: int | None = None
-    """Number of STOPs that the page knew at the operator's click; None skips the check."""
-
-
-Inbound = (
-    Ping
-    | CommandRequest
-    | ImageSelection
-    | Approval
-    | ApprovalRequest
-    | SequenceAction
-    | Drive
-    | Tick
-    | Release
-    | Stop
-)
+Inbound = ClientMessage
 
 _Message = TypeVar("_Message")
 
@@ -244,7 +129,7 @@ def encode_hello(profile: Profile, session: str, now_s: float) -> str:
     sources = _sources(profile.driver)
     signals = profile.driver.signals
     return encoded(
-        _Hello(
+        HelloMessage(
             version=VERSION,
             session=session,
             robot=profile.name,
@@ -253,6 +138,9 @@ def encode_hello(profile: Profile, session: str, now_s: float) -> str:
             names=tuple(signals),
             signals=[_signal(signal, sources.get(name, ())) for name, signal in signals.items()],
             roles={name: one.role for name, one in profile.driver.commands.items()},
+            controls=tuple(
+                name for name, one in profile.driver.commands.items() if one.hold is not None
+            ),
         )
     )
 
@@ -295,15 +183,15 @@ def encode_values(
     now_ms, numbers = round(now_s * 1000), indexes.of(names)
     told = None if are_normal else alarms
     counted = indexes.keyed(firsts) if firsts else None
-    return encoded_bytes(_Values(now_ms, numbers, values, ages, told, counted))
+    return encoded_bytes(ValuesMessage(now_ms, numbers, values, ages, told, counted))
 
 
 def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
     """Return the message with the state of every transport."""
     return encoded(
-        _Links(
+        LinksMessage(
             [
-                _Link(
+                LinkRow(
                     transport=link.transport,
                     state=link.state,
                     address=link.address,
@@ -321,10 +209,10 @@ def encode_links(links: Iterable[LinkStatus], now_s: float) -> str:
 def encode_log(notes: Iterable[LogEntry], first: int, now_s: float) -> str:
     """Return a message with log lines; `first` is the number of the first line in its session."""
     lines = [
-        _Line(max(0, milliseconds(now_s - note.time_s)), note.level, note.source, cut(note.text))
+        LogRow(max(0, milliseconds(now_s - note.time_s)), note.level, note.source, cut(note.text))
         for note in notes
     ]
-    return encoded(_Log(first, lines))
+    return encoded(LogMessage(first, lines))
 
 
 def encode_reply(
@@ -336,19 +224,19 @@ def encode_reply(
 ) -> str:
     """Return the reply to a command: its values, or the `code` and `message` of its failure."""
     if code:
-        return encoded(_Reply(run.id, ok=False, code=code, message=cut(message)))
+        return encoded(ReplyMessage(run.id, ok=False, code=code, message=cut(message)))
     plain = {name: _plain(value) for name, value in (values or {}).items()}
-    return encoded(_Reply(run.id, ok=True, values=plain))
+    return encoded(ReplyMessage(run.id, ok=True, values=plain))
 
 
 def encode_pong(ping: Ping, now_s: float, utc_s: float = 0.0) -> str:
     """Return the reply to a ping; `utc_s` is the current time in seconds since 1970."""
-    return encoded(_Pong(ping.c, milliseconds(now_s), milliseconds(utc_s)))
+    return encoded(PongMessage(ping.c, milliseconds(now_s), milliseconds(utc_s)))
 
 
 def encode_error(code: str, message: str) -> str:
     """Return the message with the reason why a message was invalid, or why the socket closes."""
-    return encoded(_Error(code, cut(message)))
+    return encoded(ErrorMessage(code, cut(message)))
 
 
 def _plain(value: object) -> object:
@@ -368,13 +256,13 @@ def _plain(value: object) -> object:
     return cut(str(value))
 
 
-def _signal(signal: Signal, sources: tuple[str, ...]) -> _Signal:
+def _signal(signal: Signal, sources: tuple[str, ...]) -> SignalRow:
     limits = {
         name: value
         for name in ("lolo", "low", "high", "hihi")
         if (value := getattr(signal.limits, name)) is not None
     }
-    return _Signal(
+    return SignalRow(
         name=signal.name,
         type=signal.type,
         title=signal.title,

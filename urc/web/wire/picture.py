@@ -11,13 +11,10 @@ server does not mask).
 """
 
 import struct
-from typing import Annotated
-
-import msgspec
 
 from urc.images import media_type
 
-__all__ = ["ImageSelection", "as_frame", "encode_picture"]
+__all__ = ["as_frame", "encode_picture"]
 
 _PICTURE = 1
 _HEADER = struct.Struct(">BBHId")
@@ -28,21 +25,11 @@ _SHORT, _MEDIUM = 126, 1 << 16
 other lengths take nine bytes."""
 
 
-class ImageSelection(
-    msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True
-):
-    """The selection of the images that the page shows; the server sends no other images."""
-
-    signals: Annotated[
-        tuple[Annotated[str, msgspec.Meta(max_length=256)], ...], msgspec.Meta(max_length=64)
-    ] = ()
-
-
 def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
     """Return the binary message with an image.
 
     Args:
-        index: index of the signal in the names of `Hello`.
+        index: index of the signal in the names of `HelloMessage`.
         data: the image from the robot.
         age_ms: age of the image at `now_ms`, in milliseconds.
         now_ms: time on the server's clock, in milliseconds.

@@ -7,7 +7,6 @@ import msgspec
 
 __all__ = [
     "TEXT_CHARACTERS",
-    "Outbound",
     "cut",
     "encoded",
     "encoded_bytes",
@@ -19,10 +18,6 @@ TEXT_CHARACTERS = 4096
 """Maximum length of a text value, in characters; a longer text is cut, and an ellipsis is added."""
 
 _encode = msgspec.json.Encoder().encode
-
-
-class Outbound(msgspec.Struct, tag_field="t", omit_defaults=True, frozen=True):
-    """The base class of messages to a page."""
 
 
 def encoded(message: msgspec.Struct) -> str:

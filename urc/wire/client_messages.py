@@ -1,0 +1,161 @@
+"""The shapes of the messages from a client to the server, by their tag ``t``.
+
+Layer 3½. Pure: `urc.client` encodes these messages, and `urc.web.wire` decodes them. The types
+limit the nesting depth: the decoder refuses anything deeper than a map of plain arguments.
+"""
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from urc.motion.lease import REQUEST_S
+from urc.protocol.sequences.sequence_control import Pull
+
+__all__ = [
+    "INBOUND_BYTES",
+    "Arguments",
+    "ClientMessage",
+    "Doubled",
+    "Driving",
+    "Verb",
+    "Ping",
+    "CommandRequest",
+    "ImageSelection",
+    "Approval",
+    "ApprovalRequest",
+    "SequenceAction",
+    "Drive",
+    "Tick",
+    "Release",
+    "Stop",
+    "JoinRedundant",
+]
+
+INBOUND_BYTES = 64 * 1024
+"""Maximum length of a message from a client, in bytes."""
+
+_Scalar = bool | int | float | str
+Arguments = dict[str, bool | int | float | str | tuple[_Scalar, ...] | None]
+"""Arguments of a command, as the client sends them."""
+Verb = Literal["take", "ask", "yes", "no", "force", "leave", "reset"]
+"""A request about the lease, or the reset of STOP."""
+
+
+class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True, frozen=True):
+    """A request for a `pong` with the same `c`, the page's time in milliseconds."""
+
+    c: float
+
+
+class CommandRequest(
+    msgspec.Struct, tag_field="t", tag="run", forbid_unknown_fields=True, frozen=True
+):
+    """One command. The page chooses `id`, and exactly one reply contains the same `id`."""
+
+    id: int
+    command: str
+    arguments: Arguments = {}
+    token: str = ""
+    """Token from `ApprovalRequest`, if the driver requires a confirmation."""
+    stops: int | None = None
+    """Number of STOPs that the page knew at the operator's click; None skips the check."""
+
+
+class ImageSelection(
+    msgspec.Struct, tag_field="t", tag="show", forbid_unknown_fields=True, frozen=True
+):
+    """The selection of the images that the page shows; the server sends no other images."""
+
+    signals: Annotated[
+        tuple[Annotated[str, msgspec.Meta(max_length=256)], ...], msgspec.Meta(max_length=64)
+    ] = ()
+
+
+class Approval(msgspec.Struct, tag_field="t", tag="agree", forbid_unknown_fields=True, frozen=True):
+    """The answer to question `n`; False from the asking page withdraws the question."""
+
+    n: int
+    yes: bool
+
+
+class ApprovalRequest(
+    msgspec.Struct, tag_field="t", tag="prepare", forbid_unknown_fields=True, frozen=True
+):
+    """The operator's confirmation of one command with its arguments; the reply is a `token`."""
+
+    id: int
+    command: str
+    arguments: Arguments = {}
+    stops: int | None = None
+    """Number of STOPs that the page knew. The server checks only the number in `CommandRequest`."""
+
+
+class SequenceAction(
+    msgspec.Struct, tag_field="t", tag="steer", forbid_unknown_fields=True, frozen=True
+):
+    """A request to pause, step, resume or end a sequence."""
+
+    command: str
+    verb: Pull
+
+
+class Drive(msgspec.Struct, tag_field="t", tag="drive", forbid_unknown_fields=True, frozen=True):
+    """A request about the lease; `for_s` is the time for the holder's answer, in seconds."""
+
+    verb: Verb
+    for_s: float = REQUEST_S
+
+
+class Tick(msgspec.Struct, tag_field="t", tag="tick", forbid_unknown_fields=True, frozen=True):
+    """One sample of a held control. See `urc.motion.freshness.ControlInput`."""
+
+    command: str
+    epoch: int
+    number: int
+    echo: int
+    arguments: Arguments = {}
+
+
+class Release(
+    msgspec.Struct, tag_field="t", tag="release", forbid_unknown_fields=True, frozen=True
+):
+    """The release of a held control.
+
+    Releases and ticks share one count; without a redundant socket, the number is 0.
+    """
+
+    command: str
+    number: int = 0
+
+
+class Stop(msgspec.Struct, tag_field="t", tag="stop", forbid_unknown_fields=True, frozen=True):
+    """A press of STOP, with a number as in `Release`."""
+
+    number: int = 0
+
+
+class JoinRedundant(
+    msgspec.Struct, tag_field="t", tag="spare", forbid_unknown_fields=True, frozen=True
+):
+    """First message of a redundant socket, with the key from the page's lease."""
+
+    key: str
+
+
+Driving = Drive | Tick | Release | Stop
+"""Messages about the controls."""
+Doubled = Tick | Release | Stop
+"""Messages that a page may also send over its redundant socket."""
+ClientMessage = (
+    Ping
+    | CommandRequest
+    | ImageSelection
+    | Approval
+    | ApprovalRequest
+    | SequenceAction
+    | Drive
+    | Tick
+    | Release
+    | Stop
+)
+"""Every message of a client over its main socket."""

@@ -1,0 +1,290 @@
+"""The shapes of the messages from the server to a client, by their tag ``t``.
+
+Layer 3½. Pure: `urc.web.wire` encodes these messages, and `urc.client` decodes them. Times are in
+milliseconds on the server's monotonic clock; ages are in milliseconds at the moment of encoding.
+Images are binary messages; see `urc.web.wire.picture`.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import msgspec
+
+from urc.model.role import Role
+
+__all__ = [
+    "CLOSE_BAD_MESSAGES",
+    "CLOSE_FAILED",
+    "CLOSE_FULL",
+    "CLOSE_NOT_LET_IN",
+    "CLOSE_NOT_READY",
+    "CLOSE_NO_ROBOT",
+    "CLOSE_TOO_FAST",
+    "VERSION",
+    "Outbound",
+    "SignalRow",
+    "HelloMessage",
+    "ValuesMessage",
+    "LinkRow",
+    "LinksMessage",
+    "LogRow",
+    "LogMessage",
+    "ReplyMessage",
+    "PongMessage",
+    "ErrorMessage",
+    "OperatorRow",
+    "LeaseMessage",
+    "HeartbeatMessage",
+    "StoppedMessage",
+    "RefusedMessage",
+    "QuestionMessage",
+    "QuestionEndMessage",
+    "TokenMessage",
+    "SequenceRow",
+    "ProgressMessage",
+    "ServerMessage",
+]
+
+VERSION = 1
+"""Version of the messages, in `HelloMessage`."""
+CLOSE_BAD_MESSAGES = 4400
+CLOSE_NOT_LET_IN = 4401
+CLOSE_NO_ROBOT = 4404
+CLOSE_NOT_READY = 4409
+CLOSE_TOO_FAST = 4429
+CLOSE_FAILED = 4500
+CLOSE_FULL = 4503
+
+
+class Outbound(msgspec.Struct, tag_field="t", omit_defaults=True, frozen=True):
+    """The base class of messages to a page."""
+
+
+class SignalRow(msgspec.Struct, omit_defaults=True, frozen=True):
+    """The meaning of one signal, as in `urc.model.values.Signal`."""
+
+    name: str
+    type: str
+    title: str = ""
+    unit: str = ""
+    min: float | None = None
+    max: float | None = None
+    precision: int | None = None
+    states: dict[str, str] | None = None
+    limits: dict[str, float] | None = None
+    stale_after_s: float = 0.0
+    sources: tuple[str, ...] = ()
+    """Transports that supply readings of the signal; if none of them is connected, the value is
+    stale immediately."""
+    axes: str = ""
+    """Axis convention of the signal; "" if unknown."""
+
+
+class HelloMessage(Outbound, tag="hello", omit_defaults=False, frozen=True):
+    """The first message: the robot, and the signal names that later messages refer to by index."""
+
+    version: int
+    session: str
+    """Identifier of the session; in a new session, the numbers of log lines restart."""
+    robot: str
+    title: str
+    now: int
+    names: tuple[str, ...]
+    signals: list[SignalRow]
+    roles: dict[str, Role] = {}
+    """Role that a visitor needs for each command."""
+    controls: tuple[str, ...] = ()
+    """Names of the held commands."""
+
+
+class ValuesMessage(Outbound, tag="v", frozen=True):
+    """Changed signals: `i` indexes of names, `v` values, `s` alarms (None if all are normal).
+
+    A signal with a history may have several values, oldest first; `e` has the number of its first
+    value, by index. `n` is the server's time in milliseconds.
+    """
+
+    n: int
+    i: msgspec.Raw
+    v: Sequence[object]
+    a: int | Sequence[int]
+    """Ages of the values in milliseconds; a single number if all ages are equal."""
+    s: Sequence[str] | None = None
+    e: Mapping[int, int] | None = None
+
+
+class LinkRow(msgspec.Struct, frozen=True):
+    """The state of one transport; `since` is the time in this state, in milliseconds."""
+
+    transport: str
+    state: str
+    address: str
+    since: int
+    detail: str
+    attempts: int
+    faults: int
+
+
+class LinksMessage(Outbound, tag="links", omit_defaults=False, frozen=True):
+    """The state of every transport."""
+
+    links: list[LinkRow]
+
+
+class LogRow(msgspec.Struct, frozen=True):
+    """One line of the log; `age` is in milliseconds."""
+
+    age: int
+    level: str
+    source: str
+    text: str
+
+
+class LogMessage(Outbound, tag="log", omit_defaults=False, frozen=True):
+    """New lines of the log, oldest first; a gap in the numbers shows dropped lines."""
+
+    first: int
+    """Number of the first line of the log within the session, from 0."""
+    lines: list[LogRow]
+
+
+class ReplyMessage(Outbound, tag="reply", frozen=True):
+    """The only reply to a command: its values, or the `code` and `message` of its failure."""
+
+    id: int
+    ok: bool
+    values: Mapping[str, object] | None = None
+    code: str = ""
+    message: str = ""
+
+
+class PongMessage(Outbound, tag="pong", frozen=True):
+    """The reply to a ping with the same `c`; `n` is the server's time in milliseconds."""
+
+    c: float
+    n: int
+    u: int = 0
+    """Server time in milliseconds since 1970; omitted if unknown."""
+
+
+class ErrorMessage(Outbound, tag="error", frozen=True):
+    """The reason why a message was invalid, or why the socket closes."""
+
+    code: str
+    message: str
+
+
+class OperatorRow(msgspec.Struct, frozen=True):
+    """A page or program that may hold the lease."""
+
+    id: str
+    name: str
+
+
+class LeaseMessage(Outbound, tag="lease", omit_defaults=False, frozen=True):
+    """The lease of the robot: its holder, the client that asks for it, and the latch of STOP."""
+
+    you: str
+    name: str
+    """Name of the page, as other pages show it."""
+    epoch: int
+    holder: OperatorRow | None
+    asker: OperatorRow | None
+    left: int
+    """Time until the asking page gets the controls, in milliseconds."""
+    latched: str
+    """Name of the operator who pressed STOP; "" while STOP is not latched."""
+    stops: int
+    """Number of STOPs in this run of the server."""
+    confirmed: bool
+    """Whether all transports of the robot have accepted the stop."""
+    drives: bool
+    """Whether the page may drive."""
+    forces: bool
+    """Whether the page may take the lease from another page without its consent."""
+    spare: str
+    """Secret key for the redundant socket of the page; "" for watchers."""
+
+
+class HeartbeatMessage(Outbound, tag="beat", frozen=True):
+    """A heartbeat number for the client that drives; its ticks echo the number."""
+
+    n: int
+
+
+class StoppedMessage(Outbound, tag="stopped", frozen=True):
+    """A control stopped before its release; it needs a new gesture."""
+
+    command: str
+    reason: str
+
+
+class RefusedMessage(Outbound, tag="refused", frozen=True):
+    """A tick, or a request about the controls, was refused."""
+
+    about: str
+    message: str
+    command: str = ""
+
+
+class QuestionMessage(Outbound, tag="ask", omit_defaults=False, frozen=True):
+    """A question for a second person; the asking page gets a copy."""
+
+    n: int
+    """Number of the question."""
+    id: int
+    """Number of the command on the asking page; 0 in messages to other pages."""
+    who: str
+    command: str
+    text: str
+    level: str
+    left: int
+    """Time until the question expires, in milliseconds."""
+
+
+class QuestionEndMessage(Outbound, tag="asked", frozen=True):
+    """The end of question `n`."""
+
+    n: int
+
+
+class TokenMessage(Outbound, tag="token", omit_defaults=False, frozen=True):
+    """The token that allows the command `id` once, for a few seconds."""
+
+    id: int
+    token: str
+
+
+class SequenceRow(msgspec.Struct, omit_defaults=False, frozen=True):
+    """The progress of one sequence, as in `urc.runtime.hub.SequenceProgress`."""
+
+    command: str
+    place: int
+    of: int
+    state: str
+    reason: str
+
+
+class ProgressMessage(Outbound, tag="progress", omit_defaults=False, frozen=True):
+    """The state of all sequences."""
+
+    sequences: list[SequenceRow]
+
+
+ServerMessage = (
+    HelloMessage
+    | ValuesMessage
+    | LinksMessage
+    | LogMessage
+    | ReplyMessage
+    | PongMessage
+    | ErrorMessage
+    | LeaseMessage
+    | HeartbeatMessage
+    | StoppedMessage
+    | RefusedMessage
+    | QuestionMessage
+    | QuestionEndMessage
+    | TokenMessage
+    | ProgressMessage
+)
+"""Every text message of the server."""
