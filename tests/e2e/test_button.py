@@ -19,10 +19,10 @@ from urc.model.exchange import Hold
 from urc.model.interface import WidgetUse
 from urc.model.payload import ReadSpec, WriteSpec
 from urc.model.values import Signal, Value
+from urc.runtime.one_shot_commands import HELD
 from urc.runtime.session import CommandFailed
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import BEARER
-from urc.web.drive.one_shot_commands import HELD
 
 pytestmark = pytest.mark.anyio
 

@@ -25,6 +25,7 @@ from urc.model.profile import Profile
 from urc.runtime.audit import AuditLog
 from urc.runtime.audit_recorder import AuditRecorder
 from urc.runtime.latch import LatchStore
+from urc.runtime.one_shot_commands import can_move
 from urc.runtime.redaction import secret_texts
 from urc.shipped import vendored
 from urc.web import words
@@ -34,7 +35,6 @@ from urc.web.dev.routes import Dev, dev_url, no_dev_routes
 from urc.web.dev.start import DevStart, no_dev_start
 from urc.web.dev.timeline import timeline
 from urc.web.dev.watch import Remake
-from urc.web.drive.one_shot_commands import can_move
 from urc.web.drive.redundant_socket import RedundantSocket
 from urc.web.fleet.fleet import Fleet
 from urc.web.fleet.robot_factory import RobotFactory, RobotOptions

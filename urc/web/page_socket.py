@@ -17,9 +17,9 @@ from starlette.websockets import WebSocketDisconnect
 
 from urc.model.payload import Payload
 from urc.model.values import NOTHING, Reading
+from urc.runtime.one_shot_commands import CommandRefused
 from urc.runtime.session import CommandFailed
 from urc.web.drive.control_service import OperatorSession
-from urc.web.drive.one_shot_commands import CommandRefused
 from urc.web.feed.client_socket import ClientSocket, FlowControl, SocketPeer, TokenBucket
 from urc.web.feed.fanout import Place
 from urc.web.fleet.robots import LiveSession, RobotService, SessionFailed, missing_settings

@@ -23,11 +23,11 @@ from urc.runtime.hub import Hub, LogEntry
 from urc.runtime.latch import Latch, LatchStore
 from urc.runtime.loop_watchdog import TOO_LATE_S, LoopWatchdog
 from urc.runtime.motion_controller import MotionBackend, MotionController
-from urc.web.drive.one_shot_commands import OneShotCommands
-from urc.web.drive.operator_session import FLOOD, Drivable, OperatorSession
+from urc.runtime.one_shot_commands import Drivable, OneShotCommands
+from urc.web.drive.operator_session import FLOOD, OperatorSession
 from urc.web.wire import drive as wire
 
-__all__ = ["BEAT_S", "ControlService", "Drivable", "OperatorSession"]
+__all__ = ["BEAT_S", "ControlService", "OperatorSession"]
 
 BEAT_S = 0.05
 """Interval of the heartbeat numbers to the page that drives, in seconds; the ticks of that page

@@ -4,21 +4,16 @@ Layer 5.
 """
 
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Protocol
 
-from urc.model.payload import Payload
-from urc.model.values import Reading
 from urc.motion.freshness import DuplicateElimination
 from urc.motion.lease import LeaseState, Operator
 from urc.motion.rate_limiter import RateLimiter
-from urc.protocol.events import Replied
 from urc.runtime.clock import Timer
-from urc.runtime.held_commands import MotionSession
-from urc.runtime.hub import Hub
 from urc.web.wire import drive as wire
 
-__all__ = ["FLOOD", "Drivable", "OperatorSession", "RedundantLine"]
+__all__ = ["FLOOD", "OperatorSession", "RedundantLine"]
 
 FLOOD = 4
 """Maximum number of ticks that are accepted while a tick is pending. Further ticks stay in the
@@ -33,26 +28,6 @@ class RedundantLine(Protocol):
 
     def end(self) -> None:
         """Close the socket."""
-
-
-class Drivable(MotionSession, Protocol):
-    """The part of a robot's session that the controls use."""
-
-    @property
-    def hub(self) -> Hub:
-        """The hub with the values that all pages see."""
-
-    async def command(
-        self,
-        name: str,
-        arguments: Mapping[str, Reading],
-        *,
-        on_sent: Callable[[Payload], None] | None = None,
-    ) -> Replied:
-        """Run a command and return its reply; raise `CommandFailed` if the command fails."""
-
-    def latch(self, reason: str) -> None:
-        """Latch STOP, end sequences and block autonomous motion; an empty `reason` resets."""
 
 
 class OperatorSession:

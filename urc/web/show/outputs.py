@@ -12,7 +12,7 @@ from urc.model.interface import OutputBinding, WidgetUse
 from urc.model.units import conversion
 from urc.model.values import Reading
 from urc.model.widget import Widget, WidgetPort
-from urc.web.drive.one_shot_commands import HELD, needs_holding
+from urc.runtime.one_shot_commands import HELD, needs_holding
 
 __all__ = ["asked_before", "inputs_config", "motion_lines", "output_config"]
 

@@ -17,9 +17,9 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from urc import __version__
 from urc.model.interface import Interface, WidgetUse
 from urc.model.profile import Profile
+from urc.runtime.one_shot_commands import can_move
 from urc.shipped import shipped
 from urc.web import words
-from urc.web.drive.one_shot_commands import can_move
 from urc.web.load.widget_trust import WidgetTrust
 from urc.web.show.cells import Cell, render_foreign, widget_cell
 from urc.web.show.interfaces import (

@@ -1,6 +1,6 @@
 """Commands without a held control: permission checks, and the effect of STOP on these commands.
 
-Layer 5. Only held commands require the lease. All other commands require the role of an operator: a
+Layer 4. Only held commands require the lease. All other commands require the role of an operator: a
 watcher cannot send commands. A command that starts autonomous motion (``moves``) also fails while
 STOP is latched or another operator drives. The engine checks the latch again, because a command may
 have waited in a queue or for a confirmation.
@@ -8,26 +8,49 @@ have waited in a queue or for a confirmation.
 
 import asyncio
 from collections.abc import Callable, Mapping
+from typing import Protocol
 
 from urc.model.driver import Command, Driver
 from urc.model.payload import Payload
 from urc.model.role import includes
-from urc.model.values import NOTHING
+from urc.model.values import NOTHING, Reading
 from urc.motion.lease import WATCHES, Operator
+from urc.protocol.events import Replied
 from urc.protocol.requests.encode import BadArgument, check_arguments
 from urc.protocol.sequences.sequence_control import Pull
 from urc.runtime.audit_recorder import AuditRecorder
 from urc.runtime.clock import Clock
+from urc.runtime.held_commands import MotionSession
+from urc.runtime.hub import Hub
 from urc.runtime.motion_controller import MotionController
 from urc.runtime.session import CommandFailed
-from urc.web.drive.operator_session import Drivable
 
-__all__ = ["HELD", "CommandRefused", "OneShotCommands", "can_move", "needs_holding"]
+__all__ = ["HELD", "CommandRefused", "Drivable", "OneShotCommands", "can_move", "needs_holding"]
 
 AGAIN_S = 1.0
 """Delay before a STOP that has not reached the robot is sent again, in seconds."""
 _STOP = Operator("", "STOP")
 HELD = "this command moves the robot only while a control is held; it cannot be sent once"
+
+
+class Drivable(MotionSession, Protocol):
+    """The part of a robot's session that the controls use."""
+
+    @property
+    def hub(self) -> Hub:
+        """The hub with the values that all pages see."""
+
+    async def command(
+        self,
+        name: str,
+        arguments: Mapping[str, Reading],
+        *,
+        on_sent: Callable[[Payload], None] | None = None,
+    ) -> Replied:
+        """Run a command and return its reply; raise `CommandFailed` if the command fails."""
+
+    def latch(self, reason: str) -> None:
+        """Latch STOP, end sequences and block autonomous motion; an empty `reason` resets."""
 
 
 class CommandRefused(CommandFailed):
