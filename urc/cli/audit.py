@@ -1,6 +1,10 @@
-"""`urc audit`: print the audit log of motion as JSON lines."""
+"""`urc audit`: print, export and check the audit log."""
 
 import argparse
+import os
+import sys
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from urc.cli.output import complain, json_text
@@ -13,7 +17,7 @@ MOST = 1_000_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command-line arguments: number of entries, robot and data folder."""
+    """Declare the command-line arguments: entries, export, check and data folder."""
     parser.add_argument(
         "--last",
         type=_count,
@@ -22,7 +26,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="number of newest entries to print (default: 200)",
     )
     parser.add_argument(
-        "--robot", default="", metavar="NAME", help="print only entries of this robot"
+        "--robot", default="", metavar="NAME", help="use only entries of this robot"
+    )
+    parser.add_argument("--who", default="", metavar="NAME", help="print only entries of a person")
+    parser.add_argument("--text", default="", help="print only entries that contain this text")
+    action = parser.add_mutually_exclusive_group()
+    action.add_argument(
+        "--export",
+        metavar="FILE",
+        help="write all entries as JSON lines that can be checked later; - prints them",
+    )
+    action.add_argument(
+        "--check",
+        metavar="FILE",
+        help="check an exported file; with --data-dir, also compare it with the audit log",
     )
     parser.add_argument(
         "--data-dir",
@@ -34,22 +51,77 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the entries, oldest first; return 1 if the log was tampered with."""
-    from urc._folders import data_folder
-    from urc.runtime.audit import check, read
+    """Print, export or check the entries; return 1 if they were tampered with."""
+    from urc.runtime.audit_check import check
 
-    file = (arguments.data or data_folder()) / "audit.sqlite"
+    if arguments.check:
+        return _check_export(arguments)
+    file = _file(arguments)
+    if arguments.export:
+        _export(file, arguments.export, arguments.robot)
+    else:
+        _print(file, arguments)
+    broken = check(file)
+    if broken:
+        complain(f"urc audit: {file} was tampered with: {broken}")
+    return 1 if broken else 0
+
+
+def _file(arguments: argparse.Namespace) -> Path:
+    from urc._folders import data_folder
+    from urc.runtime.audit import FILE
+
+    file: Path = (arguments.data or data_folder()) / FILE
     if not file.is_file():
         raise UrcError(
             f"{file} does not exist; start 'urc serve' to create the file,"
             " or select its folder with --data-dir"
         )
-    for entry in read(file, robot=arguments.robot, last=arguments.last):
-        print(json_text(entry._asdict()))
-    broken = check(file)
-    if broken:
-        complain(f"urc audit: {file} was tampered with: {broken}")
-    return 1 if broken else 0
+    return file
+
+
+def _print(file: Path, arguments: argparse.Namespace) -> None:
+    from urc.runtime.audit_search import AuditQuery, search
+
+    query = AuditQuery(
+        robot=arguments.robot, who=arguments.who, text=arguments.text, last=arguments.last
+    )
+    for row in reversed(search(file, query, longest_s=float("inf"))):
+        print(json_text(row.entry._asdict()))
+
+
+def _export(file: Path, target: str, robot: str) -> None:
+    from urc.runtime.audit_check import exported
+
+    blocks = exported(file, frozenset({robot}) if robot else None)
+    if target == "-":
+        # Exports are UTF-8 everywhere, because a check elsewhere reads them as UTF-8.
+        for block in blocks:
+            sys.stdout.buffer.write(block.encode())
+        sys.stdout.buffer.flush()
+        return
+    # The log names people and addresses, so only its owner may read the copy.
+    number = os.open(target, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    with open(number, "w", encoding="utf-8", newline="\n") as copy:
+        with suppress(OSError):
+            os.chmod(target, 0o600)
+        for block in blocks:
+            copy.write(block)
+
+
+def _check_export(arguments: argparse.Namespace) -> int:
+    from urc.runtime.audit_check import LONGEST_LINE, check_export, compare
+
+    with open(arguments.check, encoding="utf-8", errors="replace") as lines:
+        found = check_export(iter(partial(lines.readline, LONGEST_LINE + 1), ""))
+    fault = found.fault or ("" if arguments.robot else found.gap)
+    if not fault and arguments.data and found.entries:
+        fault = compare(_file(arguments), found)
+    if fault:
+        complain(f"urc audit: {arguments.check} cannot be trusted: {fault}")
+        return 1
+    print(f"{arguments.check}: {found.entries} entries, intact")
+    return 0
 
 
 def _count(text: str) -> int:

@@ -33,7 +33,7 @@ VERBS: dict[str, str] = {
     "bundle": "pack a package and its dependencies into one file",
     "publish": "publish a package to a repository",
     "trust": "show the host key of an SSH server, and store it after confirmation",
-    "audit": "print the audit log of motion as JSON lines",
+    "audit": "print, export or check the audit log",
     "discover": "find robots on the network, serial ports and ROS topics",
     "schema": "print the JSON Schema of a kind of document",
     "doctor": "check the features of this machine",

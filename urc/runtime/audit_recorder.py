@@ -17,7 +17,7 @@ from typing import Concatenate, Final, ParamSpec
 from urc.model.payload import Payload, traffic_of
 from urc.model.values import NOTHING, Reading
 from urc.motion.lease import LeaseState, Operator
-from urc.runtime.audit import AuditEntry, shown
+from urc.runtime.audit_entry import AuditEntry, shown
 from urc.runtime.hub import AuditRecord, Hub, MotionRecord
 from urc.runtime.secret_forms import HIDDEN, SecretForms
 

@@ -20,7 +20,7 @@ from urc.model.values import Reading, Sample, Signal
 from urc.runtime.redaction import Redactor
 
 if TYPE_CHECKING:
-    from urc.runtime.audit import AuditEntry
+    from urc.runtime.audit_entry import AuditEntry
 from typing import Final
 
 __all__ = [

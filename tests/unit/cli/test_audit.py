@@ -1,6 +1,7 @@
 """`urc audit` prints what happened, and tells when somebody has changed it."""
 
 import json
+import os
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -8,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from urc.cli.main import main
-from urc.runtime.audit import AuditEntry, AuditLog
+from urc.runtime.audit import AuditLog
+from urc.runtime.audit_entry import AuditEntry
 
 
 @pytest.fixture
@@ -78,3 +80,62 @@ def test_folder_without_an_audit_is_told(
         f"urc audit: {tmp_path / 'audit.sqlite'} does not exist;"
         " start 'urc serve' to create the file, or select its folder with --data-dir\n"
     )
+
+
+def test_export_is_checked_without_the_log_and_private(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "copy.jsonl"
+    assert main(["audit", "--data-dir", str(folder), "--export", str(copy)]) == 0
+    assert os.name != "posix" or copy.stat().st_mode & 0o077 == 0
+    assert main(["audit", "--check", str(copy)]) == 0
+    assert capsys.readouterr().out == f"{copy}: 6 entries, intact\n"
+    copy.write_text(copy.read_text().replace("Ann", "Bob", 1))
+    assert main(["audit", "--check", str(copy)]) == 1
+    assert capsys.readouterr().err == (
+        f"urc audit: {copy} cannot be trusted: entry 1 does not follow from entry 0\n"
+    )
+
+
+def test_export_goes_to_standard_output_too(
+    folder: Path, tmp_path: Path, capfdbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    assert main(["audit", "--data-dir", str(folder), "--export", "-"]) == 0
+    lines = capfdbinary.readouterr().out.splitlines()
+    assert [json.loads(line)["id"] for line in lines] == [1, 2, 3, 4, 5, 6]
+
+
+def test_export_of_one_robot_has_gaps(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "copy.jsonl"
+    words = ["audit", "--data-dir", str(folder), "--robot", "rover", "--export", str(copy)]
+    assert main(words) == 0
+    assert main(["audit", "--check", str(copy)]) == 1
+    assert "entry 3 is missing" in capsys.readouterr().err
+    assert main(["audit", "--check", str(copy), "--robot", "rover"]) == 0
+
+
+def test_export_tells_that_the_log_was_cut(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "copy.jsonl"
+    assert main(["audit", "--data-dir", str(folder), "--export", str(copy)]) == 0
+    assert main(["audit", "--data-dir", str(folder), "--check", str(copy)]) == 0
+    with closing(sqlite3.connect(folder / "audit.sqlite")) as base, base:
+        base.execute("DELETE FROM entries WHERE id > 4")
+    assert main(["audit", "--data-dir", str(folder), "--check", str(copy)]) == 1
+    assert "the audit log lacks entry 6 of the export" in capsys.readouterr().err
+
+
+def test_missing_export_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["audit", "--check", str(tmp_path / "none.jsonl")]) == 1
+    assert "none.jsonl" in capsys.readouterr().err
+
+
+def test_entries_are_searched_by_person_and_text(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert printed(capsys, "--data-dir", str(folder), "--who", "ben") == []
+    assert len(printed(capsys, "--data-dir", str(folder), "--who", "ann")) == 6
+    assert len(printed(capsys, "--data-dir", str(folder), "--text", "PUPPET")) == 3

@@ -8,7 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from urc.runtime.audit import AuditEntry, AuditLog, check, read, shown
+from urc.runtime.audit import AuditLog
+from urc.runtime.audit_check import check
+from urc.runtime.audit_entry import AuditEntry, shown
+from urc.runtime.audit_search import AuditQuery, search
+from urc.runtime.audit_table import Retention
 
 
 @pytest.fixture(autouse=True)
@@ -24,6 +28,12 @@ def file(tmp_path: Path) -> Path:
 
 def entry(number: int, robot: str = "puppet", text: str = "") -> AuditEntry:
     return AuditEntry(1000.0 + number, robot, "moved", "screen 1", "drive", "s1", 7, "go", text)
+
+
+def read(file: Path, robot: str = "", since: float = 0.0, last: int = 200) -> list[AuditEntry]:
+    """Return the newest entries, oldest first."""
+    query = AuditQuery(robot=robot, since=since, last=last)
+    return [row.entry for row in reversed(search(file, query))]
 
 
 @pytest.fixture
@@ -73,19 +83,20 @@ def test_a_removed_row_shows(kept: AuditLog) -> None:
     assert kept.settle()
     with sqlite3.connect(kept.file) as base:
         base.execute("DELETE FROM entries WHERE id = 3")
-    assert check(kept.file) == "entry 4 does not follow from entry 2"
+    assert check(kept.file) == "entry 3 is missing"
 
 
 def test_a_full_file_loses_its_oldest_entries(file: Path) -> None:
     most_bytes = 400_000
-    with AuditLog(file, most_bytes=most_bytes) as log:
+    retention = Retention(most_bytes)
+    with AuditLog(file, retention=retention, now=lambda: 5000.0) as log:
         for number in range(4000):
             log.add(entry(number, text="x" * 200))
             if number % 500 == 0:
                 assert log.settle()
         assert log.settle(20)
         found = read(file, last=100_000)
-        assert found[-1].at == 4999.0
+        assert found[-1].at == 5000.0
         assert found[0].at > 2000.0
         assert check(file) == ""
     assert file.stat().st_size < 2 * most_bytes
@@ -184,7 +195,7 @@ def test_a_file_that_somebody_locks_holds_nobody_up_and_is_told_once(
     file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("urc.runtime.audit._RETRY_S", 0.0)
-    monkeypatch.setattr("urc.runtime.audit._LOCKED_S", 0.05)
+    monkeypatch.setattr("urc.runtime.audit_table.LOCKED_S", 0.05)
     with AuditLog(file) as log:
         log.add(entry(1))
         assert log.settle()

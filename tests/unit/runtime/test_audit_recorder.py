@@ -3,7 +3,7 @@
 import pytest
 
 from urc.motion.lease import LeaseState, Operator
-from urc.runtime.audit import AuditEntry
+from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_recorder import HIDDEN, AuditRecorder
 from urc.runtime.hub import AuditRecord, Hub, MotionRecord
 

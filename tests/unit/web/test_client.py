@@ -13,7 +13,7 @@ from urc.model.driver import Command
 from urc.model.profile import Setting
 from urc.model.role import Role
 from urc.protocol.events import Replied
-from urc.runtime.audit import AuditEntry
+from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
 from urc.runtime.session import CommandFailed
 from urc.testing.clock import FakeClock, settle

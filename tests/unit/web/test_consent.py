@@ -11,7 +11,7 @@ from urc.model.driver import Command
 from urc.model.exchange import Confirm
 from urc.model.payload import WriteSpec
 from urc.model.role import Role
-from urc.runtime.audit import AuditEntry
+from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile

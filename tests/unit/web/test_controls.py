@@ -12,7 +12,7 @@ import pytest
 from tests.unit.runtime.desks import DRIVER
 from urc.model.role import Role
 from urc.protocol.events import MotionEvent, MotionRefused
-from urc.runtime.audit import AuditEntry
+from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
 from urc.runtime.hub import Hub
 from urc.runtime.latch import LatchStore

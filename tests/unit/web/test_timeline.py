@@ -10,7 +10,8 @@ from starlette.responses import Response
 from starlette.routing import Route
 from starlette.testclient import TestClient
 
-from urc.runtime.audit import AuditEntry, AuditLog
+from urc.runtime.audit import AuditLog
+from urc.runtime.audit_entry import AuditEntry
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.entry import HERE, OPEN
 from urc.web.app import build_app

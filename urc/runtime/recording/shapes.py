@@ -17,7 +17,7 @@ import msgspec
 from urc.images import media_type
 from urc.model.driver import Driver
 from urc.model.values import Alarm, Reading, Sample, Signal
-from urc.runtime.audit import AuditEntry
+from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.hub import (
     AuditRecord,
     LinkState,

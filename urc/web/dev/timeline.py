@@ -10,7 +10,9 @@ import asyncio
 from starlette.requests import Request
 from starlette.responses import JSONResponse
 
-from urc.runtime.audit import AuditEntry, AuditLog, read
+from urc.runtime.audit import AuditLog
+from urc.runtime.audit_entry import AuditEntry
+from urc.runtime.audit_search import AuditQuery, search
 
 __all__ = ["timeline"]
 
@@ -49,10 +51,11 @@ async def timeline(
         found = await asyncio.to_thread(_settled, log, robot, since, last)
     except OSError as error:
         return JSONResponse({"error": str(error)}, 503, _HEADERS)
-    entries = [one._asdict() for one in reversed(found)]
+    entries = [one._asdict() for one in found]
     return JSONResponse({"entries": entries, "fault": log.fault}, headers=_HEADERS)
 
 
 def _settled(log: AuditLog, robot: str, since: float, last: int) -> list[AuditEntry]:
     log.settle(_SETTLE_S)  # the newest entries matter most
-    return read(log.file, robot=robot, since=since, last=last)
+    query = AuditQuery(robot=robot, since=since, last=last)
+    return [row.entry for row in search(log.file, query)]

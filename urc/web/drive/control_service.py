@@ -16,7 +16,7 @@ from urc.motion.freshness import ControlInput
 from urc.motion.hold_to_run import Reason
 from urc.motion.lease import LeaseState, Operator
 from urc.motion.rate_limiter import RateLimiter
-from urc.runtime.audit import AuditEntry
+from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
 from urc.runtime.clock import Clock, Timer
 from urc.runtime.hub import Hub, LogEntry

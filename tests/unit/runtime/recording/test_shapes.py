@@ -9,7 +9,7 @@ import pytest
 
 from urc.model.driver import Argument, Command, Driver, FramingSpec, Hold, TransportSpec
 from urc.model.values import Reading, Sample, Signal
-from urc.runtime.audit import AuditEntry
+from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.hub import AuditRecord, LinkStatus, LogEntry, MotionRecord, Tapped, Traffic
 from urc.runtime.recording.events import event_of
 from urc.runtime.recording.shapes import DRIVING, LOG, RecordingEncoder, channels

@@ -1,0 +1,196 @@
+"""The check of the audit log's hash chain, and export as JSON Lines that can be checked later.
+
+Layer 4. All functions block: servers call them in a thread.
+
+Each exported line has the link before its entry (``before``) and the link of the entry
+(``chain``). A line proves itself, so an export of single robots can be checked, too. Lines with
+consecutive numbers must also fit together.
+"""
+
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from urc.problems import printable_json
+from urc.runtime.audit_entry import COLUMNS, FIRST_COLUMNS, VERSION, AuditEntry, link
+from urc.runtime.audit_search import AuditQuery, condition, opened
+from urc.runtime.audit_table import PRUNED, AuditRow, is_migrated, row_of, select
+
+__all__ = ["LONGEST_LINE", "ExportCheck", "check", "check_export", "compare", "exported", "line_of"]
+
+_AT_ONCE: Final = 500
+"""Number of entries of one read transaction: a slow download must not hold back the writer."""
+LONGEST_LINE: Final = 100_000
+"""Maximum length of a line of an export, in characters."""
+
+
+class ExportCheck(NamedTuple):
+    """The result of the check of an export."""
+
+    entries: int
+    """Number of checked entries."""
+    fault: str
+    """Message about the first fault; "" for an intact export."""
+    gap: str
+    """Message about the first missing entry; exports of single robots have gaps."""
+    last: int = 0
+    """Number of the last entry."""
+    chain: str = ""
+    """Link of the last entry."""
+
+
+def check(file: Path) -> str:
+    """Return a message about the first broken link of the hash chain, or "" for an intact file.
+
+    Raises:
+        OSError: the file cannot be read.
+    """
+    with opened(file) as base:
+        if base is None:
+            return ""
+        last, chain = _last_pruning(base)
+        is_explained = bool(last) or is_migrated(base)
+        for values in base.execute(select(base) + " ORDER BY id"):
+            row = row_of(values)
+            if row.id > last + 1 and is_explained:
+                return _missing(last + 1, row.id - 1)
+            before = "" if row.id == 1 else chain or None
+            if fault := _fault_of(row, before):
+                return fault
+            last, chain, is_explained = row.id, row.chain, True
+    return ""
+
+
+def exported(file: Path, robots: frozenset[str] | None = None) -> Iterator[str]:
+    """Yield blocks of JSON lines, oldest entry first.
+
+    Args:
+        file: file of the audit log.
+        robots: robots whose entries are exported; None exports all entries.
+
+    Raises:
+        OSError: the file cannot be read.
+    """
+    after = 0
+    where, values = condition(AuditQuery(robots))
+    order = " AND id > ? ORDER BY id LIMIT ?"
+    before = "SELECT chain FROM entries WHERE id = ?"
+    while True:
+        lines = []
+        with opened(file) as base:
+            if base is None:
+                return
+            found = base.execute(select(base) + where + order, (*values, after, _AT_ONCE))
+            for row in map(row_of, found.fetchall()):
+                known = base.execute(before, (row.id - 1,)).fetchone()
+                chain = known[0] if known else _before_first(base, row.id)
+                lines.append(line_of(row, chain))
+                after = row.id
+        if not lines:
+            return
+        yield "".join(lines)
+
+
+def line_of(row: AuditRow, before: str | None) -> str:
+    """Return one line of an export; `before` is the link before the entry, None if unknown."""
+    head = {"id": row.id, "version": row.version, "before": before, "chain": row.chain}
+    text = json.dumps(head | row.entry._asdict(), ensure_ascii=False)
+    return printable_json(text) + "\n"
+
+
+def check_export(lines: Iterable[str]) -> ExportCheck:
+    """Check an export without the audit log that it came from."""
+    count, last, chain, gap = 0, 0, "", ""
+    for number, line in enumerate(lines, 1):
+        try:
+            row, before = _parsed(line)
+        except ValueError as error:
+            return ExportCheck(count, f"line {number} is no entry: {error}", gap, last, chain)
+        if count and row.id <= last:
+            fault = f"line {number}: entry {row.id} does not follow from entry {last}"
+        elif count and row.id == last + 1 and before != chain:
+            fault = f"entry {row.id} does not follow from entry {last}"
+        else:
+            fault = _fault_of(row, "" if row.id == 1 else before, is_first=count == 0)
+        if fault:
+            return ExportCheck(count, fault, gap, last, chain)
+        if count and row.id > last + 1 and not gap:
+            gap = _missing(last + 1, row.id - 1)
+        count, last, chain = count + 1, row.id, row.chain
+    return ExportCheck(count, "", gap, last, chain)
+
+
+def compare(file: Path, export: ExportCheck) -> str:
+    """Return a message if the audit log lacks the last entry of an export, or ""; see `check`.
+
+    An export in another place therefore also proves that no newer entries were cut off.
+
+    Raises:
+        OSError: the audit log cannot be read.
+    """
+    with opened(file) as base:
+        if base is None:
+            return f"{file} does not exist"
+        row = base.execute("SELECT chain FROM entries WHERE id = ?", (export.last,)).fetchone()
+        if row is None and export.last <= _last_pruning(base)[0]:
+            return ""
+    if row is None:
+        return f"the audit log lacks entry {export.last} of the export"
+    return "" if row[0] == export.chain else f"entry {export.last} differs from the export"
+
+
+def _parsed(line: str) -> tuple[AuditRow, str | None]:
+    """Return an exported line as a row, and the link before the row; raise `ValueError`."""
+    if len(line) > LONGEST_LINE:
+        raise ValueError(f"more than {LONGEST_LINE} characters")
+    found: Any = json.loads(line)
+    if not isinstance(found, dict):
+        raise ValueError("expected an object")
+    kinds = AuditEntry.__annotations__ | {"id": int, "version": int, "chain": str}
+    for name, kind in kinds.items():
+        if type(found.get(name)) is not kind:
+            raise ValueError(f"expected {name!r} of type {kind.__name__}")
+    if "before" not in found or not isinstance(found["before"], str | None):
+        raise ValueError("expected 'before' of type str, or null")
+    entry = AuditEntry(*(found[name] for name in COLUMNS))
+    return AuditRow(found["id"], found["version"], found["chain"], entry), found["before"]
+
+
+def _fault_of(row: AuditRow, before: str | None, *, is_first: bool = True) -> str:
+    """Return a message about a broken link, or ""; only before the first row, None is allowed."""
+    if row.version > VERSION:
+        return f"entry {row.id} was written by a newer version of URC"
+    if row.version < 1 or (row.version == 1 and any(row.entry[FIRST_COLUMNS:])):
+        return f"entry {row.id} was changed"
+    if before is None and is_first:
+        return ""
+    if before is None or row.chain != link(before, row.entry, row.version):
+        return f"entry {row.id} does not follow from entry {row.id - 1}"
+    return ""
+
+
+def _missing(first: int, last: int) -> str:
+    if first == last:
+        return f"entry {first} is missing"
+    return f"entries {first} to {last} are missing"
+
+
+def _before_first(base: sqlite3.Connection, first: int) -> str | None:
+    if first == 1:
+        return ""
+    last, chain = _last_pruning(base)
+    return chain or None if last == first - 1 else None
+
+
+def _last_pruning(base: sqlite3.Connection) -> tuple[int, str]:
+    """Return number and link of the last deleted entry; 0 and "" without a deletion."""
+    row = base.execute(
+        "SELECT arguments FROM entries WHERE what = ? ORDER BY id DESC LIMIT 1", (PRUNED,)
+    ).fetchone()
+    try:
+        found = json.loads(row[0]) if row else {}
+        return int(found.get("last", 0)), str(found.get("chain", ""))
+    except (ValueError, AttributeError, TypeError):
+        return 0, ""  # changed by hand: the check reports the beginning

@@ -1,0 +1,126 @@
+"""Search in the audit log.
+
+Layer 4. All functions block: servers call them in a thread. They read the file of an `AuditLog`,
+which may be writing at the same time.
+"""
+
+import sqlite3
+import time
+from collections.abc import Collection, Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from urc.problems import UrcError
+from urc.runtime.audit_entry import COLUMNS, AuditEntry
+from urc.runtime.audit_table import AuditRow, reading, row_of, select
+
+__all__ = ["MOST", "AuditQuery", "SearchTimeout", "condition", "opened", "search"]
+
+MOST: Final = 1000
+"""Maximum number of entries in one result for a page or a program."""
+_LONGEST_S: Final = 5.0
+"""Maximum time of one search, in seconds."""
+_STEPS: Final = 50_000
+"""Steps of SQLite between two looks at the clock."""
+_TEXTS: Final = tuple(name for name in COLUMNS if AuditEntry.__annotations__[name] is str)
+
+
+class SearchTimeout(UrcError):
+    """A search that takes too long."""
+
+
+class AuditQuery(NamedTuple):
+    """The entries to find."""
+
+    robots: frozenset[str] | None = None
+    """Robots whose entries may be shown; None allows all entries, with those of the server."""
+    robot: str = ""
+    """Name of the only robot; "" for all."""
+    who: str = ""
+    """Part of the name of a person, device or program, its whole identifier, or part of an
+    address."""
+    what: tuple[str, ...] = ()
+    """Kinds of events; empty for all."""
+    text: str = ""
+    """Text in any column, regardless of the case of ASCII letters."""
+    since: float = 0.0
+    """Start of the period, as UTC time in seconds since 1970."""
+    until: float = float("inf")
+    """End of the period; entries at this time are not included."""
+    before: int = 0
+    """Number of an entry; only older entries are returned. 0 starts with the newest entry."""
+    last: int = 200
+    """Maximum number of entries."""
+
+
+def search(file: Path, query: AuditQuery, longest_s: float = _LONGEST_S) -> list[AuditRow]:
+    """Return the newest entries of a query, newest first; return [] without a file.
+
+    Raises:
+        OSError: the file cannot be read.
+        SearchTimeout: the search takes longer than `longest_s`.
+    """
+    where, values = condition(query)
+    order = " ORDER BY id DESC LIMIT ?"
+    with opened(file) as base:
+        if base is None:
+            return []
+        ends_at = time.monotonic() + longest_s
+        base.set_progress_handler(lambda: time.monotonic() > ends_at, _STEPS)
+        try:
+            found = base.execute(select(base) + where + order, (*values, query.last)).fetchall()
+        except sqlite3.OperationalError:
+            if time.monotonic() > ends_at:
+                raise SearchTimeout(
+                    f"the search takes more than {longest_s:g} s: choose a shorter period"
+                ) from None
+            raise
+    return [row_of(row) for row in found]
+
+
+def condition(query: AuditQuery) -> tuple[str, list[object]]:
+    """Return the condition of a query, and its values."""
+    parts, values = ["at >= ? AND at < ?"], list[object]((query.since, query.until))
+    if query.robots is not None:
+        parts.append(f"robot IN ({_marks(query.robots)})")
+        values += sorted(query.robots)
+    if query.robot:
+        # Lost entries may concern any robot.
+        parts.append("(robot = ? OR what = 'lost')")
+        values.append(query.robot)
+    if query.what:
+        parts.append(f"what IN ({_marks(query.what)})")
+        values += query.what
+    if query.who:
+        parts.append("(principal = ? OR who LIKE ? ESCAPE '!' OR place LIKE ? ESCAPE '!')")
+        values += (query.who, _pattern(query.who), _pattern(query.who))
+    if query.text:
+        parts.append("(" + " OR ".join(f"{name} LIKE ? ESCAPE '!'" for name in _TEXTS) + ")")
+        values += [_pattern(query.text)] * len(_TEXTS)
+    if query.before:
+        parts.append("id < ?")
+        values.append(query.before)
+    return " WHERE " + " AND ".join(parts), values
+
+
+def _marks(values: Collection[str]) -> str:
+    return ", ".join("?" * len(values))
+
+
+def _pattern(text: str) -> str:
+    escaped = text.replace("!", "!!").replace("%", "!%").replace("_", "!_")
+    return f"%{escaped}%"
+
+
+@contextmanager
+def opened(file: Path) -> Iterator[sqlite3.Connection | None]:
+    """Open a file for reading; give None without a file, and turn errors into `OSError`."""
+    if not file.is_file():
+        yield None
+        return
+    try:
+        with closing(reading(file)) as base:
+            yield base
+    except sqlite3.Error as error:
+        raise OSError(f"{file} cannot be read: {error}") from error
