@@ -21,7 +21,7 @@ from urc.access.directory import Directory, Kind, Principal, SignIn, Way, digest
 from urc.access.grants import AccessError, Grant, parse_grant
 from urc.private_files import make_private
 
-__all__ = ["FILE", "AccessStore", "Invitation", "MOST_INVITATIONS", "MOST_SIGN_INS"]
+__all__ = ["FILE", "AccessStore", "Invitation", "MOST_INVITATIONS", "MOST_SIGN_INS", "parse_name"]
 
 FILE: Final = "access.sqlite"
 MOST_SIGN_INS: Final = 5000
@@ -44,6 +44,16 @@ _CREATE: Final = (
     "id TEXT PRIMARY KEY, principal TEXT NOT NULL REFERENCES principals ON DELETE CASCADE, "
     "way TEXT NOT NULL, digest BLOB NOT NULL UNIQUE, created_at REAL NOT NULL, "
     "used_at REAL NOT NULL, ends_at REAL, idle_s REAL, place TEXT NOT NULL, agent TEXT NOT NULL "
+    ") STRICT",
+    "CREATE TABLE passkeys ( "
+    "id TEXT PRIMARY KEY, principal TEXT NOT NULL REFERENCES principals ON DELETE CASCADE, "
+    "name TEXT NOT NULL, host TEXT NOT NULL, public_key BLOB NOT NULL, counter INTEGER NOT NULL, "
+    "created_at REAL NOT NULL, used_at REAL NOT NULL "
+    ") STRICT",
+    "CREATE TABLE external_accounts ( "
+    "issuer TEXT NOT NULL, subject TEXT NOT NULL, "
+    "principal TEXT NOT NULL REFERENCES principals ON DELETE CASCADE, grants TEXT NOT NULL, "
+    "PRIMARY KEY (issuer, subject) "
     ") STRICT",
     "CREATE TABLE invitations ( "
     "digest BLOB PRIMARY KEY, kind TEXT NOT NULL, name TEXT NOT NULL, grants TEXT NOT NULL, "
@@ -145,8 +155,8 @@ class AccessStore:
             AccessError: the name is empty, too long or in use, or there are too many principals.
         """
         principal = Principal(
-            secrets.token_hex(8), kind, _name(name), tuple(grants), owner, tuple(commands), now,
-            ends_at,
+            secrets.token_hex(8), kind, parse_name(name), tuple(grants), owner, tuple(commands),
+            now, ends_at,
         )  # fmt: skip
         row = principal._replace(
             grants=_texts(principal.grants),  # type: ignore[arg-type]
@@ -165,7 +175,7 @@ class AccessStore:
     def rename(self, principal: str, name: str) -> None:
         """Give a principal another name; raise `AccessError` if it is in use or invalid."""
         try:
-            self._update("UPDATE principals SET name = ? WHERE id = ?", _name(name), principal)
+            self._update("UPDATE principals SET name = ? WHERE id = ?", parse_name(name), principal)
         except sqlite3.IntegrityError:
             raise AccessError(f"the name {name!r} is in use") from None
 
@@ -338,7 +348,12 @@ class AccessStore:
                 raise AccessError("it was removed already")
 
 
-def _name(name: str) -> str:
+def parse_name(name: str) -> str:
+    """Return a name with single spaces.
+
+    Raises:
+        AccessError: the name is empty or too long, or has invisible characters.
+    """
     name = " ".join(name.split())
     if not name:
         raise AccessError("the name is empty")

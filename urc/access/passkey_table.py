@@ -1,0 +1,116 @@
+"""The passkeys of all people, in the store of people, devices and programs.
+
+Layer 4. A passkey is a public key, so the table has no secret. The methods block for some
+milliseconds: servers call them in a thread.
+"""
+
+from typing import Final, NamedTuple
+
+from urc.access.grants import AccessError
+from urc.access.store import AccessStore, parse_name
+
+__all__ = ["MOST_PASSKEYS", "Passkey", "PasskeyTable"]
+
+MOST_PASSKEYS: Final = 20
+"""Most passkeys of one person."""
+
+
+class Passkey(NamedTuple):
+    """A public key whose private key is in a phone, a computer or a security key."""
+
+    id: str
+    """Credential id in base64url; unique, no secret."""
+    principal: str
+    """Id of its owner."""
+    name: str
+    """Name for people, such as “Ann's phone”."""
+    host: str
+    """Host name for which browsers offer the passkey (the RP ID of WebAuthn)."""
+    public_key: bytes
+    """The public key in the form of COSE (RFC 9052)."""
+    counter: int
+    """The last value of its signature counter; 0 for passkeys without a counter."""
+    created_at: float
+    """UTC time in seconds since 1970."""
+    used_at: float
+    """UTC time of the last sign-in; `created_at` before the first."""
+
+
+class PasskeyTable:
+    """The passkeys in the file."""
+
+    def __init__(self, store: AccessStore) -> None:
+        """Keep the store."""
+        self._store = store
+
+    def add(self, passkey: Passkey) -> Passkey:
+        """Add a passkey; return it with its name in the form that is kept.
+
+        Raises:
+            AccessError: the name is invalid, the owner is no person of this server or has too many
+                passkeys, or the passkey is known.
+        """
+        passkey = passkey._replace(name=parse_name(passkey.name))
+        with self._store.transaction() as base:
+            owner = base.execute(
+                "SELECT kind FROM principals WHERE id = ?", (passkey.principal,)
+            ).fetchone()
+            if owner != ("person",):
+                raise AccessError("only people have passkeys: sign in as a person first")
+            (count,) = base.execute(
+                "SELECT count(*) FROM passkeys WHERE principal = ?", (passkey.principal,)
+            ).fetchone()
+            if count >= MOST_PASSKEYS:
+                raise AccessError(f"you have {count} passkeys; remove one first")
+            added = base.execute(
+                "INSERT INTO passkeys VALUES (?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO NOTHING",
+                passkey,
+            )
+            if added.rowcount == 0:
+                raise AccessError("this passkey is registered already")
+        return passkey
+
+    def find(self, passkey: str) -> Passkey | None:
+        """Return the passkey with an id, or None."""
+        with self._store.transaction() as base:
+            row = base.execute("SELECT * FROM passkeys WHERE id = ?", (passkey,)).fetchone()
+        return Passkey(*row) if row else None
+
+    def of(self, principal: str) -> list[Passkey]:
+        """Return the passkeys of a person, oldest first."""
+        with self._store.transaction() as base:
+            rows = base.execute(
+                "SELECT * FROM passkeys WHERE principal = ? ORDER BY created_at, id", (principal,)
+            ).fetchall()
+        return [Passkey(*row) for row in rows]
+
+    def rename(self, principal: str, passkey: str, name: str) -> None:
+        """Give a passkey of a person another name.
+
+        Raises:
+            AccessError: the name is invalid, or the person has no such passkey.
+        """
+        self._changed(
+            "UPDATE passkeys SET name = ? WHERE id = ? AND principal = ?",
+            parse_name(name), passkey, principal,
+        )  # fmt: skip
+
+    def remove(self, principal: str, passkey: str) -> None:
+        """Remove a passkey of a person; raise `AccessError` if the person has no such passkey."""
+        self._changed("DELETE FROM passkeys WHERE id = ? AND principal = ?", passkey, principal)
+
+    def used(self, passkey: str, counter: int, now: float) -> None:
+        """Record a sign-in.
+
+        Raises:
+            AccessError: the passkey was removed, or a later sign-in was recorded already.
+        """
+        self._changed(
+            "UPDATE passkeys SET counter = ?, used_at = ? WHERE id = ? AND (counter < ? OR ? = 0)",
+            counter, now, passkey, counter, counter,
+        )  # fmt: skip
+
+    def _changed(self, statement: str, *values: object) -> None:
+        with self._store.transaction() as base:
+            if base.execute(statement, values).rowcount == 0:
+                raise AccessError("this passkey was removed")
