@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tests.e2e.processes import UrcProcess
-from tests.unit.packages.made import keep_settings, write_package
+from tests.unit.packages.made import accepted, keep_settings, write_package
 from urc.cli.dashboard import DashboardAddress, workshop_of
 from urc.model.profile import Profile
 from urc.packages.install import plan_requirement
 from urc.packages.names import parse_requirement
 from urc.packages.repositories import Repositories
+from urc.packages.signature import new_signer
 from urc.packages.store import Store
 from urc.testing.entry import ACCESS
 from urc.web.app import build_app, serve
@@ -139,7 +140,7 @@ def install(data: Path, url: str, *packages: str) -> None:
     for package in packages:
         plan = plan_requirement(parse_requirement(package), known.all(), store, print)
         with store.changing() as change:
-            change.stage(plan)
+            change.stage(accepted(plan))
             change.commit(plan)
 
 
@@ -193,7 +194,10 @@ def running_shop(home: Path) -> Iterator[Shop]:
     fill_lab(lab)
     folders: dict[tuple[bool, str], Path] = {}
     urls = {}
-    on = UrcProcess(["repo", "serve", str(lab), "--port", "0", "--name", "Lab"], {})
+    key = home / "keeper.pem"
+    new_signer("Keeper", key)
+    words = ["repo", "serve", str(lab), "--port", "0", "--name", "Lab", "--key", str(key)]
+    on = UrcProcess(words, {})
     try:
         urls[True] = on.wait_for(r"^repository (http://\S+)$")[1]
         with static_server(lab) as urls[False]:

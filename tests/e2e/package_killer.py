@@ -15,7 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
-from tests.unit.packages.made import assert_whole, install, package
+from tests.unit.packages.made import accepted, assert_whole, install, package
 from urc.packages import atomic_files
 from urc.packages.index import INDEX, read_index
 from urc.packages.index_builder import make_index
@@ -50,7 +50,7 @@ def update(store: Store) -> None:
     plan = plan_update(old, [source], store, fail)
     assert plan is not None
     with store.changing() as change:
-        change.stage(plan)
+        change.stage(accepted(plan))
         change.replace(old, plan)
 
 

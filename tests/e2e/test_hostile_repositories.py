@@ -42,7 +42,7 @@ def person(
     made = Person(tmp_path / "data", capsys, monkeypatch)
     file = tmp_path / "good.zip"
     file.write_bytes(GOOD.data)
-    made.does("install", str(file), "--yes")
+    made.does("install", str(file), "--yes", "--allow-unsigned", "widgets/good")
     assert made.holds()
     return made
 
@@ -125,7 +125,7 @@ def test_an_archive_that_tries_to_escape_is_refused(person: Person, tmp_path: Pa
         person.does("repo", "add", url)
         for word, name in names.items():
             began = time.process_time()
-            complaint = person.refuses("install", word, "--yes")
+            complaint = person.refuses("install", word, "--yes", "--allow-unsigned", word)
             assert time.process_time() - began < 10, name
             is_too_large = len(made[name]) > PACKAGE.archive_bytes
             assert ("more than the" if is_too_large else told[name]) in complaint, name
@@ -238,7 +238,7 @@ def test_a_package_that_says_less_than_its_index_is_refused(person: Person) -> N
     entry = IndexEntry("widget", "dial", false.version, DIAL.digest, len(DIAL.data))
     with server(evil(says(DIAL.data), Index(1, "evil", (entry,)).to_bytes())) as url:
         person.does("repo", "add", url)
-        told = person.refuses("install", "dial", "--yes")
+        told = person.refuses("install", "dial", "--yes", "--allow-unsigned", "dial")
     assert "widgets/dial 9.0.0: found widgets/dial 1.0.0" in told
 
 

@@ -29,7 +29,9 @@ from tests.e2e.processes import UrcProcess
 from tests.e2e.test_languages import check
 from tests.unit.packages.made import DOCUMENTS
 from urc.packages.index_builder import make_index
+from urc.packages.index_head import IndexSigner
 from urc.packages.repositories import Repositories
+from urc.packages.signature import read_signer
 from urc.packages.store import Store
 from urc.runtime.open_profile import open_document
 from urc.runtime.settings_store import SettingsStore
@@ -181,9 +183,10 @@ async def test_add_an_interface(
     data = has["full"]
     set_up(data, 1)
     with Store(data / "packages").changing() as change:
-        from urc.packages.names import parse_requirement
+        from urc.packages.names import PackageId, parse_requirement
 
         change.remove(parse_requirement("interfaces/wide"))
+        change.forget_key(PackageId("interface", "wide"))
     async with running_managed(data) as address:
         page = await new_page()
         new_page.allow(page, lambda text: "422" in text)
@@ -197,6 +200,7 @@ async def test_add_an_interface(
             file.write_text(text, encoding="utf-8")
             await page.get_by_label("Or a file of this device").set_input_files(file)
             await page.get_by_role("button", name="Upload").click()
+            await page.get_by_label("Accept interfaces/wide without a signature").check()
         await agree(page)
         mine = row(page, "installed", "interfaces/wide")
         await expect(mine).to_contain_text("offered on: Rover")
@@ -307,7 +311,9 @@ async def test_an_update_says_what_it_changes_and_can_be_taken_back(
     newer = tmp_path / "newer"
     fill_lab(newer)
     newer_rover(newer)
-    make_index(newer, "Lab", lambda _: [])
+    keeper = read_signer(shop.lab.parent / "keeper.pem")
+    assert keeper is not None
+    make_index(newer, "Lab", lambda _: [], IndexSigner(keeper))
     with static_server(newer) as url:
         known = Repositories(data / "packages", print)
         known.remove(shop.url)

@@ -11,11 +11,12 @@ from urllib.parse import urlsplit
 
 import pytest
 from anyio import to_thread
-from playwright.async_api import expect
+from playwright.async_api import FilePayload, expect
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.managing import running_managed
-from tests.unit.packages.made import DOCUMENTS, write_package
+from tests.unit.packages.made import DOCUMENTS, package, write_package
+from urc.packages.sources import make_bundle
 from urc.packages.store import Store
 from urc.testing.entry import HERE_COOKIE
 
@@ -43,6 +44,34 @@ async def test_what_a_package_uses_by_itself_needs_a_tick(
         await expect(dialog).to_contain_text("✓ installed")
         (lock,) = Store(tmp_path / "packages").installed()
         assert str(lock) == "drivers/key-user 1.0.0"
+
+
+async def test_an_unsigned_upload_is_refused_until_each_package_is_accepted_by_name(
+    new_page: PageMaker, tmp_path: Path
+) -> None:
+    """The page names the packages without a signature, and offers one waiver for each."""
+    bot = package("driver", "bot", needs={"widgets/dial": "*"})
+    dial = package("widget", "dial")
+    bundle = make_bundle(
+        bot.manifest.key, {one.digest: one.data for one in (bot, dial)}, {}, "bundle"
+    )
+    upload: FilePayload = {"name": "bot.urcof", "mimeType": "application/zip", "buffer": bundle}
+    async with running_managed(tmp_path) as address:
+        page = await new_page(size="tablet")
+        await page.goto(f"{address}interfaces")
+        await page.get_by_label("Or a file of this device").set_input_files(upload)
+        await page.get_by_role("button", name="Upload").click()
+        dialog = page.get_by_role("dialog")
+        await expect(dialog.get_by_text("Refused: not signed")).to_be_visible()
+        install = dialog.get_by_role("button", name="Install")
+        await expect(install).to_be_disabled()
+        await dialog.get_by_label("Accept drivers/bot without a signature").check()
+        await expect(install).to_be_disabled()
+        await dialog.get_by_label("Accept widgets/dial without a signature").check()
+        await install.click()
+        await expect(dialog).to_contain_text("✓ installed")
+    (lock,) = Store(tmp_path / "packages").installed()
+    assert str(lock) == "drivers/bot 1.0.0"
 
 
 class Asker:

@@ -20,6 +20,7 @@ from tests.e2e.keys import headers_for
 from tests.e2e.package_people import Person
 from tests.e2e.processes import ROOT, UrcProcess
 from tests.unit.packages.made import package, write_package
+from urc.packages.signature import new_signer
 
 DRIVER_WIDGETS = "widgets:\n  battery: { use: dial, bind: { level: battery } }\n"
 ROBOT = """\
@@ -56,7 +57,11 @@ def person(others: Callable[[str], Person]) -> Person:
 
 @contextmanager
 def repository(folder: Path) -> Iterator[str]:
-    process = UrcProcess(["repo", "serve", str(folder), "--port", "0", "--name", "Lab"], {})
+    key = folder.parent / "keeper.pem"
+    if not key.exists():
+        new_signer("Keeper", key)
+    words = ["repo", "serve", str(folder), "--port", "0", "--name", "Lab", "--key", str(key)]
+    process = UrcProcess(words, {})
     try:
         yield process.wait_for(r"^repository (http://\S+)$")[1]
         process.interrupt()
@@ -94,7 +99,7 @@ def test_a_robot_is_got_once_and_driven_for_ever_without_a_network(
     fill(tmp_path / "lab")
     with repository(tmp_path / "lab") as url:
         assert f"added {url}: Lab, 4 versions of packages" in person.does("repo", "add", url)
-        assert person.does("repo", "list") == f"{url}\n"
+        assert person.does("repo", "list").startswith(f"{url}  signed by Keeper (SHA256:")
         assert person.does("repo", "search", "DIAL") == "widgets/dial 1.0.0  The widget dial.\n"
         assert "use --yes to confirm in advance" in person.does("install", "my-puppet", code=2)
         assert person.does("list") == ""
@@ -166,16 +171,18 @@ def test_the_same_folder_works_on_any_static_server(
     """`urc repo index` writes all that is needed; a new version appears beside the old one."""
     lab = tmp_path / "lab"
     fill(lab)
-    assert "4 versions of packages" in person.does("repo", "index", str(lab))
+    key = tmp_path / "keeper.pem"
+    new_signer("Keeper", key)
+    assert "4 versions of packages" in person.does("repo", "index", str(lab), "--key", str(key))
     first = (lab / "index.json").read_bytes()
-    person.does("repo", "index", str(lab))
+    person.does("repo", "index", str(lab), "--key", str(key))
     assert (lab / "index.json").read_bytes() == first
     with server(functools.partial(_Quiet, directory=str(lab))) as url:
         person.does("repo", "add", url)
         lock = tmp_path / "bot.lock"
         person.does("install", "drivers/puppet", "--yes", "--lock", str(lock))
         write_package(lab, "widget", "dial", "1.1.0", more="new")
-        assert "5 versions of packages" in person.does("repo", "index", str(lab))
+        assert "5 versions of packages" in person.does("repo", "index", str(lab), "--key", str(key))
         assert person.does("search", "dial") == "widgets/dial 1.1.0  The widget dial.\n"
         assert person.does("list", "--updates") == (
             "drivers/puppet 1.0.0  with widgets/dial 1.0.0 → 1.1.0\n"
@@ -222,6 +229,7 @@ def test_a_bundle_goes_where_no_network_is(
     fill(tmp_path / "lab")
     one, two = tmp_path / "one.urcof", tmp_path / "two.urcof"
     robot = str(tmp_path / "lab/robots/my-puppet")
+    person.does("repo", "key", "new", "Anna")
     assert "4 packages" in person.does("bundle", robot, "--to", str(one))
     other = others("other")
     other.does("install", str(one), "--yes")
@@ -240,6 +248,28 @@ def test_a_bundle_goes_where_no_network_is(
         assert told.startswith("urc install: ")
         assert told.count("\n") == 1
     assert other.holds() == before
+
+
+def test_an_unsigned_bundle_needs_a_waiver_of_each_package(
+    tmp_path: Path, person: Person, others: Callable[[str], Person]
+) -> None:
+    """By an option for one installation, or by a stored waiver that is listed."""
+    fill(tmp_path / "lab")
+    bundle = str(tmp_path / "one.urcof")
+    person.does("bundle", str(tmp_path / "lab/drivers/puppet"), "--to", bundle)
+    other = others("other")
+    told = other.refuses("install", bundle, "--yes")
+    assert "drivers/puppet 1.0.0 and widgets/dial 1.0.0 are not signed" in told
+    told = other.refuses("install", bundle, "--yes", "--allow-unsigned", "puppet")
+    assert "add: --allow-unsigned widgets/dial" in told
+    assert other.does("list") == ""
+    other.does("repo", "unsigned", "add", "widgets/dial")
+    assert other.does("repo", "unsigned", "list") == "widgets/dial\n"
+    other.does("install", bundle, "--yes", "--allow-unsigned", "drivers/puppet")
+    assert other.does("list") == "drivers/puppet 1.0.0  with widgets/dial 1.0.0\n"
+    other.does("repo", "unsigned", "remove", "widgets/dial")
+    assert other.does("repo", "unsigned", "list") == ""
+    assert "expected 'urc repo unsigned' with" in other.does("repo", "unsigned", "x", code=2)
 
 
 def test_a_package_may_not_reach_out_or_replace_what_ships(tmp_path: Path, person: Person) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from urc.cli.error_report import Misuse
 from urc.cli.output import complain
-from urc.cli.packages import add_risks
+from urc.cli.packages import add_risks, add_waivers
 from urc.cli.update import difference_lines
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with --yes: also accept new permissions compared with another installed version",
     )
     add_risks(parser)
+    add_waivers(parser)
     parser.add_argument(
         "--signed-by",
         metavar="SHA256:…",
@@ -53,7 +54,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Show the permissions, ask for confirmation, and install the package."""
-    from urc.cli.packages import is_agreed_to, is_path, keep_in_use, open_store, planned, used_lock
+    from urc.cli.packages import (
+        is_agreed_to,
+        is_path,
+        keep_in_use,
+        open_store,
+        planned,
+        used_lock,
+        waived,
+    )
     from urc.packages.atomic_files import put_file
     from urc.packages.install import origin_lines
     from urc.runtime.isolation import PreviewWorker
@@ -65,6 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
             "a lock file selects versions from repositories, so a package name is required"
         )
     plan = planned(arguments.package, pinned, takes_withdrawn=arguments.withdrawn)
+    plan = waived(plan, arguments)
     store = open_store()
     with store.changing() as change:
         folder = change.stage(plan)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "add_risks",
+    "add_waivers",
     "installed_document",
     "is_agreed",
     "is_agreed_to",
@@ -36,6 +37,7 @@ __all__ = [
     "search_repositories",
     "signer",
     "used_lock",
+    "waived",
 ]
 
 
@@ -138,6 +140,30 @@ def add_risks(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="also accept keys, files, programs or hosts that the package itself specifies",
     )
+
+
+def add_waivers(parser: argparse.ArgumentParser) -> None:
+    """Declare the option that accepts packages without a signature, by name."""
+    parser.add_argument(
+        "--allow-unsigned",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="accept the package NAME, such as drivers/puppet, without a signature; repeatable",
+    )
+
+
+def waived(plan: "InstallPlan", arguments: argparse.Namespace) -> "InstallPlan":
+    """Return the plan with the waivers of `--allow-unsigned`; raise `PackageError`."""
+    from urc.packages.names import parse_requirement
+
+    words = [parse_requirement(word) for word in arguments.allow_unsigned]
+    names = (
+        name
+        for name, key in ((name, parse_requirement(name)) for name in plan.lock.packages)
+        if any(one.name == key.name and one.kind in ("", key.kind) for one in words)
+    )
+    return plan._replace(waived=frozenset(names))
 
 
 def is_agreed(question: str) -> bool:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from urc.cli.arguments import add_host, is_loopback, port
 from urc.cli.error_report import Misuse
 from urc.cli.output import complain
+from urc.cli.repo_keys import key, unsigned
 
 if TYPE_CHECKING:
     from urc.packages.index_head import IndexSigner
@@ -41,35 +42,6 @@ def token(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def key(arguments: argparse.Namespace) -> int:
-    """Create or show the user's key, list the pinned keys, or delete a pinned key."""
-    from urc._folders import data_folder
-    from urc.cli.packages import open_store
-    from urc.packages.names import parse_key
-    from urc.packages.signature import PUBLISHER, fingerprint, new_signer, read_signer
-
-    file: Path = arguments.key or data_folder() / PUBLISHER
-    match arguments.words:
-        case ["new", name]:
-            made = new_signer(name, file)
-            print(f"{made}, in {file}: keep a private backup of this file")
-        case ["show"]:
-            own = read_signer(file)
-            if own is None:
-                raise Misuse(f"{file}: there is no key; create one with 'urc repo key new NAME'")
-            print(own)
-        case ["list"]:
-            for name, kept in sorted(open_store().state().keys.items()):
-                print(f"{name}  {fingerprint(kept)}")
-        case ["forget", name]:
-            with open_store().changing() as change:
-                change.forget_key(parse_key(name))
-            print(f"deleted the pinned key of {name}; the next installation pins a new key")
-        case _:
-            raise Misuse("expected 'urc repo key' with new NAME, show, list or forget PACKAGE")
-    return 0
-
-
 EXAMPLE = "urc repo add http://192.168.1.5:8090/"
 
 _PORT = 8090
@@ -87,7 +59,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=tuple(_ACTIONS),
         help="add URL, remove URL, list, search WORD…, index DIR, serve DIR,"
         " withdraw DIR PACKAGE VERSION, restore DIR PACKAGE VERSION;"
-        " token add|remove NAME, token list; key new NAME, key show, key list, key forget PACKAGE",
+        " token add|remove NAME, token list; key new NAME, key show, key list, key forget PACKAGE;"
+        " unsigned add|remove PACKAGE, unsigned list",
     )
     parser.add_argument(
         "words", metavar="URL|WORD|DIR|NAME", nargs="*", help="arguments of the action"
@@ -327,4 +300,5 @@ _ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "restore": _restore,
     "token": token,
     "key": key,
+    "unsigned": unsigned,
 }

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from urc.cli.error_report import Misuse
 from urc.cli.output import complain
-from urc.cli.packages import add_risks
+from urc.cli.packages import add_risks, add_waivers
 
 if TYPE_CHECKING:
     from urc.packages.install_plan import InstallPlan
@@ -33,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--allow-more", action="store_true", help="with --yes: also accept new permissions"
     )
     add_risks(parser)
+    add_waivers(parser)
     parser.add_argument("--back", action="store_true", help="undo the last update of NAME")
 
 
@@ -40,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Update packages, or undo an update; return 1 after a failure."""
     if arguments.back:
         return _back(arguments)
-    from urc.cli.packages import known_repositories, open_store
+    from urc.cli.packages import known_repositories, open_store, waived
 
     store, known = open_store(), known_repositories()
     code = 0
@@ -53,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
             plan = plan_update(lock, known, store, complain, wanted)
             if plan is None:
                 print(f"{lock} is up to date")
-            elif not _update(lock, plan, store, arguments):
+            elif not _update(lock, waived(plan, arguments), store, arguments):
                 code = 1
         except PackageError as error:  # other packages can still be updated
             complain(f"urc update: {error}")

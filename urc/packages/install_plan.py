@@ -23,5 +23,7 @@ class InstallPlan(NamedTuple):
     """Packages from a folder that the user named. The pinned keys of these packages are not
     checked.
     """
+    waived: frozenset[str] = frozenset()
+    """Packages that the user accepts without a signature in this installation."""
     remarks: Mapping[str, str] = {}
     """Remarks of repositories about withdrawals and origins, by digest."""

@@ -24,6 +24,8 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
     """
     before: dict[str, Lock] = {}
     """Previous lock for undoing the last update, by digest of the installed lock."""
+    waived: tuple[str, ...] = ()
+    """Packages that the user accepts without a signature in every installation, sorted."""
 
     def with_installed(self, plan: InstallPlan) -> "StoreState":
         """Return the state after installing a plan.
@@ -66,6 +68,19 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
         keys = {name: one for name, one in self.keys.items() if name != str(key)}
         return msgspec.structs.replace(self, keys=keys)
 
+    def with_waiver(self, key: PackageId) -> "StoreState":
+        """Return the state that accepts a package without a signature."""
+        return msgspec.structs.replace(self, waived=tuple(sorted({*self.waived, str(key)})))
+
+    def without_waiver(self, key: PackageId) -> "StoreState":
+        """Return the state that requires the signature of a package; raise `PackageError`."""
+        if str(key) not in self.waived:
+            known = ", ".join(self.waived) or "none"
+            raise PackageError(f"{key} has no waiver; waivers exist for: {known}")
+        return msgspec.structs.replace(
+            self, waived=tuple(one for one in self.waived if one != str(key))
+        )
+
     @property
     def kept(self) -> tuple[Lock, ...]:
         """All locks with archives that are still needed."""
@@ -75,7 +90,8 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
         """Raise `PackageError` for a plan that contradicts the state.
 
         The state rejects different bytes of a known version, invalid signatures, and keys that
-        differ from the pinned key. A missing signature is rejected if a key is pinned.
+        differ from the pinned key. The state also rejects a missing signature, except for the
+        packages of `lacking`.
         """
         for name, pin in plan.lock.packages.items():
             self._check_known(name, pin)
@@ -92,6 +108,29 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
                 " the first installation; if its publisher confirms the change, run"
                 f" 'urc repo key forget {name}' and install the package again"
             )
+        if lacking := self.lacking(plan):
+            names = [f"{name} {plan.lock.packages[name].version}" for name in lacking]
+            options = " ".join(f"--allow-unsigned {name}" for name in lacking)
+            raise PackageError(
+                f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} not signed, so anyone"
+                f" could have changed the content; to accept it anyway, add: {options}"
+            )
+
+    def lacking(self, plan: InstallPlan) -> list[str]:
+        """Return the packages of a plan without the required signature.
+
+        Packages from a named folder, packages with a waiver, and the exact bytes of installed
+        packages need no signature.
+        """
+        known = {(name, pin) for lock in self.kept for name, pin in lock.packages.items()}
+        accepted = {*plan.own, *plan.waived, *self.waived}
+        return [
+            name
+            for name, pin in plan.lock.packages.items()
+            if pin.sha256 not in plan.signatures
+            and name not in accepted
+            and (name, pin) not in known
+        ]
 
     def _check_known(self, name: str, pin: Pin) -> None:
         """Reject different bytes of a known version, because the change would be silent."""
@@ -119,6 +158,7 @@ class StoreState(msgspec.Struct, frozen=True, omit_defaults=True):
             tuple(sorted(installed, key=lambda lock: (lock.root, lock.number))),
             keys,
             {digest: lock for digest, lock in before.items() if digest in digests},
+            self.waived,
         )
 
 

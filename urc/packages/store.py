@@ -268,6 +268,14 @@ class StoreTransaction:
         """
         self._store.write_state(self._store.state().without_key(key))
 
+    def waive(self, key: PackageId) -> None:
+        """Accept a package without a signature in every installation."""
+        self._store.write_state(self._store.state().with_waiver(key))
+
+    def end_waiver(self, key: PackageId) -> None:
+        """Require a signature of a package again; raise `PackageError`."""
+        self._store.write_state(self._store.state().without_waiver(key))
+
 
 def _check_needs(said: Manifest, lock: Lock) -> None:
     """Check that the index and the package declare the same dependencies."""

@@ -9,6 +9,7 @@ import msgspec
 from urc.packages.archive import PACKAGE, write_archive
 from urc.packages.index import IndexEntry
 from urc.packages.install import plan_file
+from urc.packages.install_plan import InstallPlan
 from urc.packages.lock import Lock
 from urc.packages.package import Package, open_package, sha256
 from urc.packages.signature import Signature
@@ -19,6 +20,7 @@ from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
 
 __all__ = [
     "DOCUMENTS",
+    "accepted",
     "assert_whole",
     "entry",
     "files_of",
@@ -116,15 +118,23 @@ def install(
     *packages: Package,
     signatures: Mapping[str, Signature] | None = None,
     is_folder: bool = False,
+    waives: bool = True,
 ) -> Lock:
-    """Install the first of some packages; the others are what it may need."""
+    """Install the first of some packages, signed or not; the others are its dependencies."""
     root = packages[0].manifest.key
     source = FileSource("test", packages, [root], signatures, is_folder=is_folder)
     plan = plan_file(source, (), store, lambda line: None)
+    if waives:
+        plan = accepted(plan)
     with store.changing() as change:
         change.stage(plan)
         change.commit(plan)
     return plan.lock
+
+
+def accepted(plan: InstallPlan) -> InstallPlan:
+    """Return the plan with a waiver of every signature."""
+    return plan._replace(waived=frozenset(plan.lock.packages))
 
 
 def keep_settings(data: Path, name: str, settings: Mapping[str, str]) -> None:

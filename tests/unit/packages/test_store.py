@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.unit.packages.made import assert_whole, install, package
+from tests.unit.packages.made import accepted, assert_whole, install, package
 from urc.packages import atomic_files
 from urc.packages.install_plan import InstallPlan
 from urc.packages.lock import LOCK, read_lock
@@ -138,7 +138,9 @@ def test_bytes_that_are_not_those_of_the_lock_are_refused(store: Store) -> None:
         pytest.raises(PackageError, match="the archive does not match the digest in the lock"),
         store.changing() as change,
     ):
-        change.stage(InstallPlan(lock, {BOT.digest: BOT.data, DIAL.digest: DIAL_2.data}, {}, {}))
+        change.stage(
+            accepted(InstallPlan(lock, {BOT.digest: BOT.data, DIAL.digest: DIAL_2.data}, {}, {}))
+        )
     assert store.installed() == ()
     assert files_below(store.folder) == ["changing"]
 
@@ -148,7 +150,7 @@ def test_what_was_staged_but_not_agreed_to_is_gone(store: Store) -> None:
     lock = install(Store(store.folder.parent / "other"), BOT, DIAL)
     with store.changing() as change:
         plan = InstallPlan(lock, {BOT.digest: BOT.data, DIAL.digest: DIAL.data}, {}, {})
-        assert change.stage(plan).is_dir()
+        assert change.stage(accepted(plan)).is_dir()
     assert files_below(store.folder) == ["changing"]
 
 
@@ -223,7 +225,7 @@ def update(store: Store) -> None:
     plan = plan_update(old, [FileSource("lab", [BOT_2, DIAL_2], [old.key])], store, print)
     assert plan is not None
     with store.changing() as change:
-        change.stage(plan)
+        change.stage(accepted(plan))
         change.replace(old, plan)
 
 

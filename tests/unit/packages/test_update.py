@@ -7,7 +7,7 @@ from typing import NamedTuple
 import msgspec
 import pytest
 
-from tests.unit.packages.made import assert_whole, install, package
+from tests.unit.packages.made import accepted, assert_whole, install, package
 from urc.packages.index import IndexEntry
 from urc.packages.install import plan_requirement
 from urc.packages.lock import Lock
@@ -57,7 +57,7 @@ def update(store: Store, old: Lock, *packages: Package, wanted: str = "*") -> Lo
     plan = plan_update(old, [source(*packages)], store, silent, wanted)
     assert plan is not None
     with store.changing() as change:
-        change.stage(plan)
+        change.stage(accepted(plan))
         change.replace(old, plan)
     return plan.lock
 
@@ -133,7 +133,7 @@ def test_what_changes_is_shown_before(store: Store) -> None:
     plan = plan_update(old, [source(BOT_2, DIAL_2)], store, silent)
     assert plan is not None
     with store.changing() as change:
-        difference = staged_difference(old, plan, store, change.stage(plan), look)
+        difference = staged_difference(old, plan, store, change.stage(accepted(plan)), look)
     assert difference.versions == ["drivers/bot 1.0.0 → 2.0.0", "widgets/dial 1.0.0 → 2.0.0"]
     assert (difference.gained, difference.lost) == (["is 2.0.0"], ["is 1.0.0"])
     assert difference.wire == ["- send: 1.0.0", "+ send: 2.0.0", "+ more: x"]
@@ -203,5 +203,5 @@ def test_an_index_that_tells_other_needs_than_the_package_is_found_out(store: St
         ),
         store.changing() as change,
     ):
-        change.stage(plan)
+        change.stage(accepted(plan))
     assert assert_whole(store) == []

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from tests.unit.packages.made import install, package, write_package
+from tests.unit.packages.made import accepted, install, package, write_package
 from tests.unit.web.test_manage_routes import fleet_of, served
 from urc.cli.main import main
 from urc.cli.packages import RISKS_FLAG, installed_document
@@ -45,8 +45,9 @@ def asked(client: TestClient, path: str, **how: Any) -> dict[str, Any]:
     raise AssertionError(job)
 
 
-def agree(client: TestClient, job: dict[str, Any], **more: bool) -> Any:
-    return client.post("/api/v1/job/agree", json={"number": job["number"], **more})
+def agree(client: TestClient, job: dict[str, Any], **more: object) -> Any:
+    said = {"number": job["number"], "unsigned": job["unsigned"], **more}
+    return client.post("/api/v1/job/agree", json=said)
 
 
 def update(store: Store, newer: Package) -> None:
@@ -55,7 +56,7 @@ def update(store: Store, newer: Package) -> None:
     source = FileSource("test", [newer], [newer.manifest.key])
     plan = plan_file(source, (), store, lambda line: None)
     with store.changing() as change:
-        change.stage(plan)
+        change.stage(accepted(plan))
         change.replace(old, plan)
 
 
@@ -98,6 +99,23 @@ def test_another_version_shows_what_it_changes_and_waits_to_be_chosen(
     with served(tmp_path) as client:
         client.get("/")
         assert speed_of(client) == "drive -1"
+
+
+def test_an_unsigned_upload_needs_a_waiver_by_name(tmp_path: Path) -> None:
+    """A package from a path on this machine is the user's own, and needs none."""
+    store = stock(tmp_path)
+    with served(tmp_path) as client:
+        assert asked(client, "add", **WAYS["add"])["unsigned"] == []
+        job = asked(client, "upload?name=rover.zip", **WAYS["upload?name=rover.zip"])
+        assert job["unsigned"] == ["drivers/rover"]
+        for names in ([], ["drivers/other"], ["rover"]):
+            refused = agree(client, job, unsigned=names)
+            assert refused.status_code == 422
+            assert "drivers/rover: not signed: approve each package" in refused.json()["error"]
+        assert [lock.version for lock in store.installed()] == ["1.0.0"]
+        assert agree(client, job).json()["state"] == "done"
+    assert [lock.version for lock in store.installed()] == ["1.0.0", "2.0.0"]
+    assert store.state().waived == ()
 
 
 def test_another_version_is_not_chosen_by_a_restart(tmp_path: Path) -> None:

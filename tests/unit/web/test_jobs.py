@@ -8,7 +8,7 @@ from anyio import to_thread
 
 from tests.unit.packages.made import package
 from urc.packages.index import IndexEntry, entry_of
-from urc.packages.names import parse_requirement
+from urc.packages.names import PackageError, parse_requirement
 from urc.packages.package import Package
 from urc.packages.sources import FileSource
 from urc.packages.store import Store
@@ -72,7 +72,9 @@ async def test_a_stalled_repository_holds_up_nobody(tmp_path: Path) -> None:
         stalled.goes_on.set()
     await jobs.planned()
     assert second.news().state == "asks"
-    await jobs.agree(second.number)
+    with pytest.raises(PackageError, match="widgets/lamp: not signed"):
+        await jobs.agree(second.number)
+    await jobs.agree(second.number, unsigned=["widgets/lamp"])
     assert [str(lock) for lock in store.installed()] == ["widgets/lamp 1.0.0"]
     assert job.news().state == "cancelled"
     await jobs.close()

@@ -54,6 +54,8 @@ class _Planned(NamedTuple):
     may: tuple[str, ...]
     risks: tuple[str, ...] = ()
     """Resources of this machine that the package uses without any setting by the user."""
+    unsigned: tuple[str, ...] = ()
+    """Packages without the required signature, such as ``widgets/dial``."""
     old: Lock | None = None
     """The version that an update replaces; None for a new installation."""
     stays: Lock | None = None
@@ -94,6 +96,7 @@ class Job:
             packages=_clean(changes.versions if changes is not None else packages),
             may=_clean(planned.may if planned is not None else ()),
             risks=_clean(planned.risks if planned is not None else ()),
+            unsigned=_clean(planned.unsigned if planned is not None else ()),
             gained=_clean(changes.gained if changes is not None else ()),
             lost=_clean(changes.lost if changes is not None else ()),
             wire=_clean(changes.wire if changes is not None else ())[:_WIRE_MOST],
@@ -181,16 +184,20 @@ class Jobs:
             return None, None
         return planned.plan.lock.key, None if planned.old else self._used(planned.plan.lock.key)
 
-    async def agree(self, number: int, *, takes_risks: bool = False) -> Job:
+    async def agree(
+        self, number: int, *, takes_risks: bool = False, unsigned: Iterable[str] = ()
+    ) -> Job:
         """Install the planned package.
 
         Args:
             number: number of the job.
             takes_risks: whether the user also approved the package's own access to this machine.
+            unsigned: packages that the user accepts without a signature, by name.
 
         Raises:
             Busy: the job is not waiting for approval.
-            PackageError: the package requires `takes_risks`, but `takes_risks` is false.
+            PackageError: the package requires `takes_risks`, but `takes_risks` is false, or the
+                signature of a package is neither present nor waived.
         """
         job = self._asked(number)
         planned = job.planned
@@ -200,9 +207,14 @@ class Jobs:
             raise PackageError(
                 f"{planned.plan.lock} has its own access to this machine: approve this access too"
             )
+        plan = planned.plan._replace(waived=frozenset(unsigned))
+        if lacks := [one for one in planned.unsigned if one not in plan.waived]:
+            raise PackageError(
+                f"{', '.join(lacks)}: not signed: approve each package by name, or give up"
+            )
         job.state, job.line = "working", _INSTALLING
         try:
-            await asyncio.to_thread(self._install, planned)
+            await asyncio.to_thread(self._install, planned._replace(plan=plan))
         except (UrcError, OSError) as error:
             job.state, job.line = "failed", _line(error)
         else:
@@ -267,7 +279,9 @@ class Jobs:
         job.line = phrase("reading what it may do")
         old = what if isinstance(what, Lock) else None
         with self._store.changing() as change:
-            folder = change.stage(plan)
+            unsigned = tuple(self._store.state().lacking(plan))
+            # The preview needs the files; the installation needs the user's waivers.
+            folder = change.stage(plan._replace(waived=frozenset(unsigned)))
             lock = plan.lock
             widgets = [key.name for key in kinds_in(lock, "widget")]
             document = folder / lock.root / f"{lock.key.kind}.yaml"
@@ -283,7 +297,7 @@ class Jobs:
         origins = origin_lines(plan, self._store)
         risks = seen.risks if changes is None else changes.risks
         may = tuple(seen.permissions)
-        return _Planned(plan, tuple(origins), may, tuple(risks), old, stays, changes)
+        return _Planned(plan, tuple(origins), may, tuple(risks), unsigned, old, stays, changes)
 
     def _changes(
         self, job: Job, before: Lock | None, plan: InstallPlan, folder: Path, look: PreviewWorker

@@ -244,7 +244,9 @@ class Manager:
         await self.changed()
         return gone
 
-    async def agree(self, number: int, *, takes_risks: bool = False) -> Job:
+    async def agree(
+        self, number: int, *, takes_risks: bool = False, unsigned: Iterable[str] = ()
+    ) -> Job:
         """Install the planned package; raise `Busy` while its robot is being driven.
 
         The version in use stays in use, unless the job is an update.
@@ -254,7 +256,7 @@ class Manager:
             self._check_idle_of(key)
         if used is not None and used.key.kind in DRIVEN:
             await asyncio.to_thread(pin, self._kept_folder, used)
-        job = await self.jobs.agree(number, takes_risks=takes_risks)
+        job = await self.jobs.agree(number, takes_risks=takes_risks, unsigned=unsigned)
         await self.changed()
         return job
 

@@ -329,7 +329,9 @@ class ManageRoutes:
         """Install the planned package."""
         self.check(request)
         said = await body_of(request, JobDecision)
-        job = await self._manager.agree(said.number, takes_risks=said.takes_risks)
+        job = await self._manager.agree(
+            said.number, takes_risks=said.takes_risks, unsigned=said.unsigned
+        )
         return answer(job.news())
 
     @_api

@@ -69,7 +69,9 @@ def source_at(path: Path, installed: Sequence[Lock]) -> FileSource:
         if path.is_dir():
             raise PackageError(f"{path}: there is neither {MANIFEST} nor interface.yaml") from None
         raise PackageError(f"{path}: {error.strerror or error}") from None
-    return _wrapped(bare.name, data, installed)
+    source = _wrapped(bare.name, data, installed)
+    source.is_folder = True  # the user named the file on this machine, so it is the user's own
+    return source
 
 
 def _wrapped(name: str, data: bytes, installed: Sequence[Lock]) -> FileSource:

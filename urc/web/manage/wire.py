@@ -83,6 +83,8 @@ class JobDecision(ManageMessage, frozen=True):
     number: int
     takes_risks: bool = False
     """Whether the user also approved the package's own access to this machine."""
+    unsigned: Annotated[tuple[_Short, ...], msgspec.Meta(max_length=128)] = ()
+    """Packages that the user accepts without a signature, such as ``widgets/dial``."""
 
 
 JobState = Literal["working", "asks", "done", "failed", "cancelled"]
@@ -108,6 +110,9 @@ class JobNews(ManageMessage, frozen=True):
     risks: tuple[str, ...] = ()
     """Access to this machine that the package has without a setting; for an update, only additional
     access."""
+    unsigned: tuple[str, ...] = ()
+    """Packages without the required signature, such as ``widgets/dial``. Each package must be
+    approved by name."""
     gained: tuple[str, ...] = ()
     """Permissions that the update adds."""
     lost: tuple[str, ...] = ()

@@ -135,7 +135,7 @@ export class JobDialog {
         isAsking &&
           button(isSwap(job) ? t("Update") : t("Install"), "yes", () => void this.agree(job), {
             class: "urc-button-main",
-            disabled: job.risks.length > 0,
+            disabled: job.risks.length > 0 || job.unsigned.length > 0,
           }),
         isOver
           ? button(t("Close"), "close", () => this.close(), { class: "urc-button-main" })
@@ -150,6 +150,7 @@ export class JobDialog {
     const version = job.stays;
     const stays = t("{version} stays in use until another version is chosen in the settings of the robot.", { version });
     return [
+      ...this.unsigned(job),
       ...this.risks(job),
       job.stays !== "" && made("p", { class: "urc-caution" }, `◆ ${stays}`),
       isUpdate && heading(t("What changes")),
@@ -176,11 +177,7 @@ export class JobDialog {
    */
   risks({ risks }) {
     if (risks.length === 0) return [];
-    const yes = this.box(() => {
-      const install = this.el.querySelector("[data-key='yes']");
-      if (install instanceof HTMLButtonElement) install.disabled = !yes.checked;
-    });
-    yes.dataset["key"] = "risks";
+    const yes = this.box("risks");
     return [
       made("h3", { class: "urc-row-title urc-bad" }, `▲ ${t("By itself, without your filling it in")}`),
       made("ul", { class: "urc-list urc-bad", "data-risks": true }, ...risks.map((one) => made("li", {}, one))),
@@ -188,18 +185,55 @@ export class JobDialog {
     ];
   }
 
-  /** @param {() => void} onchange @returns {HTMLInputElement} */
-  box(onchange) {
+  /**
+   * Packages without a signature: refused, unless each package is accepted by name.
+   *
+   * @param {Job} job
+   */
+  unsigned({ unsigned }) {
+    if (unsigned.length === 0) return [];
+    return [
+      made("h3", { class: "urc-row-title urc-bad" }, `▲ ${t("Refused: not signed")}`),
+      made("p", { class: "urc-bad" }, t("Anyone on the way could have changed this. Ask its author for a signed version.")),
+      ...unsigned.map((name) =>
+        made(
+          "label",
+          { class: "urc-check" },
+          this.box(`unsigned ${name}`),
+          " ",
+          t("Accept {name} without a signature", { name }),
+        ),
+      ),
+    ];
+  }
+
+  /**
+   * A required approval: the main button stays disabled until all approvals are checked.
+   *
+   * @param {string} key
+   * @returns {HTMLInputElement}
+   */
+  box(key) {
     const box = document.createElement("input");
     box.type = "checkbox";
-    box.addEventListener("change", onchange);
+    box.dataset["key"] = key;
+    box.addEventListener("change", () => {
+      const all = [...this.el.querySelectorAll("input[type=checkbox]")];
+      const install = this.el.querySelector("[data-key='yes']");
+      const isWhole = all.every((one) => one instanceof HTMLInputElement && one.checked);
+      if (install instanceof HTMLButtonElement) install.disabled = !isWhole;
+    });
     return box;
   }
 
   /** @param {Job} job */
   async agree(job) {
     for (const one of this.el.querySelectorAll("button")) one.disabled = true;
-    const answer = await this.act("job/agree", { number: job.number, takesRisks: job.risks.length > 0 });
+    const answer = await this.act("job/agree", {
+      number: job.number,
+      takesRisks: job.risks.length > 0,
+      unsigned: job.unsigned,
+    });
     if (!answer) this.close();
   }
 }

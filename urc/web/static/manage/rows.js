@@ -13,6 +13,7 @@
  * @property {string[]} packages
  * @property {string[]} may
  * @property {string[]} risks
+ * @property {string[]} unsigned
  * @property {string[]} gained
  * @property {string[]} lost
  * @property {string[]} wire
