@@ -228,7 +228,7 @@ async def talk_over_the_broker(page: Page, port: int) -> None:
     await publish_bytes(port, "lamp/state", PICTURE)
     picture = page.locator(".dev-row img")
     await expect(picture).to_have_count(1)
-    await page.wait_for_function("document.querySelector('.dev-row img').naturalWidth === 1")
+    await page.wait_for_function("() => document.querySelector('.dev-row img').naturalWidth === 1")
     shown = page.locator(".dev-row", has=page.locator("img"))
     await expect(shown).to_contain_text(f"<{len(PICTURE)} bytes, image/png>")
     await page.get_by_label("Topic").fill("lamp/state")

@@ -76,7 +76,7 @@ async def check(page: Page, tag: str) -> None:
     """Fail when the page is in another language, says something in English, or hides a word."""
     await expect(page.locator("html")).to_have_attribute("lang", tag)
     # The attribute is there as soon as the first bytes of the page are.
-    await page.wait_for_function("document.readyState === 'complete'")
+    await page.wait_for_function("() => document.readyState === 'complete'")
     texts: Any = await page.evaluate(TEXTS)
     known = english(tag)
     left = [text for text in texts if any(one.fullmatch(text) for one in known)]
