@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from urc.cli.arguments import parse, profile_path
-from urc.cli.main import VERBS, main
+from urc.cli.main import VERBS, main, module_of
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -16,7 +16,7 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 @pytest.mark.parametrize("verb", VERBS)
 def test_verb_is_a_module_of_three_parts(verb: str) -> None:
     """An example, its arguments, and what it does; each says in a line what it is."""
-    module = import_module(f"urc.cli.{verb}")
+    module = import_module(module_of(verb))
     assert module.__doc__
     assert module.__doc__.startswith(f"`urc {verb}`: ")
     for name in ("add_arguments", "run"):
@@ -27,7 +27,7 @@ def test_verb_is_a_module_of_three_parts(verb: str) -> None:
 @pytest.mark.parametrize("verb", VERBS)
 def test_example_of_a_verb_can_be_typed(verb: str) -> None:
     """The parser takes it as it stands."""
-    module = import_module(f"urc.cli.{verb}")
+    module = import_module(module_of(verb))
     program, named, *words = shlex.split(module.EXAMPLE.partition(" > ")[0])
     assert (program, named) == ("urc", verb)
     assert not isinstance(parse(verb, VERBS[verb], module, words), int)
@@ -40,7 +40,7 @@ def test_help_of_a_verb_shows_its_example(verb: str, capsys: pytest.CaptureFixtu
     output, errors = capsys.readouterr()
     assert errors == ""
     assert output.startswith(f"usage: urc {verb} ")
-    assert output.endswith(f"example:\n  {import_module(f'urc.cli.{verb}').EXAMPLE}\n")
+    assert output.endswith(f"example:\n  {import_module(module_of(verb)).EXAMPLE}\n")
     lines = output.splitlines()
     for line, following in zip(lines, [*lines[1:], ""], strict=True):
         if line.startswith("  -"):
@@ -60,7 +60,7 @@ def test_an_example_names_nothing_that_only_a_checkout_has(
 ) -> None:
     """A robot is named as it can be in any folder; other files are the reader's own."""
     monkeypatch.chdir(tmp_path)
-    module = import_module(f"urc.cli.{verb}")
+    module = import_module(module_of(verb))
     words = shlex.split(module.EXAMPLE.partition(" > ")[0])
     assert not [word for word in words if word.startswith(("robots/", "widgets/", "docs/"))]
     found = parse(verb, VERBS[verb], module, words[2:])

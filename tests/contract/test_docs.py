@@ -12,7 +12,7 @@ import yaml
 
 from tests.documentation import BLOCKS, DOCUMENTS, ROOT, YAML, Block, answers, is_piece, write_files
 from urc.cli.arguments import parse
-from urc.cli.main import VERBS, main
+from urc.cli.main import VERBS, main, module_of
 from urc.config.load import WidgetFolder, check
 from urc.model.values import AlarmLimits, Signal
 from urc.runtime.document_tests import exercise
@@ -96,7 +96,7 @@ def test_a_command_of_the_pages_is_understood(block: Block, command: str) -> Non
             return
         verb, *words = words
     assert verb in VERBS, str(block)
-    module: Any = importlib.import_module(f"urc.cli.{verb}")
+    module: Any = importlib.import_module(module_of(verb))
     assert not isinstance(parse(verb, VERBS[verb], module, words), int), str(block)
 
 

@@ -4,6 +4,7 @@ Layer 4. Each function makes one transaction of an `AccessStore`, so two adminis
 each other's changes. The functions block for some milliseconds: servers call them in a thread.
 """
 
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable
 from typing import Final, NamedTuple
 
@@ -21,6 +22,7 @@ __all__ = [
     "newest_time",
     "overview",
     "principal_named",
+    "replace_passphrase",
 ]
 
 KEYS: Final[frozenset[Way]] = frozenset(("pairing", "token"))
@@ -34,12 +36,16 @@ class PrincipalStatus(NamedTuple):
     owner: str = ""
     """Name of the person whose device this is, or ""."""
     has_passphrase: bool = False
+    passkeys: int = 0
+    """Number of passkeys."""
+    accounts: int = 0
+    """Number of accounts at identity providers (OpenID Connect)."""
     invited_until: float | None = None
     """UTC time at which the newest invitation ends, in seconds; None without an invitation."""
     sign_ins: int = 0
     """Number of sign-ins that have not ended."""
     used_at: float | None = None
-    """UTC time of the last use, in seconds; None without a sign-in."""
+    """UTC time of the last use, in seconds; None without a use."""
 
 
 def overview(store: AccessStore, now: float, *kinds: Kind) -> list[PrincipalStatus]:
@@ -53,6 +59,10 @@ def overview(store: AccessStore, now: float, *kinds: Kind) -> list[PrincipalStat
     with store.transaction() as base:
         directory = store.directory()
         known = {row[0] for row in base.execute("SELECT principal FROM passphrases")}
+        keys = Counter(row[0] for row in base.execute("SELECT principal FROM passkeys"))
+        accounts = Counter(
+            row[0] for row in base.execute("SELECT principal FROM external_accounts")
+        )
         invited = dict(
             base.execute(
                 "SELECT owner, max(ends_at) FROM invitations"
@@ -62,24 +72,30 @@ def overview(store: AccessStore, now: float, *kinds: Kind) -> list[PrincipalStat
         )
     chosen = [one for one in directory.principals.values() if not kinds or one.kind in kinds]
     return [
-        _status(directory, one, one.id in known, invited.get(one.id), now)
+        _status(directory, one, now)._replace(
+            has_passphrase=one.id in known,
+            passkeys=keys[one.id],
+            accounts=accounts[one.id],
+            invited_until=invited.get(one.id),
+        )
         for one in sorted(chosen, key=lambda one: (one.kind, one.name.casefold()))
     ]
 
 
-def _status(
-    directory: Directory, one: Principal, has_passphrase: bool, invited: float | None, now: float
-) -> PrincipalStatus:
+def _status(directory: Directory, one: Principal, now: float) -> PrincipalStatus:
     owner = directory.principals.get(one.owner)
     own = [each for each in directory.sign_ins.values() if each.principal == one.id]
     return PrincipalStatus(
         one,
         owner.name if owner else "",
-        has_passphrase,
-        invited,
-        sum(not each.is_over(now) for each in own),
-        max((each.used_at for each in own), default=None),
+        sign_ins=sum(not each.is_over(now) for each in own),
+        used_at=max((each.used_at for each in own if _was_used(each)), default=None),
     )
+
+
+def _was_used(one: SignIn) -> bool:
+    """Return whether a sign-in was used; opening a browser's sign-in is a use."""
+    return one.way not in KEYS or one.used_at > one.created_at
 
 
 def principal_named(directory: Directory, kind: Kind, name: str) -> Principal | None:
@@ -134,6 +150,26 @@ def invite_person(
         base.execute("DELETE FROM invitations WHERE kind = 'person' AND owner = ?", (person.id,))
         invitation = Invitation("person", person.name, person.grants, person.id, ends_at)
         return person, store.invite(invitation, now=now)
+
+
+def replace_passphrase(store: AccessStore, person: str, kept: str) -> int:
+    """Set a person's passphrase, and return the number of ended sign-ins.
+
+    Sign-ins of browsers and invitations end, because they may be the reason for the change. Paired
+    devices stay.
+
+    Args:
+        store: the store.
+        person: id of the person.
+        kept: hash of the passphrase.
+
+    Raises:
+        AccessError: the person is unknown.
+    """
+    with store.transaction() as base:
+        store.set_passphrase(person, kept)
+        base.execute("DELETE FROM invitations WHERE kind = 'person' AND owner = ?", (person,))
+        return end_sign_ins(store, lambda one, _: one.principal == person and one.way not in KEYS)
 
 
 def end_sign_ins(store: AccessStore, is_chosen: Callable[[SignIn, Principal], bool]) -> int:

@@ -22,8 +22,10 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from urc.access.grants import AccessError
 from urc.private_files import put_private
 
-__all__ = ["CertificateAuthority", "ServerCertificate", "fingerprint"]
+__all__ = ["AUTHORITY_FOLDER", "CertificateAuthority", "ServerCertificate", "fingerprint"]
 
+AUTHORITY_FOLDER: Final = "tls"
+"""Folder of the certificates and keys in the data folder."""
 AUTHORITY_LASTS: Final = timedelta(days=3650)
 LEAF_LASTS: Final = timedelta(days=397)
 """Browsers refuse server certificates with a longer life."""

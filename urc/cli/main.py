@@ -8,7 +8,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-__all__ = ["VERBS", "main"]
+__all__ = ["VERBS", "main", "module_of"]
 
 VERBS: dict[str, str] = {
     "demo": "emulate all shipped robots and open the dashboard in a browser",
@@ -34,6 +34,10 @@ VERBS: dict[str, str] = {
     "publish": "publish a package to a repository",
     "trust": "show the host key of an SSH server, and store it after confirmation",
     "audit": "print, export or check the audit log",
+    "people": "manage people, their roles and passphrases",
+    "devices": "pair phones, tablets and computers, and manage them",
+    "tokens": "manage the tokens of programs",
+    "sign-ins": "list and end the sign-ins of browsers, devices and programs",
     "discover": "find robots on the network, serial ports and ROS topics",
     "schema": "print the JSON Schema of a kind of document",
     "doctor": "check the features of this machine",
@@ -89,9 +93,14 @@ def _run(verb: str, rest: list[str]) -> int:
 
     from urc.cli.arguments import parse
 
-    module = import_module(f"urc.cli.{verb}")
+    module = import_module(module_of(verb))
     arguments = parse(verb, VERBS[verb], module, rest)
     return arguments if isinstance(arguments, int) else int(module.run(arguments))
+
+
+def module_of(verb: str) -> str:
+    """Return the name of a subcommand's module."""
+    return f"urc.cli.{verb.replace('-', '_')}"
 
 
 def _usage() -> str:

@@ -91,7 +91,10 @@ def announce(
     from urc.runtime.running_servers import RunningServer, announced
 
     server = RunningServer(
-        _near(ready_dashboard.url, host), ready_dashboard.access.key, os.getpid()
+        _near(ready_dashboard.url, host),
+        ready_dashboard.access.key,
+        os.getpid(),
+        "" if is_loopback(host) else ready_dashboard.url,
     )
     try:
         stack.enter_context(announced(data, ready_dashboard.access.instance, server))

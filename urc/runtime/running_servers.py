@@ -31,6 +31,8 @@ class RunningServer(NamedTuple):
     """Start key."""
     pid: int
     """Process id."""
+    public: str = ""
+    """Base address for other devices; "" if the server accepts clients on this machine only."""
 
 
 def headers(server: RunningServer) -> dict[str, str]:
@@ -89,8 +91,9 @@ def _read(file: Path) -> RunningServer | None:
     try:
         with file.open("rb") as opened:
             said = json.loads(opened.read(_MOST_BYTES))
-        return RunningServer(str(said["address"]), str(said["key"]), int(said["pid"]))
-    except (OSError, ValueError, TypeError, KeyError):
+        public = str(said.get("public", ""))
+        return RunningServer(str(said["address"]), str(said["key"]), int(said["pid"]), public)
+    except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return None
 
 

@@ -35,12 +35,17 @@ def test_an_overview_has_the_state_of_all_credentials(store: AccessStore) -> Non
     store.open_sign_in(ann.id, "passphrase", now=NOW + 5)
     store.open_sign_in(ann.id, "passkey", now=NOW + 1, ends_at=NOW + 10)
     ben, _ = invite_person(store, "Ben", DRIVE, now=NOW, ends_at=NOW + 60)
+    with store.transaction() as base:
+        base.execute(
+            "INSERT INTO passkeys VALUES ('id', ?, 'Phone', 'lab.local', x'00', 0, 1.0, 1.0)",
+            (ann.id,),
+        )
     phone = store.add("device", "Ann's phone", now=NOW, owner=ann.id)
     first, second, third = overview(store, NOW + 20)
     assert (first.principal.id, first.owner, first.sign_ins) == (phone.id, "Ann", 0)
     assert first.used_at is None
     assert (second.principal, second.has_passphrase, second.sign_ins) == (ann, True, 1)
-    assert (second.used_at, second.invited_until) == (NOW + 5, None)
+    assert (second.used_at, second.invited_until, second.passkeys) == (NOW + 5, None, 1)
     assert (third.principal, third.has_passphrase) == (ben, False)
     assert third.invited_until == NOW + 60
     assert [one.principal for one in overview(store, NOW, "device")] == [phone]

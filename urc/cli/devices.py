@@ -1,0 +1,155 @@
+"""`urc devices`: pair phones, tablets and computers, and manage them."""
+
+import argparse
+import time
+from typing import TYPE_CHECKING
+
+from urc.cli.error_report import Misuse
+from urc.cli.identities import (
+    add_actions,
+    add_format,
+    add_roles,
+    change_roles,
+    iso,
+    local_time,
+    minutes_of,
+    named,
+    record,
+    roles_in,
+    roles_text,
+    run_action,
+    show,
+    words_of,
+)
+from urc.cli.output import complain
+from urc.problems import UrcError, printable
+
+if TYPE_CHECKING:
+    from urc.access.store import AccessStore
+
+EXAMPLE = "urc devices pair --name 'Tablet in the lab' --role drive@#lab"
+
+_VALID_S = 120.0
+_USUAL_ROLE = "drive"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command-line arguments: action, roles, owner and format."""
+    add_actions(
+        parser,
+        _ACTIONS,
+        "list; pair: print a link and a QR code that pair one device within 2 minutes;"
+        " grant NAME, revoke NAME, rename NAME NEW, remove NAME",
+    )
+    add_roles(
+        parser,
+        "pair, grant, revoke: watch, drive, maintain or administer; drive@cart is for one robot,"
+        " drive@#lab for a tag; repeatable (pair: drive; revoke without --role: all roles)",
+    )
+    parser.add_argument(
+        "--owner",
+        metavar="PERSON",
+        help="pair: the device belongs to this person, and always has the person's roles",
+    )
+    parser.add_argument(
+        "--name", metavar="TEXT", help="pair: name of the device (default: chosen on the device)"
+    )
+    parser.add_argument(
+        "--address", metavar="URL", help="pair: address of the server for other devices"
+    )
+    add_format(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the action."""
+    return run_action(_ACTIONS, arguments)
+
+
+def _list(store: "AccessStore", arguments: argparse.Namespace) -> int:
+    """List the devices with their owners, roles and last use."""
+    from urc.access.administration import overview
+
+    words_of(arguments, "devices")
+    devices = overview(store, time.time(), "device")
+    rows = [
+        {
+            "id": one.principal.id,
+            "name": one.principal.name,
+            "owner": one.owner or None,
+            "roles": None if one.owner else [str(grant) for grant in one.principal.grants],
+            "is_paired": one.sign_ins > 0,
+            "last_use": iso(one.used_at),
+            "created": iso(one.principal.created_at),
+        }
+        for one in devices
+    ]
+    table = [
+        (
+            one.principal.name,
+            f"roles of {one.owner}" if one.owner else roles_text(one.principal.grants),
+            local_time(one.used_at) if one.sign_ins else "not paired",
+        )
+        for one in devices
+    ]
+    head = ("NAME", "ROLES", "LAST USE")
+    return show(rows, [head, *table], arguments, "no devices yet: 'urc devices pair' pairs one")
+
+
+def _pair(store: "AccessStore", arguments: argparse.Namespace) -> int:
+    """Print a link that pairs one device."""
+    from urc.access.administration import principal_named
+    from urc.access.store import Invitation, parse_name
+    from urc.cli.invitation_links import print_link, server_address
+
+    words_of(arguments, "devices")
+    address = server_address(store.file.parent, arguments.address)
+    if arguments.owner and arguments.roles:
+        raise Misuse("a device has either the roles of its --owner, or roles of its own by --role")
+    owner = named(store, "person", arguments.owner) if arguments.owner else None
+    roles = () if owner else roles_in(arguments.roles or [_USUAL_ROLE])
+    name = parse_name(arguments.name) if arguments.name else ""
+    if name and principal_named(store.directory(), "device", name):
+        raise UrcError(f"a device has the name {name!r} already")
+    now = time.time()
+    invitation = Invitation("device", name, roles, owner.id if owner else "", now + _VALID_S)
+    code = store.invite(invitation, now=now)
+    rights = f"roles of {owner.name}" if owner else roles_text(roles)
+    record(store, "devices pair", name=name, roles=rights)
+    print_link(store.file.parent, address, "pair", code)
+    complain(f"pairs one device ({rights}): works once, valid for {minutes_of(_VALID_S)}")
+    return 0
+
+
+def _roles(store: "AccessStore", arguments: argparse.Namespace) -> int:
+    """Add roles to a device, or take roles away."""
+    return change_roles(store, "device", arguments, "devices")
+
+
+def _rename(store: "AccessStore", arguments: argparse.Namespace) -> int:
+    """Give a device another name."""
+    old, new = words_of(arguments, "devices", "NAME", "NEW")
+    device = named(store, "device", old)
+    store.rename(device.id, new)
+    record(store, "devices rename", name=device.name, new=new)
+    print(printable(f"renamed {device.name} to {new}"))
+    return 0
+
+
+def _remove(store: "AccessStore", arguments: argparse.Namespace) -> int:
+    """Remove a device; its key is worthless from now on."""
+    (name,) = words_of(arguments, "devices", "NAME")
+    device = named(store, "device", name)
+    store.remove(device.id)
+    record(store, "devices remove", name=device.name)
+    print(printable(f"removed {device.name}: this device must be paired again"))
+    return 0
+
+
+_ACTIONS = {
+    "list": _list,
+    "pair": _pair,
+    "grant": _roles,
+    "revoke": _roles,
+    "rename": _rename,
+    "remove": _remove,
+}
