@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from urc.cli.audited import audit_access
 from urc.cli.error_report import Misuse
 from urc.cli.output import complain, json_text
 from urc.problems import UrcError, printable
@@ -236,31 +237,4 @@ def show(
 
 def record(store: "AccessStore", command: str, **arguments: object) -> None:
     """Write one entry into the audit log of the store's data folder."""
-    from getpass import getuser
-
-    from urc.access.control import LOCAL_USER
-    from urc.runtime.audit import FILE, AuditLog
-    from urc.runtime.audit_entry import AuditEntry
-
-    try:
-        user = getuser()
-    except (OSError, KeyError, ImportError):
-        user = "unknown user"
-    entry = AuditEntry(
-        time.time(),
-        "",
-        "access",
-        f"{user} on this computer",
-        "administer",
-        command=command,
-        arguments=json_text(arguments),
-        outcome="done",
-        principal=LOCAL_USER.id,
-        kind=LOCAL_USER.kind,
-    )
-    with AuditLog(store.file.with_name(FILE)) as log:
-        log.add(entry)
-        is_written = log.settle()
-        fault = log.fault
-    if fault or not is_written:
-        complain(f"urc: the audit log has no entry of this: {fault or 'the file is busy'}")
+    audit_access(store.file.parent, command, **arguments)

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from urc.cli.audited import audit_packages
 from urc.cli.error_report import Misuse
 from urc.cli.output import complain
 from urc.cli.packages import add_risks, add_waivers
@@ -94,6 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
         change.commit(plan)
     if lock_file is not None and pinned is None:
         put_file(lock_file, plan.lock.to_bytes(), lock_file.resolve().parent)
+    audit_packages("install", [plan.lock])
     print(f"installed {plan.lock}")
     if used is not None and (used.key, used.version) != (plan.lock.key, plan.lock.version):
         print(f"{used} remains in use; the settings of the robot select the version")

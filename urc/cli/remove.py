@@ -2,6 +2,8 @@
 
 import argparse
 
+from urc.cli.audited import audit_packages
+
 EXAMPLE = "urc remove drivers/puppet"
 
 
@@ -27,6 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     store, folder = open_store(), data_folder() / "robots"
     with store.changing() as change:
         removed, gone = change.remove(parse_requirement(arguments.package))
+    audit_packages("remove", gone or removed)
     for line in gone:
         print(f"removed {line}")
     if not gone:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from urc.cli.arguments import add_host, is_loopback, port
+from urc.cli.audited import audit_packages
 from urc.cli.error_report import Misuse
 from urc.cli.output import complain
 from urc.cli.repo_keys import key, unsigned
@@ -132,6 +133,7 @@ def _add(arguments: argparse.Namespace) -> int:
 
     known = repositories()
     url, index = known.add(_one(arguments, "URL"))
+    audit_packages("repository add", [url])
     print(printable(f"added {url}: {index.name}, {len(index.packages)} versions of packages"))
     keeper = next((one.keeper for one in known.all() if one.name == url), "")
     print(printable(f"its index is signed by {keeper}" if keeper else "its index is not signed"))
@@ -145,10 +147,9 @@ def _add(arguments: argparse.Namespace) -> int:
 def _remove(arguments: argparse.Namespace) -> int:
     from urc.cli.packages import repositories
 
-    print(
-        f"removed {repositories().remove(_one(arguments, 'URL'))};"
-        " its installed packages remain installed"
-    )
+    url = repositories().remove(_one(arguments, "URL"))
+    audit_packages("repository remove", [url])
+    print(f"removed {url}; its installed packages remain installed")
     return 0
 
 

@@ -3,6 +3,7 @@
 import argparse
 from typing import TYPE_CHECKING
 
+from urc.cli.audited import audit_packages
 from urc.cli.error_report import Misuse
 from urc.cli.output import complain
 from urc.cli.packages import add_risks, add_waivers
@@ -100,6 +101,7 @@ def _update(
             print(f"{old} stays")
             return False
         change.replace(old, plan)
+    audit_packages("update", [plan.lock])
     print(f"updated {old.root} to {plan.lock.version}; undo with 'urc update --back {old.root}'")
     return True
 
@@ -136,5 +138,6 @@ def _back(arguments: argparse.Namespace) -> int:
     lock, _ = _installed(store, arguments.packages[0])
     with store.changing() as change:
         old = change.back(lock)
+    audit_packages("restore", [old])
     print(f"{lock.root} is restored to {old.version}, the version before {lock.version}")
     return 0

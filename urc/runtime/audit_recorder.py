@@ -19,17 +19,12 @@ from urc.model.values import NOTHING, Reading
 from urc.motion.lease import LeaseState, Operator
 from urc.runtime.audit_entry import AuditEntry, shown
 from urc.runtime.hub import AuditRecord, Hub, MotionRecord
+from urc.runtime.repeat_limiter import RepeatLimiter
 from urc.runtime.secret_forms import HIDDEN, SecretForms
 
 __all__ = ["AuditRecorder"]
 
 _NOBODY: Final = Operator("", "", "watch")
-_AGAIN_S: Final = 1.0
-"""Minimum interval between entries for the same refusal, in seconds."""
-_MOST_KEPT: Final = 64
-"""Maximum number of different refusals that are counted separately."""
-_MOST_TOLD: Final = 16
-"""Maximum number of refusal entries per second, so that a hostile page cannot fill the file."""
 _MOST_SECRETS: Final = 256
 _LONGEST_NAME: Final = 100
 _LONGEST_TEXT: Final = 1000
@@ -68,12 +63,6 @@ class _Motion:
     data: Payload = b""
 
 
-@dataclass(slots=True)
-class _Refusal:
-    told_s: float
-    count: int = 0
-
-
 class AuditRecorder:
     """A writer of the audit entries of one robot."""
 
@@ -104,11 +93,8 @@ class AuditRecorder:
         self._disguises = SecretForms()
         self.hide(secrets)
         self._motions: dict[str, _Motion] = {}
-        self._refusals: dict[tuple[str, str, str], _Refusal] = {}
+        self._refusals = RepeatLimiter[tuple[str, str, str]]()
         self._lease = LeaseState()
-        self._told_s = float("-inf")
-        self._told = 0
-        """Number of refusal entries in the current second."""
 
     def attend(self, hub: Hub | None, now: Callable[[], float]) -> None:
         """Also report entries to the taps of a session's hub.
@@ -174,17 +160,9 @@ class AuditRecorder:
     def refused(self, client: Operator, about: str, message: str, now: float) -> None:
         """Record the refusal of a tick or request; `about` names the control or the request."""
         about, message = about[:_LONGEST_NAME], message[:_LONGEST_TEXT]
-        key = (client.id, about, message)
-        known = self._refusals.get(key)
-        if known is None:
-            while len(self._refusals) >= _MOST_KEPT:
-                self._refusals.pop(next(iter(self._refusals)))
-            known = self._refusals[key] = _Refusal(now - _AGAIN_S)
-        known.count += 1
-        if now - known.told_s >= _AGAIN_S and self._may_tell(now):
+        if count := self._refusals.count((client.id, about, message), now):
             outcome = self._hidden(message)
-            self._record("refused", client, command=about, outcome=outcome, times=known.count)
-            known.told_s, known.count = now, 0
+            self._record("refused", client, command=about, outcome=outcome, times=count)
 
     @_harmless
     def leased(self, state: LeaseState, now: float) -> None:
@@ -224,12 +202,6 @@ class AuditRecorder:
             data=self._data(data),
             outcome=self._hidden(outcome),
         )
-
-    def _may_tell(self, now: float) -> bool:
-        if now - self._told_s >= _AGAIN_S:
-            self._told_s, self._told = now, 0
-        self._told += 1
-        return self._told <= _MOST_TOLD
 
     def _record(
         self,

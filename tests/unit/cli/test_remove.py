@@ -7,6 +7,7 @@ import pytest
 from tests.unit.packages.made import install, keep_settings, package
 from urc.cli.main import main
 from urc.packages.store import Store
+from urc.runtime.audit_search import AuditQuery, search
 from urc.runtime.settings_store import SettingsStore, StoredSettings
 
 SECRET = {"key": "open sesame"}
@@ -25,6 +26,10 @@ def test_what_was_filled_in_goes_along(data: Path, capsys: pytest.CaptureFixture
     assert main(["remove", "drivers/rover"]) == 0
     assert "deleted the settings of rover, including its secrets" in capsys.readouterr().out
     assert not SettingsStore(data / "robots", "rover").file.exists()
+    (row,) = search(data / "audit.sqlite", AuditQuery())
+    assert (row.entry.what, row.entry.command) == ("package", "remove")
+    assert "drivers/rover 1.0.0" in row.entry.arguments
+    assert "sesame" not in str(row)
 
 
 def test_what_was_filled_in_may_stay(data: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,55 @@
+"""Audit entries about commands on this machine, in the audit log of the data folder.
+
+A running server may write to the same file; both continue one hash chain.
+"""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from urc.cli.output import complain
+
+if TYPE_CHECKING:
+    from urc.runtime.server_recorder import Actor, ServerRecorder
+
+__all__ = ["audit_access", "audit_packages"]
+
+_WAIT_S = 2.0
+"""Maximum time for writing an entry, in seconds."""
+
+
+def audit_access(data: Path, command: str, **about: object) -> None:
+    """Record a change of people, devices, programs or roles by a command.
+
+    Args:
+        data: the data folder.
+        command: the change, such as ``people grant``.
+        about: names, roles and times, without secrets.
+    """
+    _write(data, lambda recorder, user: recorder.access_changed(user, command, **about))
+
+
+def audit_packages(command: str, packages: Iterable[object]) -> None:
+    """Record a change of packages or repositories by a command.
+
+    Args:
+        command: the change, such as ``install``.
+        packages: packages with versions, or addresses of repositories.
+    """
+    from urc._folders import data_folder
+
+    names = [str(one) for one in packages]
+    _write(data_folder(), lambda recorder, user: recorder.package_changed(user, command, names))
+
+
+def _write(data: Path, event: "Callable[[ServerRecorder, Actor], None]") -> None:
+    """Write one entry and wait for it; complain if the log cannot be written."""
+    from urc.runtime.audit import FILE, AuditLog
+    from urc.runtime.server_recorder import ServerRecorder, terminal_actor
+
+    with AuditLog(data / FILE) as log:
+        event(ServerRecorder(log.add), terminal_actor())
+        is_written = log.settle(_WAIT_S)
+        fault = log.fault
+    if fault or not is_written:
+        complain(f"urc: the audit log has no entry about this: {fault or 'the file is busy'}")

@@ -1,0 +1,289 @@
+"""Audit entries of one server: sign-ins, people, settings, packages, recordings, start and end.
+
+Layer 4. The methods are thread-safe, never block and never raise an exception, because sign-ins and
+STOP call them. Failed sign-ins and the STOP of unknown visitors are combined into one entry a
+second for each address, with a count.
+
+Secrets never reach the log. A name tried in vain is recorded only if it is the name of a person:
+people type passphrases into the wrong field.
+"""
+
+import json
+import logging
+import re
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping
+from getpass import getuser
+from typing import Final, Literal, NamedTuple
+
+from urc.runtime.audit_entry import AuditEntry
+from urc.runtime.repeat_limiter import RepeatLimiter
+from urc.runtime.secret_forms import HIDDEN, SecretForms
+
+__all__ = ["CLOCK_JUMP_S", "NO_ACTOR", "Actor", "ServerRecorder", "terminal_actor"]
+
+CLOCK_JUMP_S: Final = 5.0
+"""Smallest jump of the machine's clock that is recorded, in seconds."""
+_BURST: Final = 60
+"""Maximum number of entries about unknown visitors at once."""
+_PER_S: Final = 0.1
+"""Rate of such entries in a lasting attack: in a day, they take 3 MB of the log's 100 MB."""
+_MOST_SECRETS: Final = 256
+_USERINFO: Final = re.compile(r"//[^/@\s\"]*@")
+"""User name and passphrase in a URL."""
+
+log = logging.getLogger(__name__)
+
+
+class Actor(NamedTuple):
+    """The person, device or program behind an event, and the right by which it acted."""
+
+    name: str = ""
+    principal: str = ""
+    """Identifier; "" for an unknown visitor."""
+    kind: str = ""
+    """``person``, ``device``, ``program`` or ``guest``."""
+    role: str = ""
+    way: str = ""
+    """Way of the sign-in, such as ``passkey``; ``terminal`` for a command on this machine."""
+    place: str = ""
+    """Network address; "" for this machine."""
+    sign_in: str = ""
+    """Identifier of the sign-in; no secret."""
+
+
+NO_ACTOR: Final = Actor()
+
+
+class _Repeated(NamedTuple):
+    what: str
+    actor: Actor
+    robot: str
+    command: str
+    outcome: str
+
+
+class ServerRecorder:
+    """A writer of the audit entries of one server or one command."""
+
+    def __init__(
+        self,
+        note: Callable[[AuditEntry], None],
+        *,
+        utc: Callable[[], float] = time.time,
+        now: Callable[[], float] = time.monotonic,
+        secrets: Iterable[str] = (),
+    ) -> None:
+        """Start without events.
+
+        Args:
+            note: callback for each entry; must not block.
+            utc: source of UTC time, in seconds since 1970.
+            now: source of monotonic time, in seconds.
+            secrets: texts to redact, such as the start key.
+        """
+        self.is_faulty = False
+        """Whether a bug in URC has prevented the recording of an entry."""
+        self._note = note
+        self._utc = utc
+        self._now = now
+        self._lock = threading.Lock()
+        self._repeats = RepeatLimiter[_Repeated](_BURST, _PER_S)
+        self._ahead_s = utc() - now()
+        self._secrets: tuple[str, ...] = ()
+        self._forms = SecretForms()
+        self.hide(secrets)
+
+    def hide(self, secrets: Iterable[str]) -> None:
+        """Add texts to redact from now on."""
+        known = dict.fromkeys((*(one for one in secrets if one), *self._secrets))
+        self._secrets = tuple(known)[:_MOST_SECRETS]
+        self._forms = SecretForms(self._secrets)
+
+    # Sign-ins
+
+    def signed_in(self, actor: Actor, agent: str = "") -> None:
+        """Record a sign-in; `agent` is browser and system in words."""
+        self._record("signed in", actor, outcome=agent)
+
+    def sign_in_failed(
+        self, way: str, place: str, reason: str, *, name: str = "", principal: str = ""
+    ) -> None:
+        """Record a failed attempt to sign in or pair; equal attempts are counted.
+
+        Args:
+            way: way of the attempt, such as ``passphrase``.
+            place: network address.
+            reason: reason for display, without any input of the visitor.
+            name: name of the person, device or program that was tried; "" for an unknown name.
+            principal: its identifier; without one, the name is not recorded.
+        """
+        actor = Actor(name if principal else "", principal, way=way, place=place)
+        self._repeat(_Repeated("sign-in failed", actor, "", "", reason))
+
+    def signed_out(self, actor: Actor) -> None:
+        """Record the end of a sign-in by its owner."""
+        self._record("signed out", actor)
+
+    def revoked(self, actor: Actor, what: str, **about: object) -> None:
+        """Record the end of a sign-in, token or right by someone else.
+
+        Args:
+            actor: the administrator.
+            what: the end, such as ``sign-in`` or ``device``.
+            about: its name and other facts, without secrets.
+        """
+        self._record("revoked", actor, what, arguments=about)
+
+    def paired(
+        self, actor: Actor, step: Literal["code made", "code used"], **about: object
+    ) -> None:
+        """Record the making or the use of a pairing code; `about` never contains the code."""
+        self._record("pairing", actor, step, arguments=about)
+
+    # Administration
+
+    def access_changed(self, actor: Actor, command: str, **about: object) -> None:
+        """Record a change of people, devices, programs or their roles.
+
+        Args:
+            actor: the administrator.
+            command: the change, such as ``people grant`` or ``tokens add``.
+            about: names, roles and times, without secrets.
+        """
+        self._record("access", actor, command, arguments=about)
+
+    def settings_changed(
+        self, actor: Actor, robot: str, changes: Mapping[str, str | None], *, is_saved: bool = True
+    ) -> None:
+        """Record changed settings.
+
+        Args:
+            actor: the person.
+            robot: name of the robot; "" for the server.
+            changes: new text of each changed setting; None for a secret.
+            is_saved: whether the settings were stored.
+        """
+        shown = {name: HIDDEN if text is None else text for name, text in changes.items()}
+        outcome = "saved" if is_saved else "not saved"
+        self._record("settings", actor, robot=robot, arguments=shown, outcome=outcome)
+
+    def package_changed(
+        self, actor: Actor, command: str, packages: Iterable[str], outcome: str = "done"
+    ) -> None:
+        """Record a change of packages or repositories.
+
+        Args:
+            actor: the person.
+            command: the change, such as ``install``, ``update``, ``remove`` or ``repository add``.
+            packages: packages with versions, or addresses of repositories.
+            outcome: result as text for display.
+        """
+        about = {"packages": list(packages)}
+        self._record("package", actor, command, arguments=about, outcome=outcome)
+
+    def recording(
+        self,
+        actor: Actor,
+        robot: str,
+        step: Literal["started", "ended", "downloaded", "deleted"],
+        file: str,
+        outcome: str = "",
+    ) -> None:
+        """Record an event of a recording; `file` is its name without a folder."""
+        self._record("recording", actor, step, robot, {"file": file}, outcome)
+
+    # The server
+
+    def server(self, step: Literal["started", "ended"], version: str, **about: object) -> None:
+        """Record start or end of the server; the end also writes all pending counts."""
+        if step == "ended":
+            self.flush(is_last=True)
+        self._record("server", NO_ACTOR, step, arguments={"version": version, **about})
+
+    def stopped_by_unknown(self, robot: str, place: str) -> None:
+        """Record a press of STOP by a visitor without a sign-in; equal presses are counted."""
+        actor = Actor(place=place)
+        self._repeat(_Repeated("STOP", actor, robot, "", "pressed without a sign-in"))
+
+    def check_clock(self) -> None:
+        """Record a jump of the machine's clock since the last call."""
+        ahead_s = self._utc() - self._now()
+        jump_s, self._ahead_s = ahead_s - self._ahead_s, ahead_s
+        if abs(jump_s) >= CLOCK_JUMP_S:
+            way = "ahead" if jump_s > 0 else "back"
+            text = f"the clock was set {way} by {abs(jump_s):.0f} s"
+            self._record("clock", NO_ACTOR, outcome=text, lasted_s=round(jump_s, 1))
+
+    def flush(self, *, is_last: bool = False) -> None:
+        """Write the counts of repeated events that have waited long enough; at the end, all."""
+        with self._lock:
+            now = None if is_last else self._now()
+            forgotten = self._repeats.forgotten(now)
+            due = [*(self._repeats.rest() if now is None else self._repeats.due(now))]
+        for key, count in due:
+            self._tell(key, count)
+        if forgotten:
+            text = "further failed sign-ins and presses of STOP"
+            self._record("sign-in failed", NO_ACTOR, outcome=text, times=forgotten)
+
+    # Inside
+
+    def _repeat(self, key: _Repeated) -> None:
+        with self._lock:
+            count = self._repeats.count(key, self._now())
+        if count:
+            self._tell(key, count)
+
+    def _tell(self, key: _Repeated, count: int) -> None:
+        self._record(key.what, key.actor, key.command, key.robot, outcome=key.outcome, times=count)
+
+    def _record(
+        self,
+        what: str,
+        actor: Actor,
+        command: str = "",
+        robot: str = "",
+        arguments: Mapping[str, object] | None = None,
+        outcome: str = "",
+        *,
+        times: int = 1,
+        lasted_s: float = 0.0,
+    ) -> None:
+        try:
+            text = json.dumps(arguments, ensure_ascii=False, default=str) if arguments else ""
+            entry = AuditEntry(
+                at=self._utc(),
+                robot=robot,
+                what=what,
+                who=self._hidden(actor.name),
+                role=actor.role,
+                client=actor.sign_in,
+                command=self._hidden(command),
+                arguments=self._hidden(text),
+                outcome=self._hidden(outcome),
+                times=times,
+                lasted_s=lasted_s,
+                principal=actor.principal,
+                kind=actor.kind,
+                way=actor.way,
+                place=actor.place,
+            )
+            self._note(entry)
+        except Exception:  # supervisor: signing in and STOP must go on
+            if not self.is_faulty:
+                log.exception("an event is missing in the audit log")
+            self.is_faulty = True
+
+    def _hidden(self, text: str) -> str:
+        return _USERINFO.sub(f"//{HIDDEN}@", self._forms.hide(text))
+
+
+def terminal_actor() -> Actor:
+    """Return the user of this process, who administers by the right to the data folder."""
+    try:
+        user = getuser()
+    except (OSError, KeyError, ImportError):
+        user = "unknown user"
+    return Actor(f"{user} on this computer", "local", "person", "administer", "terminal")
