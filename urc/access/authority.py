@@ -10,7 +10,7 @@ The machine may have no clock: then all dates start on the day of this version's
 import ipaddress
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -20,9 +20,16 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from urc.access.grants import AccessError
+from urc.access.wrong_clock import RELEASED
 from urc.private_files import put_private
 
-__all__ = ["AUTHORITY_FOLDER", "CertificateAuthority", "ServerCertificate", "fingerprint"]
+__all__ = [
+    "AUTHORITY_FOLDER",
+    "CertificateAuthority",
+    "ServerCertificate",
+    "fingerprint",
+    "issued_at",
+]
 
 AUTHORITY_FOLDER: Final = "tls"
 """Folder of the certificates and keys in the data folder."""
@@ -30,7 +37,7 @@ AUTHORITY_LASTS: Final = timedelta(days=3650)
 LEAF_LASTS: Final = timedelta(days=397)
 """Browsers refuse server certificates with a longer life."""
 RENEW_BEFORE: Final = timedelta(days=30)
-OLDEST: Final = datetime(2026, 11, 1, tzinfo=UTC)
+OLDEST: Final = RELEASED
 """An earlier time of the machine's clock is wrong."""
 _BACK: Final = timedelta(days=1)
 """Devices whose clock is a little late accept the certificate, too."""
@@ -201,6 +208,19 @@ def fingerprint(certificate: x509.Certificate) -> str:
     """Return SHA-256 of a certificate as 16 groups of four hex digits."""
     text = certificate.fingerprint(hashes.SHA256()).hex().upper()
     return " ".join(text[at : at + 4] for at in range(0, len(text), 4))
+
+
+def issued_at(file: Path) -> datetime | None:
+    """Return a time at or before which a certificate of this module was issued.
+
+    The start of validity is no evidence, because it is never later than `OLDEST`. Return None for
+    a missing or damaged file.
+    """
+    found = _certificate(file)
+    if found is None:
+        return None
+    is_authority = found.issuer == found.subject
+    return found.not_valid_after_utc - (AUTHORITY_LASTS if is_authority else LEAF_LASTS)
 
 
 def _parsed(names: Iterable[str]) -> list[x509.GeneralName]:

@@ -27,6 +27,7 @@ from urc.simulator.emulated_robot import EmulatedRobot
 from urc.web.app import Robot, build_app, serve
 from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
 from urc.web.fleet.robots import Glimpse
+from urc.web.serve.clock_check import clock_warning
 
 __all__ = ["DashboardAddress", "SettingsOf", "run_dashboard", "workshop_of"]
 
@@ -109,6 +110,8 @@ async def _serve(
 ) -> int:
     async with AsyncExitStack() as stack:
         robot_options = workshop_of(place, given, faulty)
+        if warning := await asyncio.to_thread(clock_warning, robot_options.data):
+            complain(f"urc: {warning}")
         access = access_for(place.host, place.token)
 
         def ready(url: str) -> None:

@@ -5,9 +5,11 @@ import platform
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Literal
 
 from urc import __version__
+from urc._folders import data_folder
 from urc.cli.arguments import add_port
 from urc.cli.output import complain
 from urc.problems import UrcError, printable
@@ -53,13 +55,20 @@ class _Finding:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command-line arguments: port to check."""
+    """Declare the command-line arguments: port and data folder to check."""
     add_port(parser)
+    parser.add_argument(
+        "--data-dir",
+        dest="data",
+        metavar="FOLDER",
+        type=Path,
+        help="data folder of 'urc serve' (default: data folder of this user)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print one line per check; return 1 if a requirement is missing."""
-    problems = list(_problems(arguments.port))
+    problems = list(_problems(arguments.port, arguments.data or data_folder()))
     width = max(len(finding.name) for finding in problems)
     for finding in problems:
         mark = "ok     " if finding.is_good else "MISSING" if finding.is_required else "note   "
@@ -70,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     return int(missing > 0)
 
 
-def _problems(port: int) -> Iterator[_Finding]:
+def _problems(port: int, data: Path) -> Iterator[_Finding]:
     yield _Finding("urc", True, f"{__version__} on Python {platform.python_version()}")
     for name, purpose in REQUIRED.items():
         yield _package(name, purpose, is_required=True)
@@ -85,6 +94,7 @@ def _problems(port: int) -> Iterator[_Finding]:
     text = "third-party modules for the browser" if is_vendored else _VENDOR_REMEDY
     yield _Finding("urc_vendor", is_vendored, text, is_required=False)
     yield _priority()
+    yield _clock(data)
     yield _attempt("port", lambda: _try_port(port), is_required=False)
 
 
@@ -110,6 +120,14 @@ def _priority() -> _Finding:
     if refusal:
         text = f"the guard has ordinary priority ({refusal}); see docs/motion.md"
     return _Finding("real time", not refusal, text, is_required=False)
+
+
+def _clock(data: Path) -> _Finding:
+    from urc.web.serve.clock_check import clock_warning
+
+    warning = clock_warning(data)
+    text = warning or "not earlier than any known event"
+    return _Finding("clock", not warning, text, is_required=False)
 
 
 def _load_robots() -> str:

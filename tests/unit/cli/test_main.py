@@ -267,4 +267,4 @@ def test_doctor_tells_what_is_missing(
         "MISSING robots                No module named 'yaml'",
     ):
         assert line in output.splitlines()
-    assert errors == "urc doctor: 6 of 11 checks failed\n"
+    assert errors == "urc doctor: 6 of 12 checks failed\n"

@@ -1,0 +1,52 @@
+"""Detection of a clock that is behind, such as the clock of a Raspberry Pi without a network.
+
+Layer 4. Pure. A clock that is earlier than a known event is wrong. A clock that is ahead cannot be
+detected.
+"""
+
+import time
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from typing import Final, NamedTuple
+
+__all__ = ["RELEASED", "KnownTime", "clock_fault"]
+
+RELEASED: Final = datetime(2026, 11, 1, tzinfo=UTC)
+"""Day of this version's release; an earlier time of the machine's clock is wrong."""
+_SLACK_S: Final = 120.0
+"""Difference that is no fault, in seconds: time servers set clocks back by small steps."""
+
+
+class KnownTime(NamedTuple):
+    """A time that is past."""
+
+    at: float
+    """UTC time in seconds since 1970."""
+    event: str
+    """Event at that time, such as “the newest entry of the audit log”."""
+
+
+def clock_fault(now: float, known: Iterable[KnownTime] = ()) -> str:
+    """Return one line about a clock that is behind, or "".
+
+    Args:
+        now: UTC time of the machine's clock, in seconds since 1970.
+        known: times of events in the past; the day of the release is always known.
+    """
+    release = KnownTime(RELEASED.timestamp(), "the release of this version of URC")
+    newest = max([release, *known])
+    if now >= newest.at - _SLACK_S:
+        return ""
+    return (
+        f"the clock of this computer shows {_text(now)}, earlier than {newest.event}"
+        f" ({_text(newest.at)}): it is wrong now, or was wrong then. Sign-ins and tokens can last"
+        " too long, certificates can be invalid, and the audit log has wrong times. Set the clock,"
+        " or connect a time server"
+    )
+
+
+def _text(at: float) -> str:
+    try:
+        return time.strftime("%Y-%m-%d %H:%M", time.localtime(at))
+    except (OverflowError, ValueError, OSError):
+        return f"{at:.0f} s since 1970"
