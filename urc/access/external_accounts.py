@@ -1,0 +1,131 @@
+"""Accounts of identity providers and proxies, and the people that they stand for.
+
+Layer 4. An account is known by its issuer and subject, never by its name. Names change, and another
+person of this server may have the same name. The functions block for some milliseconds: servers
+call them in a thread.
+
+Theory of operation. Each sign-in replaces the grants of the previous one by the grants of the
+present claims. Grants that an administrator gave by hand stay.
+"""
+
+import json
+import sqlite3
+from collections.abc import Iterable
+from typing import Final, NamedTuple
+from urllib.parse import urlsplit
+
+from urc.access.administration import principal_named
+from urc.access.directory import Principal
+from urc.access.grants import AccessError, Grant, parse_grant
+from urc.access.store import LONGEST_NAME, AccessStore
+
+__all__ = ["ExternalAccount", "admit_account", "admit_named"]
+
+_MOST_NAMESAKES: Final = 100
+
+
+class ExternalAccount(NamedTuple):
+    """An account, as its issuer has proven it for one sign-in."""
+
+    issuer: str
+    """Address of the provider."""
+    subject: str
+    """Identifier of the account; never given to another account."""
+    name: str
+    """Name for people."""
+    grants: tuple[Grant, ...]
+    """Grants that follow from the present claims."""
+    ends_at: float
+    """UTC time of the latest end of the sign-in, in seconds since 1970."""
+
+
+def admit_account(store: AccessStore, account: ExternalAccount, now: float) -> Principal:
+    """Return the person of an account with the present grants, and add the person if needed.
+
+    Args:
+        store: the store.
+        account: the account.
+        now: UTC time in seconds since 1970.
+
+    Raises:
+        AccessError: the account has no grants. If the person exists, earlier grants of the account
+            are removed all the same.
+    """
+    with store.transaction() as base:
+        row = base.execute(
+            "SELECT principal, grants FROM external_accounts WHERE issuer = ? AND subject = ?",
+            (account.issuer, account.subject),
+        ).fetchone()
+        if row is not None:
+            person = _renewed(store, row[0], _grants(row[1]), account.grants)
+        elif account.grants:
+            person = store.add("person", _free_name(store, account), account.grants, now=now)
+        else:
+            person = None
+        if person is not None:
+            _keep(base, account, person.id)
+    if person is None or not person.grants:
+        raise AccessError(f"the account {account.name!r} has no role here: ask an administrator")
+    return person
+
+
+def admit_named(
+    store: AccessStore, name: str, new_grants: Iterable[Grant], now: float
+) -> Principal:
+    """Return the person with a name, and add the person with `new_grants` if there are any.
+
+    Args:
+        store: the store.
+        name: name that a trusted proxy has proven.
+        new_grants: grants of a new person; none: the person must exist.
+        now: UTC time in seconds since 1970.
+
+    Raises:
+        AccessError: no person has the name, or the name is invalid.
+    """
+    grants = tuple(new_grants)
+    with store.transaction():
+        person = principal_named(store.directory(), "person", name)
+        if person is None and grants:
+            person = store.add("person", name, grants, now=now)
+    if person is None:
+        raise AccessError(f"no person has the name {name!r}: ask an administrator")
+    return person
+
+
+def _renewed(
+    store: AccessStore, principal: str, before: Iterable[Grant], present: Iterable[Grant]
+) -> Principal:
+    person = store.directory().principals[principal]
+    by_hand = [grant for grant in person.grants if grant not in set(before)]
+    grants = tuple(dict.fromkeys([*by_hand, *present]))
+    if grants != person.grants:
+        store.set_grants(principal, grants)
+    return person._replace(grants=grants)
+
+
+def _keep(base: sqlite3.Connection, account: ExternalAccount, principal: str) -> None:
+    grants = json.dumps([str(grant) for grant in account.grants])
+    base.execute(
+        "INSERT INTO external_accounts VALUES (?, ?, ?, ?)"
+        " ON CONFLICT (issuer, subject) DO UPDATE SET grants = excluded.grants",
+        (account.issuer, account.subject, principal, grants),
+    )
+
+
+def _free_name(store: AccessStore, account: ExternalAccount) -> str:
+    """Return the account's name, with the provider and a number if another person has the name."""
+    directory = store.directory()
+    if principal_named(directory, "person", account.name) is None:
+        return account.name
+    place = urlsplit(account.issuer).hostname or "provider"
+    for number in range(1, _MOST_NAMESAKES):
+        suffix = f" ({place})" if number == 1 else f" ({place} {number})"
+        name = account.name[: LONGEST_NAME - len(suffix)] + suffix
+        if principal_named(directory, "person", name) is None:
+            return name
+    raise AccessError(f"{_MOST_NAMESAKES} people have the name {account.name!r}")
+
+
+def _grants(text: str) -> tuple[Grant, ...]:
+    return tuple(parse_grant(each) for each in json.loads(text))

@@ -1,0 +1,123 @@
+"""The check of ID tokens (OpenID Connect Core 1.0, 3.1.3.7).
+
+Layer 4. Pure. Only asymmetric signatures are allowed: a provider cannot choose ``none``, or a
+signature with a secret that a page may know. The keys come from the provider over TLS.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from urc.access.grants import AccessError
+
+__all__ = ["ALGORITHMS", "LEEWAY_S", "UnknownKey", "verified_claims"]
+
+ALGORITHMS: Final = (
+    "RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512",
+    "Ed25519",
+)  # fmt: skip
+"""Allowed algorithms of signatures (RFC 7518, RFC 9864)."""
+LEEWAY_S: Final = 60.0
+"""Tolerance between the clocks of this machine and of the provider, in seconds."""
+_SHORTEST_RSA: Final = 2048
+_LONGEST_TOKEN: Final = 65536
+
+
+class UnknownKey(AccessError):
+    """A token with a key that is not among the known keys of the provider."""
+
+
+def verified_claims(
+    token: str,
+    keys: Sequence[Mapping[str, Any]],
+    *,
+    issuer: str,
+    client_id: str,
+    nonce: str,
+    now: float,
+) -> dict[str, Any]:
+    """Return the claims of an ID token.
+
+    Args:
+        token: the token.
+        keys: keys of the provider, as JSON Web Keys (RFC 7517).
+        issuer: expected issuer.
+        client_id: name of this server at the provider.
+        nonce: the random text of this sign-in.
+        now: UTC time in seconds since 1970.
+
+    Raises:
+        UnknownKey: no key fits; newer keys of the provider may.
+        AccessError: the token is invalid, too old, or for another sign-in or server.
+    """
+    claims = _signed(token, keys)
+    audience = claims.get("aud")
+    audiences = audience if isinstance(audience, list) else [audience]
+    party = claims.get("azp")
+    if claims.get("iss") != issuer:
+        raise AccessError("the provider's token names another issuer than the options")
+    if client_id not in audiences or (party is None and len(audiences) > 1):
+        raise AccessError("the provider's token is for another server")
+    if party is not None and party != client_id:
+        raise AccessError("the provider's token is for another server")
+    if not nonce or claims.get("nonce") != nonce:
+        raise AccessError("the provider's token is for another sign-in")
+    if not isinstance(claims.get("sub"), str) or not 0 < len(claims["sub"]) <= 255:
+        raise AccessError("the provider's token names no account")
+    _check_times(claims, now)
+    return claims
+
+
+def _check_times(claims: Mapping[str, Any], now: float) -> None:
+    ends, begins = _time(claims, "exp"), _time(claims, "iat")
+    if now >= ends + LEEWAY_S or now < begins - LEEWAY_S:
+        raise AccessError(
+            "the provider's token is not valid at the time of this machine: check both clocks"
+        )
+
+
+def _time(claims: Mapping[str, Any], name: str) -> float:
+    found = claims.get(name)
+    if isinstance(found, bool) or not isinstance(found, int | float):
+        raise AccessError(f"the provider's token has no time {name!r}")
+    return found
+
+
+def _signed(token: str, keys: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the claims of a token with a valid signature."""
+    from joserfc import jws, jwt
+    from joserfc.errors import BadSignatureError, JoseError
+
+    if len(token) > _LONGEST_TOKEN:
+        raise AccessError("the provider's token is too long")
+    try:
+        header = jws.extract_compact(token.encode()).headers()
+    except (JoseError, ValueError, TypeError, AttributeError, RecursionError):
+        raise AccessError("the provider sent no valid token") from None
+    algorithm, name = header.get("alg"), header.get("kid")
+    if algorithm not in ALGORITHMS:
+        raise AccessError(f"the provider signs with {algorithm!r}, which is not allowed")
+    # Providers may add members of their own to the header; critical ones stay refused.
+    registry = jws.JWSRegistry(algorithms=[algorithm], strict_check_header=False)
+    for key in (one for one in keys if name is None or one.get("kid") == name):
+        try:
+            return dict(jwt.decode(token, _key(key), registry=registry).claims)
+        except BadSignatureError:
+            if name is not None:
+                raise AccessError("the signature of the provider's token is wrong") from None
+        except (JoseError, ValueError, TypeError, KeyError):
+            continue  # a key for another algorithm
+    raise UnknownKey("the provider's token has an unknown key")
+
+
+def _key(data: Mapping[str, Any]) -> Any:
+    """Return a public key that may sign tokens; raise `ValueError` for another one."""
+    from joserfc.jwk import ECKey, OKPKey, RSAKey
+
+    kinds: dict[object, type[RSAKey | ECKey | OKPKey]] = {"RSA": RSAKey, "EC": ECKey, "OKP": OKPKey}
+    kind = data.get("kty")
+    if kind not in kinds or data.get("use", "sig") != "sig":
+        raise ValueError("a key for another purpose")
+    # Base64 has six bits in each character.
+    if kind == "RSA" and len(str(data.get("n"))) * 6 < _SHORTEST_RSA:
+        raise ValueError("a short key")
+    return kinds[kind].import_key(dict(data))

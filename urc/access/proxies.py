@@ -1,0 +1,127 @@
+"""Trusted proxies: web servers in front of URC that sign people in, and name them in a header.
+
+Layer 4. Pure, except for `read_proxy_options`. The name counts only together with the secret of the
+proxy, never because of a network address. Without the secret both headers are removed, so no client
+and no other proxy can name a person.
+"""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from hmac import compare_digest
+from typing import Final, NamedTuple
+
+from urc.access.grants import AccessError, Grant, parse_grant
+from urc.access.options_file import OptionsFile
+
+__all__ = ["ProxiedRequest", "TrustedProxy", "read_proxy_options", "without_proxy_headers"]
+
+SHORTEST_SECRET: Final = 32
+"""Fewest characters of the secret; 32 random letters cannot be guessed."""
+_KEYS: Final = ("name", "user_header", "secret_header", "secret_file", "new_people")
+_HEADER: Final = re.compile(r"[A-Za-z0-9-]{1,64}")
+_TAKEN: Final = re.compile(
+    r"host|origin|cookie|authorization|connection|upgrade|content-.*|transfer-.*|sec-.*|user-agent",
+    re.IGNORECASE,
+)
+"""Headers that browsers or HTTP use themselves."""
+_Headers = Iterable[tuple[bytes, bytes]]
+
+
+@dataclass(frozen=True, slots=True)
+class TrustedProxy:
+    """One proxy."""
+
+    name: str
+    """Name for logs."""
+    user_header: bytes
+    """Header with the name of the person, in lower case."""
+    secret_header: bytes
+    """Header with the secret, in lower case."""
+    secret: bytes = field(repr=False)
+    new_people: tuple[Grant, ...] = ()
+    """Grants of a person who does not exist yet; empty: such people are refused."""
+
+
+class ProxiedRequest(NamedTuple):
+    """The headers of one request, after the check of the proxies."""
+
+    headers: list[tuple[bytes, bytes]]
+    """The headers without those of proxies."""
+    proxy: TrustedProxy | None = None
+    """The proxy that has proven itself, or None."""
+    user: str = ""
+    """Name of the person, as the proxy has proven it; "" if the proxy names none."""
+    fault: str = ""
+    """Reason why headers of a proxy were ignored, or ""."""
+
+
+def without_proxy_headers(headers: _Headers, proxies: Iterable[TrustedProxy]) -> ProxiedRequest:
+    """Return the headers of a request without those of proxies, and the proven person.
+
+    Args:
+        headers: headers of the request, with names in lower case.
+        proxies: the trusted proxies.
+    """
+    kept = list(headers)
+    found: list[tuple[TrustedProxy, str]] = []
+    fault = ""
+    for proxy in proxies:
+        users = [value for name, value in kept if name == proxy.user_header]
+        secrets = [value for name, value in kept if name == proxy.secret_header]
+        ours = (proxy.user_header, proxy.secret_header)
+        kept = [pair for pair in kept if pair[0] not in ours]
+        if not users and not secrets:
+            continue
+        # A second header of the same name comes from the client: the proxy must replace it.
+        if len(secrets) != 1 or not compare_digest(secrets[0], proxy.secret):
+            fault = f"the header {proxy.user_header.decode()} came without the secret of the proxy"
+        elif len(users) > 1:
+            fault = f"the proxy sent the header {proxy.user_header.decode()} {len(users)} times"
+        else:
+            found.append((proxy, users[0].decode("utf-8", "replace").strip() if users else ""))
+    if len(found) > 1:
+        return ProxiedRequest(kept, fault="two proxies have proven themselves in one request")
+    if not found:
+        return ProxiedRequest(kept, fault=fault)
+    return ProxiedRequest(kept, *found[0], fault)
+
+
+def read_proxy_options(file: str) -> TrustedProxy:
+    """Return the proxy that a file describes.
+
+    Raises:
+        ProblemsError: the file or the file of the secret cannot be read, or a value is invalid.
+    """
+    options = OptionsFile(file, _KEYS)
+    user, secret = (_header(options, key) for key in ("user_header", "secret_header"))
+    if user == secret:
+        raise options.fault(("secret_header",), "expected another header than user_header")
+    options.text("secret_file")
+    return TrustedProxy(
+        options.text("name"),
+        user,
+        secret,
+        options.secret("secret_file", shortest=SHORTEST_SECRET).encode(),
+        tuple(_grants(options)),
+    )
+
+
+def _header(options: OptionsFile, key: str) -> bytes:
+    name = options.text(key)
+    if not _HEADER.fullmatch(name) or _TAKEN.fullmatch(name):
+        raise options.fault(
+            (key,), f"expected a header of its own such as X-Forwarded-User, found {name!r}"
+        )
+    return name.lower().encode()
+
+
+def _grants(options: OptionsFile) -> Iterable[Grant]:
+    for number, text in enumerate(options.list_of("new_people")):
+        path = ("new_people", number)
+        if not isinstance(text, str):
+            raise options.fault(path, f"expected a grant such as watch, found {text!r}")
+        try:
+            yield parse_grant(text)
+        except AccessError as error:
+            raise options.fault(path, str(error)) from None
