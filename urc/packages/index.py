@@ -6,6 +6,7 @@ from typing import Annotated, Final
 import msgspec
 
 from urc.packages.archive import PACKAGE
+from urc.packages.blocks import BlockList
 from urc.packages.names import KINDS, NAME, PackageError, PackageId, parse_key
 from urc.packages.package import Package
 from urc.packages.signature import Signature
@@ -87,6 +88,13 @@ class Index(msgspec.Struct, frozen=True):
     packages: tuple[IndexEntry, ...]
     number: Annotated[int, msgspec.Meta(ge=0, le=1 << 53)] = 0
     """Number that increases with every change of the repository; 0 in unnumbered indexes."""
+    blocks: BlockList | msgspec.UnsetType = msgspec.UNSET
+    """Blocked packages. Clients believe only the list of a signed index."""
+
+    @property
+    def block_list(self) -> BlockList | None:
+        """Block list, or None."""
+        return self.blocks if isinstance(self.blocks, BlockList) else None
 
     def to_bytes(self) -> bytes:
         """Return the content of the index file: equal indexes have the same bytes."""

@@ -5,6 +5,7 @@
     DIR/archives/drivers/puppet/1.0.0.sig signature of the archive, if any
     DIR/archives/drivers/puppet/1.0.0.json origin and withdrawal of the version
     DIR/index.json                        all versions, with a number that grows with each change
+    DIR/blocks.json                       blocked packages, a part of the next index
     DIR/index/head.json                   number and digest of the index, signed by the maintainer
     DIR/drivers/puppet/urcpm.json         the package's description in the form of the URC thesis
 
@@ -21,6 +22,7 @@ import msgspec
 
 from urc.packages import atomic_files
 from urc.packages.archive import PACKAGE
+from urc.packages.blocks import BLOCK_FILE_BYTES, BlockList
 from urc.packages.index import INDEX, INDEX_BYTES, Index, IndexEntry, entry_of, in_order, read_index
 from urc.packages.index_head import (
     HEAD,
@@ -38,6 +40,7 @@ from urc.packages.signature import Signature, Signer
 from urc.packages.version_notes import Notes, Provenance, read_notes, write_notes
 
 __all__ = [
+    "BLOCKS",
     "IndexListing",
     "changing",
     "head_in",
@@ -51,6 +54,8 @@ __all__ = [
     "write_index",
 ]
 
+BLOCKS: Final = "blocks.json"
+"""File with the repository's block list."""
 _THESIS: Final = ("driver", "interface", "widget")
 _PACKAGES_MOST: Final = 20_000
 _SIGNED: Final = ".sig"
@@ -234,11 +239,10 @@ def write_index(
         OSError: writing failed, for example because the disk is full.
     """
     before, number = _before(folder)
-    index = Index(1, name, in_order(entries), number)
-    is_new = before is None or (before.name, before.packages) != (index.name, index.packages)
-    if is_new:
+    index = Index(1, name, in_order(entries), number, _blocks(folder))
+    if is_new := before != index:
         number += 1
-        index = Index(1, name, index.packages, number)
+        index = msgspec.structs.replace(index, number=number)
     data = index.to_bytes()
     head = next_head(head_in(folder), number, sha256(data), index_signer).to_bytes()
     if is_new:
@@ -246,6 +250,15 @@ def write_index(
     if _content(folder / HEAD, HEAD_BYTES) != head:
         atomic_files.put_file(folder / HEAD, head, work)
     return index
+
+
+def _blocks(folder: Path) -> BlockList | msgspec.UnsetType:
+    """Return the block list of a repository's folder; raise `PackageError` for a damaged file."""
+    data = _content(folder / BLOCKS, BLOCK_FILE_BYTES)
+    try:
+        return msgspec.UNSET if data is None else msgspec.json.decode(data, type=BlockList)
+    except (ValueError, PackageError) as error:
+        raise PackageError(f"{folder / BLOCKS}: this file is damaged: {error}") from None
 
 
 def _before(folder: Path) -> tuple[Index | None, int]:

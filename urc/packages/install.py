@@ -22,6 +22,7 @@ __all__ = [
     "plan_root",
     "plan_requirement",
     "settle",
+    "without_blocked",
     "withdrawn_lines",
 ]
 
@@ -56,13 +57,13 @@ def plan_requirement(
     found = everything
     if pinned is not None:
         found = _pinned(everything, pinned)
-    elif not takes_withdrawn:
-        found = offered(everything)
+    else:
+        found = without_blocked(everything if takes_withdrawn else offered(everything), store)
     try:
         root = choose({key: [entry for entry, _ in some] for key, some in found.items()}, required)
         return plan_root(root, required.range, found, store, pinned)
     except PackageError as error:
-        if found is not everything and (told := _withdrawn(required, everything)):
+        if found is not everything and (told := _left_out(required, everything, store)):
             raise PackageError(f"{error}; {told}") from None
         raise
 
@@ -83,7 +84,8 @@ def plan_file(
     except PackageError:
         if not others:
             raise
-        plan = plan_root(root, version, offered(merged([source, *others], complain)), store)
+        found = without_blocked(offered(merged([source, *others], complain)), store)
+        plan = plan_root(root, version, found, store)
     if not source.is_folder:
         return plan
     names = (name for name, origin in plan.origins.items() if origin == source.name)
@@ -172,6 +174,21 @@ def withdrawn_lines(lock: Lock, entries: Sequence[IndexEntry]) -> list[str]:
     ]
 
 
+def without_blocked(found: Found, store: Store) -> Found:
+    """Return the packages without blocked versions; raise `PackageError` for a damaged store."""
+    if not store.blocks.all():
+        return found
+    kept = {
+        key: [one for one in some if not _blocked(one[0], store)] for key, some in found.items()
+    }
+    return {key: some for key, some in kept.items() if some}
+
+
+def _blocked(entry: IndexEntry, store: Store) -> list[str]:
+    """Return the reasons why a version is blocked, one per line."""
+    return store.blocks.lines(lock_of(entry.key, {entry.key: entry}), lambda _: entry.signed)
+
+
 def _remark(entry: IndexEntry) -> str:
     """Return the repository's remarks about a version."""
     said: list[str] = []
@@ -180,18 +197,21 @@ def _remark(entry: IndexEntry) -> str:
     return joined("; ", said + ([str(entry.provenance)] if entry.provenance else []))
 
 
-def _withdrawn(required: PackageRequirement, found: Found) -> str:
-    """Return the withdrawn versions that match the requirement, with the reasons."""
+def _left_out(required: PackageRequirement, found: Found, store: Store) -> str:
+    """Return the withdrawn and blocked versions that match the requirement, with the reasons."""
     wanted = parse_range(required.range)
-    gone = [
-        f"{entry} was withdrawn: {entry.why_withdrawn}"
+    meant = [
+        entry
         for key, some in found.items()
         for entry, _ in some
         if key.name == required.name
         and required.kind in ("", key.kind)
-        and entry.why_withdrawn
         and wanted.allows(entry.number)
     ]
+    blocked = [line for entry in meant for line in _blocked(entry, store)]
+    if blocked:
+        return "; ".join(blocked[-3:])
+    gone = [f"{one} was withdrawn: {one.why_withdrawn}" for one in meant if one.why_withdrawn]
     return "; ".join([*gone[-3:], "--withdrawn installs it anyway"]) if gone else ""
 
 

@@ -10,6 +10,7 @@ from typing import Annotated, Final
 import msgspec
 
 from urc.packages import atomic_files
+from urc.packages.block_store import BlockStore
 from urc.packages.http_repository import HttpResponse, ask, fetch_archive, repository_url
 from urc.packages.index import INDEX, INDEX_BYTES, Index, IndexEntry, read_index
 from urc.packages.index_head import HEAD, HEAD_BYTES, IndexHead, read_head
@@ -64,11 +65,18 @@ class Repository:
         self._index = folder / f"{stem}.index.json"
         self._tags = folder / f"{stem}.tags.json"
         self._trust = PinnedKey(url, folder / f"{stem}.key.json", now)
+        self._blocks = BlockStore(folder.parent)
 
     @property
     def keeper(self) -> str:
         """Name and fingerprint of the index's signer; "" for an unsigned index."""
         return self._trust.keeper
+
+    @property
+    def key(self) -> str:
+        """Public key of the index's signer; "" for an unsigned index."""
+        by = self._trust.signer
+        return by.key if by is not None else ""
 
     def known(self) -> tuple[IndexEntry, ...]:
         """Return the entries of the stored index without a request; () without a stored index."""
@@ -102,10 +110,21 @@ class Repository:
         for _ in range(_TRIES):
             index = self._asked()
             if index is not None:
+                self._keep_blocks(index)
                 return index
         raise PackageError(
             f"{self.name}{INDEX}: the index does not match its digest in {HEAD}; try again"
         )
+
+    def _keep_blocks(self, index: Index) -> None:
+        """Store the block list of an accepted index; the list of an unsigned index is ignored."""
+        listed, by = index.block_list, self._trust.signer
+        if listed is None or by is None:
+            return
+        try:
+            self._blocks.keep(by, index.number, listed, self.name)
+        except PackageError as error:
+            self._complain(str(error))
 
     def _asked(self) -> Index | None:
         """Request head and index once; return None if the index does not match its signed head."""

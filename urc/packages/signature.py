@@ -9,6 +9,7 @@ import base64
 import binascii
 import hashlib
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -23,6 +24,7 @@ __all__ = [
     "PUBLISHER",
     "SIGNATURE",
     "Signature",
+    "SignatureOf",
     "Signer",
     "fingerprint",
     "new_signer",
@@ -84,6 +86,10 @@ class Signature(msgspec.Struct, frozen=True):
 
     def __str__(self) -> str:
         return f"{self.by} ({self.fingerprint})"
+
+
+SignatureOf = Callable[[str], Signature | None]
+"""Function that returns the signature of an archive by its digest; None without a signature."""
 
 
 class Signer:

@@ -2,6 +2,7 @@
 
     packages/
       state.json              installed packages, one lock each, and pinned keys
+      blocks.json             known lists of blocked packages
       blobs/<sha256>.zip      the archives, each under the digest of its bytes
       signatures/<sha256>.json  signatures of the archives, if any
       ecosystems/<sha256>/    the files of one lock, extracted from its blobs
@@ -12,7 +13,7 @@ deletes all files that `state.json` does not refer to. The store is therefore al
 """
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
@@ -21,8 +22,9 @@ import msgspec
 
 from urc.packages import atomic_files
 from urc.packages.archive import PACKAGE, read_archive
+from urc.packages.block_store import BlockStore
 from urc.packages.install_plan import InstallPlan
-from urc.packages.lock import LOCK, Lock
+from urc.packages.lock import LOCK, Lock, read_lock
 from urc.packages.manifest import Manifest
 from urc.packages.names import PackageError, PackageId, PackageRequirement, parse_key
 from urc.packages.package import open_package, sha256
@@ -30,9 +32,10 @@ from urc.packages.signature import Signature
 from urc.packages.state import StoreState
 from urc.packages.versions import parse_range, parse_version
 
-__all__ = ["StoreTransaction", "Store", "ecosystem_of", "kinds_in"]
+__all__ = ["StoreTransaction", "Store", "blocked_lines_of", "ecosystem_of", "kinds_in"]
 
 _STATE_BYTES: Final = 16 << 20
+_LOCK_BYTES: Final = 1 << 20
 
 
 class Store:
@@ -41,6 +44,8 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.work = folder / "work"
+        self.blocks = BlockStore(folder)
+        """Known lists of blocked packages."""
         self._state = folder / "state.json"
 
     def installed(self) -> tuple[Lock, ...]:
@@ -80,13 +85,22 @@ class Store:
         """Return the document of an installed package, after comparing its files with the archives.
 
         Raises:
-            PackageError: both the files and the archives are damaged.
+            PackageError: the package is blocked, or both the files and the archives are damaged.
         """
+        self.check_use(lock)
         folder = self.place(lock)
         if not _holds(folder, self._files(lock)):
             with self.changing():
                 self.make(lock)
         return folder / lock.root / f"{lock.key.kind}.yaml"
+
+    def blocked(self, lock: Lock) -> list[str]:
+        """Return one line for each blocked package of a lock; raise `PackageError`."""
+        return self.blocks.lines(lock, self.signature)
+
+    def check_use(self, lock: Lock) -> None:
+        """Raise `PackageError` if the package or a dependency is blocked."""
+        _check_blocks(self.blocked(lock))
 
     def place(self, lock: Lock) -> Path:
         """Return the folder of a lock's files."""
@@ -204,6 +218,10 @@ class StoreTransaction:
         """
         store = self._store
         store.state().check(plan)
+        signatures = plan.signatures
+        _check_blocks(
+            store.blocks.lines(plan.lock, lambda one: signatures.get(one) or store.signature(one))
+        )
         opened = []
         for key, pin in plan.lock.packages.items():
             data = plan.archives.get(pin.sha256)
@@ -239,6 +257,7 @@ class StoreTransaction:
         """Restore the lock before the update to `lock`; raise `PackageError`."""
         state = self._store.state().with_back(lock)
         old = self._store.state().before[lock.digest]
+        self._store.check_use(old)
         self._store.make(old)
         self._store.write_state(state)
         return old
@@ -277,6 +296,11 @@ class StoreTransaction:
         self._store.write_state(self._store.state().without_waiver(key))
 
 
+def _check_blocks(lines: Sequence[str]) -> None:
+    if lines:
+        raise PackageError("; ".join(lines))
+
+
 def _check_needs(said: Manifest, lock: Lock) -> None:
     """Check that the index and the package declare the same dependencies."""
     for need, wanted in said.needs.items():
@@ -295,6 +319,20 @@ def ecosystem_of(document: Path) -> Path | None:
         if (folder / LOCK).is_file():
             return folder
     return None
+
+
+def blocked_lines_of(document: Path) -> list[str]:
+    """Return one line for each blocked package of an installed document.
+
+    Raises:
+        PackageError: the lock of the document, or the file of the block lists, is damaged.
+    """
+    folder = ecosystem_of(document)
+    if folder is None:
+        return []
+    with open(folder / LOCK, "rb") as opened:
+        lock = read_lock(opened.read(_LOCK_BYTES), str(folder / LOCK))
+    return Store(folder.parent.parent).blocked(lock)
 
 
 def _meant(required: PackageRequirement, locks: tuple[Lock, ...]) -> list[Lock]:

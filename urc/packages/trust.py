@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import msgspec
 
@@ -12,7 +12,16 @@ from urc.packages.index_head import IndexHead
 from urc.packages.names import PackageError
 from urc.packages.signature import fingerprint
 
-__all__ = ["PinnedKey"]
+__all__ = ["PinnedKey", "PinnedSigner"]
+
+
+class PinnedSigner(NamedTuple):
+    """The signer of a repository's index."""
+
+    by: str
+    """Name of the signer. Only the key confirms the name."""
+    key: str
+    """Public key, 32 bytes in base64."""
 
 
 class _Pin(msgspec.Struct, frozen=True):
@@ -42,6 +51,12 @@ class PinnedKey:
         """Name and fingerprint of the index's signer; "" without a pinned key."""
         pin = self._pin()
         return f"{pin.by} ({fingerprint(pin.key)})" if pin is not None else ""
+
+    @property
+    def signer(self) -> PinnedSigner | None:
+        """Signer of the index; None without a pinned key."""
+        pin = self._pin()
+        return PinnedSigner(pin.by, pin.key) if pin is not None else None
 
     @property
     def number(self) -> int:

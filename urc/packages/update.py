@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from urc._translatable import phrase
-from urc.packages.install import Found, plan_root, settle
+from urc.packages.install import Found, plan_root, settle, without_blocked
 from urc.packages.install_plan import InstallPlan
 from urc.packages.lock import Lock, lock_of
 from urc.packages.names import PackageError
@@ -94,7 +94,7 @@ def newer(
     Raises:
         PackageError: the store cannot be read.
     """
-    found = offered(merged(sources, complain))
+    found = without_blocked(offered(merged(sources, complain)), store)
     updates = []
     for lock in _newest(store.installed()):
         if lock.key not in found:
@@ -129,7 +129,7 @@ def plan_update(
         PackageError: no source has the package, its dependencies conflict, or an archive differs
             from the index.
     """
-    found = offered(merged(sources, complain))
+    found = without_blocked(offered(merged(sources, complain)), store)
     if old.key not in found:
         raise PackageError(f"no repository has {old.root}; what is installed stays")
     new = _lock(old, wanted, found)

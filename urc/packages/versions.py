@@ -77,6 +77,10 @@ class Range:
         """
         if version.prerelease and _core(version) not in self._unfinished:
             return False
+        return self.spans(version)
+
+    def spans(self, version: Version) -> bool:
+        """Return whether a version is within the bounds of the range, even as a pre-release."""
         return all(bound.allows(version) for bound in self._bounds)
 
     @cached_property

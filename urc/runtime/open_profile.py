@@ -11,7 +11,8 @@ from typing import Final
 from urc.config.interface_fit import fit_interface
 from urc.config.load import load_profile
 from urc.model.profile import Profile
-from urc.packages.store import ecosystem_of
+from urc.packages.names import PackageError
+from urc.packages.store import blocked_lines_of, ecosystem_of
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.widget_registry import widget_folder_of
 
@@ -27,7 +28,10 @@ def open_document(path: str | PathLike[str]) -> Profile:
 
     Raises:
         ProblemsError: the document has errors; the exception lists them.
+        PackageError: the document is installed, and its package is blocked.
     """
+    if blocked := blocked_lines_of(Path(path)):
+        raise PackageError("; ".join(blocked))
     profile = load_profile(path, built_in_catalog(), widget_folder_of(path))
     home = ecosystem_of(Path(path))
     if home is None or Path(path).name != _DRIVER:

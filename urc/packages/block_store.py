@@ -1,0 +1,166 @@
+"""The known block lists on this machine, in ``blocks.json`` in the folder of the packages.
+
+A list stays known while its repository is unreachable, expired or removed. An entry therefore acts
+until the package is removed, or a newer list of the same maintainer lacks the entry.
+"""
+
+from collections.abc import Iterable
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Annotated, Final, Protocol
+
+import msgspec
+
+from urc.packages import atomic_files
+from urc.packages.blocks import BlockList
+from urc.packages.lock import Lock
+from urc.packages.names import PackageError
+from urc.packages.signature import SignatureOf, fingerprint
+
+__all__ = ["BlockStore", "KeyHolder", "KnownBlocks"]
+
+_FILE_BYTES: Final = 64 << 20
+_LISTS_MOST: Final = 64
+
+
+class KeyHolder(Protocol):
+    """The name and the public key of a signer."""
+
+    @property
+    def by(self) -> str:
+        """Name of the signer."""
+
+    @property
+    def key(self) -> str:
+        """Public key, 32 bytes in base64."""
+
+
+class KnownBlocks(msgspec.Struct, frozen=True):
+    """A block list with its maintainer and origin."""
+
+    by: str
+    """Name of the maintainer. Only the key confirms the name."""
+    key: str
+    """Public key of the maintainer, 32 bytes in base64."""
+    number: int
+    """Number of the index with the list."""
+    listed: BlockList
+    place: str
+    """URL of the repository, or path of the imported file."""
+
+    @property
+    def maintainer(self) -> str:
+        """Name and fingerprint of the maintainer."""
+        return f"{self.by} ({fingerprint(self.key)})"
+
+
+class _Kept(msgspec.Struct, frozen=True):
+    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
+    known: tuple[KnownBlocks, ...] = ()
+
+
+class BlockStore:
+    """The block lists of all maintainers whose keys the user trusts."""
+
+    def __init__(self, folder: Path) -> None:
+        """Initialize without reading the file; `folder` is the folder of the packages."""
+        self._folder = folder
+        self._file = folder / "blocks.json"
+        self._read: tuple[object, tuple[KnownBlocks, ...]] = (None, ())
+
+    def stamp(self) -> object:
+        """Return a value that changes with the file; None without a file."""
+        try:
+            found = self._file.stat()
+        except OSError:
+            return None
+        return found.st_mtime_ns, found.st_size, found.st_ino
+
+    def all(self) -> tuple[KnownBlocks, ...]:
+        """Return the known lists; raise `PackageError` for a damaged file."""
+        stamp = self.stamp()
+        if stamp is None:
+            return ()
+        if self._read[0] != stamp:
+            self._read = stamp, self._decoded()
+        return self._read[1]
+
+    def keep(self, by: KeyHolder, number: int, listed: BlockList, place: str) -> None:
+        """Store a verified list instead of an older list with the same key and id.
+
+        Args:
+            by: holder of the trusted key that signed the list.
+            number: number of the index with the list.
+            listed: the list.
+            place: URL of the repository, or path of the file.
+
+        Raises:
+            PackageError: a newer list is known, or too many lists are known.
+        """
+        new = KnownBlocks(by.by, by.key, number, listed, place)
+        with self._changing():
+            others = []
+            for one in self.all():
+                if (one.key, one.listed.id) != (new.key, listed.id):
+                    others.append(one)
+                elif one.number > number or (one.number == number and one.listed != listed):
+                    raise PackageError(
+                        f"{place}: the list of blocked packages has number {number}, but number"
+                        f" {one.number} of {one.maintainer} is already known"
+                    )
+                elif one.listed == listed and one.number == number:
+                    return
+            if len(others) >= _LISTS_MOST:
+                raise PackageError(f"{place}: at most {_LISTS_MOST} block lists can be known")
+            self._write([*others, new])
+
+    def forget(self, key: str) -> None:
+        """Delete all lists of the key with this fingerprint; raise `PackageError`."""
+        with self._changing():
+            left = [one for one in self.all() if fingerprint(one.key) != key]
+            if len(left) == len(self.all()):
+                known = ", ".join(one.maintainer for one in left) or "none"
+                raise PackageError(f"no block list is signed by {key}; known lists: {known}")
+            self._write(left)
+
+    def lines(self, lock: Lock, signature_of: SignatureOf) -> list[str]:
+        """Return one line for each blocked package of a lock, with maintainer and reason.
+
+        Args:
+            lock: lock of an installed or planned package.
+            signature_of: function that returns the signature of an archive by its digest.
+
+        Raises:
+            PackageError: the file of the lists is damaged.
+        """
+        known = self.all()
+        if not known:
+            return []
+        lines = []
+        for name, pin in lock.packages.items():
+            signature = signature_of(pin.sha256)
+            lines += [
+                f"{name} {pin.version} is blocked by {one.by}: {block.why}"
+                for one in known
+                for block in one.listed.blocks
+                if block.is_about(name, pin.version, pin.sha256, signature)
+            ]
+        return list(dict.fromkeys(lines))
+
+    def _decoded(self) -> tuple[KnownBlocks, ...]:
+        try:
+            with open(self._file, "rb") as opened:
+                data = opened.read(_FILE_BYTES)
+        except FileNotFoundError:
+            return ()
+        try:
+            return msgspec.json.decode(data, type=_Kept).known
+        except (ValueError, PackageError) as error:
+            raise PackageError(f"{self._file}: this file is damaged: {error}") from None
+
+    def _changing(self) -> AbstractContextManager[None]:
+        return atomic_files.exclusive(self._folder / "blocking")
+
+    def _write(self, known: Iterable[KnownBlocks]) -> None:
+        data = msgspec.json.format(msgspec.json.encode(_Kept(1, tuple(known))), indent=1) + b"\n"
+        atomic_files.put_file(self._file, data, self._folder / "blocking-work")

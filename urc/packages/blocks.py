@@ -1,0 +1,118 @@
+"""The block list of a repository: packages that must not be used, although they are installed.
+
+A maintainer signs the list, as a part of the index or in a file for machines without a network.
+"""
+
+from typing import Annotated, Final
+
+import msgspec
+
+from urc.packages.index_head import IndexSigner
+from urc.packages.names import PackageError, parse_key
+from urc.packages.package import sha256
+from urc.packages.signature import Signature
+from urc.packages.versions import parse_range, parse_version
+
+__all__ = ["BLOCK_FILE_BYTES", "Block", "BlockFile", "BlockList", "read_block_file", "sign_blocks"]
+
+BLOCK_FILE_BYTES: Final = 4 << 20
+_BLOCKS_MOST: Final = 5000
+_STATEMENT: Final = "URC block list 1\n{number}\n{sha256}\n{by}\n"
+_Text = Annotated[str, msgspec.Meta(max_length=500)]
+
+
+class Block(msgspec.Struct, frozen=True, omit_defaults=True):
+    """One entry: a package with a range of versions, an archive, or all packages of a signer."""
+
+    why: Annotated[str, msgspec.Meta(min_length=1, max_length=500)]
+    """Reason for users, on one line."""
+    package: str = ""
+    """Package, such as ``drivers/puppet``; "" for an entry about an archive or a key."""
+    versions: _Text = "*"
+    """Blocked range of versions. Pre-releases within the bounds are blocked, too."""
+    sha256: Annotated[str, msgspec.Meta(pattern=r"\A([0-9a-f]{64})?\Z")] = ""
+    """Digest of the blocked archive."""
+    key: Annotated[str, msgspec.Meta(pattern=r"\A(SHA256:[A-Za-z0-9+/]{43})?\Z")] = ""
+    """Fingerprint of the key with blocked packages, for example of a stolen key."""
+
+    def __post_init__(self) -> None:
+        """Reject an ambiguous subject, invalid names and ranges, and hidden characters."""
+        if sum(map(bool, (self.package, self.sha256, self.key))) != 1:
+            raise ValueError("expected exactly one of package, sha256 and key")
+        if self.package:
+            parse_key(self.package)
+        parse_range(self.versions)
+        if not self.why.isprintable():
+            raise ValueError("expected a reason on one line")
+
+    @property
+    def subject(self) -> str:
+        """Subject of the entry for people."""
+        if self.package:
+            return self.package if self.versions == "*" else f"{self.package} {self.versions}"
+        return f"archive {self.sha256}" if self.sha256 else f"packages signed by {self.key}"
+
+    def is_about(self, name: str, version: str, digest: str, signature: Signature | None) -> bool:
+        """Return whether the entry blocks a version of a package.
+
+        Args:
+            name: package, such as ``drivers/puppet``.
+            version: its version.
+            digest: digest of its archive.
+            signature: signature of its archive, or None.
+        """
+        if self.package:
+            spanned = parse_range(self.versions).spans(parse_version(version))
+            return self.package == name and spanned
+        if self.sha256:
+            return self.sha256 == digest
+        return signature is not None and signature.fingerprint == self.key
+
+
+class BlockList(msgspec.Struct, frozen=True):
+    """The entries of one maintainer."""
+
+    id: Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{32}\Z")]
+    """Random name of the list, because one maintainer may sign several repositories."""
+    blocks: Annotated[tuple[Block, ...], msgspec.Meta(max_length=_BLOCKS_MOST)] = ()
+
+
+class BlockFile(msgspec.Struct, frozen=True):
+    """A signed block list in a file of its own."""
+
+    format: Annotated[int, msgspec.Meta(ge=1, le=1)]
+    number: Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]
+    """Number of the index with the same list; an older list is not accepted."""
+    listed: BlockList
+    signature: Signature
+
+    def to_bytes(self) -> bytes:
+        """Return the content of the file."""
+        return msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n"
+
+
+def sign_blocks(listed: BlockList, number: int, index_signer: IndexSigner) -> BlockFile:
+    """Return the file of a block list, signed with the maintainer's key."""
+    signer = index_signer.signer
+    return BlockFile(1, number, listed, signer.signs(_statement(listed, number, signer.by)))
+
+
+def read_block_file(data: bytes, where: str) -> BlockFile:
+    """Return a block list with a valid signature; raise `PackageError`.
+
+    The caller decides whether the key of the signature is trusted.
+    """
+    try:
+        if len(data) > BLOCK_FILE_BYTES:
+            raise ValueError(f"larger than {BLOCK_FILE_BYTES >> 20} MiB")
+        file = msgspec.json.decode(data, type=BlockFile)
+    except (ValueError, PackageError, RecursionError) as error:
+        raise PackageError(f"{where}: this is not a block list: {error}") from None
+    if not file.signature.verifies(_statement(file.listed, file.number, file.signature.by)):
+        raise PackageError(f"{where}: the list does not match the signature by {file.signature}")
+    return file
+
+
+def _statement(listed: BlockList, number: int, by: str) -> bytes:
+    digest = sha256(msgspec.json.encode(listed))
+    return _STATEMENT.format(number=number, sha256=digest, by=by).encode()
