@@ -22,18 +22,20 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.updates:
         return _updates(is_json=arguments.json)
-    installed = open_store().installed()
+    store = open_store()
+    installed = store.installed()
     gone = [one for one in known_entries() if one.why_withdrawn] if installed else []
     for lock in installed:
-        withdrawn = withdrawn_lines(lock, gone)
+        withdrawn, blocked = withdrawn_lines(lock, gone), store.blocked(lock)
         needs = {key: pin.version for key, pin in lock.packages.items() if key != lock.root}
         if arguments.json:
             said = {"package": lock.root, "version": lock.version, "needs": needs}
-            print(json_text({**said, "withdrawn": withdrawn} if withdrawn else said))
+            found = {"withdrawn": withdrawn, "blocked": blocked}
+            print(json_text(said | {name: lines for name, lines in found.items() if lines}))
         else:
             rest = ", ".join(f"{key} {version}" for key, version in needs.items())
             print(f"{lock}  with {rest}" if rest else str(lock))
-            for line in withdrawn:
+            for line in (*blocked, *withdrawn):
                 print(printable(f"  ▲ {line}"))
     return 0
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from urc.cli import repo_blocks
 from urc.cli.arguments import add_host, is_loopback, port
 from urc.cli.audited import audit_packages
 from urc.cli.error_report import Misuse
@@ -61,7 +62,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="add URL, remove URL, list, search WORD…, index DIR, serve DIR,"
         " withdraw DIR PACKAGE VERSION, restore DIR PACKAGE VERSION;"
         " token add|remove NAME, token list; key new NAME, key show, key list, key forget PACKAGE;"
-        " unsigned add|remove PACKAGE, unsigned list",
+        " unsigned add|remove PACKAGE, unsigned list;"
+        " block DIR PACKAGE [RANGE], unblock DIR PACKAGE [RANGE];"
+        " blocks list, blocks import FILE, blocks export DIR FILE, blocks forget KEY",
     )
     parser.add_argument(
         "words", metavar="URL|WORD|DIR|NAME", nargs="*", help="arguments of the action"
@@ -86,19 +89,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--key",
         metavar="FILE",
         type=Path,
-        help="index, serve, withdraw, restore, key: file of the publisher's key"
-        " (default: your own key, if you have one)",
+        help="index, serve, withdraw, restore, block, unblock, blocks, key: file of the"
+        " publisher's key (default: your own key, if you have one)",
     )
     parser.add_argument(
         "--valid",
         metavar="DAYS",
         type=_days,
         default=14,
-        help="index, serve, withdraw, restore: validity of a signed index in days, 1 to 365"
-        " (default: 14)",
+        help="index, serve, withdraw, restore, block, unblock: validity of a signed index in"
+        " days, 1 to 365 (default: 14)",
     )
     parser.add_argument(
-        "--why", metavar="TEXT", help="withdraw: reason, shown to users with the version installed"
+        "--why",
+        metavar="TEXT",
+        help="withdraw, block: reason, shown to users with the version installed",
+    )
+    parser.add_argument(
+        "--signed-by",
+        metavar="SHA256:…",
+        help="blocks import: trust the key with this fingerprint",
     )
     add_host(parser)
     parser.add_argument(
@@ -302,4 +312,7 @@ _ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "token": token,
     "key": key,
     "unsigned": unsigned,
+    "block": lambda arguments: repo_blocks.block(arguments, _codec(arguments)),
+    "unblock": lambda arguments: repo_blocks.unblock(arguments, _codec(arguments)),
+    "blocks": lambda arguments: repo_blocks.blocks(arguments, _codec(arguments)),
 }

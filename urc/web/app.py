@@ -266,7 +266,10 @@ class _Routes:
                 if self.manager is not None:
                     await self.manager.changed()
                 watching = group.create_task(self.dev.run()) if self.dev else None
+                blocking = group.create_task(self.manager.watch_blocks()) if self.manager else None
                 yield
+                if blocking is not None:
+                    blocking.cancel()
                 if self.manager is not None:
                     await self.manager.close()
                 if watching is not None:

@@ -257,6 +257,11 @@ class ControlService:
         self.controller.stop(by)
         self.once.stopped()
 
+    async def settle(self) -> None:
+        """Wait until the latch is stored, or storing has failed."""
+        if self._file is not None:
+            await self._file.settle()
+
     def _drive(self, operator: OperatorSession, said: wire.Drive) -> None:
         now = self._clock.now()
         reason = self.controller.drive(operator.client.id, said.verb, now, said.for_s)

@@ -21,6 +21,7 @@ from urc.runtime.settings_store import DRIVEN, in_use, names_kept, pin
 from urc.web.fleet.fleet import BrokenRobot, Fleet
 from urc.web.fleet.robot_factory import RobotFactory
 from urc.web.fleet.robots import Robot
+from urc.web.manage.block_watch import BlockWatch
 from urc.web.manage.catalogue import PackageCatalog
 from urc.web.manage.jobs import Busy, Job, Jobs
 from urc.web.manage.wire import MOST_HITS, Available, Installed, PackageList
@@ -54,6 +55,13 @@ class Manager:
         self._renew = renew
         self.catalogue = PackageCatalog(factory.robot_options.data / "packages", now)
         self.jobs = Jobs(factory.store, self._sources, self._used)
+        self._block_watch = BlockWatch(
+            factory.store,
+            fleet,
+            lambda name, robot: factory.robot(name, self.document_of(name, robot)),
+            lambda name, robot: set(self.document_of(name, robot).interfaces),
+            lambda: self.catalogue.refresh(force=True),
+        )
         self._parked: dict[str, Lock] = {}
         """Served version of each robot that is on the menu because its package is installed, by
         name."""
@@ -169,6 +177,10 @@ class Manager:
         """Update the menu if any program has installed or removed a package."""
         if await asyncio.to_thread(self.factory.stamp) != self._seen:
             await self.changed()
+
+    async def watch_blocks(self) -> None:
+        """Enforce the lists of blocked packages until cancelled."""
+        await self._block_watch.run(self.changed)
 
     async def changed(self) -> None:
         """Update the menu from the installed packages."""
@@ -377,9 +389,16 @@ class Manager:
             url=url,
             settings_url=f"{page}settings" if is_served else "",
             fits=self._fits(name) if key.kind == "interface" else (),
-            fault=fault or (broken.fault if broken else ""),
+            fault=self._block_of(lock) or fault or (broken.fault if broken else ""),
             withdrawn=tuple(printable(spoken(line)) for line in self.catalogue.withdrawn(lock)),
         )
+
+    def _block_of(self, lock: Lock) -> str:
+        """Return the reason why a package is blocked; "" for other packages."""
+        try:
+            return "; ".join(self.factory.store.blocked(lock))
+        except UrcError as error:
+            return str(error)
 
     def _fits(self, interface: str) -> tuple[str, ...]:
         """Return the titles of the robots that offer an installed interface."""
